@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import socket
 import subprocess
 import sys
@@ -15,7 +16,6 @@ from mcap.writer import Writer
 
 import seerob as sr
 from seerob.app.cli import COMMANDS
-from seerob.kernels._kept_loops import key_of
 
 FILES = ["report.html", "results.xlsx", "run.mcap"]
 
@@ -203,20 +203,46 @@ def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, comm
     assert (tmp_path / name).read_text() == "mine"
 
 
-def test_a_wait_for_the_compiler_is_announced_once(capsys, tmp_path, monkeypatch):
+def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(capsys, tmp_path, monkeypatch):
+    from seerob.app.console import loops
+    from seerob.kernels import _ahead
+
+    names = ["paint averaged", "paint darken", "pull along"]
+    monkeypatch.setattr(_ahead, "LOOPS", {name: _ahead.LOOPS[name] for name in names})
+    monkeypatch.setattr("seerob.app.console.progress.EVERY", 0.0)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    (folder,) = loops.cache_folders()
+    folder.mkdir()
+    (folder / "paint.averaged-1-0123456789abcdef.py311.nbi").write_bytes(b"")  # of another source
+    assert loops.missing_loops() == names
+    loops.compile_loops()
+    assert capsys.readouterr() == ("", "".join(f"{loops.COMPILING}: {k} of 3\n" for k in range(4)))
+    assert loops.missing_loops() == []
+    loops.compile_loops()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, tmp_path):
+    from seerob.app.console import loops
+
+    started = []
+    begin = loops._worker
+    monkeypatch.setattr(loops, "_worker", lambda: started.append(begin()) or started[-1])
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(loops.Queue, "get", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        loops.compile_loops()
+    assert started
+    assert all(worker.returncode is not None for worker in started)
+
+
+def test_where_no_process_can_be_started_loops_are_compiled_when_they_are_called(monkeypatch, tmp_path):
     from seerob.app.console import loops
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    loops.tell_compiling()
-    assert capsys.readouterr() == ("", "compiling the inner loops (once)\n")
-    (folder,) = loops.cache_folders()
-    folder.mkdir()
-    (folder / "tree.build-1-0123456789abcdef.py311.nbi").write_bytes(b"")  # of another source
-    loops.tell_compiling()
-    assert capsys.readouterr() == ("", "compiling the inner loops (once)\n")
-    (folder / f"tree.build-1-{key_of('tree')}.py311.nbi").write_bytes(b"")
-    loops.tell_compiling()
-    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    loops.compile_loops()
+    assert loops.missing_loops()
 
 
 @pytest.mark.parametrize("command", ["check-file", "assess", "report", "swept"])
@@ -232,7 +258,7 @@ def test_the_wait_begins_with_the_announcement(tmp_path, recorded, command):
     ) as process:
         first = process.stderr.readline()
         process.kill()
-    assert first == "compiling the inner loops (once)\n"
+    assert re.fullmatch(r"compiling the inner loops, once: 0 of \d+\n", first)
 
 
 def test_numba_keeps_what_it_compiles_where_it_is_looked_for(tmp_path):

@@ -12,9 +12,10 @@ import trimesh
 from made_cell import FLOATING, Q0, UR10, made, results_at, state_at, two_r
 from seerob.core.shapes.geometry import Mesh, Solid, capsule
 from seerob.core.snapshot import Verdict
+from seerob.criteria.contact import joint_gaps
 from seerob.criteria.contact.clamped_regions import Clamping
 from seerob.criteria.contact.joint_gaps import closing, places
-from seerob.session.station import Station
+from seerob.session.station import Station, load
 
 HAND, CHEST = "Hands and fingers", "Chest"
 ARM = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
@@ -40,6 +41,33 @@ def elbow(folder: Path, base: str = "") -> Station:
 
 
 BOTH = {"arm/l1", "arm/l2"}
+
+
+def test_rates_are_kept_between_starts_and_none_that_are_damaged(tmp_path: Path, monkeypatch) -> None:
+    elbow(tmp_path)
+
+    def rates(cache: Path | None) -> list[bytes]:
+        monkeypatch.setattr(joint_gaps, "_KNOWN", {})
+        model = load(tmp_path, cache=cache).model
+        bound = Clamping(model, model.robot("arm"), {}, (HAND, CHEST), None)
+        return [table.rates.tobytes() for table in bound._joints._tables]
+
+    anew = rates(None)
+    assert anew
+    cache = tmp_path / "cache"
+    assert rates(cache) == anew
+    (kept,) = cache.glob("*.gaps")
+    whole = kept.read_bytes()
+    with monkeypatch.context() as none_is_made:
+        none_is_made.setattr(joint_gaps, "places", None)
+        assert rates(cache) == anew
+    for damaged in (whole[:-8], whole[:40] + bytes([whole[40] ^ 1]) + whole[41:], b""):
+        kept.write_bytes(damaged)
+        assert rates(cache) == anew
+        assert kept.read_bytes() == whole
+    kept.unlink()
+    kept.mkdir()  # may neither be read nor written
+    assert rates(cache) == anew
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,13 @@ IMPORTED = re.compile(rb"^from seerob\.kernels\.(\w+) import ", re.MULTILINE)
 
 @cache
 def key_of(module: str) -> str:
-    """Hash of what a module of `seerob.kernels` is compiled from: its source and what it imports there."""
+    """Hash of what a module of `seerob.kernels` is compiled from and by, and the processor it is for.
+
+    That is its source and what it imports there, and Numba.
+    """
+    import numba
+    from llvmlite.binding import get_host_cpu_name
+
     sources: dict[str, bytes] = {}
     waiting = [module]
     while waiting:
@@ -29,7 +35,7 @@ def key_of(module: str) -> str:
         if name not in sources:
             sources[name] = (FOLDER / f"{name}.py").read_bytes()
             waiting += [found.decode() for found in IMPORTED.findall(sources[name])]
-    content = hashlib.sha256()
+    content = hashlib.sha256(f"{numba.__version__} {get_host_cpu_name()}".encode())
     for name in sorted(sources):
         content.update(hashlib.sha256(sources[name]).digest())
     return content.hexdigest()[:16]

@@ -177,10 +177,15 @@ def felt(J: Array, M: Array, inverse: Array, axes: Array, figures: Array) -> boo
     rows, found = J[:3].copy().reshape(1, 3, n), np.empty((1, 3, 3))
     if not mobility(rows, M.reshape(1, n, n), found):
         return False
-    inverse[:] = found[0]
+    # Element by element: an array that is assigned to another takes three seconds to compile.
+    for i in range(3):
+        for j in range(3):
+            inverse[i, j] = found[0, i, j]
     values, turned = np.empty((1, 3)), np.empty((1, 3, 3))
     principal_axes(found, values, turned)
-    axes[:] = turned[0]
+    for i in range(3):
+        for j in range(3):
+            axes[i, j] = turned[0, i, j]
     lost = np.isnan(values).any()
     for i in range(3):
         figures[i] = np.nan if lost else np.inf if values[0, i] <= 0.0 else 1.0 / values[0, i]

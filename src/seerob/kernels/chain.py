@@ -410,7 +410,9 @@ def at_point(
         jacobian[3, c], jacobian[4, c], jacobian[5, c] = wx, wy, wz
     values, directions = np.empty((1, 3)), np.empty((1, 3, 3))
     principal_axes(jacobian[:3].copy().reshape(1, 3, n), values, directions)
-    axes[:] = directions[0]
+    for r in range(3):
+        for c in range(3):
+            axes[r, c] = directions[0, r, c]
     lost = np.isnan(values).any()
     for r in range(3):
         figures[r] = np.nan if lost else values[0, r]

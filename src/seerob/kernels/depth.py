@@ -35,6 +35,13 @@ PIECES = 24
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _put(x: Array, y: Array) -> None:
+    """Copy a point; an array that is assigned to another takes three seconds to compile."""
+    for c in range(3):
+        y[c] = x[c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _apart(x: Array, y: Array) -> float:
     return math.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
 
@@ -112,17 +119,17 @@ def _along_axis(
             way = r / room if depth[asked] > 0.0 else -r / room
             for c in range(3):
                 y[c] = x[c] + way * (x[c] - near[asked, c])
-            other[:] = near[asked]
+            _put(near[asked], other)
             sign = -1 if radius[i] == 0.0 and depth[asked] > 1.001 * r else 0
             deep = -signed_distance(
                 i, which, corners, radius, nodes, links, T, world, y, other, sign, stack, bounds, W, other
             )
             if deep > best:
                 best = deep
-                at[:] = y
+                _put(y, at)
         if depth[asked] > best:
             best = depth[asked]
-            at[:] = x
+            _put(x, at)
         highest = max(highest, depth[asked] + r)
         asked += 1
         if asked == 1:
@@ -186,6 +193,7 @@ def _in_cells(
     heap = [(-most, c[0], c[1], c[2], h[0], h[1], h[2])]
     used = 0
     done = best
+    either = np.int64(0)  # a literal would be compiled for by itself
     while len(heap) > 0:
         top, cx, cy, cz, hx, hy, hz = heappop(heap)
         top = min(-top, most)
@@ -197,9 +205,9 @@ def _in_cells(
         x[0], x[1], x[2] = cx, cy, cz
         # Along the axis that the last bound hung on most.
         room = signed_distance(
-            i, which, corners, radius, nodes, links, T, world, x, near, 0, stack, bounds, W, near
+            i, which, corners, radius, nodes, links, T, world, x, near, either, stack, bounds, W, near
         )
-        parent[:] = near
+        _put(near, parent)
         axis = 0
         gain = -1.0
         for k in range(3):
@@ -216,12 +224,12 @@ def _in_cells(
             x[0], x[1], x[2] = cx, cy, cz
             x[axis] += half[axis] if side == 1 else -half[axis]
             gap = signed_distance(
-                j, which, corners, radius, nodes, links, T, world, x, other, 0, stack, bounds, W, other
+                j, which, corners, radius, nodes, links, T, world, x, other, either, stack, bounds, W, other
             )
             if gap > reach + 1e-12:
                 continue
             sign = 0 if not same else (-1 if room < 0.0 else 1)
-            near[:] = parent
+            _put(parent, near)
             depth = -signed_distance(
                 i, which, corners, radius, nodes, links, T, world, x, near, sign, stack, bounds, W, near
             )
@@ -229,15 +237,15 @@ def _in_cells(
             for k in range(3):
                 far += (abs(x[k] - near[k]) + half[k]) ** 2
             bound = min(math.sqrt(far), depth + reach, most)
-            y[:] = x
+            _put(x, y)
             if gap > 0.0:
-                y[:] = other
+                _put(other, y)
                 depth = -signed_distance(
-                    i, which, corners, radius, nodes, links, T, world, y, near, 0, stack, bounds, W, near
+                    i, which, corners, radius, nodes, links, T, world, y, near, either, stack, bounds, W, near
                 )
             if depth > best:
                 best = depth
-                at[:] = y
+                _put(y, at)
             if bound > best + tolerance:
                 heappush(heap, (-bound, x[0], x[1], x[2], half[0], half[1], half[2]))
             else:

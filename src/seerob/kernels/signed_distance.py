@@ -70,10 +70,11 @@ def signed_distance(
         if radius[s] == 0.0 and not math.isnan(known[0]):
             limit = cut_of((x[0] - known[0]) ** 2 + (x[1] - known[1]) ** 2 + (x[2] - known[2]) ** 2) + 1e-12
         d2, _ = mesh_segment(
-            nodes[n0:n1], links[n0:n1], T[t0:t1], p[0], p[1], p[2], 0.0, 0.0, 0.0, limit, -1,
+            nodes[n0:n1], links[n0:n1], T[t0:t1], p[0], p[1], p[2], 0.0, 0.0, 0.0, limit, np.int64(-1),
             stack, bounds, W,
         )  # fmt: skip
-        q[:] = W[:3]
+        for c in range(3):
+            q[c] = W[c]
         if which[s, VOLUME] == 1 and sign <= 0:
             closed = which[s, CLOSED] == 1
             if sign < 0 or encloses(nodes[n0:n1], links[n0:n1], T[t0:t1], closed, p[0], p[1], p[2]):

@@ -217,6 +217,8 @@ class Model:
     """The workstation file and every file it names, by the name that it gives them."""
     dictionary: dict[str, Variable] = field(default_factory=dict)
     """Variables of controllers and machines by their names here."""
+    cache: Path | None = None
+    """Folder that keeps what takes long to make between starts."""
     _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
 
     def __repr__(self) -> str:

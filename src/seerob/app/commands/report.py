@@ -16,7 +16,7 @@ from seerob.app.commands.permissible_result import (
     work_progress,
 )
 from seerob.app.console.loading import compiled
-from seerob.app.console.loops import tell_compiling
+from seerob.app.console.loops import compile_loops
 from seerob.app.console.progress import progress
 from seerob.app.console.sinks import refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     if options.workstation is not None:
         station = compiled(options.workstation, quiet=options.json, sources=False)
     else:
-        tell_compiling()
+        compile_loops()
         from seerob.session.recorded_station import load_recorded
 
         station = load_recorded(recording, cache=cache_folder())

@@ -6,15 +6,17 @@ is left out, and with it what speaks of it: that it leads nowhere is no mistake 
 
 from __future__ import annotations
 
+import gc
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
-from seerob.app.console.loops import tell_compiling
+from seerob.app.console.loops import compile_loops
 from seerob.app.console.progress import spinner
 from seerob.app.console.terminal import cache_folder
 from seerob.core.errors import InputError, Problem
@@ -181,7 +183,24 @@ def compiled(path: Path, *, quiet: bool = False, sources: bool = True) -> Statio
     from seerob.workstation.workstation import locate
 
     file = locate(path)
-    tell_compiling()  # before the imports: many loops are compiled by them
+    with uncollected():
+        return _compiled(path, file, quiet=quiet, sources=sources)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """No search for garbage meanwhile: a start makes much and leaves little behind, and was a tenth of it."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
+def _compiled(path: Path, file: Path, *, quiet: bool, sources: bool) -> Station:
+    compile_loops()  # before the imports: many loops are compiled by them
     from seerob.session.reading import readable, shortened
     from seerob.session.station import Station
 

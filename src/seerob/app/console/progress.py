@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
+from seerob.app.console.printable import printable
 from seerob.app.console.terminal import STATUS
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Snapshot
@@ -39,16 +40,34 @@ class Progress:
         return time.perf_counter() - self._last
 
 
+EVERY = 10.0
+"""Time between two lines, where there is no terminal [s]."""
+
+
+def lines() -> Callable[[str], None]:
+    """What says a text in a line of its own, once in `EVERY`: for who reads it through a pipe, or later."""
+    said = time.monotonic()
+
+    def say(text: str) -> None:
+        nonlocal said
+        if time.monotonic() - said >= EVERY:
+            said = time.monotonic()
+            STATUS.print(printable(text), markup=False)
+
+    return say
+
+
 @contextmanager
 def progress(duration: float, what: str) -> Iterator[Progress]:
-    """A bar over run time on a terminal; silence elsewhere.
+    """A bar over run time on a terminal; elsewhere `lines`.
 
     Args:
         duration: Run time that the bar is full at [s].
         what: Beside the bar.
     """
     if not STATUS.is_terminal or duration <= 0:
-        yield Progress(lambda _: None, lambda _: None)
+        say = lines()
+        yield Progress(lambda t: say(f"{what}: at {t:.1f} s"), say)
         return
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
@@ -106,9 +125,9 @@ def announced(writers: Sequence[Writer], files: Sequence[str], say: Callable[[st
 
 @contextmanager
 def spinner(*, quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """Yields what shows a text and a spinner on a terminal, from its first call on; silence elsewhere."""
+    """Yields what shows a text and a spinner on a terminal, from its first call on; elsewhere `lines`."""
     if quiet or not STATUS.is_terminal:
-        yield lambda _: None
+        yield (lambda _: None) if quiet else lines()
         return
     status = STATUS.status("")
 

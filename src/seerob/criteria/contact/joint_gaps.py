@@ -17,16 +17,22 @@ nearer gap counts, and the mean rate.
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes.geometry import Solid
 from seerob.core.transforms import Array
 from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints
 from seerob.distance.least import Query, Shapes
+from seerob.kernels._kept_loops import key_of
 from seerob.model.model import Mechanism, Model
 from seerob.twin.spans import Span
 from seerob.twin.state import State
@@ -177,7 +183,7 @@ class JointGaps:
             rotations, positions = joints.poses({coordinate: grid})
             poses = [(rotations[:, i], positions[:, i]) for i in (a, b)]
             solids = [model.bodies[i].solids for i in (a, b)]
-            rates = _rates(solids, poses, np.diff(grid), thickness, fits, least)
+            rates = _rates(solids, poses, np.diff(grid), thickness, fits, least, model.cache)
             if rates.any():
                 step = max((high - low) / STEPS, 1e-12)
                 self._tables.append(_Table(*coordinate, rows, low, step, turns, rates))
@@ -217,25 +223,57 @@ def _rates(
     thickness: Array,
     fits: Array,
     least: float,
+    cache: Path | None,
 ) -> Array:
-    """How fast two bodies close on each other, as `closing` tells it; remembered by content."""
+    """How fast two bodies close on each other, as `closing` tells it; remembered, and kept, by content."""
     cores = [_core(solid) for of in solids for solid in of]
     radii = [[s.radius for s in of] for of in solids]
     of_pair = repr((radii, [core.shape for core in cores], least)).encode()
     arrays = [*cores, *(part for pose in poses for part in pose), steps, thickness, fits]
     key = hashlib.sha256(
-        b"".join([of_pair, *(np.ascontiguousarray(array).tobytes() for array in arrays)])
+        b"".join([_how(), of_pair, *(np.ascontiguousarray(array).tobytes() for array in arrays)])
     ).digest()
     if key not in _KNOWN:
-        found = np.zeros((2, len(steps), len(thickness)))
-        for one, other in ((0, 1), (1, 0)):
-            on = places(solids[one])
-            gaps, faces = _gaps(on, solids[other], (poses[one], poses[other]))
-            found = np.maximum(found, closing(gaps, faces, steps, thickness, fits, least=least))
+        file = None if cache is None else cache / f"{key.hex()}.gaps"
+        shape = (2, len(steps), len(thickness))
+        found = None if file is None else _read(file, shape)
+        if found is None:
+            found = np.zeros(shape)
+            for one, other in ((0, 1), (1, 0)):
+                on = places(solids[one])
+                gaps, faces = _gaps(on, solids[other], (poses[one], poses[other]))
+                found = np.maximum(found, closing(gaps, faces, steps, thickness, fits, least=least))
+            if file is not None:
+                _write(file, found)
         if len(_KNOWN) >= MOST_KNOWN:
             _KNOWN.clear()
         _KNOWN[key] = found
     return _KNOWN[key]
+
+
+@functools.cache
+def _how() -> bytes:
+    """What makes rates of content: this file, and what measures distances."""
+    return Path(__file__).read_bytes() + key_of("nearest").encode()
+
+
+def _read(file: Path, shape: tuple[int, ...]) -> Array | None:
+    """The rates in a file; None when there is none or it is not what was written."""
+    try:
+        kept = file.read_bytes()
+    except OSError:
+        return None
+    check, rates = kept[:32], kept[32:]
+    if hashlib.sha256(rates).digest() != check or len(rates) != 8 * math.prod(shape):
+        return None
+    return np.frombuffer(rates).reshape(shape)
+
+
+def _write(file: Path, rates: Array) -> None:
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(file) as hidden:
+            hidden.write_bytes(hashlib.sha256(rates.tobytes()).digest() + rates.tobytes())
 
 
 def _core(solid: Solid) -> Array:

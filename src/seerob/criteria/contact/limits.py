@@ -105,8 +105,8 @@ class RegionArrays:
         """
         return Speeds(
             *permissible_speeds(
-                np.ascontiguousarray(m_R, float), forces, clamped, self.force, self.multiplier,
-                self.stiffness, self.mass, self.energy,
+                np.ascontiguousarray(m_R, float), forces, np.ascontiguousarray(clamped), self.force,
+                self.multiplier, self.stiffness, self.mass, self.energy,
             )
         )  # fmt: skip
 

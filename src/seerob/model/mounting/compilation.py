@@ -408,6 +408,7 @@ class _Compiler:
             ),
             files={**self.station.files, **self.mounting.files},
             dictionary=self.bound.variables,
+            cache=self.cache,
         )
         findings = (*model.findings, *self._too_small(model), *implausible(model), *unasked(model))
         return replace(model, findings=findings)

@@ -1,0 +1,71 @@
+"""Which inner loops nearly every run needs, and a process that compiles them before they are asked for.
+
+    python -m seerob.kernels._ahead
+
+Numba compiles one loop at a time in a process, and a run needs its loops one after the other: on a machine
+where none is kept yet, several of these processes share them. Each reads lines ``module function`` and
+answers each with a line. A loop that is not listed, or asked with other types, is compiled when it is called.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+LOOPS = {
+    "nearest nearest": ("(f8[:,:,::1], f8[:,::1], i8, i8[:,::1], f8[::1], f8[:,::1], i8[:,::1], i1[::1])"),
+    "depth deepest": (
+        "(i8[:,::1], f8[:,:,::1], f8[:,::1], i8[:,::1], f8[:,::1], f8[:,:,::1], f8[::1], f8[:,::1],"
+        " i4[:,::1], f8[:,::1], f8, i8, f8[:,::1], f8[::1], f8[::1])"
+    ),
+    "tree build_tree": "(f8[:,::1], i4[:,::1])",
+    "tree component_of": "(i8[:,::1], i8)",
+    "wide widen": "(f8[:,::1], i4[:,::1], f8[:,::1])",
+    "axes felt": "",
+    "chain at_point": "",
+    "spans joint_bounds": "",
+    "speed fastest": "",
+    "speed carried": "(f8[:,::1], f8[:,::1], i8, f8[:,::1])",
+    "pull along": "",
+    "paint raster": "(f8[:,::1], f8[::1], f8[::1], i4[:,::1], i4[::1], f8[:,::1], f8[:,::1], i4[:,::1])",
+    "approach relative_speeds": (
+        "(f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8[:,::1], f8[:,::1], i8[::1], f8[::1])"
+    ),
+    "approach lowest_and_falling": (
+        "(i8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[::1], f8[:,::1])"
+    ),
+    "contact_speeds permissible_speeds": (
+        "(f8[::1], f8[:,:,::1], b1[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])"
+    ),
+    "contact_speeds governing": "(f8[:,::1], b1[:,::1], i8[::1], f8[:,::1], i8[:,::1], f8)",
+    "paint stroke": "(f4[:,:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8, f8, f8, f8)",
+    "paint averaged": "(f4[:,:,::1], i8)",
+    "paint glaze": "(f4[:,:,::1], f8[:,::1], i4[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8)",
+    "paint outline": "(f4[:,:,::1], i4[:,::1], f8[:,::1])",
+    "paint solid": "(f4[:,:,::1], i4[:,::1], f8[:,::1], f8[:,::1])",
+    "paint darken": "(f4[:,:,::1], i4[:,::1], f8)",
+}
+"""Module and function, those that take longest first, and the types that it is called with; no types where
+its decorator has them, and those of its module are compiled by importing it."""
+
+
+def compile_loop(name: str) -> None:
+    """Compile one of `LOOPS`, or load it."""
+    from numba.core.sigutils import normalize_signature
+
+    module, function = name.split()
+    loop = getattr(import_module(f"seerob.kernels.{module}"), function)
+    if LOOPS[name]:
+        # Types, not text: Numba keeps it under what it is given, and a call gives types.
+        loop.compile(normalize_signature(LOOPS[name])[0])
+
+
+def main() -> None:
+    """Compile what is asked for, until nothing is asked for any more."""
+    for line in sys.stdin:
+        compile_loop(line.strip())
+        print(line.strip(), flush=True)  # noqa: T201 - to whoever asked
+
+
+if __name__ == "__main__":
+    main()

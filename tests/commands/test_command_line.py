@@ -205,10 +205,10 @@ def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, comm
 
 def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(capsys, tmp_path, monkeypatch):
     from seerob.app.console import loops
-    from seerob.kernels import _ahead
+    from seerob.kernels import _beforehand
 
     names = ["paint averaged", "paint darken", "pull along"]
-    monkeypatch.setattr(_ahead, "LOOPS", {name: _ahead.LOOPS[name] for name in names})
+    monkeypatch.setattr(_beforehand, "LOOPS", {name: _beforehand.LOOPS[name] for name in names})
     monkeypatch.setattr("seerob.app.console.progress.EVERY", 0.0)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     (folder,) = loops.cache_folders()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from numba.core.sigutils import normalize_signature
 
-from seerob.kernels._ahead import LOOPS
+from seerob.kernels._beforehand import LOOPS
 
 SCRIPT = """
 import json, sys
@@ -28,13 +28,17 @@ station.run(
     folder=sys.argv[2], sinks=sinks_of(station.workstation, lossless=True),
     stop=lambda: next(ticks, None) is None,
 )
-asked = {}
+asked, imported = {}, set()
 for name, module in list(sys.modules.items()):
     if name.startswith("seerob.kernels."):
         for loop in vars(module).values():
-            if isinstance(loop, Dispatcher) and loop.__module__ == name and loop._can_compile:
-                asked[f"{name.rpartition('.')[2]} {loop.__name__}"] = list(map(str, loop.signatures))
-print(json.dumps({name: found for name, found in asked.items() if found}))
+            if isinstance(loop, Dispatcher) and loop.__module__ == name:
+                own = name.rpartition(".")[2]
+                if loop._can_compile:
+                    asked[f"{own} {loop.__name__}"] = list(map(str, loop.signatures))
+                else:
+                    imported.add(own)
+print(json.dumps([{name: found for name, found in asked.items() if found}, sorted(imported)]))
 """
 
 
@@ -45,9 +49,10 @@ def test_a_run_compiles_no_loop_but_those_that_are_listed(tmp_path):
     for turn in ("compiled", "loaded"):
         done = subprocess.run([*command, str(tmp_path / turn)], check=True, capture_output=True, text=True)
     listed = {name: [str(normalize_signature(types)[0])] for name, types in LOOPS.items() if types}
-    asked = json.loads(done.stdout.splitlines()[-1])
+    asked, imported = json.loads(done.stdout.splitlines()[-1])
     assert {name: types for name, types in asked.items() if types != listed.get(name)} == {}
     assert "nearest nearest" in asked
+    assert {name.split()[0] for name in LOOPS}.issuperset(imported)
 
 
 @pytest.mark.parametrize("name", LOOPS)

@@ -22,7 +22,7 @@ MOST = 4
 
 
 def compile_loops() -> None:
-    """Compile the loops of `seerob.kernels._ahead` that are not kept as they are now, and say how far it is.
+    """Compile loops of `seerob.kernels._beforehand` that are not kept as they are now; say how far it is.
 
     What cannot be compiled here, whatever the reason, is compiled when it is called.
     """
@@ -36,8 +36,8 @@ def compile_loops() -> None:
 
 
 def missing_loops() -> list[str]:
-    """Names in `seerob.kernels._ahead.LOOPS` of which nothing is kept that was compiled from their source."""
-    from seerob.kernels._ahead import LOOPS
+    """Names in `seerob.kernels._beforehand.LOOPS` of what is not kept as it is now."""
+    from seerob.kernels._beforehand import LOOPS
     from seerob.kernels._kept_loops import key_of
 
     kept = {found.name for folder in cache_folders() if folder.is_dir() for found in folder.glob("*.nbi")}
@@ -93,7 +93,7 @@ def _compiled(names: Sequence[str]) -> Iterator[str]:
 def _worker() -> subprocess.Popen[str]:
     path = os.pathsep.join(entry for entry in sys.path if entry)
     return subprocess.Popen(
-        (sys.executable, "-P", "-m", "seerob.kernels._ahead"),
+        (sys.executable, "-P", "-m", "seerob.kernels._beforehand"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -1,6 +1,6 @@
 """Which inner loops nearly every run needs, and a process that compiles them before they are asked for.
 
-    python -m seerob.kernels._ahead
+    python -m seerob.kernels._beforehand
 
 Numba compiles one loop at a time in a process, and a run needs its loops one after the other: on a machine
 where none is kept yet, several of these processes share them. Each reads lines ``module function`` and
@@ -24,6 +24,8 @@ LOOPS = {
     "axes felt": "",
     "chain at_point": "",
     "spans joint_bounds": "",
+    "separation separations": "",
+    "ahead until_braking": "",
     "speed fastest": "",
     "speed carried": "(f8[:,::1], f8[:,::1], i8, f8[:,::1])",
     "pull along": "",

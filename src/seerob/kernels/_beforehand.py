@@ -59,7 +59,7 @@ def compile_loop(name: str) -> None:
     loop = getattr(import_module(f"seerob.kernels.{module}"), function)
     if LOOPS[name]:
         # Types, not text: Numba keeps it under what it is given, and a call gives types.
-        loop.compile(normalize_signature(LOOPS[name])[0])
+        loop.compile(normalize_signature(LOOPS[name])[0])  # type: ignore[no-untyped-call]
 
 
 def main() -> None:

@@ -193,7 +193,7 @@ def _in_cells(
     heap = [(-most, c[0], c[1], c[2], h[0], h[1], h[2])]
     used = 0
     done = best
-    either = np.int64(0)  # a literal would be compiled for by itself
+    either = int(np.int64(0))  # a literal would be compiled for by itself
     while len(heap) > 0:
         top, cx, cy, cz, hx, hy, hz = heappop(heap)
         top = min(-top, most)

@@ -69,7 +69,7 @@ def mesh_segment(
             cut = min(cut, cut_of(best))
             winner = first
             W[0], W[1], W[2], W[3], W[4], W[5] = px, py, pz, ax + s * dx, ay + s * dy, az + s * dz
-    low = segment_box(nodes, np.int64(0), ax, ay, az, dx, dy, dz, dd, cut)
+    low = segment_box(nodes, int(np.int64(0)), ax, ay, az, dx, dy, dz, dd, cut)
     stack[0] = 0
     bounds[0] = low
     depth = 1
@@ -91,8 +91,8 @@ def mesh_segment(
         else:
             left = i + 1
             right = links[i, 0]
-            a = segment_box(nodes, np.int64(left), ax, ay, az, dx, dy, dz, dd, cut)
-            b = segment_box(nodes, np.int64(right), ax, ay, az, dx, dy, dz, dd, cut)
+            a = segment_box(nodes, left, ax, ay, az, dx, dy, dz, dd, cut)
+            b = segment_box(nodes, right, ax, ay, az, dx, dy, dz, dd, cut)
             if a < b:
                 left, right, a, b = right, left, b, a
             if a <= cut:

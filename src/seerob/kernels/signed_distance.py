@@ -70,7 +70,7 @@ def signed_distance(
         if radius[s] == 0.0 and not math.isnan(known[0]):
             limit = cut_of((x[0] - known[0]) ** 2 + (x[1] - known[1]) ** 2 + (x[2] - known[2]) ** 2) + 1e-12
         d2, _ = mesh_segment(
-            nodes[n0:n1], links[n0:n1], T[t0:t1], p[0], p[1], p[2], 0.0, 0.0, 0.0, limit, np.int64(-1),
+            nodes[n0:n1], links[n0:n1], T[t0:t1], p[0], p[1], p[2], 0.0, 0.0, 0.0, limit, int(np.int64(-1)),
             stack, bounds, W,
         )  # fmt: skip
         for c in range(3):

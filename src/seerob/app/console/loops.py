@@ -6,7 +6,7 @@ import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing, suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -51,7 +51,7 @@ def missing_loops() -> list[str]:
     return [name for name in LOOPS if not is_kept(name)]
 
 
-def _compiled(names: Sequence[str]) -> Iterator[str]:
+def _compiled(names: Sequence[str]) -> Generator[str]:
     """Compile loops in processes side by side; yields the name of each when it is done."""
     waiting, answers = iter(names), Queue[str | None]()
     workers: list[subprocess.Popen[str]] = []

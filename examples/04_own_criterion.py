@@ -1,4 +1,7 @@
-"""A criterion of your own, in your own package: a dotted ``kind`` names its module (see acme/)."""
+"""A criterion of your own, in your own package: a dotted ``kind`` names it (see acme/ and pyproject.toml).
+
+Installed (``pip install ./examples``) it is found by its entry point; by its module's name where allowed.
+"""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +24,7 @@ limit = 1.4
 """
 with TemporaryDirectory() as folder:
     (Path(folder) / "workstation.toml").write_text(cell)
-    station = sr.load(folder)
+    station = sr.load(folder, allow_plugins=True)
 run = station.run()
 
 worst = run.results["height"].worst()

@@ -74,7 +74,7 @@ def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return load(folder)
+    return load(folder, allow_plugins=True)
 
 
 def heard(
@@ -101,7 +101,7 @@ def results_at(station: Station, **motion: tuple[Sequence[float], Sequence[float
 
 def basis_in(folder: Path) -> Basis:
     """What the first criterion of the workstation in a folder rests on."""
-    return load(folder).bound[0].basis
+    return load(folder, allow_plugins=True).bound[0].basis
 
 
 def judged(bound: Sequence[Bound], state: State) -> tuple[Result, ...]:

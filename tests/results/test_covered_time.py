@@ -185,7 +185,8 @@ def test_the_share_is_told_to_people_and_to_machines_and_the_exit_code_follows(t
     ):
         (tmp_path / name).write_text(text)
     env = {"PYTHONPATH": f"{EXAMPLES}:{heights}", "PATH": "/usr/bin:/bin"}
-    asked = [sys.executable, "-m", "seerob", "assess", str(tmp_path), "-o", str(tmp_path / "out"), "--json"]
+    asked = [sys.executable, "-m", "seerob", "assess", str(tmp_path), "-o", str(tmp_path / "out")]
+    asked += ["--allow-plugins", "--json"]
     done = subprocess.run(asked, capture_output=True, text=True, check=False, env=env)
     assert done.returncode == 2, done.stderr
     told = json.loads(done.stdout)

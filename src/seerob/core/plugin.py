@@ -1,16 +1,24 @@
 """Finding a plug-in: the ``kind`` in the file is the name of a module, and that is all.
 
 ``kind = "separation"`` under ``[[safety]]`` is the one `Criterion` defined in
-``seerob/criteria/safety/separation.py``; a dotted kind, ``acme.brake_rules``, is a module of your own.
+``seerob/criteria/safety/separation.py``. A dotted kind, ``acme.brake_rules``, is an entry point of an
+installed package in the group ``seerob.safety``, or, where whoever starts seerob allows that, a module of
+that name. None is taken from the workstation's folder or from where seerob is started: opening a folder runs
+nothing of it.
 """
 
 from __future__ import annotations
 
 import importlib
 import inspect
+import os
 import pkgutil
+import sys
+from collections.abc import Sequence
 from importlib.machinery import PathFinder
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import TypeVar
 
 from seerob.core.errors import SeerobError, UnknownName
@@ -36,9 +44,13 @@ def home(package: str) -> str:
     return HOMES[package]
 
 
+_OFFERED: dict[type, str] = {}
+"""Classes of installed packages → the kind that they are offered as."""
+
+
 def kind_of(package: str, plugin: object) -> str:
     """The kind that a plug-in is of, as the workstation file says it: dotted where it is one's own."""
-    return type(plugin).__module__.removeprefix(f"{home(package)}.")
+    return _OFFERED.get(type(plugin)) or type(plugin).__module__.removeprefix(f"{home(package)}.")
 
 
 def kinds(package: str) -> tuple[str, ...]:
@@ -47,32 +59,62 @@ def kinds(package: str) -> tuple[str, ...]:
     return tuple(sorted(m.name for m in pkgutil.iter_modules(found.__path__) if not m.name.startswith("_")))
 
 
-def load(package: str, kind: str, base: type[T], *, folder: Path | None = None) -> type[T]:
+def offered(package: str) -> dict[str, EntryPoint]:
+    """Kinds that installed packages offer, by name; nothing of them is imported."""
+    found = entry_points(group=f"seerob.{package}")
+    return {point.name: point for point in sorted(found) if "." in point.name}
+
+
+def load(
+    package: str, kind: str, base: type[T], *, folder: Path | None = None, allow_plugins: bool = False
+) -> type[T]:
     """The plug-in class of a kind.
 
     Args:
         package: ``safety``, ``ergonomics``, ``sources``, ``sinks`` or ``emulators``.
-        kind: Module name in that package, or a dotted module name of your own.
+        kind: Module name in that package, the name of an entry point, or a dotted module name of your own.
         base: What the class must derive from.
         folder: Of the workstation file that says so, from which no module is taken.
+        allow_plugins: Whether a dotted name that no installed package offers is imported.
 
     Raises:
         UnknownName: No such kind.
-        PluginError: A module that is not there, that fails, or that has not exactly one such class.
+        PluginError: A module that is not there, that is not allowed, that fails, or that has not exactly one
+            such class.
     """
     what = "emulator" if package == "emulators" else f"kind of [[{package}]]"
     if not all(part.isidentifier() for part in kind.split(".")):
         raise UnknownName(what, kind, kinds(package))
-    if "." in kind:
-        name = kind
-        if folder is not None:
-            _refuse_beside(folder, kind)
-    elif kind in kinds(package):
-        name = f"{home(package)}.{kind}"
-    else:
-        raise UnknownName(what, kind, kinds(package))
+    if "." not in kind:
+        if kind not in kinds(package):
+            raise UnknownName(what, kind, (*kinds(package), *offered(package)))
+        return _only(_imported(package, kind, f"{home(package)}.{kind}"), base)
+    point = offered(package).get(kind)
+    if point is None and not allow_plugins:
+        known = ", ".join(offered(package)) or "none"
+        raise PluginError(
+            f"no installed package offers the kind {kind!r} (entry points in 'seerob.{package}': {known}), "
+            "and modules are not imported by their names: install its package, or, if you trust it, "
+            "--allow-plugins (in Python allow_plugins=True)"
+        )
+    name = kind if point is None else point.module
+    spec = PathFinder.find_spec(name.split(".", maxsplit=1)[0])
+    places = [] if spec is None else [*(spec.submodule_search_locations or ()), spec.origin or ""]
+    if point is not None and point.dist is not None:
+        places.append(str(point.dist.locate_file("entry_points")))
+    _refuse_beside(folder, kind, places)
+    module = _imported(package, kind, name)
+    found = getattr(module, point.attr, None) if point is not None and point.attr else _only(module, base)
+    if not (isinstance(found, type) and issubclass(found, base)):
+        raise PluginError(f"the entry point of kind {kind!r} must be a {base.__name__}, it is {found!r}")
+    if point is not None:
+        _OFFERED[found] = kind
+    return found
+
+
+def _imported(package: str, kind: str, name: str) -> ModuleType:
     try:
-        module = importlib.import_module(name)
+        return importlib.import_module(name)
     except ModuleNotFoundError as error:
         if error.name is not None and not (name + ".").startswith(error.name + "."):
             raise PluginError(f"kind {kind!r} needs the package {error.name!r}: install it") from error
@@ -83,6 +125,10 @@ def load(package: str, kind: str, base: type[T], *, folder: Path | None = None) 
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         raise PluginError(f"the module of kind {kind!r} fails when it is imported: {what}") from error
+
+
+def _only(module: ModuleType, base: type[T]) -> type[T]:
+    name = module.__name__
     classes = [
         c
         for _, c in inspect.getmembers(module, inspect.isclass)
@@ -94,18 +140,26 @@ def load(package: str, kind: str, base: type[T], *, folder: Path | None = None) 
     return classes[0]
 
 
-def _refuse_beside(folder: Path, kind: str) -> None:
-    """Refuse a kind whose module would be taken from the workstation's folder; imports nothing.
+def _refuse_beside(folder: Path | None, kind: str, places: Sequence[str]) -> None:
+    """Refuse a kind that would be taken from the workstation's folder or from the present one.
+
+    What is installed for the interpreter that runs is not meant, wherever that lies.
 
     Raises:
         PluginError: It would.
     """
-    spec = PathFinder.find_spec(kind.split(".", maxsplit=1)[0])
-    places = [] if spec is None else [*(spec.submodule_search_locations or ()), spec.origin or ""]
-    here = folder.resolve()
-    for place in places:
-        if place and Path(place).resolve().is_relative_to(here):
-            raise PluginError(
-                f"the module of kind {kind!r} lies in the workstation's folder, and opening a folder runs "
-                "nothing of it; install its package, or keep it in a folder of its own on PYTHONPATH"
-            )
+    installed, present = Path(sys.prefix).resolve(), Path.cwd()
+    for place in (Path(place).resolve() for place in places if place):
+        where = place.parent if place.suffix != ".py" or place.stem != "__init__" else place.parent.parent
+        if place.is_relative_to(installed):
+            continue
+        if folder is not None and place.is_relative_to(folder.resolve()):
+            what = "the workstation's folder"
+        elif where == present and str(present) not in os.environ.get("PYTHONPATH", "").split(os.pathsep):
+            what = "the folder that seerob is started in"
+        else:
+            continue
+        raise PluginError(
+            f"the module of kind {kind!r} lies in {what}, and opening a folder runs nothing of it; "
+            "install its package, or keep it in a folder of its own that PYTHONPATH names in full"
+        )

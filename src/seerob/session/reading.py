@@ -16,6 +16,7 @@ from seerob.core.files.toml_file import read_toml
 from seerob.criteria.criterion import Criterion
 from seerob.outputs.sink import Sink
 from seerob.workstation import naming
+from seerob.workstation.allowed import NOTHING, Allowed
 from seerob.workstation.conversion import convert, tables
 from seerob.workstation.plausibility.of_file import unknown
 from seerob.workstation.source import Source
@@ -49,21 +50,29 @@ class Readable(NamedTuple):
     """Problems that an entry has with other entries: a name that is taken or leads nowhere."""
 
 
-def read(path: Path | str) -> Workstation:
+def read(path: Path | str, allowed: Allowed = NOTHING) -> Workstation:
     """The workstation of a file or of a folder that contains one.
+
+    Args:
+        path: The file or the folder.
+        allowed: What the file may do.
 
     Raises:
         InputError: With every mistake in it: unknown keys, missing keys, wrong types and ranges,
             unknown kinds, names that are taken or lead nowhere.
     """
-    found = readable(path)
+    found = readable(path, allowed)
     if found.problems:
         raise InputError(shortened(found.problems))
     return with_entries(found.head, found.entries)
 
 
-def readable(path: Path | str) -> Readable:
+def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
     """What can be read of a file or of a folder that contains one, beside every mistake in it.
+
+    Args:
+        path: The file or the folder.
+        allowed: What the file may do.
 
     Raises:
         InputError: There is no such file, or it is not TOML.
@@ -77,7 +86,7 @@ def readable(path: Path | str) -> Readable:
         files |= zones.files
         own = table.get("areas", [])
         table |= {"areas": [*own, *zones.areas] if isinstance(own, list) else own}
-    found = _convert(table, str(file))
+    found = _convert(table, str(file), allowed)
     head = msgspec.structs.replace(found.head, folder=str(file.parent.resolve()), files=files)
     return found._replace(head=head, problems=[*problems, *found.problems])
 
@@ -104,14 +113,14 @@ def shortened(problems: list[Problem]) -> list[Problem]:
     return [*problems[:_MAX_PROBLEMS], last]
 
 
-def _convert(table: Mapping[str, Any], file: str) -> Readable:
+def _convert(table: Mapping[str, Any], file: str, allowed: Allowed = NOTHING) -> Readable:
     problems: list[Problem] = []
     groups = (*TABLES, *PLUGINS)
     entries: dict[str, dict[int, Any]] = {}
     for group in groups:
         entries[group] = {}
         for i, table_of_entry in enumerate(tables(table.get(group, []), group, file, problems)):
-            entry = _entry(table_of_entry, group, f"{group}[{i}]", file, problems)
+            entry = _entry(table_of_entry, group, f"{group}[{i}]", file, problems, allowed)
             if entry is not None:
                 entries[group][i] = entry
     for group in ("sources", "safety", "ergonomics"):
@@ -124,10 +133,10 @@ def _convert(table: Mapping[str, Any], file: str) -> Readable:
 
 
 def _entry(
-    table: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem]
+    table: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem], allowed: Allowed
 ) -> Struct | None:
     if group in PLUGINS:
-        return _plugin(table, group, key, file, problems)
+        return _plugin(table, group, key, file, problems, allowed)
     before = len(problems)
     entry = convert(table, TABLES[group], file=file, key=key, problems=problems)
     if entry is not None or group not in ("robots", "humans"):
@@ -164,16 +173,17 @@ def _head(table: Mapping[str, Any], file: str, problems: list[Problem]) -> Works
 
 
 def _plugin(
-    entry: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem]
+    entry: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem], allowed: Allowed
 ) -> Struct | None:
     kind = entry.get("kind")
     if not isinstance(kind, str):
         what = "missing" if kind is None else f"{kind!r} is not text"
-        known = ", ".join(plugin.kinds(group)) or "none ships here; a dotted name is a module of your own"
+        known = ", ".join(plugin.kinds(group)) or "none ships here; a dotted name is a kind of your own"
         problems.append(Problem(file, f"{key}.kind", what, f"kinds of [[{group}]]: {known}"))
         return None
     try:
-        wanted = plugin.load(group, kind, BASES[group], folder=Path(file).parent)
+        folder = Path(file).parent
+        wanted = plugin.load(group, kind, BASES[group], folder=folder, allow_plugins=allowed.plugins)
     except SeerobError as error:
         problems.append(Problem(file, f"{key}.kind", str(error)))
         return None

@@ -14,14 +14,20 @@ from seerob.recording.filing import SOURCES
 from seerob.recording.recording import Recording
 from seerob.session.reading import read
 from seerob.session.station import Station
+from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import FILE_NAME
 
 _REMEDY = "give the workstation that it was made with (--workstation)"
 
 
-def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station:
+def load_recorded(recording: Recording, *, cache: Path | None = None, allow_plugins: bool = False) -> Station:
     """The workstation that a recording was made with, from the files inside it.
+
+    Args:
+        recording: The recording.
+        cache: Folder that keeps what takes long to make between starts.
+        allow_plugins: Whether dotted kinds that no installed package offers are imported by their names.
 
     Raises:
         InputError: It needs files that the recording does not carry, or that have changed since.
@@ -29,7 +35,8 @@ def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station
     with TemporaryDirectory(prefix="seerob-") as folder:
         recording.extract(Path(folder))
         try:
-            station = Station(read(Path(folder) / _workstation_file(recording)), cache=cache)
+            file = Path(folder) / _workstation_file(recording)
+            station = Station(read(file, Allowed(plugins=allow_plugins)), cache=cache)
         except InputError as error:
             problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
             raise InputError(

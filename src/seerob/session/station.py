@@ -38,6 +38,7 @@ from seerob.session.run import Bound, Feed, Summary
 from seerob.session.scene import scene_of
 from seerob.twin.own_words import said_by
 from seerob.twin.states import motion_of
+from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import Workstation
 
@@ -486,14 +487,18 @@ def _digests(files: Mapping[str, bytes]) -> dict[str, str]:
     return {name: sha256(content).hexdigest() for name, content in files.items()}
 
 
-def load(path: Path | str, *, cache: Path | None = None) -> Station:
+def load(
+    path: Path | str, *, cache: Path | None = None, allow_plugins: bool = False, allow_outside: bool = False
+) -> Station:
     """Read and compile a workstation.
 
     Args:
         path: A workstation file, or a folder with a ``workstation.toml``.
         cache: Folder that keeps what takes long to make between starts.
+        allow_plugins: Whether dotted kinds that no installed package offers are imported by their names.
+        allow_outside: Whether files outside the folder of the workstation file are read.
 
     Raises:
         InputError: With every mistake in the file and in the files it names.
     """
-    return Station(read(path), cache=cache)
+    return Station(read(path, Allowed(allow_plugins, allow_outside)), cache=cache)

@@ -129,7 +129,7 @@ def never_within(
         AssertionError: With every criterion that is within where it must not be, or is none.
         InputError: The workstation cannot be used.
     """
-    station = cell if isinstance(cell, Station) else load(cell)
+    station = cell if isinstance(cell, Station) else load(cell, allow_plugins=True)
     asked = [
         (criterion, group)
         for group in ("safety", "ergonomics")
@@ -207,7 +207,7 @@ def sources_never_within(cell: Station | Path | str, *, names: Sequence[str] = (
         AssertionError: With every criterion that is within where it must not be, or never.
         InputError: The workstation or a file cannot be used.
     """
-    station = cell if isinstance(cell, Station) else load(cell)
+    station = cell if isinstance(cell, Station) else load(cell, allow_plugins=True)
     told: list[str] = []
     for i, (source, _) in enumerate(station.sources):
         if isinstance(source, LiveSource) or (names and source.name not in names):
@@ -467,7 +467,7 @@ def pytest_collect_file(parent: Any, file_path: Path) -> Any:
 
     class Cell(pytest.Item):
         def runtest(self) -> None:
-            station = load(file_path)
+            station = load(file_path, allow_plugins=True)
             never_within(station)
             if not all(isinstance(source, LiveSource) for source in station.workstation.sources):
                 sources_never_within(station)

@@ -21,6 +21,7 @@ from seerob.app.console.terminal import (
     OUT,
     add_output,
     add_workstation,
+    allowed,
     describe,
     exit_code,
     line,
@@ -51,7 +52,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Evaluate, print, and return the exit code of the verdict."""
-    station = compiled(options.workstation, quiet=options.json)
+    station = compiled(options.workstation, allowed(options), quiet=options.json)
     from seerob.devices.live.real_time import require_recorded
 
     require_recorded(station.workstation)

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from seerob.app.console.loading import compiled
-from seerob.app.console.terminal import Exit, add_workstation, describe, line
+from seerob.app.console.terminal import Exit, add_workstation, allowed, describe, line
 
 if TYPE_CHECKING:
     from seerob.session.station import Station
@@ -38,7 +38,7 @@ def _masses(station: Station) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, compile, bind and open everything; run nothing, connect to nothing."""
-    station = compiled(options.workstation)
+    station = compiled(options.workstation, allowed(options))
     describe(station)
     for finding in station.scene().findings:
         line(finding.level, f"{finding.subject}: {finding.text}")

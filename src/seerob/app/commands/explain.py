@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from seerob.app.console.loading import compiled
-from seerob.app.console.terminal import OUT, Exit, add_workstation, line
+from seerob.app.console.terminal import OUT, Exit, add_workstation, allowed, line
 from seerob.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Open the sources, compare, fit, and tell."""
-    station = compiled(options.workstation)
+    station = compiled(options.workstation, allowed(options))
     found = []
     if options.robot is not None:
         found.append(station.explain(options.robot))

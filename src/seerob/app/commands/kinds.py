@@ -47,6 +47,9 @@ def run(options: argparse.Namespace) -> int:
             shown = [f"{f.name}{_unit(f.type)}{' *' if f.required else ''}" for f in fields]
             if shown:
                 OUT.print(f"  {'':<18} {', '.join(shown)}", style="dim", markup=False)
+        for kind, point in plugin.offered(group).items():
+            by = "" if point.dist is None else f"{point.dist.name} {point.dist.version}: "
+            OUT.print(f"  {kind:<18} {by}{point.value}, not imported until a file names it", markup=False)
     OUT.print("* must be given", style="dim")
     if options.group is None:
         OUT.print("robots", style="bold")

@@ -23,6 +23,7 @@ from seerob.app.console.terminal import (
     OUT,
     add_output,
     add_workstation,
+    allowed,
     describe,
     exit_code,
     line,
@@ -109,7 +110,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Map, rescale, evaluate again, write, and return the exit code of the second evaluation."""
     need("toppra", "matplotlib")
-    station = compiled(options.workstation, quiet=options.json)
+    station = compiled(options.workstation, allowed(options), quiet=options.json)
     from seerob.outputs.sinks.dossier import Dossier
     from seerob.session.permissible.ceilings import By
     from seerob.session.permissible.evaluation import Wish

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from seerob.app.console.loading import compiled
 from seerob.app.console.progress import spinner
-from seerob.app.console.terminal import Exit, add_workstation, cache_folder, describe, line, seconds
+from seerob.app.console.terminal import Exit, add_workstation, allowed, cache_folder, describe, line, seconds
 from seerob.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def run(options: argparse.Namespace) -> int:
     _refuse_existing(options.output)
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
-    station = compiled(options.workstation, sources=False)
+    station = compiled(options.workstation, allowed(options), sources=False)
     from seerob.app.console.interruption import Stopped as Asked
     from seerob.outputs.sinks.dossier import write_whole
     from seerob.session.planning.plan import plan

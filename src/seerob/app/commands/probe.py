@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seerob.app.console.interruption import Stopped
-from seerob.app.console.terminal import OUT, Exit, line, port, seconds
+from seerob.app.console.terminal import OUT, Exit, add_allowed, allowed, line, port, seconds
 from seerob.core.errors import InputError, SeerobError
 from seerob.devices.live.arrivals import Arrivals
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from seerob.core.samples import Sample
     from seerob.devices.live.listening import LiveSource
     from seerob.devices.variables.live_source import VariablesSource
+    from seerob.workstation.allowed import Allowed
 
 
 def tell_heard(source: VariablesSource, nodes: Sequence[Node], wait: float) -> None:
@@ -111,6 +112,7 @@ def add(sub: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the kinematics of that very robot to a new file",
     )
+    add_allowed(sub)
     sub.add_argument("--seconds", type=seconds, default=3.0, help="how long to listen (default: 3)")
 
 
@@ -127,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
     from seerob.devices.live.listening import Listener, because
 
     if options.address is None and options.kind not in kinds("sources") and Path(options.kind).exists():
-        return _workstation(Path(options.kind))
+        return _workstation(Path(options.kind), allowed(options))
     source, given = _source(options)
     where = f"{options.kind} {options.address or ''}".strip()
     if options.address is not None and (port := getattr(source, "port", None)) is not None:
@@ -183,12 +185,12 @@ def run(options: argparse.Namespace) -> int:
     return Exit.WITHIN
 
 
-def _workstation(path: Path) -> int:
+def _workstation(path: Path, allow: Allowed) -> int:
     """Ask every live source of a workstation what it has; `Exit.ERROR` when one is not reached."""
     from seerob.app.commands.run import reach
     from seerob.app.console.loading import compiled
 
-    station = compiled(path)
+    station = compiled(path, allow)
     before = {f for _, opened in station.sources for f in opened.findings}
     reach(station)
     said = [f for _, opened in station.sources for f in opened.findings if f not in before]

@@ -22,7 +22,9 @@ from seerob.app.console.sinks import refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
     OUT,
     WORDS,
+    add_allowed,
     add_output,
+    allowed,
     cache_folder,
     exit_code,
     extreme,
@@ -43,6 +45,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
     sub.add_argument("--workstation", type=Path, help="judge by this workstation instead of the recorded one")
+    add_allowed(sub)
     add_permissible(sub)
     add_output(sub, beside="recording")
 
@@ -54,12 +57,12 @@ def run(options: argparse.Namespace) -> int:
 
     recording = Recording.open(options.recording)
     if options.workstation is not None:
-        station = compiled(options.workstation, quiet=options.json, sources=False)
+        station = compiled(options.workstation, allowed(options), quiet=options.json, sources=False)
     else:
         compile_loops()
         from seerob.session.recorded_station import load_recorded
 
-        station = load_recorded(recording, cache=cache_folder())
+        station = load_recorded(recording, cache=cache_folder(), allow_plugins=options.allow_plugins)
     folder = run_folder(options.recording.parent, options.output)
     sinks = sinks_of(station.workstation, lossless=True, record=False)
     refuse_existing(sinks, folder)

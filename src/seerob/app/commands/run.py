@@ -11,6 +11,8 @@ from seerob.app.console.loading import compiled
 from seerob.app.console.progress import announced, spinner
 from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
+    add_allowed,
+    allowed,
     describe,
     exit_code,
     line,
@@ -37,6 +39,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "workstation", type=Path, nargs="?", help="folder with a workstation.toml, or the file itself"
     )
+    add_allowed(sub)
     add_page(sub)
     sub.add_argument(
         "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
@@ -63,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
         return replay.show(options.replay, options)
     if options.workstation is None:
         raise InputError.at("seerob run", "workstation", "missing", "name a folder, or --replay FILE")
-    station = compiled(options.workstation)
+    station = compiled(options.workstation, allowed(options))
     describe(station)
     reach(station)
     scene = station.scene()

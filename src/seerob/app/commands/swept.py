@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from seerob.app.console.loading import compiled
 from seerob.app.console.progress import progress
-from seerob.app.console.terminal import Exit, add_workstation, describe, line, tell
+from seerob.app.console.terminal import Exit, add_workstation, allowed, describe, line, tell
 from seerob.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     check_format(options.output)
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
-    station = compiled(options.workstation, sources=not options.reach)
+    station = compiled(options.workstation, allowed(options), sources=not options.reach)
     from seerob.distance.voxels import check_room
     from seerob.model.volumes.moving import posed, reach_box
     from seerob.model.volumes.reachable import reachable_volume

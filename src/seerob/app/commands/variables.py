@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.loading import compiled
-from seerob.app.console.terminal import OUT, Exit, add_workstation, line, seconds, tell
+from seerob.app.console.terminal import OUT, Exit, add_workstation, allowed, line, seconds, tell
 from seerob.core.errors import InputError, SeerobError
 from seerob.devices.variables.live_source import Node
 from seerob.files.tables.mapping import toml_value
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from seerob.core.samples import Sample
     from seerob.devices.variables.live_source import Node, VariablesSource
     from seerob.session.station import Station
+    from seerob.workstation.allowed import Allowed
     from seerob.workstation.variables.dictionary import Variable
 
 
@@ -100,8 +101,8 @@ def run(options: argparse.Namespace) -> int:
         InputError: The workstation is wrong, or the device cannot be browsed.
     """
     if options.browse is not None:
-        return _browse(options.workstation, options.browse)
-    station = compiled(options.workstation)
+        return _browse(options.workstation, options.browse, allowed(options))
+    station = compiled(options.workstation, allowed(options))
     variables = tuple(station.model.dictionary.values())
     if not variables:
         what = "the workstation names no dictionary"
@@ -169,7 +170,7 @@ def _listen(station: Station, wait: float) -> dict[str, str]:
     return told
 
 
-def _browse(path: Path, name: str) -> int:
+def _browse(path: Path, name: str, allow: Allowed) -> int:
     import asyncio
 
     from seerob.core.errors import suggestion
@@ -178,7 +179,7 @@ def _browse(path: Path, name: str) -> int:
     from seerob.session.reading import readable
 
     # The dictionary may not be there yet, or may not be right yet.
-    found = readable(path)
+    found = readable(path, allow)
     sources = {s.name: s for s in found.entries["sources"].values() if isinstance(s, VariablesSource)}
     if name not in sources:
         what = f"no source named {name!r} that can be browsed"

@@ -22,6 +22,7 @@ from seerob.app.console.terminal import cache_folder
 from seerob.core.errors import InputError, Problem
 from seerob.description.formats.resolve import as_written_or_in_other_case
 from seerob.session.reading import with_entries
+from seerob.workstation.allowed import NOTHING, Allowed
 from seerob.workstation.naming import Entries, Named
 from seerob.workstation.workstation import Workstation
 
@@ -168,11 +169,12 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(item)
 
 
-def compiled(path: Path, *, quiet: bool = False, sources: bool = True) -> Station:
+def compiled(path: Path, allowed: Allowed = NOTHING, *, quiet: bool = False, sources: bool = True) -> Station:
     """The workstation of a path: read, compiled, its criteria bound and its sources open.
 
     Args:
         path: Workstation file, or the folder of one.
+        allowed: What the file may do.
         quiet: Show nothing meanwhile, not even on a terminal.
         sources: Whether its sources will be played.
 
@@ -204,7 +206,7 @@ def _compiled(path: Path, file: Path, *, quiet: bool, sources: bool) -> Station:
     from seerob.session.reading import readable, shortened
     from seerob.session.station import Station
 
-    found = readable(path)
+    found = readable(path, allowed)
     problems = list(found.problems)
     whole = Draft(str(file), found.head, found.entries, tuple(found.names))
     draft = whole.without(found.between)

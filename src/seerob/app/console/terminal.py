@@ -18,6 +18,7 @@ from rich.console import Console as RichConsole
 from seerob.app.console.printable import printable
 from seerob.core.figures import against, with_unit
 from seerob.core.snapshot import Finding, Verdict
+from seerob.workstation.allowed import Allowed
 
 if TYPE_CHECKING:
     from seerob.recording.bone_errors import BoneErrors
@@ -129,6 +130,20 @@ def cache_folder() -> Path:
 def add_workstation(sub: argparse.ArgumentParser) -> None:
     """The argument that nearly every command takes."""
     sub.add_argument("workstation", type=Path, help="folder with a workstation.toml, or the file itself")
+    add_allowed(sub)
+
+
+def add_allowed(sub: argparse.ArgumentParser) -> None:
+    """Options by which a file that is trusted may do more."""
+    text = "import kinds of the file by their dotted names, which runs their code"
+    sub.add_argument("--allow-plugins", action="store_true", help=text)
+    text = "read files that lie outside the workstation's folder"
+    sub.add_argument("--allow-outside", action="store_true", help=text)
+
+
+def allowed(options: argparse.Namespace) -> Allowed:
+    """What the command line allows the workstation file to do."""
+    return Allowed(options.allow_plugins, options.allow_outside)
 
 
 def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> None:

@@ -14,6 +14,7 @@ from seerob.app import cli
 from seerob.core import plugin
 from seerob.description.humans import keyframes, manikin
 from seerob.session.reading import convert_workstation
+from seerob.workstation.allowed import Allowed
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -104,7 +105,7 @@ def test_command_lines_are_understood(path: Path) -> None:
 def test_tables_of_the_workstation_file_are_understood(path: Path) -> None:
     for text in blocks(path, "toml"):
         if text.startswith("["):
-            _, problems = convert_workstation(tomllib.loads(text), path.name)
+            _, problems = convert_workstation(tomllib.loads(text), path.name, Allowed(plugins=True))
             assert not [str(p) for p in problems if not ONLY_NAMES.match(p.what)], text
 
 

@@ -61,7 +61,7 @@ file = "motion.jsonl"
 
 def test_a_source_of_ones_own_moves_the_robot(tmp_path):
     swing(tmp_path)
-    run = sr.load(cell(tmp_path, FROM_FILE)).run()
+    run = sr.load(cell(tmp_path, FROM_FILE), allow_plugins=True).run()
     speed = run.results["speed"]
     # The tool point of the upright arm is 0.2328 m from the axis of its base (d4 + d6 of its table).
     assert speed.max() == pytest.approx(0.6 * math.hypot(0.1333 + 0.0996, 0.0), rel=0.02)
@@ -86,7 +86,7 @@ def test_it_is_never_within_when_it_lies(tmp_path):
 def test_a_wrong_line_is_said_with_its_place(tmp_path, line, said):
     good = json.dumps({"t": 0.0, "q": UP})
     (tmp_path / "motion.jsonl").write_text(f"{good}\n{line}\n", encoding="latin-1")
-    station = sr.load(cell(tmp_path, FROM_FILE))
+    station = sr.load(cell(tmp_path, FROM_FILE), allow_plugins=True)
     with pytest.raises(sr.InputError, match=said):
         station.run()
 
@@ -128,7 +128,7 @@ class Controller:
 def test_a_live_source_of_ones_own_is_heard_and_its_silence_is_undecided(tmp_path):
     controller = Controller()
     text = f'[[sources]]\nkind = "acme.cell_controller"\nrobot = "arm"\nport = {controller.port}\n'
-    station = sr.load(cell(tmp_path, text + "frequency = 125\n"))
+    station = sr.load(cell(tmp_path, text + "frequency = 125\n"), allow_plugins=True)
     begun = time.monotonic()
 
     def stop():
@@ -151,7 +151,7 @@ def test_a_live_source_of_ones_own_is_heard_and_its_silence_is_undecided(tmp_pat
 def test_a_sink_of_ones_own_writes_each_change_once(tmp_path):
     swing(tmp_path)
     text = FROM_FILE + '[[sinks]]\nkind = "acme.verdict_changes"\n'
-    station = sr.load(cell(tmp_path, text))
+    station = sr.load(cell(tmp_path, text), allow_plugins=True)
     station.run(folder=tmp_path / "out", sinks=station.workstation.sinks)
     with (tmp_path / "out/verdicts.csv").open(newline="") as file:
         head, *rows = csv.reader(file)

@@ -91,9 +91,11 @@ def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
     return found._replace(head=head, problems=[*problems, *found.problems])
 
 
-def convert_workstation(table: Mapping[str, Any], file: str) -> tuple[Workstation | None, list[Problem]]:
+def convert_workstation(
+    table: Mapping[str, Any], file: str, allowed: Allowed = NOTHING
+) -> tuple[Workstation | None, list[Problem]]:
     """The typed workstation of a parsed file, and every mistake that was found."""
-    found = _convert(table, file)
+    found = _convert(table, file, allowed)
     if found.problems:
         return None, shortened(found.problems)
     return with_entries(found.head, found.entries), []

@@ -375,3 +375,50 @@ def test_velocities_over_positions_that_stand_to_the_last_bit(rate, told):
     looking = Contradictions(None)
     found = [looking.find(said(0.008 * k, (0.3,), (rate,))) for k in range(200)]
     assert any(found) is told
+
+
+def swung(hertz, factor, lag=0.0, seconds=12.0, noise=0.0, low_pass=0.0):
+    """A swing of half a hertz and one of one, with velocities as a device may have them."""
+    chance, kept = np.random.default_rng(4), 0.0
+    for t in np.arange(0, seconds, 1 / hertz).tolist():
+        q = 0.4 * math.sin(3 * t) + 0.1 * math.sin(6 * t + 1)
+        at = t - lag
+        rate = 1.2 * math.cos(3 * at) + 0.6 * math.cos(6 * at + 1)
+        kept += (rate - kept) * (1 - math.exp(-2 * math.pi * low_pass / hertz) if low_pass else 1.0)
+        yield t, q + noise * chance.normal(), factor * kept + noise * chance.normal()
+
+
+@pytest.mark.parametrize("hertz", [20, 125, 500])
+@pytest.mark.parametrize("factor", [0.85, 0.9, 1.12, 0.5])
+def test_velocities_that_are_a_tenth_off_are_found_on_a_long_way(hertz, factor):
+    looking, way, last = Contradictions(None), 0.0, 0.0
+    found = []
+    for t, q, rate in swung(hertz, factor):
+        way, last = way + abs(q - last), q
+        found.append((way, looking.find(said(t, (q,), (rate,)))))
+    first = next(way for way, why in found if why)
+    assert first < 1.7
+    assert "is off by a factor: positions move at" in found[-1][1]
+    # A joint that stands is no reason to believe it again.
+    assert "factor" in looking.find(said(t + 0.1, (q,), (0.0,)))
+
+
+@pytest.mark.parametrize("hertz", [20, 125, 500])
+@pytest.mark.parametrize(
+    "how", [{}, {"lag": 0.02}, {"noise": 1e-3}, {"low_pass": 8.0}, {"low_pass": 8.0, "noise": 1e-3}]
+)
+def test_velocities_that_are_filtered_rounded_or_late_are_those_of_the_positions(hertz, how):
+    looking = Contradictions(None)
+    for t, q, rate in swung(hertz, 1.0, **how):
+        assert not looking.find(said(t, (q,), (rate,))), t
+
+
+def test_what_was_right_for_long_is_forgotten_on_a_long_way():
+    looking, way, last = Contradictions(None), 0.0, 0.0
+    for t, q, rate in swung(125, 1.0, seconds=60.0):
+        assert not looking.find(said(t, (q,), (rate,)))
+    found = []
+    for t, q, rate in swung(125, 0.85, seconds=20.0):
+        way, last = way + abs(q - last), q
+        found.append((way, looking.find(said(60.0 + t, (q,), (rate,)))))
+    assert next(way for way, why in found if "factor" in why) < 6.0

@@ -158,8 +158,10 @@ def listened(samples):
     return posted
 
 
-def test_a_point_that_never_moved_while_others_do_is_not_measured():
-    told = listened(said(k, (0.1 * np.sin(k), 0.0)) for k in range(3 * STEPS))
+@pytest.mark.parametrize("moved", [0, 1, 10, STEPS - 1, STEPS])
+def test_a_point_that_stands_while_others_move_is_not_measured(moved):
+    """However little it moved before."""
+    told = listened(said(k, (0.1 * np.sin(k), 0.1 * np.sin(min(k, moved)))) for k in range(3 * STEPS))
     assert [p.position is None for p in told[-1].points] == [False, True]
 
 

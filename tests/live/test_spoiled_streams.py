@@ -277,6 +277,13 @@ SPOILED = {
     "half the velocities": Case(
         stream(said=lambda t: (motion(t)[0], 0.5 * motion(t)[1])), shift=math.inf, least=0, until=0.1
     ),
+    "velocities a sixth low": Case(
+        stream(said=lambda t: (motion(t)[0], 0.83 * motion(t)[1])),
+        shift=math.inf,
+        least=0.1,
+        until=2.5,
+        why="is off by a factor",
+    ),
     "pauses of the run": Case(
         stream(), gap=TIMEOUT, least=0.85, pauses={200: 0.5, 400: 0.2}, why="run time fell behind"
     ),

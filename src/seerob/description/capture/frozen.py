@@ -4,7 +4,7 @@ Whatever is measured has noise: its last digits change from sample to sample, to
 noise so far and now says exactly the same is no longer measured, whatever stamp its samples carry. What
 never had noise (made motions, values rounded to millimetres) may stand still in a file. A live device makes
 no motions, and what it filters has little noise that goes to and fro: there a point that never repeated
-itself is frozen once it does, and so is one that never moved while others do.
+itself is frozen once it does, and so is one that stands for long while others move.
 """
 
 from __future__ import annotations
@@ -93,6 +93,6 @@ class Frozen:
         never = self._repeats <= REPEATED * self._steps
         if self._live:
             often = self._steps >= STEPS
-            return np.asarray(same & never & (often | ((self._steps == 0) & often.any())))
+            return np.asarray(same & never & (often | ((self._same >= STEPS) & often.any())))
         noisy = (self._steps >= STEPS) & (self._back >= TO_AND_FRO * self._steps)
         return np.asarray(same & noisy & never)

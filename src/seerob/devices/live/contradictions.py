@@ -61,6 +61,13 @@ STEPS = 4
 HELD = 2e-3, 2.5
 """Way that velocities tell of a joint which stands to the last bit, from which on they contradict it [rad or
 m]: twice the coarsest digit that controllers have; and after how many intervals what stands does not move."""
+SCALE = 0.08
+"""Share by which velocities may be off what positions move at over a long way: filters of 5 Hz and the
+trapezoidal rule make less of it than half."""
+LONG_WAY = {"rad": 1.0, "m": 0.3}
+"""Of a joint, from which on that share is told [rad or m]; what was four times as long ago counts half."""
+TOLD_BY = {"rad": 0.01, "m": 2e-3}
+"""Way between two anchors that tells of it [rad or m]: twice `NOISE`."""
 SILENCE = 0.5
 """After it what was before says nothing of now [s]."""
 
@@ -148,6 +155,36 @@ class _Standing:
         )
 
 
+class _Scale:
+    """By how much the velocities of one joint are off, over ways so long that lag and noise do not matter.
+
+    Args:
+        unit: ``rad`` or ``m``.
+    """
+
+    def __init__(self, unit: str) -> None:
+        self._unit = unit
+        self._went = self._said = self._way = 0.0
+        """Sums of the squares of ways, by positions and by velocities; and of ways."""
+
+    def add(self, went: float, said: float) -> None:
+        """Take the way between two anchors, by positions and by velocities [rad or m]."""
+        if max(abs(went), abs(said)) < TOLD_BY[self._unit]:
+            return
+        if self._way > 4 * LONG_WAY[self._unit]:
+            self._went, self._said, self._way = 0.5 * self._went, 0.5 * self._said, 0.5 * self._way
+        self._went, self._said, self._way = self._went + went**2, self._said + said**2, self._way + abs(went)
+
+    def off(self) -> str:
+        """Why they are no velocities of these positions; empty when they may be."""
+        if self._way < LONG_WAY[self._unit] or not self._said:
+            return ""
+        scale = math.sqrt(self._went / self._said)
+        if (1 - SCALE) <= scale <= 1 / (1 - SCALE):
+            return ""
+        return f"is off by a factor: positions move at {scale:.3g} × the velocity"
+
+
 class Contradictions:
     """What one source says of one target, sample by sample.
 
@@ -174,6 +211,7 @@ class Contradictions:
         self._places: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=ANCHORS + 1)
         """Instants [s] and positions of a device that gives no velocities."""
         self._standing: list[_Standing] = []
+        self._scales: list[_Scale] = []
 
     def find(self, sample: Sample) -> str:
         """Why this sample and those before it are no one motion; empty when they may be."""
@@ -229,8 +267,17 @@ class Contradictions:
             if t - then.t <= SPAN and (found := self._differ(then, now) or self._hurries(then, now)):
                 break
         if t - self._told[-1].t >= SPAN / ANCHORS:
+            self._scale(self._told[-1], now)
             self._told.append(now)
-        return found
+        offs = ((k, scale.off()) for k, scale in enumerate(self._scales))
+        return found or next((f"the velocity of joint {k + 1} {off}" for k, off in offs if off), "")
+
+    def _scale(self, then: _Told, now: _Told) -> None:
+        if len(self._scales) != len(now.q):
+            units = [*self._units, *["rad"] * len(now.q)]
+            self._scales = [_Scale(unit) for unit in units[: len(now.q)]]
+        for k, scale in enumerate(self._scales):
+            scale.add(now.q[k] - then.q[k], now.way[k] - then.way[k])
 
     def _hangs(self, sample: JointSample, t: float) -> str:
         """Whether a joint that moved stands to the last bit, as nothing that brakes does."""

@@ -222,6 +222,20 @@ def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(capsys, tmp
     assert capsys.readouterr() == ("", "")
 
 
+def test_long_work_says_where_it_is_also_without_a_terminal(capsys, tmp_path, recorded, monkeypatch):
+    monkeypatch.setattr("seerob.app.console.progress.EVERY", 1e9)
+    _, _, at_once = seerob(capsys, "assess", recorded[0], "-o", tmp_path / "quick")
+    monkeypatch.setattr("seerob.app.console.progress.EVERY", 0.0)
+    _, _, said = seerob(capsys, "assess", recorded[0], "-o", tmp_path / "out")
+    assert at_once == ""
+    shares = [int(found) for found in re.findall(r"^[\d.]+ s of motion: (\d+)%$", said, re.MULTILINE)]
+    assert shares == sorted(shares)
+    assert {0, 100} < set(shares)
+    for file in ("run.mcap", "report.html", "results.xlsx"):
+        assert f"\nwriting {file}\n" in said
+    assert "writing report.html: 2 of 2\n" in said or "writing report.html: 1 of 1\n" in said
+
+
 def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, tmp_path):
     from seerob.app.console import loops
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from seerob.app.console.progress import lines
 from seerob.app.console.terminal import STATUS, WORDS, line, tell, tell_results
 from seerob.core.errors import InputError
 
@@ -146,9 +147,10 @@ def permissible_json(
 
 @contextmanager
 def work_progress(*, quiet: bool) -> Iterator[Any]:
-    """A bar on a terminal that says which part of the work is done; silence elsewhere."""
+    """A bar on a terminal that says which part of the work is done; elsewhere `lines`."""
     if quiet or not STATUS.is_terminal:
-        yield lambda what, share: None
+        say = (lambda _: None) if quiet else lines()
+        yield lambda what, share: say(f"{what}: {share:.0%}")
         return
     from rich.progress import BarColumn, Progress, TextColumn
 

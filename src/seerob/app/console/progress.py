@@ -67,7 +67,7 @@ def progress(duration: float, what: str) -> Iterator[Progress]:
     """
     if not STATUS.is_terminal or duration <= 0:
         say = lines()
-        yield Progress(lambda t: say(f"{what}: at {t:.1f} s"), say)
+        yield Progress(lambda t: say(f"{what}: {t / max(duration, t, 1e-9):.0%}"), say)
         return
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars

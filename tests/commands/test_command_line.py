@@ -417,13 +417,24 @@ def test_a_taken_port_moves_on_and_says_so(capsys, recorded):
     assert f"port {port}: " in out
 
 
-def test_other_machines_need_a_token(capsys, recorded):
-    code, _, err = seerob(
-        capsys, "run", recorded[0], "--host", "0.0.0.0", "--port", "0", "--no-record", "--seconds", "0.1"
-    )
-    assert code == 3
-    assert "token" in err
-    assert err.count("\n") == 1
+def test_other_machines_are_served_encrypted_with_tokens_that_seerob_makes(
+    capsys, recorded, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    asked = ("run", recorded[0], "--host", "0.0.0.0", "--port", "0", "--no-record", "--seconds", "0.1")
+    code, out, _ = seerob(capsys, *asked)
+    assert code in (0, 2)
+    pages = [line.split("https://localhost:")[1] for line in out.splitlines() if "https://localhost:" in line]
+    tokens = [page.split("?token=")[1].split()[0] for page in pages]
+    assert len(set(tokens)) == 3
+    assert {len(token) for token in tokens} == {32}
+    assert str(tmp_path / "seerob" / "tls" / "authority.pem") in out
+    code, out, _ = seerob(capsys, *asked, "--clear-text")
+    assert "http://localhost:" in out
+    assert "unencrypted" in out
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    code, out, err = seerob(capsys, *asked)
+    assert (code, "seerob[tls]" in err, "page " in out) == (3, True, False)
 
 
 def test_live_for_a_while_writes_everything_and_ends_with_the_verdict(capsys, tmp_path):

@@ -19,6 +19,7 @@ from seerob.app.console.progress import announced, progress
 from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
     OUT,
+    Exit,
     add_output,
     add_workstation,
     allowed,
@@ -76,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
             add_sections(opened, station, found, cut)
         if bounds:
             add_section(opened, bounds)
-        writers = announced(opened, list(map(file_of, sinks)), tick.say)
+        writers = announced(opened, list(map(file_of, sinks)), tick.say, outlived=True)
         summary = station.run(writers=writers, scene=scene, progress=tick)
         moving, writing = tick.moving, tick.writing
     if options.json:
@@ -85,16 +86,18 @@ def run(options: argparse.Namespace) -> int:
             more["bounds"] = [bound.figures() for bound in bounds]
         if options.permissible:
             more["permissible"] = [permissible_json(found, cut, [], folder) for found, cut in every]
+        failed = {str(folder / w.file): str(w.failure) for w in writers if w.failure is not None}
+        if failed:
+            more["not_written"] = failed
         OUT.print(results_json(summary, folder=str(folder), **more), markup=False)
-        return exit_code(summary.verdict)
+        return Exit.ERROR if failed else exit_code(summary.verdict)
     line("ran", f"{summary.duration:.1f} s of motion in {moving:.1f} s, then wrote for {writing:.1f} s")
     tell_results(summary)
     for found, cut in every:
         tell_plan(found, cut)
     for bound in bounds:
         line("bound", bound.sentence())
-    tell_files(sinks, folder)
-    return exit_code(summary.verdict)
+    return exit_code(summary.verdict) if tell_files(sinks, folder, writers) else Exit.ERROR
 
 
 def _bounds(station: Station) -> list[Bound]:

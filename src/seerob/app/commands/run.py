@@ -11,6 +11,7 @@ from seerob.app.console.loading import compiled
 from seerob.app.console.progress import announced, spinner
 from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
+    Exit,
     add_allowed,
     allowed,
     describe,
@@ -26,6 +27,7 @@ from seerob.core.errors import InputError
 
 if TYPE_CHECKING:
     from seerob.core.snapshot import Scene
+    from seerob.outputs.sink import Writer
     from seerob.session.station import Station
     from seerob.session.writing.cartesian_targets import CartesianTargets
     from seerob.session.writing.triggers import Triggers
@@ -115,7 +117,8 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             now = t
 
         with spinner() as say, opened_sinks(station, sinks, folder, scene) as opened:
-            writers = announced(opened, list(map(file_of, sinks)), say)
+            files = announced(opened, list(map(file_of, sinks)), say, outlived=True)
+            writers: list[Writer] = [view, *files]
             for writer in opened:
                 if isinstance(writer, RecordsVisitors):
                     writer.watch(view.server.visits)
@@ -123,14 +126,13 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             _tell_ends(station)
             writers += _triggers(station, allow=options.allow_writing)
             writers += _targets(station, allow=options.allow_writing)
-            summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
+            summary = station.run(writers=writers, live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
     for name, (late, bound) in summary.late.items():
         text = f"{name}: heard up to {1e3 * late:.0f} ms later than at its best; {1e3 * bound:.0f} ms may be"
         line("late", text, "yellow" if late > bound else "")
     tell_results(summary)
-    tell_files(sinks, folder)
-    return exit_code(summary.verdict)
+    return exit_code(summary.verdict) if tell_files(sinks, folder, files) else Exit.ERROR
 
 
 def _tell_ends(station: Station) -> None:

@@ -186,7 +186,7 @@ def compiled(path: Path, allowed: Allowed = NOTHING, *, quiet: bool = False, sou
 
     file = locate(path)
     with uncollected():
-        return _compiled(path, file, quiet=quiet, sources=sources)
+        return _compiled(path, file, allowed, quiet=quiet, sources=sources)
 
 
 @contextmanager
@@ -201,7 +201,7 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def _compiled(path: Path, file: Path, *, quiet: bool, sources: bool) -> Station:
+def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources: bool) -> Station:
     compile_loops()  # before the imports: many loops are compiled by them
     from seerob.session.reading import readable, shortened
     from seerob.session.station import Station

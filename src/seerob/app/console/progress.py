@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from seerob.app.console.printable import printable
 from seerob.app.console.terminal import STATUS
+from seerob.core.errors import SeerobError
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Snapshot
-from seerob.outputs.sink import KeepsResults, Writer
+from seerob.outputs.sink import AtEnd, KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
 
 
@@ -83,14 +86,37 @@ def progress(duration: float, what: str) -> Iterator[Progress]:
 
 
 class Announced:
-    """A writer that says what it writes while it is closed: a report takes seconds."""
+    """A writer that says what it writes while it is closed: a report takes seconds.
 
-    def __init__(self, writer: Writer, file: str, say: Callable[[str], None]) -> None:
-        self._writer, self._file, self._say = writer, file, say
+    Args:
+        writer: The writer.
+        file: Of it.
+        say: Shows a text.
+        outlived: Whether a run goes on, and comes to its verdict, where the file cannot be written. Then what
+            is written at the end is written elsewhere, if there is room.
+
+    Attributes:
+        failure: Why the file is not there, or not whole.
+        elsewhere: Where it was written instead.
+    """
+
+    def __init__(
+        self, writer: Writer, file: str, say: Callable[[str], None], *, outlived: bool = False
+    ) -> None:
+        self._writer, self.file, self._say, self._outlived = writer, file, say, outlived
+        self.failure: Exception | None = None
+        self.elsewhere: Path | None = None
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick: what goes out, and what came in to make it."""
-        self._writer.write(snapshot, samples)
+        if self.failure is not None:
+            return
+        try:
+            self._writer.write(snapshot, samples)
+        except (SeerobError, OSError) as error:
+            if not self._outlived:
+                raise
+            self.failure = error
 
     def share(self, log: ResultLog) -> None:
         """Use the log of the run; adding a snapshot that is in it changes nothing."""
@@ -110,17 +136,36 @@ class Announced:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._announce()
-        self._writer.__exit__(kind, error, trace)
+        try:
+            self._writer.__exit__(kind, error, trace)
+        except (SeerobError, OSError) as failure:
+            if kind is not None or not self._outlived:
+                raise
+            self.failure = self.failure or failure
+            self._write_elsewhere()
+
+    def _write_elsewhere(self) -> None:
+        if not isinstance(self._writer, AtEnd) or not hasattr(self._writer, "path"):
+            return
+        writer: Any = self._writer
+        for near in (tempfile.gettempdir(), Path.home()):
+            with suppress(SeerobError, OSError):
+                writer.path = Path(tempfile.mkdtemp(prefix="seerob-", dir=near)) / self.file
+                writer.close()
+                self.elsewhere = writer.path
+                return
 
     def _announce(self) -> None:
-        self._say(f"writing {self._file}")
+        self._say(f"writing {self.file}")
         if hasattr(self._writer, "progress"):
-            self._writer.progress = lambda done, total: self._say(f"writing {self._file}: {done} of {total}")
+            self._writer.progress = lambda done, total: self._say(f"writing {self.file}: {done} of {total}")
 
 
-def announced(writers: Sequence[Writer], files: Sequence[str], say: Callable[[str], None]) -> list[Writer]:
-    """Writers that say which file they are writing."""
-    return [Announced(writer, file, say) for writer, file in zip(writers, files, strict=True)]
+def announced(
+    writers: Sequence[Writer], files: Sequence[str], say: Callable[[str], None], *, outlived: bool = False
+) -> list[Announced]:
+    """Writers that say which file they are writing; ``outlived`` as of `Announced`."""
+    return [Announced(w, file, say, outlived=outlived) for w, file in zip(writers, files, strict=True)]
 
 
 @contextmanager

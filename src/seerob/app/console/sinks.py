@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
+from seerob.app.console.progress import Announced
 from seerob.app.console.terminal import line
 from seerob.core.errors import InputError
 from seerob.outputs.sink import Sink
@@ -74,8 +75,15 @@ def refuse_existing(sinks: list[Sink], folder: Path) -> None:
             raise InputError.at(folder / file_of(sink), "", "exists already", "give another folder with -o")
 
 
-def tell_files(sinks: list[Sink], folder: Path) -> None:
-    """One line per file that was written."""
+def tell_files(sinks: list[Sink], folder: Path, writers: Sequence[Announced] = ()) -> bool:
+    """One line per file that was written, or could not be; whether all of them are there."""
+    failed = {writer.file: writer for writer in writers if writer.failure is not None}
     for sink in sinks:
-        if file_of(sink):
-            line("wrote", str(folder / file_of(sink)))
+        file = file_of(sink)
+        if file and file not in failed:
+            line("wrote", str(folder / file))
+    for file, writer in failed.items():
+        line("not written", f"{folder / file}: {writer.failure}", "bold red")
+        if writer.elsewhere is not None:
+            line("wrote", f"{writer.elsewhere}  (instead)", "yellow")
+    return not failed

@@ -19,11 +19,11 @@ NODE := $(VENV)/.node
 PAGE := src/seerob/app/server/page/index.html
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock clean
+.PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock audit clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo "also: check format unit web-test package bench soak mutate wire web build docs lock clean"
+	@echo "also: check format unit web-test package bench soak mutate wire web build docs lock audit clean"
 
 # -- the two commands ---------------------------------------------------------------------------
 
@@ -121,6 +121,12 @@ web: $(PAGE)
 build: $(DEV) $(PAGE)
 	rm -rf dist
 	$(BIN)/python -m build --no-isolation --wheel --sdist
+	$(BIN)/python scripts/sbom dist/seerob.cdx.json
+
+# Known flaws of what is locked: asks the advisory database, and needs pip-audit (pipx install pip-audit).
+audit:
+	pip-audit --require-hashes --disable-pip -r requirements/run.txt
+	pip-audit --require-hashes --disable-pip -r requirements/dev.txt
 
 # Each limit, sign, unit and comparison of the verdicts changed in turn: minutes.
 mutate: $(DEV)

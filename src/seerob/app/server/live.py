@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 from array import array
 from collections import deque
-from math import ceil, log2, nan
+from math import ceil, inf, log2, nan
 from time import monotonic
 
 import numpy as np
@@ -140,6 +140,11 @@ TELL_EVERY = 1.0
 """How often pages are told the shares of a run that goes on [s]; a verdict that changes, at once."""
 
 
+OLD = 0.25
+"""A snapshot that waited longer before it could be shown, or was computed across such a pause of the whole
+process, is not the present any more [s]: it goes into the history only."""
+
+
 class Live:
     """Takes snapshots from any one thread without ever making it wait.
 
@@ -155,7 +160,9 @@ class Live:
 
     def __init__(self, *, rate: float = 60.0) -> None:
         self._pause = 1.0 / rate
-        self._inbox: deque[Snapshot] = deque(maxlen=WAITING)
+        self._inbox: deque[tuple[Snapshot, float]] = deque(maxlen=WAITING)
+        self._published: tuple[float, float] | None = None
+        self._interrupted = False
         self._past = Past()
         self._newest = 0.0
         self._finished = False
@@ -166,7 +173,13 @@ class Live:
         """Hand over what is now; returns at once."""
         # The server's thread comes and looks. Waking it would be a system call, after which this
         # thread may have to wait for the interpreter's lock: 5 ms of a 10 ms tick.
-        self._inbox.append(snapshot)
+        now = monotonic()
+        if self._published is not None:
+            pause = now - self._published[1] - max(snapshot.t - self._published[0], 0.0)
+            # One that always takes so long is slow, not interrupted.
+            self._interrupted = pause > OLD and not self._interrupted
+        self._published = snapshot.t, now
+        self._inbox.append((snapshot, -inf if self._interrupted else now))
 
     def finish(self) -> None:
         """Say that no more will come, so that no page takes the last picture for the present."""
@@ -194,13 +207,14 @@ class Live:
         again = 0.0
         while True:
             finished = self._finished  # before looking: what was published earlier comes first
-            newest = None
+            newest, then = None, -inf
             for _ in range(len(self._inbox)):
-                newest = self._inbox.popleft()
+                newest, then = self._inbox.popleft()
                 self._past.add(newest)
             if newest is not None:
                 self._newest = newest.t
-                audience.show(newest)
+                if finished or monotonic() - then <= OLD:
+                    audience.show(newest)
                 self._past.tidy()
             now = monotonic()
             if (

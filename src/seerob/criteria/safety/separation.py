@@ -39,6 +39,7 @@ from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shift
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import REACHING, WALKING
 from seerob.kernels.separation import EXCEEDED, UNDECIDED, WITHIN, judged, separations
+from seerob.kernels.spans import greatest
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
@@ -534,12 +535,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
             ranges = [(span.fast, span.slow)]
             if span.noise.any():
                 ranges.append((span.fast + span.noise, span.slow + span.noise[: len(span.slow)]))
-            sides = [
-                [(v[parts], float(v[people].max(initial=0.0))) for v in (most, least)]
-                for most, least in ranges
-            ]
+            sides = [[(v[parts], greatest(v, people)) for v in (most, least)] for most, least in ranges]
             risen = [S_p(*most) - S_p(*least) for S_p in required for most, least in sides]
-            return np.asarray(np.max(risen, axis=0))
+            return risen[0] if len(risen) == 1 else np.asarray(np.max(risen, axis=0))
 
         return rises
 

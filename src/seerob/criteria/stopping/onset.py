@@ -154,7 +154,9 @@ class Foreseen:
         self._robot, self._gap, self._T_r = robot, gap, T_r
         self._period = model.workstation.engine.tick
         self._with = (robot.name, *robot.riders, *model.carriers_of(robot.name))
-        self._data = mujoco.MjData(model.mj)
+        self._data = data = mujoco.MjData(model.mj)
+        # To ask the data for them takes longer than to use them.
+        self._views = data.qpos, data.qvel, data.xmat, data.xpos, data.cvel, data.subtree_com
         bodies = [model.bodies[i] for i in gap.b]
         self._corners = stacked([body.corners for body in bodies])
         self._reach = np.array([body.radius + body.deviation for body in bodies])
@@ -255,16 +257,15 @@ class Foreseen:
     def _speeds(self, state: State, now: mujoco.MjData, q: Array, qd: Array, speeds: Array) -> None:
         """Of the parts [m/s], into the last argument (n,), with the robot elsewhere and all others as now."""
         mj, data, robot = state.model.mj, self._data, self._robot
-        data.qpos[:], data.qvel[:] = now.qpos, now.qvel
-        data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
-        data.qvel[robot.v_address] = robot.coupling @ qd
+        qpos, qvel, xmat, xpos, cvel, com = self._views
+        qpos[:], qvel[:] = now.qpos, now.qvel
+        qpos[robot.q_address] = robot.coupling @ q + robot.offset
+        qvel[robot.v_address] = robot.coupling @ qd
         mujoco.mj_kinematics(mj, data)
         mujoco.mj_comPos(mj, data)
         mujoco.mj_comVel(mj, data)
         ids, roots = (each[self._parts] for each in (state.attachments.ids, state.attachments.roots))
-        fastest_of(
-            data.xmat, data.xpos, data.cvel, data.subtree_com, ids, roots, *self._corners, self._reach, speeds
-        )
+        fastest_of(xmat, xpos, cvel, com, ids, roots, *self._corners, self._reach, speeds)
 
 
 class _End(NamedTuple):

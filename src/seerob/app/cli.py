@@ -23,6 +23,7 @@ COMMANDS = (
     "assess",
     "replay",
     "report",
+    "repair",
     "swept",
     "permissible",
     "plan",

@@ -108,7 +108,12 @@ class Recording:
     @property
     def complete(self) -> bool:
         """Whether the writer finished the file and nothing read so far was damaged."""
-        return self._index.finished and not self._damage
+        return self._ended and not self._damage
+
+    @property
+    def _ended(self) -> bool:
+        """Whether the recorder itself ended the file: another program may have closed what was cut off."""
+        return self._index.finished and END_METADATA in self._index.metadata
 
     @property
     def metadata(self) -> dict[str, str]:
@@ -119,7 +124,7 @@ class Recording:
     def findings(self) -> tuple[Finding, ...]:
         """What is missing from this recording, as far as it is known by now."""
         texts = list(self._damage)
-        if not self._index.finished:
+        if not self._ended:
             texts.append(
                 f"the recording was cut off: it can be read until t = {self.end:.3f} s, less than a second "
                 f"after that may be lost ({self._index.unread} bytes at the end hold no whole record)"

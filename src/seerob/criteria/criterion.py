@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple, Protocol
 
 from msgspec import Meta, Struct
 
 from seerob.core.errors import UnknownName
 from seerob.core.quantities import Seconds
-from seerob.core.snapshot import Basis, Result, Verdict
+from seerob.core.snapshot import Basis, Finding, Result, Verdict
 from seerob.core.verdict import keeps
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from seerob.recording.answers import Answers
     from seerob.twin.spans import Falls, Margin, Points, Span
     from seerob.twin.state import State
-    from seerob.twin.states import States
+    from seerob.twin.states import Motion, States
 
 Evaluate = Callable[["State"], Result]
 """Called at each tick (or each ``every``); may raise `Undecided`."""
@@ -54,6 +54,19 @@ class Follows(NamedTuple):
     """Whether the largest since a run began counts."""
     again: Callable[[], Evaluate]
     """Makes what judges an instant by the figure of that instant."""
+
+
+class Claim(Protocol):
+    """A figure that the file states: where a motion contradicts it, nothing that rests on it is WITHIN."""
+
+    holds: tuple[str, ...]
+    """Names of what rests on it."""
+
+    def of_motion(self, motion: Motion, what: str = "") -> Finding | None:
+        """What a motion that is known in advance contradicts; ``what``: where that is from."""
+
+    def __call__(self, state: State) -> Finding | None:
+        """What is seen to contradict it, asked at every tick; None for nothing."""
 
 
 EvaluateMany = Callable[["States"], "Answers"]
@@ -165,6 +178,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
         """Name of a robot → how far ahead it asks what its recorded motion does [s], `State.foresee`."""
         return {}
+
+    def claims(self, model: Model) -> Sequence[Claim]:
+        """Figures of its own that the motion of its subjects can contradict."""
+        return ()
 
     def variables(self) -> dict[str, str]:
         """Variables of the dictionary that it asks, and the SI unit that each must have, or ``bool``."""

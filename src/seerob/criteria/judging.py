@@ -20,7 +20,7 @@ from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.core.verdict import ROUNDING, keeps
 from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.criterion import Claim, Criterion, Evaluate
 from seerob.criteria.noisy_speeds import shaken
 from seerob.model.model import Model
 from seerob.twin.state import VARIABLE, State
@@ -323,6 +323,10 @@ class Judge:
         self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
         self._as_heard: AsHeard | None = None
+        self._worded: tuple[Finding, ...] = ()
+        """What it says now."""
+        self._claims: list[Claim] = []
+        """That nothing has contradicted yet."""
         self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
         self._declared: tuple[frozenset[str], ...] = ()
         """Of each criterion, whom it says that it rests on, and the variables."""
@@ -348,9 +352,17 @@ class Judge:
             self._declared = tuple(_all_declared(bound.criterion, model) for bound in self._bound)
             self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
             self._as_heard = AsHeard(model)
+            known = {finding.holds for finding in findings}
+            claims = (claim for one in self._bound for claim in one.criterion.claims(model))
+            self._claims = [claim for claim in claims if claim.holds not in known]
         assert self._as_heard is not None
-        if (worded := self._as_heard.at(state)) is not None:
-            findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *worded)))
+        worded = self._as_heard.at(state)
+        refuted = [(claim, what) for claim in self._claims if (what := claim(state)) is not None]
+        if worded is not None or refuted:
+            self._worded = self._worded if worded is None else worded
+            self._findings = (*self._findings, *(what for _, what in refuted))
+            self._claims = [claim for claim in self._claims if claim not in [one for one, _ in refuted]]
+            findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *self._worded)))
             self._held = tuple(held(bound.criterion, state.model, findings) for bound in self._bound)
             self._held_names = held_names(findings, state.model)
         results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))

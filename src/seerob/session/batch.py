@@ -167,6 +167,10 @@ def judged(
     """
     n = len(motion.t)
     findings = tuple(dict.fromkeys((*model.findings, *findings)))
+    if motion.ways is not None:
+        claims = (claim for one in bound for claim in one.criterion.claims(model))
+        refuted = (each.of_motion(motion) for each in claims if each.holds not in {f.holds for f in findings})
+        findings = (*findings, *filter(None, refuted))
     asked, notes = _able(model, bound, findings)
     length = min(max(STRETCH, -(-n // SHARES)), LONGEST)
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, length), n]) if begin < end]

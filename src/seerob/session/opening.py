@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace as changed
 from itertools import islice
 
 import numpy as np
@@ -23,11 +24,14 @@ from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.in_place import implausible_motion
 from seerob.twin.own_words import compared, said_by
+from seerob.twin.states import motion_of
 from seerob.workstation.plausibility.of_file import findings as implausible
 from seerob.workstation.source import Matrix4, Opened, Source, Target, delayed
 
 FIRST, LOOKS = 2000, 8
 """Samples at the begin of a recorded motion, and how many of them are looked at for where it goes."""
+MOST_CLAIMED = 100_000
+"""Samples of a file against which what criteria state is held, evenly."""
 MOST_NAMED = 5
 """Variables in one finding."""
 
@@ -62,7 +66,11 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
     if problems:
         raise InputError(problems)
     if opened:
-        found = (*implausible_motion(model, _begins(model, opened)), *_clocks(opened))
+        found = (
+            *implausible_motion(model, _begins(model, opened)),
+            *_clocks(opened),
+            *_contradicted(model, opened),
+        )
         source, first = opened[0]
         opened[0] = source, replace(first, findings=(*first.findings, *found))
     return tuple((source, delayed(each, source.begins or 0.0)) for source, each in opened)
@@ -194,6 +202,32 @@ def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
     if said is not None:
         found += compared(model, name, said)
     return replace(opened, findings=tuple(found))
+
+
+def _contradicted(model: Model, opened: Sequence[tuple[Source, Opened]]) -> Iterator[Finding]:
+    """What criteria state of a robot, and its recorded motion contradicts."""
+    for source, one in opened:
+        samples, name = one.samples, source.target()
+        claims = [
+            claim
+            for criterion in model.workstation.safety
+            if name in criterion.subjects()
+            for claim in criterion.claims(model)
+        ]
+        if not claims or not isinstance(samples, TrajectorySamples) or samples.qd is None:
+            continue
+        motion = samples.trajectory
+        some = slice(None, None, -(-len(motion.t) // MOST_CLAIMED))
+        t, q, qd = motion.t[some], motion.q[some], samples.qd[some]
+        places = motion_of(model, {name: q}, {name: qd}, t - t[0])
+        errors = {} if samples.qd_error is None else {name: np.tile(samples.qd_error, (len(t), 1))}
+        doubts = dict(places.doubts)
+        if motion.invalid is not None:
+            doubts[name] = np.where(motion.invalid[some], "invalid", doubts[name]).astype(object)
+        places = changed(places, doubts=doubts, speed_errors=errors)
+        for claim in claims:
+            found = claim.of_motion(places, f"in {_file(source)} ")
+            yield from () if found is None else (found,)
 
 
 def _placed(problem: Problem, source: Source, key: str, file: str) -> Problem:

@@ -192,6 +192,14 @@ class States:
         """Say that what follows depends on robots or humans."""
         self.asked.update(names)
 
+    def everywhere(self) -> tuple[Array, Array]:
+        """Rotations and positions [m] of all bodies, whoever was heard: for bounds, never for a verdict.
+
+        Returns:
+            Shapes (N, n, 3, 3) and (N, n, 3).
+        """
+        return self._rotations, self._positions
+
     def placed(self, bodies: Sequence[int]) -> tuple[Array, Array]:
         """World from body, and the origins in the world [m], of these bodies; of others NaN.
 

@@ -3,7 +3,7 @@ r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [W
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -34,6 +34,7 @@ from seerob.criteria.stopping.many_instants import separations as at_instants
 from seerob.criteria.stopping.models import MOVING, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.search import TOP, factor_by_search
+from seerob.criteria.stopping.stated_acceleration import StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
 from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shifted, tolerances
 from seerob.description.norms import iso_13855
@@ -265,6 +266,24 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return {}
         worst = self._by_device(model)[0].at_worst(model).stop.reaction
         return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
+
+    def claims(self, model: Model) -> Sequence[StatedAcceleration]:
+        """Claim that the robot gets no faster than ``stop.acceleration`` says while it reacts."""
+        a, station = self.stop.acceleration, model.workstation
+        if a is None or self not in station.safety:
+            return ()
+        areas = (area for area in station.areas if area.swept and area.swept.separation == self.name)
+        on_it = (one for one in station.safety if getattr(one, "separation", None) == self.name)
+        return (
+            StatedAcceleration(
+                model,
+                self.moving(model),
+                a,
+                self._by_device(model)[0].at_worst(model).stop.reaction,
+                f"safety[{station.safety.index(self)}].stop.acceleration",
+                (self.name, *(each.name for each in (*on_it, *areas))),
+            ),
+        )
 
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""

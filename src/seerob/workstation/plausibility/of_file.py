@@ -91,17 +91,22 @@ def findings(all_of_them: Iterable[Quantity], confirmed: Sequence[Confirmed]) ->
         if row is None or value is None:
             continue
         text = sentence(quantity, value, row)
-        said = [(one, factor) for one in confirmed for k, factor in canonical(one.key) if k == quantity.key]
-        why = [one.why for one, factor in said if same(scaled(one.value, factor), quantity)]
+        why, other = confirmation(quantity, confirmed)
         subject = next((name for name in quantity.about if name != "*"), quantity.key)
         if why:
-            text = f"{text.partition(', which is not plausible')[0]}; confirmed: {why[0]}"
+            text = f"{text.partition(', which is not plausible')[0]}; confirmed: {why}"
             yield Finding(level="note", subject=subject, text=text)
             continue
-        if said:
-            text += f"; the file confirms {said[0][0].value}, another value"
+        text += other
         text += f"; {how_to_confirm(quantity)}"
         yield Finding(level="warning", subject=subject, text=text, holds=quantity.about)
+
+
+def confirmation(quantity: Quantity, confirmed: Sequence[Confirmed]) -> tuple[str, str]:
+    """Why a quantity is as it is meant, empty when nobody says so, and what is confirmed of it instead."""
+    said = [(one, factor) for one in confirmed for k, factor in canonical(one.key) if k == quantity.key]
+    why = next((one.why for one, factor in said if same(scaled(one.value, factor), quantity)), "")
+    return why, f"; the file confirms {said[0][0].value}, another value" if said and not why else ""
 
 
 def unknown(confirmed: Mapping[int, Confirmed], entries: Entries, engine: Engine, file: str) -> list[Problem]:

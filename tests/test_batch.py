@@ -119,9 +119,18 @@ every = 0.1
 """
 
 
+CONFIRMED = "".join(
+    f'[[confirmed]]\nkey = "safety[{i}].stop.acceleration"\nvalue = 0\nwhy = "S_p of present speeds"\n'
+    for i, block in enumerate((MORE + SLOW).split("[[safety]]")[1:])
+    if "acceleration = 0" in block
+)
+
+
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
-    return made(tmp_path_factory.mktemp("cell"), "engine = { physics = false }\n" + UR10 + MORE + SLOW)
+    return made(
+        tmp_path_factory.mktemp("cell"), "engine = { physics = false }\n" + UR10 + MORE + SLOW + CONFIRMED
+    )
 
 
 @pytest.fixture(scope="module")

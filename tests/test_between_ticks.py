@@ -614,6 +614,7 @@ intrusion = 0
 human_uncertainty = 0
 robot_uncertainty = 0
 """
+MEANT = '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nvalue = 0\nwhy = "S_p of present speeds"\n'
 AROUND = '[[safety]]\nkind = "separation_area"\nname = "c"\nseparation = "s"\nof = "op"\n'
 
 
@@ -637,6 +638,7 @@ def test_a_fixed_separation_remembers_what_s_p_was_between_two_ticks(tmp_path, k
     def found(faster, speed):
         text = f"engine = {{ physics = false, gravity = [0, 0, 0] }}\n{TWO_R}{person('op', 2.4, 0.5, 0)}"
         text += SOURCE + EVER.format(mode=mode, speed=speed, ahead=ahead) + (AROUND if kind == "area" else "")
+        text += MEANT if ahead else ""
         files = {"arm.urdf": two_r(), "motion.csv": rows(nearing(faster), NEARING.tolist())}
         summary = made(tmp_path / f"{faster}", text, files).run()
         return summary.results["c" if kind == "area" else "s"]

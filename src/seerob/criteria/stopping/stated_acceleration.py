@@ -117,8 +117,7 @@ class StatedAcceleration:
         self._model, self._bodies = model, bodies
         self._a, self._T_r, self.holds = a, T_r, holds
         self._quantity = Quantity(key, "safety.separation.stop.acceleration", "m/s²", (a,), holds)
-        why, _ = confirmation(self._quantity, model.workstation.confirmed)
-        self._confirmed = bool(why)
+        self._confirmed, self._other = confirmation(self._quantity, model.workstation.confirmed)
         self._seen: deque[tuple[float, Array]] = deque()
 
     def of_motion(self, motion: Motion, what: str = "") -> Finding | None:
@@ -129,7 +128,7 @@ class StatedAcceleration:
             what: Where it is from.
         """
         movers = {self._model.bodies[i].carrier for i in self._bodies}
-        if self._confirmed or any(self._model.bodies[i].holder for i in self._bodies):
+        if any(self._model.bodies[i].holder for i in self._bodies):
             return None  # what is picked up moves with the hand, which only the run shows
         bench = Bench(self._model, Questions(self._model))
         rows, shape = np.array(self._bodies, np.int64), SpeedNoise(self._model)
@@ -181,11 +180,14 @@ class StatedAcceleration:
         right = math.ceil(100 * gain.least) / 100
         text = (
             f"{self._quantity.key} = {self._a:g} m/s² is contradicted by the robot's own motion: {what}"
-            f"{part} gets faster by {gain.gained:.3g} m/s from {gain.begin:.3f} s to {gain.end:.3f} s, within "
-            f"the reaction time; give {right:g} or more, or leave it out"
+            f"{part} gets faster by {gain.gained:.3g} m/s from {gain.begin:.3f} s to {gain.end:.3f} s, "
+            "within the reaction time"
         )
-        _, other = confirmation(self._quantity, self._model.workstation.confirmed)
-        text = f"{text}{other}; {how_to_confirm(self._quantity)}"
+        if self._confirmed:
+            text = f"{text}; confirmed: {self._confirmed}"
+            return Finding(level="note", subject=self.holds[0], text=text)
+        text = f"{text}; give {right:g} or more, or leave it out{self._other}"
+        text = f"{text}; {how_to_confirm(self._quantity)}"
         return Finding(level="warning", subject=self.holds[0], text=text, holds=self.holds)
 
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import minimize
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, two_r
 from oracles import pinocchio_oracle as oracle
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
-from seerob.criteria.safety.tool_force import ToolForce, largest_error, wrench_from_torques
+from seerob.criteria.safety.tool_force import (
+    ToolForce,
+    largest_error,
+    pseudo_inverse_change,
+    wrench_from_torques,
+)
 from seerob.description.robots import library
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
@@ -78,6 +84,29 @@ def test_batches():
         np.testing.assert_allclose(found.wrench[i], one.wrench, atol=1e-12)
         np.testing.assert_allclose(found.residual[i], one.residual, atol=1e-12)
         np.testing.assert_allclose(found.hidden[i], one.hidden, atol=1e-12)
+
+
+def used(pair):
+    """Share of the bound that a matrix and another one of full rank, 3 by 4 each, use; from 24 numbers."""
+    a, b = pair.reshape(2, 3, 4)
+    least, change = np.linalg.svd(a, compute_uv=False)[-1], np.linalg.norm(b - a, 2)
+    bound = pseudo_inverse_change(least, min(change, 0.999 * least))
+    return np.linalg.norm(np.linalg.pinv(b) - np.linalg.pinv(a), 2) / bound if change < 0.999 * least else 0.0
+
+
+def test_no_change_of_a_jacobian_changes_its_pseudo_inverse_by_more_than_the_bound():
+    rng = np.random.default_rng(3)
+    a = rng.normal(size=(4000, 12)) * rng.uniform(0.05, 2, (4000, 12))
+    pairs = np.hstack([a, a + rng.normal(size=a.shape) * 10 ** rng.uniform(-3, 0, (4000, 1))])
+    shares = np.array([used(pair) for pair in pairs])
+    worst = pairs[np.argsort(shares)[-3:]]
+    sought = [minimize(lambda x: -used(x), x, method="Nelder-Mead", options={"maxfev": 2000}) for x in worst]
+    top = max(shares.max(), *(-each.fun for each in sought))
+    assert 0.6 < top <= 1
+
+
+def test_a_jacobian_that_may_lose_its_rank_has_no_bound():
+    assert pseudo_inverse_change(0.1, 0.1) == np.inf
 
 
 def test_error_bound_holds_for_every_corner_of_the_uncertainty_and_one_joint_reaches_it():

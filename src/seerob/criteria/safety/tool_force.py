@@ -97,6 +97,30 @@ def largest_error(gain: Array, uncertainty: Array) -> Array:
     return np.asarray(np.linalg.norm(gain[..., :3, :], axis=-2) @ uncertainty)
 
 
+def pseudo_inverse_change(least: float, change: float) -> float:
+    r"""Bound on the change of a pseudo-inverse by a change E of a matrix A of full column rank, in 2-norms.
+
+    With :math:`B = A + E` of full column rank too, and P, :math:`P_\perp` the projectors on the range of A
+    and off it, :math:`A^+ = A^+ P`, :math:`B^+ B = 1`, so that
+
+    .. math:: B^+ - A^+ = -B^+ E A^+ P + B^+ P_\perp .
+
+    With Q on the range of B, of the same dimension, :math:`\|Q P_\perp\| = \|Q_\perp P\|`, which is
+    :math:`\|Q_\perp A A^+\| = \|Q_\perp E A^+\| \le \|E\| \|A^+\|`. So both terms are at most
+    :math:`g = \|A^+\| \|B^+\| \|E\|`, of parts of a vector that are at right angles:
+    :math:`\|B^+ - A^+\| \le \sqrt 2\, g`, as Wedin 1973 has it.
+
+    Args:
+        least: Least singular value of A.
+        change: Bound on the norm of E; infinity comes out where it is not less than ``least``.
+    """
+    number("least", least, 0.0)
+    number("change", change, 0.0)
+    if not least > change:
+        return math.inf
+    return math.sqrt(2) * change / (least * (least - change))
+
+
 class ToolForce(Criterion, frozen=True, kw_only=True):
     """Force that the robot exerts at its tool, from the joint torques that its source measures."""
 
@@ -163,9 +187,8 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         r"""Least margin in a span of a force without moment, from external torques that are measured.
 
-        Torques lie on straight lines between samples. With a Jacobian that changes by at most Δ and stays
-        above where it is damped, its pseudo-inverse changes by at most
-        :math:`\sqrt 2 \Delta / (\sigma (\sigma - \Delta))`, σ its least singular value (Wedin 1973).
+        Torques lie on straight lines between samples, and with a Jacobian that stays above where it is damped
+        its pseudo-inverse changes by at most `pseudo_inverse_change`.
         """
         limit = self.limit
         if limit is None or self.torques != "external" or self.contact != "zero_moment":
@@ -188,7 +211,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             tau = state.torques_within(robot, span.begin, span.end)
             found = wrench_from_torques(J, tau, damped_below=self.damped_below)
             forces = np.linalg.norm(found.wrench, axis=1) + largest_error(found.gain, uncertainty)
-            more = math.sqrt(2) * change / (least * (least - change))
+            more = pseudo_inverse_change(least, change)
             errors = np.linalg.norm(tau, axis=1) + float(uncertainty.sum())
             return limit - float((forces + more * errors).max())
 

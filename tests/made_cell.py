@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -75,6 +76,17 @@ def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return load(folder, allow_plugins=True)
+
+
+def meant(text: str) -> str:
+    """Confirm each ``stop.acceleration`` of a workstation, whatever its robot's motion says of it."""
+    tables = text.split("[[safety]]")[1:]
+    stated = ((i, re.search(r"stop = .*\bacceleration = ([0-9.]+)", table)) for i, table in enumerate(tables))
+    return "".join(
+        f'[[confirmed]]\nkey = "safety[{i}].stop.acceleration"\nvalue = {a[1]}\nwhy = "monitored"\n'
+        for i, a in stated
+        if a is not None
+    )
 
 
 def heard(

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from made_cell import TWO_R, UR10, heard, made, two_r, wave
+from made_cell import TWO_R, UR10, heard, made, meant, two_r, wave
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.criteria.criterion import Criterion
@@ -119,18 +119,12 @@ every = 0.1
 """
 
 
-CONFIRMED = "".join(
-    f'[[confirmed]]\nkey = "safety[{i}].stop.acceleration"\nvalue = 0\nwhy = "S_p of present speeds"\n'
-    for i, block in enumerate((MORE + SLOW).split("[[safety]]")[1:])
-    if "acceleration = 0" in block
-)
+TEXT = "engine = { physics = false }\n" + UR10 + MORE + SLOW
 
 
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
-    return made(
-        tmp_path_factory.mktemp("cell"), "engine = { physics = false }\n" + UR10 + MORE + SLOW + CONFIRMED
-    )
+    return made(tmp_path_factory.mktemp("cell"), TEXT + meant(TEXT))
 
 
 @pytest.fixture(scope="module")

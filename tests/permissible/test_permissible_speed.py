@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, heard, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, heard, made, meant, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError
 from seerob.session.permissible import evaluation
@@ -44,7 +44,7 @@ def turn(duration=1.0, angle=0.4):
 
 def cell(folder, *criteria, x=3.2, more="", masses=(1.0, 1.0), limits=LIMITS):
     text = FLOATING + TWO_R + limits + PERSON.format(x=x) + SOURCE + more + "".join(criteria)
-    return made(folder, text, {"arm.urdf": two_r(masses=masses), "motion.csv": turn()})
+    return made(folder, text + meant(text), {"arm.urdf": two_r(masses=masses), "motion.csv": turn()})
 
 
 COARSE = Wish(spacing=0.1, verify=0.02)

@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_cells import random_cell, station
+from random_cells import files, random_cell, station
 from test_bounds import by_table, map_csv
 
+from made_cell import meant
 from seerob.core.snapshot import Verdict
 from seerob.recording.series import CODES
 from seerob.session import batch
@@ -106,7 +107,9 @@ def cell_of(cell, folder, figures):
     folder.mkdir(parents=True, exist_ok=True)
     places = [(*[x] * n, figures["path"]) for x in (0.0, 0.01)]
     (folder / "map.csv").write_text(map_csv(units, places))
-    return station(replace(cell, more=cell.more + asked(cell, figures)), folder)
+    asking = replace(cell, more=cell.more + asked(cell, figures))
+    # How fast the arm gets from tick to tick is not the matter here.
+    return station(replace(asking, more=asking.more + meant(files(asking)["workstation.toml"])), folder)
 
 
 def at_ticks(made):

@@ -93,7 +93,8 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How fast any point of the robot may get faster during the reaction time [m/s²]; 0 where your safety
     controller sees to it. When not given: what a motion from a file is known to do; of a live robot the
     ``acceleration_limits`` of its table; else all of its ``velocity_limits`` at once, and between that and no
-    acceleration the verdict is undecided."""
+    acceleration the verdict is undecided. Where the robot's own motion contradicts what is given, nothing
+    that rests on it is within until it is corrected or confirmed."""
     tolerance: StopTolerance | None = None
     """How far ``reaction``, ``stopping`` and ``deceleration`` may be off, either way."""
 

@@ -18,17 +18,19 @@ STEP = 2.5e-4
 class Chain:
     """A chain of boxes behind joints that turn and slide about any axes."""
 
-    def __init__(self, rng):
+    def __init__(self, rng, *, turning=False):
         n = int(rng.integers(1, 6))
-        self.slides = rng.random(n) < 0.25
+        self.slides = (rng.random(n) < 0.25) & (not turning)
         links, joints, self.boxes = ['<link name="base"/>'], [], []
         for k in range(n):
             x, size = rng.normal(size=3) * 0.2, rng.uniform(0.02, 0.4, 3)
             self.boxes.append((x, size))
+            where = f'<origin xyz="{x[0]} {x[1]} {x[2]}"/>'
             links.append(
-                f'<link name="l{k}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
-                f'ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="{x[0]} {x[1]} {x[2]}"/>'
-                f'<geometry><box size="{size[0]} {size[1]} {size[2]}"/></geometry></collision></link>'
+                f'<link name="l{k}"><inertial>{where}<mass value="{rng.uniform(0.5, 4)}"/>'
+                '<inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
+                f'<collision>{where}<geometry><box size="{size[0]} {size[1]} {size[2]}"/></geometry>'
+                "</collision></link>"
             )
             at, turn, axis = rng.normal(size=3) * 0.3, rng.normal(size=3), rng.normal(size=3)
             axis /= np.linalg.norm(axis)

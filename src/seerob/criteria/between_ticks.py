@@ -68,11 +68,13 @@ class Watch:
     """Another one of it, which is asked of instants between ticks."""
     people: tuple[str, ...]
     """Whose place it depends on: how well devices know that changes from tick to tick."""
+    looks: int
+    """Instants that are looked at between two ticks at most."""
 
     @property
     def accepted(self) -> str:
         """Why the file accepts what is not known between ticks; what is known to exceed there counts."""
-        return "" if self.lowest is None else self.criterion.between_samples or ""
+        return self.criterion.between_samples or "" if self.looks < MOST else ""
 
 
 def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
@@ -84,7 +86,8 @@ def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     follows = criterion.follows(model, points)
     within = criterion.follows(model, points)
     again = follows.again if follows is not None else lambda: criterion.bind(model)
-    return Watch(criterion, points, falls, lowest, remembers, again, follows, within, people)
+    looks = 0 if criterion.bounded_once else MOST if lowest is None else FEW
+    return Watch(criterion, points, falls, lowest, remembers, again, follows, within, people, looks)
 
 
 def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
@@ -450,7 +453,7 @@ class BetweenTicks:
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
         invalid_reason = ""
-        for _ in range(MOST if watch.lowest is None else FEW):
+        for _ in range(watch.looks):
             if not spans:
                 break
             _, _, a, b = heapq.heappop(spans)

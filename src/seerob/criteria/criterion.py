@@ -154,6 +154,11 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Instead of `falls`: what bounds its margin within a span of which the twin at one end is given."""
         return None
 
+    @property
+    def bounded_once(self) -> bool:
+        """Whether what bounds it gets no sharper within parts of a span, so that none is looked at."""
+        return False
+
     def follows(self, model: Model, points: Points) -> Follows | None:
         """What its limit follows from between instants, when that is bounded apart; see `Follows`."""
         return None

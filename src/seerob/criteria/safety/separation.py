@@ -475,6 +475,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         return falls
 
+    @property
+    def bounded_once(self) -> bool:
+        """Whether energy bounds the stops that begin within a span: those of half of it are no shorter."""
+        return self.stop.model == "simulated"
+
     def follows(self, model: Model, points: Points) -> Follows | None:
         """With ``mode = "fixed"`` the largest S_p counts, also of instants between two ticks."""
         if self.mode != "fixed":

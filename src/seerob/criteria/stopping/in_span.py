@@ -114,7 +114,7 @@ def bind_in_span(
             onset = None
             if held:
                 onset = Onset(v, v * T_r, v, speeds * T_r, speeds)
-            elif (known := _known(span, robot.name, T_r, period, own_v)) is not None:
+            elif (known := known_in_span(span, robot.name, T_r, period, own_v)) is not None:
                 u, ways, whole, q = known
                 u, ways, whole = u + noise, ways + noise * T_r, whole + noise * T_r
                 moved = np.maximum(whole, np.abs(q - middle[own_q]).max(axis=0)) + ROUNDING
@@ -134,7 +134,7 @@ def bind_in_span(
     return bind
 
 
-def _known(
+def known_in_span(
     span: Span, name: str, T_r: float, period: float, own_v: Indices
 ) -> tuple[Array, Array, Array, Array] | None:
     """Of a motion that is known ahead, bounds for reactions that begin in a span, see `onset.Foreseen`.

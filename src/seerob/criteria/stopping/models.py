@@ -16,6 +16,7 @@ from seerob.core.snapshot import Input, Origin
 from seerob.core.tolerances import Shifts
 from seerob.core.transforms import Array
 from seerob.criteria.stopping import table as stopping_table
+from seerob.criteria.stopping.by_energy import bind_braked_in_span
 from seerob.criteria.stopping.by_table import bind_table, not_its_own
 from seerob.criteria.stopping.in_span import InSpan, Stopping, bind_in_span
 from seerob.criteria.stopping.onset import At as OnsetAt
@@ -439,6 +440,8 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
 
         return at
 
+    # Of a positive acceleration such a stop knows nothing.
+    known = not (unknown or stop.acceleration)
     shown = ", ".join("?" if np.isnan(b) else f"{b:g}" for b in brakes)
     inputs = (Input(name="brake torques", value=shown, unit="N·m or N", origin=origin, source=source),)
     way = "whole path" if stop.direction == "path" else "loss of distance to where the person is now"
@@ -462,6 +465,9 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
             "joint friction, damping and mechanical stops, which would shorten the stop",
             "brakes that act late or one after the other: their delay belongs into the reaction time",
         ),
+        in_span=bind_braked_in_span(model, robot, gap, brakes, T_r=stop.reaction, held=stop.acceleration == 0)
+        if known
+        else None,
         costly=True,
         more=f"if masses are off: {', '.join(map(str, masses.tolerances))}" if corners else "",
     )

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.domains import number
+from seerob.core.domains import at_least, number
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -66,6 +66,7 @@ def largest_gain(t: Array, v: Array, a: float, window: float, noise: Array | flo
     """
     number("a", a, 0.0, unit="m/s²")
     number("window", window, 0.0, unit="s")
+    _check(t=t, v=v, noise=noise)
     if not v.size:
         return None
     left = v - a * t[:, None]
@@ -76,6 +77,12 @@ def largest_gain(t: Array, v: Array, a: float, window: float, noise: Array | flo
         return None
     i = first[j] + int(np.argmin(left[first[j] : j + 1, part]))
     return Gain(int(part), float(t[i]), float(t[j]), float(v[j, part] - v[i, part]))
+
+
+def _check(**given: Array | float) -> None:
+    for name, value in given.items():
+        if not np.isfinite(at_least(name, value, unit="s" if name == "t" else "m/s")).all():
+            raise ValueError(f"{name} is not a finite number everywhere")
 
 
 def _least_since(x: Array, first: NDArray[np.int64]) -> Array:
@@ -92,6 +99,7 @@ def _least_since(x: Array, first: NDArray[np.int64]) -> Array:
 
 def explains(t: Array, v: Array, window: float, noise: Array | float = 0.0) -> float:
     """The least acceleration that leaves no gain beyond it [m/s²], from above; as `largest_gain`."""
+    _check(t=t, v=v, noise=noise)
     low, high = 0.0, float((np.diff(v, axis=0) / np.diff(t)[:, None]).max(initial=0.0))
     while high - low > CLOSE * high:
         middle = (low + high) / 2

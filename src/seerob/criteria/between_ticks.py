@@ -86,7 +86,7 @@ def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     follows = criterion.follows(model, points)
     within = criterion.follows(model, points)
     again = follows.again if follows is not None else lambda: criterion.bind(model)
-    looks = 0 if criterion.bounded_once else MOST if lowest is None else FEW
+    looks = 0 if criterion.bounded_once(model) else MOST if lowest is None else FEW
     return Watch(criterion, points, falls, lowest, remembers, again, follows, within, people, looks)
 
 

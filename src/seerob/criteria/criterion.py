@@ -154,8 +154,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Instead of `falls`: what bounds its margin within a span of which the twin at one end is given."""
         return None
 
-    @property
-    def bounded_once(self) -> bool:
+    def bounded_once(self, model: Model) -> bool:
         """Whether what bounds it gets no sharper within parts of a span, so that none is looked at."""
         return False
 

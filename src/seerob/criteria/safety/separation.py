@@ -475,8 +475,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         return falls
 
-    @property
-    def bounded_once(self) -> bool:
+    def bounded_once(self, model: Model) -> bool:
         """Whether energy bounds the stops that begin within a span: those of half of it are no shorter."""
         return self.stop.model == "simulated"
 
@@ -533,7 +532,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if by_speed is None and longest is None:
             return None
         most = by_joints if by_speed is None else known_ahead if stop.lasts else at_speeds
-        return Follows(now, most, CLOSE, keeps, again)
+        close = math.inf if self.bounded_once(model) else CLOSE
+        return Follows(now, most, close, keeps, again)
 
     def lasts(self, model: Model) -> bool:
         """Whether S_p of an instant is at least that of any other in the tick that begins with it.

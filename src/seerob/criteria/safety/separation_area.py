@@ -202,6 +202,10 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
         return falls
 
+    def bounded_once(self, model: Model) -> bool:
+        """Whether S_p of the separation is."""
+        return bool(self._criterion(model).bounded_once(model))
+
     def follows(self, model: Model, points: Points) -> Follows | None:
         """S_p is bounded apart where the largest counts, or where speeds alone do not tell how it changes."""
         criterion = self._criterion(model)

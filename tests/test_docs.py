@@ -102,8 +102,11 @@ def test_command_lines_are_understood(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", pages())
-def test_tables_of_the_workstation_file_are_understood(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_of_the_workstation_file_are_understood(
+    path: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "examples"))  # where the kinds of docs/extending.md are
+    monkeypatch.chdir(tmp_path)  # no kind is taken from below the file's folder
     for text in blocks(path, "toml"):
         if text.startswith("["):
             _, problems = convert_workstation(tomllib.loads(text), path.name, Allowed(plugins=True))

@@ -484,11 +484,11 @@ def said(cell: Cell, folder: Path) -> ResultLog:
 def least_margin(series: Series) -> float:
     """Least distance to the limit over the run, negative beyond it; nan without figures.
 
-    A figure that never has a limit is compared by itself; instants without one are left out where others
-    have one.
+    A figure that only informs is compared by itself; instants without a limit of one that is judged are left
+    out.
     """
     limits, values = series.limits, series.values
-    limits = np.nan_to_num(limits) if np.isnan(limits).all() else limits
+    limits = np.nan_to_num(limits) if series.verdict is None else limits
     margins = limits - values if series.at_most else values - limits
     return float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
 

@@ -7,7 +7,15 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.transforms import transform
-from seerob.twin.own_words import SaidTool, bound, fixed_offset, other_speed, sign_or_unit
+from seerob.twin.own_words import (
+    SaidTool,
+    _differ,
+    _Ways,
+    bound,
+    fixed_offset,
+    other_speed,
+    sign_or_unit,
+)
 
 
 def test_the_largest_distance_that_is_left_decides() -> None:
@@ -131,3 +139,30 @@ def test_the_speed_beside_the_tip_is_that_of_the_closed_form(tool: SaidTool) -> 
     x = -wa * np.sin(a) - wb * (np.sin(b) + 0.2 * np.cos(b))
     y = wa * np.cos(a) + wb * (np.cos(b) - 0.2 * np.sin(b))
     np.testing.assert_allclose(tool.speeds(tool.arm.posture(q), qd), [np.hypot(x, y)], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("said", "twins", "told"),
+    [
+        # 0.02 m/s over 0.5 s, a fifth of the longer way, and 30 ms of 2 m/s.
+        (1.0, (0.74, 0.0), ""),
+        (1.0, (0.72, 0.0), "went 1000 mm in 0.5 s, the twin's 720 mm"),
+        (0.74, (1.0, 9.0), ""),
+        (0.72, (1.0, 9.0), "went 720 mm in 0.5 s, the twin's 1000 mm"),
+        (0.70, (9.0, 1.0), "the twin's 1000 mm"),
+        (0.0, (0.0, 9.0), ""),
+    ],
+)
+def test_ways_of_one_motion(said: float, twins: tuple[float, float], told: str) -> None:
+    """Of several points where the tool centre point may be, the nearest counts."""
+    before, ways = np.array([0.3, 0.4, 0.5]), np.array([said, *twins])
+    speeds = np.full(3, 2.0)
+    then, now = _Ways(4.0, speeds, before), _Ways(4.5, speeds, before + ways)
+    why = _differ(then, now)
+    assert told in why if told else why == ""
+    slow = np.zeros(3)
+    then, now = _Ways(4.0, slow, before), _Ways(4.5, slow, before + ways)
+    assert bool(_differ(then, now)) is (min(abs(w - said) - 0.2 * max(w, said) for w in twins) > 0.01)
+    # What either of both speeds was at one end may lag, not at both.
+    for a, b in ((speeds, slow), (slow, speeds)):
+        assert bool(_differ(_Ways(4.0, a, before), _Ways(4.5, b, before + ways))) is bool(told)

@@ -569,3 +569,29 @@ limit = 0.2
         value = found[0].text.split("value = ")[1].split(",")[0]
         own = f'[[confirmed]]\nkey = "parts[1].inside.table"\nvalue = {value}\nwhy = "it is built in"\n'
         assert not doubted(station_of(tmp_path, text + own))
+
+
+def test_a_vector_is_confirmed_by_all_its_numbers(tmp_path: Path) -> None:
+    """One that is equal in some is another value."""
+    said = '[[confirmed]]\nkey = "robots[0].base.position"\nvalue = {}\nwhy = "a hall"\n'
+    for value, told in (
+        ("[75, 0, 0.75]", False),
+        ("[75, 0, 0.5]", True),
+        ("[60, 0, 0.75]", True),
+        ("75", True),
+    ):
+        text = cell(base="position = [75, 0, 0.75]", more=said.format(value))
+        found = [f for f in doubted(station_of(tmp_path, text)) if f.text.startswith("robots[0].base")]
+        assert bool(found) is told
+
+
+@pytest.mark.parametrize("by", ['sensor = "curtain"', ""])
+def test_what_is_implausible_of_a_sensor_is_of_criteria_that_name_it(tmp_path: Path, by: str) -> None:
+    curtain = "light_curtain = { ends = [[-0.5, 0, 0], [0.5, 0, 0]], height = 1, pitch = 0.1 }"
+    text = cell(more=f'[[sensors]]\nname = "curtain"\nresponse = 100\nsource = "data sheet"\n{curtain}\n')
+    asked = f"human_speed = 1.6\n{by}"
+    (tmp_path / "workstation.toml").write_text(text.replace("human_speed = 1.6", asked))
+    station = read(tmp_path)
+    (found,) = findings(listed(entries_of(station), station.engine), ())
+    assert found.text.startswith("sensors[0].response = 100")
+    assert set(found.holds) == {"curtain", *(["separation"] if by else [])}

@@ -286,3 +286,15 @@ def test_a_source_of_ones_own_returns_what_a_source_returns(cell):
         station = Station(replace(cell.workstation, sources=(Odd(name="own"),)))
         with pytest.raises(SeerobError, match=words):
             station.run()
+
+
+def test_a_source_of_ones_own_that_cannot_be_opened_is_told_with_file_and_key(cell):
+    class Odd(Own, frozen=True, kw_only=True):
+        def open(self, model):
+            return model
+
+    station = Station(replace(cell.workstation, sources=(Odd(name="own"),)))
+    with pytest.raises(
+        SeerobError, match=r"workstation\.toml: sources\[0\]: open of .* fails: TypeError: .*open\("
+    ):
+        station.run()

@@ -50,7 +50,8 @@ def test_no_pose_within_the_span_has_a_longer_lever():
     ("q", "expected"), [((0.0, 0.0), 2.0), ((0.7, np.pi / 2), np.sqrt(2.0)), ((0.3, np.pi), 0.0)]
 )
 def test_the_flange_is_as_far_from_the_first_axis_as_the_arm_is_stretched(tmp_path, q, expected):
-    station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()})
+    text = f"{FLOATING}{TWO_R}base = {{ position = [0.5, -0.3, 0.2], rpy = [0.3, 0, 1] }}\n"
+    station = made(tmp_path, text, {"arm.urdf": two_r()})
     robot, data = station.model.robot("arm"), mujoco.MjData(station.model.mj)
     data.qpos[robot.q_address] = q
     mujoco.mj_kinematics(station.model.mj, data)

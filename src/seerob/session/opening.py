@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace as changed
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
 
-from seerob.core.errors import InputError, Problem
+from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.plugin import home, kind_of
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
+from seerob.criteria.judging import worded
 from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.looked_at import looked_at
 from seerob.devices.variables.live_source import VariablesSource
@@ -55,7 +57,7 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
         problems += _too_short(model, source, delay)
         try:
             driven = source_target(model, source)
-            found = source.open(model.folder, driven)
+            found = _opened(source, model.folder, driven, file, f"sources[{i}]")
             if not (_ships(source) or isinstance(source, LiveSource)):
                 found = looked_at(found, source.name or kind_of("sources", source), driven)
             found = replace(found, findings=(*found.findings, *_lateness(model, source)))
@@ -66,13 +68,13 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
     if problems:
         raise InputError(problems)
     if opened:
-        found = (
+        more = (
             *implausible_motion(model, _begins(model, opened)),
             *_clocks(opened),
             *_contradicted(model, opened),
         )
         source, first = opened[0]
-        opened[0] = source, replace(first, findings=(*first.findings, *found))
+        opened[0] = source, replace(first, findings=(*first.findings, *more))
     return tuple((source, delayed(each, source.begins or 0.0)) for source, each in opened)
 
 
@@ -94,6 +96,24 @@ def reached(model: Model, opened: Sequence[tuple[Source, Opened]]) -> tuple[tupl
     if problems:
         raise InputError(problems)
     return tuple(found)
+
+
+def _opened(source: Source, folder: Path, driven: Target | None, file: str, key: str) -> Opened:
+    """What opening a source gives.
+
+    Raises:
+        SeerobError: Its file is none, or it is one of the user's and fails.
+    """
+    what = f"open of {type(source).__module__}"
+    remedy = "open(self, folder, target) gives a seerob.api.Opened"
+    try:
+        return source.open(folder, driven)
+    except SeerobError:
+        raise
+    except Exception as error:
+        if _ships(source):
+            raise
+        raise InputError.at(file, key, f"{what} fails: {worded(error)}", remedy) from error
 
 
 def _ships(source: Source) -> bool:

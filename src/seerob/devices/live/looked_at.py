@@ -100,7 +100,8 @@ class LookedAt:
         except (SeerobError, OSError):
             raise
         except Exception as error:
-            what = f"it fails after its sample of {t:.3f} s: {type(error).__name__}: {error}"
+            when = f"after its sample of {t:.3f} s" if math.isfinite(t) else "before its first sample"
+            what = f"it fails {when}: {type(error).__name__}: {error}"
             raise InputError.at(self._name, "samples", what, "mend the source") from error
 
     def _check(self, sample: Sample) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core.errors import InputError, UnknownName
+from seerob.core.markers import drawn
 from seerob.core.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, keeps
@@ -75,7 +76,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
             parts: list[Result] = []
-            lit: list[Marker] = []
+            lit: list[tuple[str, Depth, Array]] = []
             asked = [state.closest_per_body(each.gap, strayed=True) for each in watched]
             entered: list[tuple[_Watched, Closests, int]] = []
             for each, found, off in zip(watched, asked, offs, strict=True):
@@ -103,8 +104,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                         interval=(-deep.at_most, -deep.at_least),
                     )
                 )
-                lit.append(Highlight(body=model.bodies[each.gap.b[i]].name, verdict=Verdict.EXCEEDED))
-                lit += _line(deep, found.point_a[i])
+                lit.append((model.bodies[each.gap.b[i]].name, deep, found.point_a[i]))
             return self._result(nearest, perhaps, parts, deeps, lit)
 
         return evaluate
@@ -115,7 +115,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         perhaps: tuple[float, str, float],
         parts: list[Result],
         deeps: Sequence[Depth],
-        lit: list[Marker],
+        lit: Sequence[tuple[str, Depth, Array]],
     ) -> Result:
         room, who = nearest
         interval: tuple[float, float] | None
@@ -134,7 +134,14 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 else who
             )
             interval = (least, room) if least < room else None
-        areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]
+
+        def draw() -> tuple[Marker, ...]:
+            areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]
+            inside: list[Marker] = []
+            for body, deep, border in lit:
+                inside += (Highlight(body=body, verdict=Verdict.EXCEEDED), *_line(deep, border))
+            return *areas, *dict.fromkeys(inside)
+
         return Result(
             name=self.name,
             value=room,
@@ -145,7 +152,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
             reason=reason,
             interval=interval,
             parts=tuple(parts),
-            markers=(*areas, *dict.fromkeys(lit)),
+            markers=drawn(draw),
         )
 
     def _watched(self, model: Model) -> tuple[_Watched, ...]:

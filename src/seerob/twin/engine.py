@@ -370,8 +370,8 @@ class Engine:
         if isinstance(sample, PoseSample):
             return moved_by_poses(self.model, sample)
         mechanism = self.model.mechanism(sample.target)
-        n = len(mechanism.joints)
-        if any(len(values) != n for values in (sample.q, sample.qd, sample.tau) if values is not None):
+        n, qd, tau = len(mechanism.joints), sample.qd, sample.tau
+        if len(sample.q) != n or (qd is not None and len(qd) != n) or (tau is not None and len(tau) != n):
             heard = f"{len(sample.q)} joint values" + (
                 "" if sample.qd is None else f", {len(sample.qd)} speeds"
             )

@@ -463,7 +463,7 @@ def station(cell: Cell, folder: Path) -> Station:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files(cell).items():
         (folder / name).write_text(text)
-    return load(folder)
+    return load(folder, allow_plugins=True)
 
 
 _kept: dict[tuple[str, ...], ResultLog] = {}

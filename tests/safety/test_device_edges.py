@@ -64,7 +64,8 @@ def scanned(folder, tables, *, more="capability = 0.07", resolution=HALF, of="po
 def test_which_kinds_bound_from_below():
     for name in kinds("safety"):
         kind = load("safety", name, Criterion)
-        assert kind.at_most is (name not in BELOW), name
+        if name != "variable":  # what it is told says on which side its limit is
+            assert kind.at_most is (name not in BELOW), name
 
 
 def test_units_of_all_kinds():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -193,6 +194,8 @@ def test_names_of_links_and_patterns_mean_what_is_not_shown_too(tmp_path):
 
 class Forgetful(Criterion, frozen=True, kw_only=True):
     """An own criterion that says nothing of shapes, and not of whom it speaks."""
+
+    at_most: ClassVar[bool] = False
 
     def bind(self, model):
         """See `Criterion.bind`."""

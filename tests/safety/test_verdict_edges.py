@@ -222,7 +222,9 @@ def test_what_is_least_permitted_and_how_far_it_is():
     speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
     ends = Spread(speeds.permissible * 0.9, speeds.permissible, np.zeros((0, 1, n)))
     none = np.zeros((1, n), bool)
-    judged = Judged(np.ones(1), np.zeros(n), none, np.ones(1), speeds, none, np.zeros(n), np.zeros(n))
+    judged = Judged(
+        np.ones(1), np.ones(1, bool), np.zeros(n), none, np.ones(1), speeds, none, np.zeros(n), np.zeros(n)
+    )
     assert judged.least is speeds.permissible
     assert replace(judged, ends=ends).least is ends.low
 
@@ -255,7 +257,7 @@ def test_areas_on_and_beside_the_speed_that_each_allows():
     )
     speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
     judged = Judged(
-        v_r=np.ones(1), v_h=np.zeros(n), near=np.ones((1, n), bool), projected=np.ones(1), speeds=speeds,
+        v_r=np.ones(1), moves=np.ones(1, bool), v_h=np.zeros(n), near=np.ones((1, n), bool), projected=np.ones(1), speeds=speeds,
         clamped=np.zeros((1, n), bool), rows=np.zeros(n, int), ranks=np.zeros(n),
     )  # fmt: skip
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.criteria.contact.clamping import STILL
 from seerob.criteria.contact.impact_mass import Behind
 from seerob.criteria.stopping.models import Stop, bind_stop
 from seerob.criteria.stopping.simulated import StopSimulation
@@ -20,6 +21,10 @@ slide = { along = [1, 0, 0], lower = -1, upper = 1 }
 """
 WALL = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [9, 0, 0] }\n'
 SPEEDS = [(0.0, True), (RESTS, True), (-RESTS, True), (1.05e-3, False), (-1.05e-3, False)]
+
+
+PRESSED = [(0.0, True), (STILL, True), (-STILL, True), (1.05e-6, False), (-1.05e-6, False), (RESTS, False)]
+"""A drive behind the robot presses however slowly it moves it."""
 
 
 def moving(cell, speed):
@@ -61,7 +66,7 @@ def test_a_simulated_stop_is_that_of_the_robot_alone(tmp_path):
     np.testing.assert_array_equal(rests.speeds, moves.speeds)
 
 
-@pytest.mark.parametrize(("speed", "rests"), SPEEDS)
+@pytest.mark.parametrize(("speed", "rests"), PRESSED)
 def test_all_that_moves_is_behind_an_arm_that_is_carried_about(tmp_path, speed, rests):
     cell = made(tmp_path, FLOATING + AXIS + TWO_R + 'on = "axis"\n', {"arm.urdf": two_r()})
     state, behind = moving(cell, speed), Behind(cell.model, cell.model.robot("arm"))

@@ -33,8 +33,8 @@ STOPS = {
 KINDS = {
     "tip": ('kind = "velocity"\nat = "arm"\nlimit = FIGURE\n', 9.0),
     "all": ('kind = "velocity"\nof = "arm"\nlimit = FIGURE\n', 9.0),
-    "energy": ('kind = "kinetic_energy"\nrobot = "arm"\nlimit = FIGURE\n', 900.0),
-    "mass": ('kind = "effective_mass"\nat = "arm"\nlimit = FIGURE\n', 900.0),
+    "energy": ('kind = "kinetic_energy"\nrobot = "arm"\nlimit = FIGURE\n', 240.0),
+    "mass": ('kind = "effective_mass"\nat = "arm"\nlimit = FIGURE\n', 140.0),
     "own": ('kind = "own.joint_speed"\nrobot = "arm"\nlimit = FIGURE\n', 99.0),
     **{
         name: (f'kind = "separation"\nbetween = ["arm", "op"]\nstop = {stop}\n{SPACE}', 0.0)

@@ -257,7 +257,8 @@ def test_areas_on_and_beside_the_speed_that_each_allows():
     )
     speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
     judged = Judged(
-        v_r=np.ones(1), moves=np.ones(1, bool), v_h=np.zeros(n), near=np.ones((1, n), bool), projected=np.ones(1), speeds=speeds,
+        v_r=np.ones(1), moves=np.ones(1, bool), v_h=np.zeros(n), near=np.ones((1, n), bool),
+        projected=np.ones(1), speeds=speeds,
         clamped=np.zeros((1, n), bool), rows=np.zeros(n, int), ranks=np.zeros(n),
     )  # fmt: skip
 

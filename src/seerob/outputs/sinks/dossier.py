@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -17,9 +16,6 @@ from seerob.core.samples import Sample
 from seerob.core.snapshot import Basis, Finding, Scene, Snapshot
 from seerob.outputs.sink import AtEndWithResults, Sink
 from seerob.recording.result_log import result_named
-
-MOST_AT_ONCE = 4
-"""Pictures that are drawn side by side, mostly in compiled loops that hold no lock; each takes 130 MB."""
 
 
 class Dossier(Sink, frozen=True, kw_only=True):
@@ -119,17 +115,9 @@ class DossierWriter(AtEndWithResults):
         stage = Stage(self._scene, self._meshes)
         self.findings.extend(stage.findings)
         drawn = {}
-        pool = ThreadPoolExecutor(min(MOST_AT_ONCE, os.cpu_count() or 1, len(chosen)))
-        try:
-            drawing = [
-                pool.submit(stage.picture, snapshot, result, subjects=subjects.get(result.name, ()))
-                for snapshot, result in chosen
-            ]
-            for k, ((_, result), picture) in enumerate(zip(chosen, drawing, strict=True)):
-                drawn[result.name] = picture.result()
-                self._tell(k + 1, len(chosen) + 1)
-        finally:
-            pool.shutdown(cancel_futures=True)
+        for k, (snapshot, result) in enumerate(chosen):
+            drawn[result.name] = stage.picture(snapshot, result, subjects=subjects.get(result.name, ()))
+            self._tell(k + 1, len(chosen) + 1)
         return drawn
 
     def _bases(self) -> dict[str, Basis]:

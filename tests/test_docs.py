@@ -109,7 +109,9 @@ def test_tables_of_the_workstation_file_are_understood(
     monkeypatch.chdir(tmp_path)  # no kind is taken from below the file's folder
     for text in blocks(path, "toml"):
         if text.startswith("["):
-            _, problems = convert_workstation(tomllib.loads(text), path.name, Allowed(plugins=True))
+            _, problems = convert_workstation(
+                tomllib.loads(text), f"of docs/{path.name}", Allowed(plugins=True)
+            )
             assert not [str(p) for p in problems if not ONLY_NAMES.match(p.what)], text
 
 

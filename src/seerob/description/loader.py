@@ -64,7 +64,7 @@ def _from_file(
         text, files = expanded(path, resolver, arguments)
         robot = urdf.from_text(text, resolver=resolver, name=name)
         return replace(robot, files={**robot.files, **files})
-    if path.suffix.lower() not in {".urdf", ".xml", ".mjcf"}:
+    if path.suffix.lower() not in {".urdf", ".xml"}:
         readable = ".urdf, .xacro and .xml (URDF or MJCF) are read"
         raise InputError.at(model, "", f"{path.suffix or 'no ending'!r} is not a robot description", readable)
     if path.stat().st_size > MAX_BYTES:
@@ -84,8 +84,11 @@ def _path(model: str, folder: Path) -> Path:
     if model.startswith("package:") and not model.startswith("package://"):
         return of_distribution(model.removeprefix("package:"))
     path = folder / model
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+    except (OSError, ValueError) as error:
+        raise InputError.at(model[:200], "", f"is no name of a file: {error.args[-1]}", "name one") from error
     found = as_written_or_in_other_case(path)
     if found is None:
         hint = suggestion(model, [f"library:{known}" for known in library.names()])

@@ -487,18 +487,15 @@ def _digests(files: Mapping[str, bytes]) -> dict[str, str]:
     return {name: sha256(content).hexdigest() for name, content in files.items()}
 
 
-def load(
-    path: Path | str, *, cache: Path | None = None, allow_plugins: bool = False, allow_outside: bool = False
-) -> Station:
+def load(path: Path | str, *, cache: Path | None = None, allow_plugins: bool = False) -> Station:
     """Read and compile a workstation.
 
     Args:
         path: A workstation file, or a folder with a ``workstation.toml``.
         cache: Folder that keeps what takes long to make between starts.
         allow_plugins: Whether dotted kinds that no installed package offers are imported by their names.
-        allow_outside: Whether files outside the folder of the workstation file are read.
 
     Raises:
         InputError: With every mistake in the file and in the files it names.
     """
-    return Station(read(path, Allowed(allow_plugins, allow_outside)), cache=cache)
+    return Station(read(path, Allowed(allow_plugins)), cache=cache)

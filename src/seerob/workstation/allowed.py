@@ -10,8 +10,6 @@ class Allowed(NamedTuple):
 
     plugins: bool = False
     """A dotted kind that no installed package offers is imported by its name (``--allow-plugins``)."""
-    outside: bool = False
-    """Files outside the workstation's folder are read (``--allow-outside``)."""
 
 
 NOTHING = Allowed()

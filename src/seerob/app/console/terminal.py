@@ -134,16 +134,14 @@ def add_workstation(sub: argparse.ArgumentParser) -> None:
 
 
 def add_allowed(sub: argparse.ArgumentParser) -> None:
-    """Options by which a file that is trusted may do more."""
+    """Option by which a file that is trusted may do more."""
     text = "import kinds of the file by their dotted names, which runs their code"
     sub.add_argument("--allow-plugins", action="store_true", help=text)
-    text = "read files that lie outside the workstation's folder"
-    sub.add_argument("--allow-outside", action="store_true", help=text)
 
 
 def allowed(options: argparse.Namespace) -> Allowed:
     """What the command line allows the workstation file to do."""
-    return Allowed(options.allow_plugins, options.allow_outside)
+    return Allowed(options.allow_plugins)
 
 
 def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> None:

@@ -20,6 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.files.zip_members import TooLarge, unpacked
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, transform
 from seerob.description.xml_values import MAX_BYTES, parse_xml
@@ -224,8 +225,11 @@ def _unpack(path: Path, name: str) -> bytes:
             entry = archive.getinfo(name.lstrip("/"))
             if entry.file_size > MAX_BYTES:
                 raise InputError.at(path, name, f"larger than {MAX_BYTES >> 20} MiB", "simplify it first")
-            with archive.open(entry) as file:
-                data = file.read(MAX_BYTES + 1)
+            return unpacked(archive, entry, MAX_BYTES)
+        except TooLarge:
+            raise InputError.at(
+                path, name, f"larger than {MAX_BYTES >> 20} MiB", "simplify it first"
+            ) from None
         except KeyError:
             raise InputError.at(path, name, "is not in the container", "export it again") from None
         except (
@@ -237,9 +241,6 @@ def _unpack(path: Path, name: str) -> bytes:
             ValueError,
         ) as error:
             raise InputError.at(path, name, f"cannot be unpacked: {error}", "export it again") from error
-    if len(data) > MAX_BYTES:
-        raise InputError.at(path, name, f"larger than {MAX_BYTES >> 20} MiB", "simplify it first")
-    return data
 
 
 # -- the tree -----------------------------------------------------------------------------------

@@ -304,6 +304,10 @@ def _mimic(reader: Reader, element: Element, key: str) -> Mimic | None:
     return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 
+LARGEST = 1e9
+"""No mass [kg] and no moment of inertia [kg·m²] of a link is larger."""
+
+
 def _inertial(
     reader: Reader, name: str, link: Element, *, moves: bool, body: bool
 ) -> tuple[Inertial | None, str, Problem | None]:
@@ -322,6 +326,8 @@ def _inertial(
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
         reader.problem(f"{key}.mass.value", f"is {kilograms:g} kg", "a mass is greater than 0")
+    if max(map(abs, (kilograms, xx, yy, zz, xy, xz, yz))) > LARGEST:
+        reader.problem(key, f"has a figure beyond {LARGEST:g}", "give kg and kg·m²")
     if len(reader.problems) > before:
         return None, "", None
     rotation = link_from_inertial[:3, :3]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from seerob.core.files.zip_members import TooLarge, unpacked
 from seerob.core.transforms import Array
 from seerob.description.mesh_files.source import Color, MeshSource, RawFile, RawMesh
 
@@ -41,9 +42,6 @@ def read(source: MeshSource) -> RawFile:
     """Meshes of the build items, components followed into other parts of the package."""
     with source.parsing("3MF package"):
         package = zipfile.ZipFile(io.BytesIO(source.data))
-        unpacked = sum(entry.file_size for entry in package.infolist())
-        if unpacked > source.max_bytes:
-            source.fail(f"unpacks to {unpacked} bytes, more than {source.max_bytes}", "raise max_bytes")
         reader = _Package(source, package)
         root = reader.model(reader.start())
         unit = root.get("unit", "millimeter")
@@ -59,6 +57,8 @@ class _Package:
         self.entries = {name.lower(): name for name in package.namelist()}
         self.objects: dict[tuple[str, str], _Object] = {}
         self.models: dict[str, Any] = {}
+        self.left = source.max_bytes
+        """How much more of the package is unpacked [byte]."""
 
     def start(self) -> str:
         """The part that the package's relationships call its 3D model."""
@@ -74,7 +74,12 @@ class _Package:
         name = self.entries.get(part.lower())
         if name is None:
             self.source.fail(f"has no part {part[:200]!r}", "export it again")
-        return fromstring(self.package.read(name), forbid_dtd=True)
+        try:
+            text = unpacked(self.package, name, self.left)
+        except TooLarge as error:
+            self.source.fail(f"{name[:200]}: {error}", "raise max_bytes")
+        self.left -= len(text)
+        return fromstring(text, forbid_dtd=True)
 
     def model(self, part: str) -> Any:
         """Root element of a model part; its objects are remembered."""

@@ -23,7 +23,11 @@ BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "
 
 def check_file(path: Path, name: str, max_bytes: int = MAX_BYTES) -> bytes:
     """The first bytes of a readable file of a bearable size; InputError otherwise."""
-    if not path.is_file():
+    try:
+        there = path.is_file()
+    except (OSError, ValueError) as error:
+        raise InputError.at(name[:200], "", f"is no name of a file: {error.args[-1]}", "name one") from error
+    if not there:
         if path.is_dir():
             raise InputError.at(name, "", "is a folder", "give the file that is meant")
         raise InputError.at(name, "", "no such file", f"looked for {path}")

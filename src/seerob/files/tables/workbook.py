@@ -11,15 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from seerob.core.errors import InputError
+from seerob.core.files.zip_members import TooLarge, sizes
 from seerob.files.tables.grid import MAX_COLUMNS, Cell
 from seerob.files.tables.text import check_file
 
 MAX_BYTES = 1 << 30
-MAX_UNPACKED = 4 << 30
+MAX_UNPACKED = 1 << 30
+MAX_RATIO, UNSUSPECTED = 200, 64 << 20
+"""A workbook unpacks to so many times its size at most, or to so much [byte]; both our choice."""
 MAX_ROWS = 1_048_576
 """Excel's own bound; a file that states a larger row number is not Excel's."""
 MAX_STRINGS = 256 << 20
 """Largest table of shared strings, which is held in memory."""
+MAX_LEFT_OUT = 10_000
+"""Rows that a sheet leaves out one after the other; a file that leaves out more states a wrong row number."""
 
 SAVE_AS = "open it in Excel or LibreOffice and save it as .xlsx"
 
@@ -37,10 +42,10 @@ def check_workbook(path: Path, name: str) -> None:
             names = {part.filename for part in parts}
             if "[Content_Types].xml" not in names or not any(n.startswith("xl/") for n in names):
                 raise InputError.at(name, "", "a zip archive, but not a workbook", SAVE_AS)
-            unpacked = sum(part.file_size for part in parts)
-            strings = sum(p.file_size for p in parts if p.filename.endswith("sharedStrings.xml"))
-            if unpacked > MAX_UNPACKED or strings > MAX_STRINGS:
-                raise InputError.at(name, "", f"unpacks to {unpacked} bytes, more than is taken", "split it")
+            most = min(MAX_UNPACKED, max(UNSUSPECTED, MAX_RATIO * path.stat().st_size))
+            held = sizes(archive, most)
+            if sum(size for part, size in held.items() if part.endswith("sharedStrings.xml")) > MAX_STRINGS:
+                raise InputError.at(name, "", f"more than {MAX_STRINGS} bytes of texts", "split it")
             # No workbook has a document type; one that has is after the parser's entities.
             for part in parts:
                 if part.filename.endswith((".xml", ".rels")):
@@ -49,6 +54,8 @@ def check_workbook(path: Path, name: str) -> None:
                             raise InputError.at(name, part.filename, "declares a document type", SAVE_AS)
     except InputError:
         raise
+    except TooLarge as error:
+        raise InputError.at(name, "", f"{error}, which is more than is taken", "split it") from None
     except Exception as error:  # zipfile and zlib raise many things over a broken archive
         raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
 
@@ -68,9 +75,14 @@ class SheetGrid:
             # The stated extent may be wrong by any amount; what is there counts.
             sheet.reset_dimensions()
             cells = _parsed(sheet.iter_rows(values_only=True), self.file, self.sheet)
+            left_out = 0
             for count, row in enumerate(cells, start=1):
                 if count > MAX_ROWS:
                     raise InputError.at(self.file, f"sheet {self.sheet!r}", f"more than {MAX_ROWS} rows")
+                left_out = 0 if row else left_out + 1
+                if left_out > MAX_LEFT_OUT:
+                    what = f"leaves out more than {MAX_LEFT_OUT} rows before row {count}"
+                    raise InputError.at(self.file, f"sheet {self.sheet!r}", what, SAVE_AS)
                 if len(row) > MAX_COLUMNS:
                     what = f"{len(row)} columns, more than {MAX_COLUMNS}"
                     raise InputError.at(self.file, f"sheet {self.sheet!r}", what)

@@ -145,7 +145,9 @@ class _Compiler:
         try:
             mj = self.mounting.spec.compile()
         except ValueError as error:
-            raise InputError.at(self.file, "", f"MuJoCo refuses the model: {error}") from error
+            remedy = "look at the body that it names: its mass and inertia, or what is mounted there"
+            said = " ".join(str(error).split())
+            raise InputError.at(self.file, "", f"MuJoCo refuses the model: {said}", remedy) from error
         return self._model(mj, bodies)
 
     def _try(self, key: str, build: Callable[[Any], None], table: Any) -> None:

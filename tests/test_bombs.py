@@ -1,0 +1,136 @@
+"""Files that unpack to more than they say or than anybody has, and figures that no arithmetic bears."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+import zlib
+
+import pytest
+
+import seerob as sr
+from seerob.app.console.printable import printable
+from seerob.core.errors import InputError
+from seerob.core.files import zip_members
+from seerob.description.loader import load_robot
+from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets
+from seerob.outputs.html import text
+
+HUGE = 1 << 30
+ROBOT = (
+    '<robot name="a"><link name="base"/><link name="l"><inertial><mass value="1"/>{}</inertial></link>'
+    '<joint name="j" type="continuous"><parent link="base"/><child link="l"/></joint></robot>'
+)
+READ = """
+import resource, sys
+from pathlib import Path
+from seerob.core.errors import InputError
+import {module}
+begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    {call}
+except InputError as error:
+    print(error)
+else:
+    print("read")
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - begun) >> 10)
+"""
+
+
+def zeros(size):
+    """Deflated zeros, made without holding them."""
+    packed, piece = zlib.compressobj(9, zlib.DEFLATED, -15), bytes(1 << 20)
+    return b"".join([*(packed.compress(piece) for _ in range(size >> 20)), packed.flush()])
+
+
+def with_lies(path, members, lie=None):
+    """An archive whose member ``lie`` unpacks to `HUGE` bytes while its directory says 100."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    data = zeros(HUGE)
+    with zipfile.ZipFile(path, "a") as archive:
+        info = zipfile.ZipInfo(lie)
+        archive.writestr(info, data)  # as it is
+        info.compress_type, info.file_size = zipfile.ZIP_DEFLATED, 100
+    raw = bytearray(path.read_bytes())
+    local = raw.index(lie.encode()) - 30
+    raw[local + 8 : local + 10] = (8).to_bytes(2, "little")
+    path.write_bytes(raw)
+
+
+def asked(module, call):
+    """What a process of its own says of a file, and by how many MiB it grew."""
+    done = subprocess.run(
+        [sys.executable, "-c", READ.format(module=module, call=call)],
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    *said, grown = done.stdout.splitlines()
+    return " ".join(said), int(grown)
+
+
+def test_a_3mf_whose_directory_lies_about_sizes_is_refused_after_a_piece(tmp_path):
+    path = tmp_path / "a.3mf"
+    with_lies(path, {"[Content_Types].xml": "<x/>"}, "3D/3dmodel.model")
+    with pytest.raises(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
+        zip_members.unpacked(archive, "3D/3dmodel.model", HUGE)
+    said, grown = asked(
+        "seerob.description.mesh", f"seerob.description.mesh.load_meshes(Path({str(path)!r}))"
+    )
+    assert str(path) in said
+    assert grown < 200
+
+
+def test_a_workbook_that_unpacks_to_a_thousand_times_its_size_is_refused(tmp_path):
+    path = tmp_path / "a.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("[Content_Types].xml", "<x/>")
+        with archive.open("xl/worksheets/sheet1.xml", "w") as file:
+            for _ in range(HUGE >> 20):
+                file.write(bytes(1 << 20))
+    assert path.stat().st_size < 2 << 20
+    said, grown = asked(
+        "seerob.files.tables.workbook", f"seerob.files.tables.workbook.sheets(Path({str(path)!r}), 'a.xlsx')"
+    )
+    assert "a.xlsx: unpacks to more than" in said
+    assert grown < 200
+
+
+def test_a_row_number_that_no_sheet_has_is_refused_after_few_rows(tmp_path):
+    from openpyxl import Workbook
+
+    path, made = tmp_path / "a.xlsx", tmp_path / "b.xlsx"
+    book = Workbook()
+    book.active.append([1, 2])
+    book.active.append([3, 4])
+    book.save(path)
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name.endswith("sheet1.xml"):
+                content = content.replace(b'r="2"', b'r="999999999"')
+            new.writestr(name, content)
+    assert len(list(sheets(path, "a.xlsx")[0].rows())) == 2
+    with pytest.raises(InputError, match=f"leaves out more than {MAX_LEFT_OUT} rows"):
+        list(sheets(made, "b.xlsx")[0].rows())
+
+
+@pytest.mark.parametrize("figures", ['ixx="1" iyy="1e308" izz="1"', 'ixx="1" iyy="1" izz="1" ixy="-1e300"'])
+def test_a_moment_of_inertia_that_nothing_has_is_refused_by_its_link(tmp_path, figures):
+    (tmp_path / "a.urdf").write_text(ROBOT.format(f"<inertia {figures}/>"))
+    with pytest.raises(InputError, match=r"a\.urdf: link\[l\]\.inertial: has a figure beyond 1e\+09"):
+        load_robot("a.urdf", folder=tmp_path)
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".urdf", "x/" * 3000 + ".urdf"])
+def test_a_name_that_no_file_can_have_is_a_mistake_in_the_file(tmp_path, name):
+    (tmp_path / "workstation.toml").write_text(f'[[robots]]\nname = "a"\nmodel = "{name}"\n')
+    with pytest.raises(InputError, match="is no name of a file"):
+        sr.load(tmp_path)
+
+
+def test_what_a_terminal_or_a_page_would_obey_is_written_or_left_out():
+    obeyed = "\x1b[2J \u061c\u200e\u200f\u2028\u202e\u2066\x07\x9b"
+    for shown in (printable(f"a{obeyed}b"), text(f"a{obeyed}b")):
+        assert not set(obeyed.replace(" ", "").replace("[2J", "")) & set(shown)

@@ -31,6 +31,7 @@ def cell(folder, server, *, model="ur10", calibration=""):
 
 
 def said(station):
+    station.reach()
     return {
         f.level: f.text for f in station.scene().findings if "tool is" in f.text or "kinematics" in f.text
     }

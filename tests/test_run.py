@@ -16,6 +16,7 @@ import seerob as sr
 from kept_run import Kept
 from made_cell import FLOATING, TWO_R, heard, made, two_r
 from seerob.core.errors import InputError
+from seerob.core.markers import plain
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 from seerob.session.recorded_station import load_recorded
@@ -53,7 +54,7 @@ def up_to(ticks):
 
 def encoded(snapshots):
     """Every float, verdict, reason, basis and marker of every tick."""
-    return [msgspec.msgpack.encode(snapshot) for snapshot in snapshots]
+    return [msgspec.msgpack.encode(snapshot, enc_hook=plain) for snapshot in snapshots]
 
 
 def record(station, folder, ticks=10_000):

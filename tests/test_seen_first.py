@@ -76,7 +76,7 @@ def test_an_estimate_that_the_file_accepts_may_be_off_by_so_much(tmp_path, accep
     more = "" if accepted is None else f"unseen_uncertainty = {accepted}\n"
     for k, verdict in enumerate(verdicts):
         text = FLOATING + PERSON + more + CELL.format(z=1.75 + 0.05 + 0.35 - 0.1 * k)
-        station = made(tmp_path / str(k), text + NEAR.replace("0.01", "0.001"))
+        station = made(tmp_path / str(k), text + NEAR.replace("0.01", "0.005"))
         state = state_at(station)
         hearing = state.hearings["op"]
         hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))

@@ -88,7 +88,7 @@ def test_a_cart_has_neither_brakes_nor_a_table_of_a_robot(tmp_path, stop):
 
 
 DISTANCE = '[[safety]]\nkind = "minimum_distance"\nname = "d"\nbetween = ["arm", "op"]\nlimit = 0.5\n'
-ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "{0}"\nrobot = "{0}"\nlimit = 1000\n'
+ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "{0}"\nrobot = "{0}"\nlimit = 240\n'
 AREA = (
     '[[areas]]\nname = "front"\nshape = { box = [1, 1, 0.4] }\nat = { position = [1.5, 0, 0.2] }\n'
     '[[safety]]\nkind = "safety_area"\nname = "a"\narea = "front"\nof = "arm"\n'

@@ -99,7 +99,7 @@ robot_uncertainty = 0.005
 def station_of(folder: Path, text: str) -> Station:
     """The workstation of a text."""
     (folder / "workstation.toml").write_text(text)
-    return load(folder)
+    return load(folder, allow_plugins=True)
 
 
 def doubted(station: Station) -> list[Finding]:

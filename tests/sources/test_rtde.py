@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 import threading
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -16,6 +17,7 @@ from made_cell import TWO_R, made, two_r
 from reached import asked
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.core.errors import InputError
+from seerob.core.markers import plain
 from seerob.core.samples import Quality, SignalSample
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.rtde import Rtde, figures, joint_sample, states
@@ -158,7 +160,7 @@ def test_what_was_heard_live_is_computed_again_bit_for_bit(tmp_path):
     again = Story(10_000)
     feed = (tuple(tick.samples) for tick in recording.ticks())
     load_recorded(recording).run(feed=feed, writers=[again])
-    encode = msgspec.msgpack.encode
+    encode = partial(msgspec.msgpack.encode, enc_hook=plain)
     assert [encode(s) for s in again.snapshots] == [encode(s) for s in story.snapshots]
     assert "undecided" in again.verdicts()
     assert any(isinstance(s, SignalSample) for samples in again.heard for s in samples)

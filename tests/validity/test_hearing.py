@@ -15,7 +15,7 @@ from seerob.twin.validity.hearing import Heard, Hearing
 from seerob.workstation.source import Opened, Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
-ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 2000.0\n'
+ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 240.0\n'
 
 
 def judged_run(station, name, opened, *, timeout=0.2):

@@ -20,6 +20,7 @@ from seerob.core.markers import (
     Rays,
     Segment,
     Sphere,
+    plain,
 )
 from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Result, Row, Scene, Snapshot
@@ -97,5 +98,6 @@ __all__ = [
     "judge",
     "judge_interval",
     "no_formula",
+    "plain",
     "worst",
 ]

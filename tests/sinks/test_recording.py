@@ -5,6 +5,7 @@ import struct
 import subprocess
 import sys
 import time
+import tracemalloc
 from pathlib import Path
 from threading import Event, Thread
 
@@ -13,16 +14,17 @@ import msgspec
 import numpy as np
 import pytest
 from mcap.exceptions import EndOfFile
-from mcap.reader import NonSeekingReader, make_reader
+from mcap.reader import NonSeekingReader, SeekingReader, make_reader
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 import seerob
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.snapshot import Scene, Snapshot
+from seerob.outputs.mcap.tape import McapTape
 from seerob.outputs.sinks import recorder as recorder_module
-from seerob.outputs.sinks.recorder import Recorder
-from seerob.recording.format import SAMPLES, SCENE, SNAPSHOT
+from seerob.outputs.sinks.recorder import FLUSH_PERIOD, Recorder
+from seerob.recording.format import SAMPLES, SCENE, SNAPSHOT, nanoseconds
 from seerob.recording.recording import Recording
 
 N = 150
@@ -213,6 +215,31 @@ def test_checksums_are_in_the_file(path):
     with path.open("rb") as file:
         chunks = [r for r in StreamReader(file, emit_chunks=True).records if type(r).__name__ == "Chunk"]
     assert all(chunk.uncompressed_crc for chunk in chunks)
+
+
+def test_what_the_index_remembers_of_hours_of_chunks_is_not_in_memory(tmp_path, monkeypatch):
+    chunks, first = 800, 200
+    monkeypatch.setattr("os.fsync", lambda _: None)
+    tape = McapTape(tmp_path / "run.mcap", made_run.scene(), made_run.MESHES, {})
+    tracemalloc.start()
+    for k in range(chunks):
+        if k == first:
+            begun = tracemalloc.get_traced_memory()[0]
+        t = k * FLUSH_PERIOD
+        tape.tick(k, t, (), msgspec.structs.replace(made_run.snapshot(k % 10), seq=k, t=t))
+        tape.flush()
+    grown = tracemalloc.get_traced_memory()[0] - begun
+    tracemalloc.stop()
+    tape.finish({})
+    assert grown / ((chunks - first) * FLUSH_PERIOD / 3600) < 1e6  # [byte per hour of run time]
+    with (tmp_path / "run.mcap").open("rb") as file:
+        reader = SeekingReader(file, validate_crcs=True)
+        indexes = reader.get_summary().chunk_indexes
+        assert [i.message_end_time for i in indexes[-chunks:]] == [
+            nanoseconds(k * FLUSH_PERIOD) for k in range(chunks)
+        ]
+        late = reader.iter_messages(topics=[SNAPSHOT], starting_at=nanoseconds((chunks - 3) * FLUSH_PERIOD))
+        assert [m.sequence for _, _, m in late] == [chunks - 3, chunks - 2, chunks - 1]
 
 
 def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkeypatch):

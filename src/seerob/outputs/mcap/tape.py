@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import msgspec
+from mcap.data_stream import RecordBuilder
+from mcap.records import ChunkIndex
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
 
@@ -19,6 +22,7 @@ from seerob.core.samples import Sample
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.outputs.mcap.foxglove import frame_transforms, marker_update, scene_update
 from seerob.outputs.versions import versions
+from seerob.recording.column import Column, Spill
 from seerob.recording.format import (
     END_METADATA,
     FILE_PREFIX,
@@ -94,6 +98,26 @@ _VISITOR_SCHEMA = {
 }
 
 
+class _ChunkIndexes:
+    """Where the chunks are, in a temporary file: the library's own list of eight hours takes 50 MB."""
+
+    def __init__(self) -> None:
+        self._records = Column("B", Spill())
+
+    def append(self, index: ChunkIndex) -> None:
+        record: Any = RecordBuilder()
+        index.write(record)
+        for byte in record.end():
+            self._records.append(byte)
+
+    def __iter__(self) -> Iterator[_ChunkIndexes]:
+        yield self
+
+    def write(self, summary: RecordBuilder) -> None:
+        """All records, where the library would write one."""
+        summary.write(self._records.tobytes())
+
+
 class McapTape:
     """An MCAP file that is only ever appended to."""
 
@@ -115,6 +139,7 @@ class McapTape:
         try:
             # The library types its constructor only.
             self._mcap: Any = McapWriter(self._file, enable_crcs=True)
+            vars(self._mcap)["_Writer__chunk_indices"] = _ChunkIndexes()
             self._mcap.start(profile="", library=f"seerob {scene.version}")
             self._mcap.add_metadata(
                 METADATA,

@@ -14,6 +14,7 @@ from seerob.core.shapes.geometry import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.core.units import LENGTHS
+from seerob.description.mesh_files.apart import apart
 from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh
 from seerob.description.meshes import collada, gltf, obj, off, ply, stl, threemf
 from seerob.description.shapes.mesh_sides import sided
@@ -27,11 +28,11 @@ MAX_FACES = 20_000_000
 READERS: dict[str, Callable[[MeshSource], RawFile]] = {
     ".stl": stl.read,
     ".obj": obj.read,
-    ".ply": ply.read,
+    ".ply": apart(ply.read),
     ".off": off.read,
     ".glb": gltf.read,
     ".gltf": gltf.read,
-    ".dae": collada.read,
+    ".dae": apart(collada.read),
     ".3mf": threemf.read,
 }
 """File name ending → reader."""

@@ -1,4 +1,7 @@
-"""An Excel workbook as grids, one per sheet; values only, formulas as last calculated."""
+"""An Excel workbook as grids, one per sheet; values only, formulas as last calculated.
+
+Whatever is unpacked or parsed is in the parsers' process, from which rows come as they are asked for.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from seerob.core.errors import InputError
+from seerob.core.files.parser_process import parsed, parsed_one_by_one
 from seerob.core.files.zip_members import TooLarge, sizes
 from seerob.files.tables.grid import MAX_COLUMNS, Cell
 from seerob.files.tables.text import check_file
@@ -29,37 +33,6 @@ MAX_LEFT_OUT = 10_000
 SAVE_AS = "open it in Excel or LibreOffice and save it as .xlsx"
 
 
-def check_workbook(path: Path, name: str) -> None:
-    """InputError unless the file is a workbook of a bearable size, packed and unpacked."""
-    head = check_file(path, name, MAX_BYTES)
-    if head.startswith(b"\xd0\xcf\x11\xe0"):
-        raise InputError.at(name, "", "an old Excel file (.xls) or one with a password", SAVE_AS)
-    if path.suffix.lower() not in (".xlsx", ".xlsm"):
-        raise InputError.at(name, "", f"{path.suffix or 'no'} extension, not .xlsx or .xlsm", SAVE_AS)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            parts = archive.infolist()
-            names = {part.filename for part in parts}
-            if "[Content_Types].xml" not in names or not any(n.startswith("xl/") for n in names):
-                raise InputError.at(name, "", "a zip archive, but not a workbook", SAVE_AS)
-            most = min(MAX_UNPACKED, max(UNSUSPECTED, MAX_RATIO * path.stat().st_size))
-            held = sizes(archive, most)
-            if sum(size for part, size in held.items() if part.endswith("sharedStrings.xml")) > MAX_STRINGS:
-                raise InputError.at(name, "", f"more than {MAX_STRINGS} bytes of texts", "split it")
-            # No workbook has a document type; one that has is after the parser's entities.
-            for part in parts:
-                if part.filename.endswith((".xml", ".rels")):
-                    with archive.open(part) as stream:
-                        if b"<!DOCTYPE" in stream.read(4096):
-                            raise InputError.at(name, part.filename, "declares a document type", SAVE_AS)
-    except InputError:
-        raise
-    except TooLarge as error:
-        raise InputError.at(name, "", f"{error}, which is more than is taken", "split it") from None
-    except Exception as error:  # zipfile and zlib raise many things over a broken archive
-        raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
-
-
 @dataclass(frozen=True)
 class SheetGrid:
     """One sheet of a workbook."""
@@ -70,42 +43,97 @@ class SheetGrid:
 
     def rows(self) -> Iterator[Sequence[Cell]]:
         """Rows as tuples of cells."""
-        with _opened(self.path, self.file) as book:
-            sheet = book[self.sheet]
-            # The stated extent may be wrong by any amount; what is there counts.
-            sheet.reset_dimensions()
-            cells = _parsed(sheet.iter_rows(values_only=True), self.file, self.sheet)
-            left_out = 0
-            for count, row in enumerate(cells, start=1):
-                if count > MAX_ROWS:
-                    raise InputError.at(self.file, f"sheet {self.sheet!r}", f"more than {MAX_ROWS} rows")
-                left_out = 0 if row else left_out + 1
-                if left_out > MAX_LEFT_OUT:
-                    what = f"leaves out more than {MAX_LEFT_OUT} rows before row {count}"
-                    raise InputError.at(self.file, f"sheet {self.sheet!r}", what, SAVE_AS)
-                if len(row) > MAX_COLUMNS:
-                    what = f"{len(row)} columns, more than {MAX_COLUMNS}"
-                    raise InputError.at(self.file, f"sheet {self.sheet!r}", what)
-                yield row
+        return parsed_one_by_one(_rows, self.path, self.file, self.sheet, file=self.file, remedy=SAVE_AS)
 
     def uncalculated(self) -> Iterator[tuple[int, int]]:
         """Row and column, from 1, of formulas whose result the file does not hold.
 
         Programs that write workbooks without calculating leave them so; their cells look empty.
         """
-        with (
-            _opened(self.path, self.file) as book,
-            _opened(self.path, self.file, formulas=True) as written,
-        ):
-            sheets = book[self.sheet], written[self.sheet]
-            for sheet in sheets:
-                sheet.reset_dimensions()
-            values, formulas = (_parsed(sheet.iter_rows(), self.file, self.sheet) for sheet in sheets)
-            for row, cells in enumerate(zip(values, formulas, strict=True), start=1):
-                for column, (value, formula) in enumerate(zip(*cells, strict=False), start=1):
-                    # An empty text is a result.
-                    if formula.data_type == "f" and value.value is None and value.data_type == "n":
-                        yield row, column
+        given = self.path, self.file, self.sheet
+        return parsed_one_by_one(_uncalculated, *given, file=self.file, remedy=SAVE_AS)
+
+
+def sheets(path: Path, name: str) -> tuple[SheetGrid, ...]:
+    """The sheets with cells, in order; InputError when the file is no workbook."""
+    head = check_file(path, name, MAX_BYTES)
+    if head.startswith(b"\xd0\xcf\x11\xe0"):
+        raise InputError.at(name, "", "an old Excel file (.xls) or one with a password", SAVE_AS)
+    if path.suffix.lower() not in (".xlsx", ".xlsm"):
+        raise InputError.at(name, "", f"{path.suffix or 'no'} extension, not .xlsx or .xlsm", SAVE_AS)
+    titles = parsed(_titles, path, name, MAX_UNPACKED, file=name, remedy=SAVE_AS)
+    return tuple(SheetGrid(path, name, title) for title in titles)
+
+
+# -- in the parsers' process --------------------------------------------------------------------
+
+
+def _check(path: Path, name: str, most: int) -> None:
+    """InputError unless it is a workbook that unpacks to ``most`` bytes at most."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            parts = archive.infolist()
+            names = {part.filename for part in parts}
+            if "[Content_Types].xml" not in names or not any(n.startswith("xl/") for n in names):
+                raise InputError.at(name, "", "a zip archive, but not a workbook", SAVE_AS)
+            suspected = max(UNSUSPECTED, MAX_RATIO * path.stat().st_size)
+            held = sizes(archive, min(most, suspected))
+            if sum(size for part, size in held.items() if part.endswith("sharedStrings.xml")) > MAX_STRINGS:
+                raise InputError.at(name, "", f"more than {MAX_STRINGS} bytes of texts", "split it")
+            # No workbook has a document type; one that has is after the parser's entities.
+            for part in parts:
+                if part.filename.endswith((".xml", ".rels")):
+                    with archive.open(part) as stream:
+                        if b"<!DOCTYPE" in stream.read(4096):
+                            raise InputError.at(name, part.filename, "declares a document type", SAVE_AS)
+    except (InputError, MemoryError):
+        raise
+    except TooLarge as error:
+        raise InputError.at(name, "", f"{error}, which is more than is taken", "split it") from None
+    except Exception as error:  # zipfile and zlib raise many things over a broken archive
+        raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
+
+
+def _titles(path: Path, name: str, most: int) -> list[str]:
+    _check(path, name, most)
+    with _opened(path, name) as book:
+        found = [sheet.title for sheet in book.worksheets]
+    if not found:
+        raise InputError.at(name, "", "a workbook without a sheet of cells", SAVE_AS)
+    return found
+
+
+def _rows(path: Path, name: str, title: str) -> Iterator[Sequence[Cell]]:
+    with _opened(path, name) as book:
+        sheet = book[title]
+        # The stated extent may be wrong by any amount; what is there counts.
+        sheet.reset_dimensions()
+        cells = _parsed(sheet.iter_rows(values_only=True), name, title)
+        left_out = 0
+        for count, row in enumerate(cells, start=1):
+            if count > MAX_ROWS:
+                raise InputError.at(name, f"sheet {title!r}", f"more than {MAX_ROWS} rows")
+            left_out = 0 if row else left_out + 1
+            if left_out > MAX_LEFT_OUT:
+                what = f"leaves out more than {MAX_LEFT_OUT} rows before row {count}"
+                raise InputError.at(name, f"sheet {title!r}", what, SAVE_AS)
+            if len(row) > MAX_COLUMNS:
+                what = f"{len(row)} columns, more than {MAX_COLUMNS}"
+                raise InputError.at(name, f"sheet {title!r}", what)
+            yield row
+
+
+def _uncalculated(path: Path, name: str, title: str) -> Iterator[tuple[int, int]]:
+    with _opened(path, name) as book, _opened(path, name, formulas=True) as written:
+        both = book[title], written[title]
+        for sheet in both:
+            sheet.reset_dimensions()
+        values, formulas = (_parsed(sheet.iter_rows(), name, title) for sheet in both)
+        for row, cells in enumerate(zip(values, formulas, strict=True), start=1):
+            for column, (value, formula) in enumerate(zip(*cells, strict=False), start=1):
+                # An empty text is a result.
+                if formula.data_type == "f" and value.value is None and value.data_type == "n":
+                    yield row, column
 
 
 @contextmanager
@@ -118,6 +146,8 @@ def _opened(path: Path, name: str, *, formulas: bool = False) -> Iterator[Any]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 book = load_workbook(file, read_only=True, data_only=not formulas)
+        except MemoryError:
+            raise
         except Exception as error:  # openpyxl raises whatever a broken part makes it raise
             raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
         try:
@@ -137,17 +167,9 @@ def _parsed(rows: Iterator[Sequence[Any]], name: str, sheet: str) -> Iterator[Se
                 row = next(iterator)
         except StopIteration:
             return
+        except MemoryError:
+            raise
         except Exception as error:  # as above: a broken part of the file
             where = f"sheet {sheet!r} row {count}"
             raise InputError.at(name, where, f"cannot be read: {error}", SAVE_AS) from error
         yield row
-
-
-def sheets(path: Path, name: str) -> tuple[SheetGrid, ...]:
-    """The sheets with cells, in order; InputError when the file is no workbook."""
-    check_workbook(path, name)
-    with _opened(path, name) as book:
-        found = tuple(SheetGrid(path, name, sheet.title) for sheet in book.worksheets)
-    if not found:
-        raise InputError.at(name, "", "a workbook without a sheet of cells", SAVE_AS)
-    return found

@@ -37,7 +37,12 @@ def test_encoded_messages_have_the_keys_of_their_interface():
         body = re.search(rf"interface {type(message).__name__} {{\n(.*?)^}}", wire.typescript(), re.M | re.S)[
             1
         ]
-        assert list(data) == re.findall(r"^  (\w+):", body, re.M)
+        left_out = {
+            field.name
+            for field in msgspec.structs.fields(message)
+            if not field.required and type(message) in wire.COMPLETED and field.name not in data
+        }
+        assert list(data) == [key for key in re.findall(r"^  (\w+):", body, re.M) if key not in left_out]
         assert data["type"] == type(message).__struct_config__.tag
 
 

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "9d7633cdb8c53690";
+export const SCHEMA = "b62710767b875e70";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -538,6 +538,22 @@ export interface Command {
    */
   value?: number | null;
 }
+
+export const DEFAULTS = {
+  snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {} },
+  result: { value: null, unit: "", limit: null, at_most: true, verdict: null, reason: "", interval: null, parts: [], markers: [], rows: [], t: null, muted: false, nothing: false },
+  arrow: { label: "", verdict: null },
+  segment: { label: "", verdict: null },
+  sphere: { label: "", verdict: null },
+  ellipsoid: { label: "", verdict: null },
+  box: { label: "", verdict: null },
+  hull: { label: "", verdict: null },
+  polyline: { closed: false, label: "", verdict: null },
+  prism: { position: [0.0,0.0,0.0], wxyz: [1.0,0.0,0.0,0.0], label: "", verdict: null },
+  rays: { hits: [], filled: false, label: "", verdict: null },
+  label: { verdict: null },
+  highlight: { verdict: null },
+};
 
 export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked;
 

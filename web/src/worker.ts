@@ -2,6 +2,7 @@
 // waits for the network, and the network never waits for the screen.
 
 import { Decoder } from "@msgpack/msgpack";
+import { completed } from "./completed";
 import type { Frame, FromWorker, ToWorker } from "./messages";
 import { PointCollector } from "./points";
 import { FLOATS_PER_NODE, PoseWriter, poseBufferBytes } from "./poses";
@@ -35,7 +36,7 @@ const post = (message: FromWorker, transfer: Transferable[] = []): void => {
 function received(message: ServerMessage, raw: Uint8Array): void {
   switch (message.type) {
     case "snapshot":
-      heard(message, raw);
+      heard(completed(message), raw);
       return;
     case "scene":
       begin(message);
@@ -114,7 +115,7 @@ function look(t: number | null): void {
   lookingAt = t;
   if (t === null) return;
   const raw = recent.at(t) ?? newestRaw;
-  if (raw) show(decoder.decode(raw) as Snapshot);
+  if (raw) show(completed(decoder.decode(raw) as Snapshot));
 }
 
 setInterval(() => {

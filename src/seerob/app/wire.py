@@ -1,8 +1,8 @@
 """Writes ``web/src/wire.ts``, the page's types, from `seerob.core.snapshot`: one fact, one place.
 
 ``python -m seerob.app.wire`` writes the file, ``python -m seerob.app.wire --check`` fails when it is stale.
-Structs become interfaces (tagged ones carry ``type``; what a default leaves out is optional), enums unions
-of strings, ``bytes`` ``Uint8Array``; docstrings of classes and fields go along as JSDoc.
+Structs become interfaces (tagged ones carry ``type``; what a default leaves out is optional or in DEFAULTS),
+enums unions of strings, ``bytes`` ``Uint8Array``; docstrings of classes and fields go along as JSDoc.
 """
 
 from __future__ import annotations
@@ -37,6 +37,9 @@ FROM_SERVER = (
 """Messages that a page receives."""
 FROM_PAGE = (snapshot.Command, snapshot.Tracking)
 """Messages that a page sends; what has a default may be left out."""
+
+COMPLETED = (snapshot.Snapshot, snapshot.Result, *get_args(snapshot.Marker))
+"""Of these the page puts back what a default leaves out, before anything else looks at them."""
 
 SOURCES = (verdict, markers, snapshot, page_messages)
 """Modules whose types go over the wire; `seerob.core.snapshot` has the names of all of them."""
@@ -79,6 +82,7 @@ def _declarations(*, docs: bool) -> Iterator[str]:
             yield _enum(thing, docs=docs)
         elif issubclass(thing, Struct):
             yield _interface(thing, aliases, docs=docs)
+    yield _defaults()
     yield f"export type ServerMessage = {' | '.join(c.__name__ for c in FROM_SERVER)};\n"
     yield f"export type PageMessage = {' | '.join(c.__name__ for c in FROM_PAGE)};\n"
 
@@ -109,10 +113,26 @@ def _interface(cls: type[Struct], aliases: dict[Any, str], *, docs: bool) -> str
     for field in msgspec.structs.fields(cls):
         if field.name in told:
             lines.append(_comment(told[field.name], indent="  "))
-        optional = "?" if not field.required and (cls in FROM_PAGE or config.omit_defaults) else ""
+        left_out = cls in FROM_PAGE or (config.omit_defaults and cls not in COMPLETED)
+        optional = "?" if left_out and not field.required else ""
         lines.append(f"  {field.encode_name}{optional}: {_type(hints[field.name], aliases)};\n")
     lines.append("}\n")
     return (_comment(inspect.getdoc(cls) or "") if docs else "") + "".join(lines)
+
+
+def _defaults() -> str:
+    lines = ["export const DEFAULTS = {\n"]
+    for cls in COMPLETED:
+        fields = (field for field in msgspec.structs.fields(cls) if not field.required)
+        values = (f"{field.encode_name}: {default_of(field)}" for field in fields)
+        lines.append(f"  {cls.__struct_config__.tag or cls.__name__.lower()}: {{ {', '.join(values)} }},\n")
+    return "".join((*lines, "};\n"))
+
+
+def default_of(field: msgspec.structs.FieldInfo) -> str:
+    """The default of a field in JSON."""
+    made = field.default if field.default_factory is msgspec.NODEFAULT else field.default_factory()
+    return msgspec.json.encode(made).decode()
 
 
 _SIMPLE = {

@@ -17,7 +17,7 @@ Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 
 
-class Arrow(Struct, frozen=True, kw_only=True, tag="arrow"):
+class Arrow(Struct, frozen=True, kw_only=True, tag="arrow", omit_defaults=True):
     """A vector at a point."""
 
     origin: Vec3
@@ -27,7 +27,7 @@ class Arrow(Struct, frozen=True, kw_only=True, tag="arrow"):
     verdict: Verdict | None = None
 
 
-class Segment(Struct, frozen=True, kw_only=True, tag="segment"):
+class Segment(Struct, frozen=True, kw_only=True, tag="segment", omit_defaults=True):
     """A line between two points, such as a shortest distance."""
 
     start: Vec3
@@ -36,7 +36,7 @@ class Segment(Struct, frozen=True, kw_only=True, tag="segment"):
     verdict: Verdict | None = None
 
 
-class Sphere(Struct, frozen=True, kw_only=True, tag="sphere"):
+class Sphere(Struct, frozen=True, kw_only=True, tag="sphere", omit_defaults=True):
     """A translucent ball."""
 
     center: Vec3
@@ -45,7 +45,7 @@ class Sphere(Struct, frozen=True, kw_only=True, tag="sphere"):
     verdict: Verdict | None = None
 
 
-class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid"):
+class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid", omit_defaults=True):
     """A translucent ellipsoid."""
 
     center: Vec3
@@ -57,7 +57,7 @@ class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid"):
     verdict: Verdict | None = None
 
 
-class Box(Struct, frozen=True, kw_only=True, tag="box"):
+class Box(Struct, frozen=True, kw_only=True, tag="box", omit_defaults=True):
     """A translucent box."""
 
     center: Vec3
@@ -68,7 +68,7 @@ class Box(Struct, frozen=True, kw_only=True, tag="box"):
     verdict: Verdict | None = None
 
 
-class Hull(Struct, frozen=True, kw_only=True, tag="hull"):
+class Hull(Struct, frozen=True, kw_only=True, tag="hull", omit_defaults=True):
     """A translucent closed surface, convex or not."""
 
     vertices: tuple[Vec3, ...]
@@ -77,7 +77,7 @@ class Hull(Struct, frozen=True, kw_only=True, tag="hull"):
     verdict: Verdict | None = None
 
 
-class Label(Struct, frozen=True, kw_only=True, tag="label"):
+class Label(Struct, frozen=True, kw_only=True, tag="label", omit_defaults=True):
     """Text at a point."""
 
     position: Vec3
@@ -85,7 +85,7 @@ class Label(Struct, frozen=True, kw_only=True, tag="label"):
     verdict: Verdict | None = None
 
 
-class Highlight(Struct, frozen=True, kw_only=True, tag="highlight"):
+class Highlight(Struct, frozen=True, kw_only=True, tag="highlight", omit_defaults=True):
     """A whole body shown in the colour of a verdict."""
 
     body: str
@@ -93,7 +93,7 @@ class Highlight(Struct, frozen=True, kw_only=True, tag="highlight"):
     verdict: Verdict | None = None
 
 
-class Polyline(Struct, frozen=True, kw_only=True, tag="polyline"):
+class Polyline(Struct, frozen=True, kw_only=True, tag="polyline", omit_defaults=True):
     """A line through points, such as the edge of a field on the floor or a path."""
 
     points: tuple[Vec3, ...]
@@ -108,7 +108,7 @@ class Polyline(Struct, frozen=True, kw_only=True, tag="polyline"):
         return list(pairwise(points))
 
 
-class Prism(Struct, frozen=True, kw_only=True, tag="prism"):
+class Prism(Struct, frozen=True, kw_only=True, tag="prism", omit_defaults=True):
     """A translucent extruded polygon, convex or not, such as a floor area with a height."""
 
     outline: tuple[tuple[float, float], ...]
@@ -123,7 +123,7 @@ class Prism(Struct, frozen=True, kw_only=True, tag="prism"):
     verdict: Verdict | None = None
 
 
-class Rays(Struct, frozen=True, kw_only=True, tag="rays"):
+class Rays(Struct, frozen=True, kw_only=True, tag="rays", omit_defaults=True):
     """What a sensor sees: beams that end where something is in their way, or at their range."""
 
     starts: tuple[Vec3, ...]

@@ -203,7 +203,7 @@ class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Names of the inputs of the basis that its limit comes from."""
 
 
-class Result(Struct, frozen=True, kw_only=True):
+class Result(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What one criterion says at one instant; its basis does not change in a run (`CriterionInfo.basis`).
 
     A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.
@@ -236,7 +236,7 @@ class Result(Struct, frozen=True, kw_only=True):
     """Whether there is nothing to judge now, and ``reason`` says why: nobody is near."""
 
 
-class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
+class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot", omit_defaults=True):
     """The twin and its results at one tick."""
 
     seq: int

@@ -111,7 +111,7 @@ def test_own_links_of_a_robot_are_paired_by_the_joints_between_them(tmp_path) ->
     text += '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'
     model = made(tmp_path, text).model
     robot = model.robot("arm")
-    pairs, widest, by_one = robot_pinch_pairs(model, robot, cap=0.6)
+    pairs, widest, placed = robot_pinch_pairs(model, robot, cap=0.6, thinnest=0.1)
     own = [
         {model.bodies[query.a[i]].name, model.bodies[query.b[0]].name}
         for query, _ in pairs.queries[1:]
@@ -129,8 +129,15 @@ def test_own_links_of_a_robot_are_paired_by_the_joints_between_them(tmp_path) ->
     moving = {model.bodies[i].name for i in pairs.moving}
     assert sorted(map(sorted, own)) == sorted(sorted(p) for p in expected if p & moving)
     one = [{a, b} for a in solid for b in solid if a < b and abs(place[a] - place[b]) == 1]
-    found = [sorted((model.bodies[i].name, model.bodies[j].name)) for i, j, _ in by_one]
+    found = [sorted((model.bodies[i].name, model.bodies[j].name)) for i, j, of in placed if len(of) == 1]
     assert sorted(found) == sorted(sorted(p) for p in one)
+    # A hand is thicker than what is between these wherever their two joints stand.
+    two = {
+        tuple(sorted((place[model.bodies[i].name], place[model.bodies[j].name])))
+        for i, j, of in placed
+        if len(of) == 2
+    }
+    assert two == {(0, 2), (3, 5), (4, 6)}
     assert len(widest) == len(pairs.first)
     assert np.isinf(widest[~pairs.inner]).all()
     assert (widest[pairs.inner] <= 0.6).all()

@@ -106,6 +106,51 @@ def test_an_elbow_that_folds_on_a_hand_is_not_within_where_a_free_hand_would_be(
     assert folding.limit <= 140 / math.sqrt(8 * 75e3) + 1e-12
 
 
+COLUMN = '<collision><origin xyz="0 0 0.5"/><geometry><box size="0.2 0.2 1"/></geometry></collision>'
+BALL = '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
+BEAM = '<collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.06 0.06"/></geometry></collision>'
+
+
+def on_column(folder: Path, axes: tuple[str, ...]) -> Station:
+    """A beam of 1 m beside a column, 1 cm from it at its shoulder; the last of its axes lowers it."""
+    links = [f'<link name="base">{COLUMN}</link>']
+    for k, axis in enumerate(axes):
+        shape = BALL + BEAM if k == len(axes) - 1 else ""
+        inertia = '<inertia ixx="1e-2" iyy="1e-2" izz="1e-2" ixy="0" ixz="0" iyz="0"/>'
+        links.append(f'<link name="l{k}">{shape}<inertial><mass value="1"/>{inertia}</inertial></link>')
+        links.append(
+            f'<joint name="j{k}" type="revolute"><parent link="{f"l{k - 1}" if k else "base"}"/>'
+            f'<child link="l{k}"/><origin xyz="{"0 0 0" if k else "0.16 0 0.9"}"/><axis xyz="{axis}"/>'
+            '<limit lower="-1.5" upper="1.5" effort="9" velocity="9"/></joint>'
+        )
+    return made(folder, FLOATING + ARM, {"arm.urdf": f'<robot name="c">{"".join(links)}</robot>'})
+
+
+@pytest.mark.parametrize("axes", [("0 0 1", "0 1 0"), ("0 0 1", "1 0 0", "0 1 0")])
+def test_a_beam_that_folds_on_its_column_clamps_a_hand_whatever_else_is_at_its_shoulder(
+    tmp_path: Path, axes: tuple[str, ...]
+) -> None:
+    """Beam and column are near at the shoulder wherever its joints stand: that hid all other places."""
+    station, others = on_column(tmp_path, axes), [0.0] * (len(axes) - 1)
+    beam = f"arm/l{len(axes) - 1}"
+
+    def folds(lift: float, qd: list[float]) -> bool:
+        return beam in clamped(station, (HAND,), arm=([*others, lift], qd))[HAND]
+
+    assert folds(1.3, [*others, 0.3])
+    assert not folds(1.3, [*others, -0.3])
+    assert not folds(1.3, [*others, 0.0])
+    assert not folds(-0.6, [*others, 0.3])
+    # Slowly, while it is turned about fast.
+    assert folds(1.3, [2.0, *others[1:], 0.02])
+
+
+def test_beyond_three_joints_near_parts_clamp_whenever_they_move(tmp_path: Path) -> None:
+    station = on_column(tmp_path, ("0 0 1", "1 0 0", "0 0 1", "0 1 0"))
+    for qd, moves in (([0, 0, 0, -0.3], True), ([0.0] * 4, False)):
+        assert ("arm/l3" in clamped(station, (HAND,), arm=([0.0, 0.0, 0.0, 1.3], qd))[HAND]) == moves
+
+
 def test_two_links_that_come_against_each_other_count_with_how_fast_they_close(tmp_path: Path) -> None:
     """The outer link stands in the world while the inner one folds onto it, at half the speed each."""
     station = made(
@@ -245,12 +290,12 @@ def test_a_place_closes_where_it_faces_is_narrow_and_opens_wide_enough() -> None
         ([2], [0, 0], 0),
         ([3], [0, 0], 0),
     ):
-        rates = closing(gaps[:, columns], faces[:, columns], np.diff(q), thickness, fits, least=0.004)
+        rates = closing(gaps[:, columns], faces[:, columns], [np.diff(q)], thickness, fits, least=0.004)[:, 0]
         np.testing.assert_array_equal((rates[0] > 0).sum(axis=0), growing)
         assert (rates[1] > 0).sum() == falling
     # 2 cm in a metre: it slides.
-    assert not closing(gaps[:, [4]], faces[:, [4]], np.diff(q), thickness, fits, least=0.004).any()
-    rates = closing(gaps[:, [0]], faces[:, [0]], np.diff(q), thickness, fits, least=0.004)
+    assert not closing(gaps[:, [4]], faces[:, [4]], [np.diff(q)], thickness, fits, least=0.004).any()
+    rates = closing(gaps[:, [0]], faces[:, [0]], [np.diff(q)], thickness, fits, least=0.004)
     assert rates[0].max() == pytest.approx(0.3)
 
 

@@ -241,14 +241,15 @@ class Clamping:
         fits = np.minimum([openings()[0][name] for name in regions], plain)
         self._thickness = plain + deviation
         cap = float(self._thickness.max(initial=0.0)) + ROOM
-        pairs, widest, by_one = robot_pinch_pairs(model, robot, cap=cap)
+        thinnest = float(plain.min(initial=np.inf))
+        pairs, widest, placed = robot_pinch_pairs(model, robot, cap=cap, thinnest=thinnest)
         period = max(model.workstation.engine.tick, every or 0.0)
         least = min(openings()[0].values())
         between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
         self._gaps = ClosingGaps(model.shapes, pairs, between, period=period)
         self._relative = self._gaps.relative(model)
         self._joints = JointGaps(
-            model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0),
+            model, robot, placed, self._thickness, np.maximum(fits - deviation, 0.0),
             least=least, period=period,
         )  # fmt: skip
         self._moving = robot.moving

@@ -1,18 +1,21 @@
-r"""Gaps between two parts that one joint moves against each other: an elbow that folds, fingers that close.
+r"""Gaps between two parts that touch at their joints: an elbow, fingers, an upper arm that folds on its base.
 
-Such parts touch at their joint wherever it stands, so how near they are says nothing. Each place on the
-surface of the one is looked at by itself, over the whole range of the joint: it has the gap :math:`g(q)` to
-the other part. A place clamps a body part of the thickness D while it faces the other part, while
+Parts that one joint moves against each other, or a few whose axes lie close together, are near wherever
+these stand, so how near they are says nothing. Each place on the surface of the one is looked at by itself,
+over the whole range of the joints: it has the gap :math:`g(q)` to the other part. A place clamps a body part
+of the thickness D while it faces the other part, while
 
 .. math:: \dot g < 0, \qquad g \le D
 
-and where something of the body part gets in at all: where the joint opens it as wide as the thinnest of
+and where something of the body part gets in at all: where the joints open it as wide as the thinnest of
 the body part, and by more than a fingertip. What slides in its bearing never closes (a housing that is not
 quite round comes nearer by a hair, see `SLOWEST`), and what is always in touch never opens. Nothing is
-remembered: the range of the joint is part of the model.
+remembered: the range of the joints is part of the model.
 
-All of this depends on one joint, so it is settled once, on a grid of its positions; between two of them the
-nearer gap counts, and the mean rate.
+All of this depends on these joints, so it is settled once, on a grid of their positions; between its nodes
+the nearest gap counts, and of each joint the largest of the mean rates along it. Of several joints that move
+at once those that close count, as if no other opened, and both parts must see it close, somewhere on each:
+a housing that turns past another one at a constant distance brings its own places nearer and nobody's else.
 """
 
 from __future__ import annotations
@@ -24,8 +27,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes.geometry import Solid
@@ -37,8 +42,8 @@ from seerob.model.model import Mechanism, Model
 from seerob.twin.spans import Span
 from seerob.twin.state import State
 
-STEPS = 72
-"""Positions on the grid of a whole turn, or of a slide."""
+STEPS = {1: 72, 2: 30, 3: 12}
+"""By how many joints are between two parts: positions of each on the grid, of a whole turn or of a slide."""
 DETAIL = 8
 """Into so many pieces the largest extent of a part is divided."""
 FINEST, COARSEST = 0.01, 0.06
@@ -54,6 +59,7 @@ ROUND = 8
 MOST_KNOWN = 256
 """Pairs that are remembered, since a cell is often bound several times."""
 _KNOWN: dict[bytes, Array] = {}
+Value = TypeVar("Value", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,63 +83,115 @@ def places(solids: Sequence[Solid]) -> Places:
     return Places(np.concatenate([p for p, _ in found]), np.concatenate([n for _, n in found]))
 
 
-def closing(gaps: Array, faces: Flags, steps: Array, thickness: Array, fits: Array, *, least: float) -> Array:
-    """How fast places close that clamp, between the positions of a grid.
+def closing(
+    gaps: Array, faces: Flags, steps: Sequence[Array], thickness: Array, fits: Array, *, least: float
+) -> Array:
+    """How fast places close that clamp, between the nodes of a grid of k joints.
 
     Args:
-        gaps: Of each place at each position [m], not below 0, shape (m, p).
-        faces: Whether it faces the other part there, shape (m, p).
-        steps: From each position to the next [rad or m], shape (m - 1,).
+        gaps: Of each place at each node [m], not below 0, shape (m_1, ..., m_k, p).
+        faces: Whether it faces the other part there, likewise.
+        steps: Of each joint, from each position to the next [rad or m], shape (m_j - 1,).
         thickness: Of body parts [m], shape (r,).
         fits: Thinnest that a body part is [m], shape (r,).
         least: By how much a gap changes that closes at all [m].
 
     Returns:
-        Per unit of the joint, as it grows and as it falls, 0 where nothing clamps, shape (2, m - 1, r).
+        Per unit of each joint, as it grows and as it falls, 0 where nothing clamps, shape (2, k,
+        m_1 - 1, ..., m_k - 1, r).
     """
-    if not gaps.shape[1]:
-        return np.zeros((2, len(steps), len(thickness)))
-    widest = gaps.max(axis=0)
-    opens = (widest - gaps.min(axis=0) >= least - ROUNDING)[:, None] & (widest[:, None] >= fits - ROUNDING)
-    faced = faces[1:] | faces[:-1]
-    nearest = np.minimum(gaps[1:], gaps[:-1])
-    rate = np.diff(gaps, axis=0) / steps[:, None]
-    faced &= np.abs(rate) >= SLOWEST - ROUNDING
-    counts = opens & faced[..., None] & (nearest[..., None] <= thickness + ROUNDING)
-    return np.stack(
-        [np.where(counts, np.maximum(way * rate, 0)[..., None], 0).max(axis=1) for way in (-1, 1)]
-    )
+    joints = len(steps)
+    found = np.zeros((2, joints, *(len(step) for step in steps), len(thickness)))
+    if not gaps.shape[-1]:
+        return found
+    widest, nodes = gaps.max(axis=tuple(range(joints))), tuple(range(joints))
+    varies = widest - gaps.min(axis=nodes) >= least - ROUNDING
+    opens = varies[:, None] & (widest[:, None] >= fits - ROUNDING)
+    faced, nearest = faces, gaps
+    for axis in nodes:
+        (one, other), (near, also) = _neighbours(faced, axis), _neighbours(nearest, axis)
+        faced, nearest = one | other, np.minimum(near, also)
+    for axis, step in enumerate(steps):
+        rate = np.diff(gaps, axis=axis) / step.reshape([-1 if j == axis else 1 for j in (*nodes, joints)])
+        for k, way in enumerate((-1, 1)):
+            fast = np.maximum(way * rate, 0.0)
+            for node in nodes:
+                fast = fast if node == axis else np.maximum(*_neighbours(fast, node))
+            fast = np.where(faced & (fast >= SLOWEST - ROUNDING), fast, 0.0)
+            for r, thick in enumerate(thickness):
+                counts = opens[:, r] & (nearest <= thick + ROUNDING)
+                found[k, axis, ..., r] = np.where(counts, fast, 0.0).max(axis=-1)
+    return found
+
+
+def _neighbours(values: NDArray[Value], axis: int) -> tuple[NDArray[Value], NDArray[Value]]:
+    """Both ends of each step along an axis."""
+    m = values.shape[axis]
+    return values.take(range(1, m), axis), values.take(range(m - 1), axis)
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """Of those between a pair of bodies, and the grid of its positions."""
+
+    mechanism: str
+    column: int
+    low: float
+    step: float
+    count: int
+    """Of steps."""
+    turns: bool
+    """Whether it goes round without end."""
+
+    @classmethod
+    def of(cls, model: Model, joints: OwnJoints, coordinate: Coordinate, count: int) -> _Joint:
+        low, high = joints.range(coordinate)
+        mechanism = model.mechanisms[coordinate[0]]
+        whole = mechanism.coupling[:, coordinate[1]]
+        turns = (
+            mechanism.joints[coordinate[1]].kind == "revolute"
+            and high - low >= 2 * np.pi - 1e-9
+            and bool((whole == np.round(whole)).all())
+        )
+        high = low + 2 * np.pi if turns else high
+        return cls(*coordinate, low, max((high - low) / count, 1e-12), count, turns)
+
+    @property
+    def grid(self) -> Array:
+        """Its positions [rad or m], shape (count + 1,)."""
+        return np.linspace(self.low, self.low + self.count * self.step, self.count + 1)
+
+    def seen(self, start: float, end: float) -> NDArray[np.int64]:
+        """Steps from one position to another."""
+        ends = sorted(int((q - self.low) // self.step) for q in (start, end))
+        seen = np.arange(ends[0], min(ends[1], ends[0] + self.count) + 1)
+        return seen % self.count if self.turns else np.clip(seen, 0, self.count - 1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """Of a pair of bodies and the joint between them."""
+    """Of a pair of bodies and the joints between them."""
 
-    mechanism: str
-    column: int
+    joints: tuple[_Joint, ...]
     rows: tuple[int, ...]
     """Of the moving bodies of the pair."""
-    low: float
-    step: float
-    turns: bool
-    """Whether it goes round without end."""
     rates: Array
-    """How fast places close, per unit of the joint, as it grows and as it falls, shape (2, m - 1, r)."""
+    """How fast places close, per unit of each joint, as `closing` returns them."""
 
-    def at(self, start: float, end: float, qd: tuple[float, float]) -> Array:
+    def at(self, ways: Sequence[tuple[float, float]], qd: Sequence[tuple[float, float]]) -> Array:
         """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,).
 
         Args:
-            start: From where on the joint is looked at [rad or m].
-            end: To where, likewise.
-            qd: Its least and largest speed [rad/s or m/s].
+            ways: From where to where on each joint is looked at [rad or m].
+            qd: Least and largest speed of each [rad/s or m/s].
         """
-        count = self.rates.shape[1]
-        ends = sorted(int((q - self.low) // self.step) for q in (start, end))
-        seen = np.arange(ends[0], min(ends[1], ends[0] + count) + 1)
-        seen = seen % count if self.turns else np.clip(seen, 0, count - 1)
-        ways = [way for way, moves in enumerate((qd[1] > 0, qd[0] < 0)) if moves]
-        speed = self.rates[ways][:, seen].max(axis=(0, 1), initial=0.0) * max(abs(qd[0]), abs(qd[1]))
+        cells = np.ix_(*(joint.seen(*way) for joint, way in zip(self.joints, ways, strict=True)))
+        nodes = tuple(range(len(self.joints)))
+        speed = np.zeros(self.rates.shape[-1])
+        for j, (slowest, fastest) in enumerate(qd):
+            senses = [sense for sense, moves in enumerate((fastest > 0, slowest < 0)) if moves]
+            most = [self.rates[sense, j][cells].max(axis=nodes) for sense in senses]
+            speed += np.max([np.zeros_like(speed), *most], axis=0) * max(abs(slowest), abs(fastest))
         return np.where(speed > STILL, speed, 0.0)
 
 
@@ -144,7 +202,7 @@ class JointGaps:
         self,
         model: Model,
         robot: Mechanism,
-        pairs: Sequence[tuple[int, int, Coordinate]],
+        pairs: Sequence[tuple[int, int, tuple[Coordinate, ...]]],
         thickness: Array,
         fits: Array,
         *,
@@ -156,7 +214,7 @@ class JointGaps:
         Args:
             model: The compiled workstation.
             robot: The robot.
-            pairs: Two of its bodies and the joint between them.
+            pairs: Two of its bodies and the joints between them, at most three.
             thickness: Of body parts [m], shape (r,).
             fits: Thinnest that a body part is [m], shape (r,).
             least: See `closing`.
@@ -166,27 +224,21 @@ class JointGaps:
         row = {body: k for k, body in enumerate(robot.moving)}
         joints = OwnJoints(model)
         self._tables: list[_Table] = []
-        for a, b, coordinate in pairs:
+        for a, b, coordinates in pairs:
             rows = tuple(row[i] for i in (a, b) if i in row)
             if not rows:
                 continue
-            low, high = joints.range(coordinate)
-            mechanism = model.mechanisms[coordinate[0]]
-            whole = mechanism.coupling[:, coordinate[1]]
-            turns = (
-                mechanism.joints[coordinate[1]].kind == "revolute"
-                and high - low >= 2 * np.pi - 1e-9
-                and bool((whole == np.round(whole)).all())
+            between = tuple(_Joint.of(model, joints, c, STEPS[len(coordinates)]) for c in coordinates)
+            grids = np.meshgrid(*(joint.grid for joint in between), indexing="ij")
+            rotations, positions = joints.poses(
+                {c: grid.reshape(-1) for c, grid in zip(coordinates, grids, strict=True)}
             )
-            high = low + 2 * np.pi if turns else high
-            grid = np.linspace(low, high, STEPS + 1)
-            rotations, positions = joints.poses({coordinate: grid})
             poses = [(rotations[:, i], positions[:, i]) for i in (a, b)]
             solids = [model.bodies[i].solids for i in (a, b)]
-            rates = _rates(solids, poses, np.diff(grid), thickness, fits, least, model.cache)
+            steps = [np.diff(joint.grid) for joint in between]
+            rates = _rates(solids, poses, steps, thickness, fits, least, model.cache)
             if rates.any():
-                step = max((high - low) / STEPS, 1e-12)
-                self._tables.append(_Table(*coordinate, rows, low, step, turns, rates))
+                self._tables.append(_Table(between, rows, rates))
 
     def speeds(self, state: State, wanted: Flags, span: Span | None = None) -> Array:
         """At which speed moving bodies clamp body parts now [m/s], 0 where they do not, shape (b, r).
@@ -201,25 +253,27 @@ class JointGaps:
             rows = list(table.rows)
             if not wanted[rows].any():
                 continue
-            mechanism = state.model.mechanisms[table.mechanism]
-            q, qd = (float(each(mechanism)[table.column]) for each in (state.q, state.qd))
-            least, most, way = qd, qd, 0.0
-            if span is not None:
-                dof = mechanism.v_address[mechanism.own[table.column]]
-                way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T
-                change += span.joint_noise[dof]
+            ways, speeds = [], []
+            for joint in table.joints:
+                mechanism = state.model.mechanisms[joint.mechanism]
+                q, qd = (float(each(mechanism)[joint.column]) for each in (state.q, state.qd))
+                way, change = 0.0, 0.0
+                if span is not None:
+                    dof = mechanism.v_address[mechanism.own[joint.column]]
+                    way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T + span.joint_noise[dof]
                 least, most = qd - change, qd + change
-            if least or most:
                 start, end = q - way + min(least, 0.0) * self._period, q + way + max(most, 0.0) * self._period
-                at = table.at(start, end, (least, most))
-                found[rows] = np.maximum(found[rows], at)
+                ways.append((start, end))
+                speeds.append((least, most))
+            if any(least or most for least, most in speeds):
+                found[rows] = np.maximum(found[rows], table.at(ways, speeds))
         return found * wanted
 
 
 def _rates(
     solids: Sequence[Sequence[Solid]],
     poses: Sequence[tuple[Array, Array]],
-    steps: Array,
+    steps: Sequence[Array],
     thickness: Array,
     fits: Array,
     least: float,
@@ -229,20 +283,22 @@ def _rates(
     cores = [_core(solid) for of in solids for solid in of]
     radii = [[s.radius for s in of] for of in solids]
     of_pair = repr((radii, [core.shape for core in cores], least)).encode()
-    arrays = [*cores, *(part for pose in poses for part in pose), steps, thickness, fits]
+    arrays = [*cores, *(part for pose in poses for part in pose), *steps, thickness, fits]
     key = hashlib.sha256(
         b"".join([_how(), of_pair, *(np.ascontiguousarray(array).tobytes() for array in arrays)])
     ).digest()
     if key not in _KNOWN:
         file = None if cache is None else cache / f"{key.hex()}.gaps"
-        shape = (2, len(steps), len(thickness))
+        cells = tuple(len(step) for step in steps)
+        shape = (2, len(steps), *cells, len(thickness))
         found = None if file is None else _read(file, shape)
         if found is None:
-            found = np.zeros(shape)
+            nodes, sides = tuple(count + 1 for count in cells), []
             for one, other in ((0, 1), (1, 0)):
-                on = places(solids[one])
-                gaps, faces = _gaps(on, solids[other], (poses[one], poses[other]))
-                found = np.maximum(found, closing(gaps, faces, steps, thickness, fits, least=least))
+                gaps, faces = _gaps(places(solids[one]), solids[other], (poses[one], poses[other]))
+                gaps, faces = gaps.reshape(*nodes, -1), faces.reshape(*nodes, -1)
+                sides.append(closing(gaps, faces, steps, thickness, fits, least=least))
+            found = np.maximum(*sides) if len(steps) == 1 else np.minimum(*sides)
             if file is not None:
                 _write(file, found)
         if len(_KNOWN) >= MOST_KNOWN:

@@ -9,14 +9,13 @@ import gc
 import logging
 import os
 import sys
-import threading
 import time
 from importlib import import_module
 from pkgutil import iter_modules
 
 import pytest
 
-from live_story import open_files, wait_for
+from live_story import open_files, own_threads, wait_for
 from seerob.core.samples import Quality, SignalSample
 from seerob.devices import sources
 from seerob.devices.live.listening import Listener, LiveSource
@@ -40,7 +39,7 @@ def resident():
 
 def load():
     """Open files, threads and memory [byte] of this process."""
-    return open_files(), threading.active_count(), resident()
+    return open_files(), own_threads(), resident()
 
 
 class Ears(logging.Filter):
@@ -124,14 +123,14 @@ def kill_and_restart(monkeypatch, ears, kind, kills):
         assert heard.losses >= kills
         # What is closed is gone a moment later.
         settled = settled or load()
-        wait_for(lambda: open_files() <= settled[0] + 2 and threading.active_count() <= settled[1])
+        wait_for(lambda: open_files() <= settled[0] + 2 and own_threads() <= settled[1])
         end = load()
     finally:
         listener.ask_to_stop()
         assert listener.join(10.0)
         server.stop()
         getattr(server, "close", lambda: None)()
-    wait_for(lambda: threading.active_count() <= before[1] and open_files() <= before[0] + 2)
+    wait_for(lambda: own_threads() <= before[1] and open_files() <= before[0] + 2)
     print(
         f"{kind}: {kills} kills, {heard.losses} losses said, {heard.said.count('found')} returns said; "
         f"files {settled[0]} to {end[0]}, threads {settled[1]} to {end[1]}, "

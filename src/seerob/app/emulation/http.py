@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from seerob.app.emulation.background import Emulator
+from seerob.protocols.links.tcp_server import stop_accepting
 
 
 class HttpEmulator(Emulator):
@@ -58,7 +59,20 @@ class HttpEmulator(Emulator):
             files = {"ssl_certfile": self._certificate[0], "ssl_keyfile": self._certificate[1]}
         app = _unmoved(Starlette(routes=list(self.routes())))
         config = uvicorn.Config(app, log_config=None, lifespan="off", timeout_graceful_shutdown=1, **files)
-        self._server = uvicorn.Server(config)
+
+        class Server(uvicorn.Server):
+            """Leaves nothing open: uvicorn ends at once and forgets who was connected."""
+
+            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+                for server in self.servers:
+                    await stop_accepting(server)
+                await super().shutdown(sockets)
+                for connection in tuple(self.server_state.connections):
+                    if connection.transport is not None:
+                        connection.transport.abort()
+                await asyncio.sleep(0)
+
+        self._server = Server(config)
         self._begun = time.monotonic()
         run = self._server.run
         return lambda: run([listening])

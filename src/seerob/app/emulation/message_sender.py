@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from seerob.app.emulation.background import LoopEmulator
+from seerob.protocols.links.tcp_server import stop_accepting
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -76,6 +77,7 @@ class MessageSender(LoopEmulator):
             self.port = next(iter(server.sockets)).getsockname()[1]
             ready()
             await over.wait()
+            await stop_accepting(server.server)
 
     async def _until(self, over: asyncio.Event, work: Awaitable[None]) -> None:
         task, ended = asyncio.ensure_future(work), asyncio.ensure_future(over.wait())

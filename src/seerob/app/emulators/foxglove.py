@@ -12,6 +12,7 @@ from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.tcp_server import stop_accepting
 from seerob.protocols.ros import foxglove
 from seerob.protocols.ros.foxglove import ServerChannel
 from seerob.protocols.ros.ros_serialised import Edition, encode, store
@@ -52,6 +53,7 @@ class FoxgloveBridge(RosRobot):
             self._begun = time.monotonic()
             ready()
             await over.wait()
+            await stop_accepting(server.server)
 
     async def _welcome(self, connection: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed

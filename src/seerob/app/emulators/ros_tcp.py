@@ -15,7 +15,7 @@ from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, option, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.tcp_server import close_server
+from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import ros1_name, same_type
 from seerob.protocols.ros.ros_serialised import Edition, encode, store
@@ -65,12 +65,11 @@ class RosTcpEndpoint(_Playing):
     async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
         """Listen, and serve whoever connects."""
         store(self.edition)
-        server = await asyncio.start_server(self._welcome, self.host, self.port)
-        self.port = server.sockets[0].getsockname()[1]
-        self._begun = time.monotonic()
-        ready()
-        await over.wait()
-        await close_server(server)
+        async with tcp_server(self._welcome, self.host, self.port) as server:
+            self.port = server.sockets[0].getsockname()[1]
+            self._begun = time.monotonic()
+            ready()
+            await over.wait()
 
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         splitter, wanted = Splitter(), set[str]()

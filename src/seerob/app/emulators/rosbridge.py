@@ -19,6 +19,7 @@ from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.core.extras import need
+from seerob.protocols.links.tcp_server import stop_accepting
 from seerob.protocols.ros.ros_messages import Joints, Plan, Said, Transform, ros1_name
 from seerob.protocols.ros.ros_serialised import Edition, encode
 from seerob.protocols.ros.rosbridge import MAX_MESSAGE, Compression
@@ -51,6 +52,7 @@ class RosbridgeServer(RosRobot):
         self._begun = time.monotonic()
         ready()
         await over.wait()
+        await stop_accepting(server.server)
         server.close()
         await server.wait_closed()
 

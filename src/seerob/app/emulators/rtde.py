@@ -12,6 +12,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
+from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +21,7 @@ from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
 from seerob.core.errors import InputError
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.tcp_server import close_server
+from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.robots.rtde import (
     NOT_FOUND,
     Accepted,
@@ -151,18 +152,15 @@ class RtdeServer(LoopEmulator):
 
     async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
         """Listen, and serve whoever connects."""
-        server = await asyncio.start_server(self._welcome, self.host, self.port)
-        self.port = server.sockets[0].getsockname()[1]
-        self._begun = time.monotonic()
-        primary = None
-        if self.kinematics is not None:
-            primary = await asyncio.start_server(self._say_kinematics, self.host, self.primary_port)
-            self.primary_port = primary.sockets[0].getsockname()[1]
-        ready()
-        await over.wait()
-        await close_server(server)
-        if primary is not None:
-            await close_server(primary)
+        async with AsyncExitStack() as both:
+            server = await both.enter_async_context(tcp_server(self._welcome, self.host, self.port))
+            self.port = server.sockets[0].getsockname()[1]
+            self._begun = time.monotonic()
+            if self.kinematics is not None:
+                primary = tcp_server(self._say_kinematics, self.host, self.primary_port)
+                self.primary_port = (await both.enter_async_context(primary)).sockets[0].getsockname()[1]
+            ready()
+            await over.wait()
         # What is left, the clients' tasks, asyncio.run cancels.
 
     async def _say_kinematics(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -38,6 +38,7 @@ from seerob.app.server.visits import Visits
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
+from seerob.protocols.links.tcp_server import stop_accepting
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
@@ -76,6 +77,15 @@ _log = logging.getLogger(__name__)
 LARGEST_MESSAGE = 16384
 """From a page [B]; what a headset sees of a body with both hands has 10 000, a command less than 100."""
 PORTS_TRIED = 20
+
+
+class _Uvicorn(uvicorn.Server):
+    """Closes without leaving a connection open that was accepted in its last moment."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        for server in self.servers:
+            await stop_accepting(server)
+        await super().shutdown(sockets)
 
 
 class Server:
@@ -246,7 +256,7 @@ class Server:
         )
         config.load()
         config.ssl = None if self.tls is None else self.tls.context
-        self._uvicorn = uvicorn.Server(config)
+        self._uvicorn = _Uvicorn(config)
         try:
             with asyncio.Runner(loop_factory=PromptLoop) as runner:
                 runner.run(self._uvicorn.serve(sockets=[listening]))

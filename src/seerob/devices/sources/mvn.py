@@ -9,7 +9,6 @@ comes over a network ends it: what cannot be understood is counted and told once
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
 import time
@@ -31,7 +30,7 @@ from seerob.devices.capture.xsens import anatomical, differences
 from seerob.devices.live.listening import say_once
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
-from seerob.protocols.links.tcp_server import close_server
+from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.tracking import mvn
 from seerob.protocols.tracking.mvn import Assembly, Items, Kind, Scale, Tags, decode
 from seerob.protocols.tracking.mvn_pose import METRES, POSES, Up, looks_y_up, pose, unit_of
@@ -370,14 +369,13 @@ def _no_pose(said: Frames) -> str:
 async def _connected(bind: str, port: int, sender: str) -> AsyncGenerator[tuple[float, bytes], None]:
     """Datagrams of the one who connects; a second one is turned away."""
     queue: asyncio.Queue[tuple[float, bytes] | Exception] = asyncio.Queue(WAITING)
-    busy = False
+    connected: list[asyncio.StreamWriter] = []
 
     async def welcome(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        nonlocal busy
-        if busy or (sender and writer.get_extra_info("peername")[0] != sender):
+        if connected or (sender and writer.get_extra_info("peername")[0] != sender):
             writer.transport.abort()
             return
-        busy = True
+        connected.append(writer)
         splitter = mvn.Splitter()
         try:
             while data := await reader.read(mvn.LARGEST):
@@ -389,21 +387,19 @@ async def _connected(bind: str, port: int, sender: str) -> AsyncGenerator[tuple[
         finally:
             writer.transport.abort()
 
-    server = await asyncio.start_server(welcome, bind, port)
     try:
-        while True:
-            patience = SILENCE if busy else CONNECT_WITHIN
-            try:
-                async with asyncio.timeout(patience):
-                    item = await queue.get()
-            except TimeoutError as error:
-                what = "nothing sent to" if busy else "nobody connected to"
-                raise TimeoutError(f"{what} port {port} for {patience:g} s") from error
-            if isinstance(item, Exception):
-                raise item
-            yield item
+        async with tcp_server(welcome, bind, port):
+            while True:
+                patience = SILENCE if connected else CONNECT_WITHIN
+                try:
+                    async with asyncio.timeout(patience):
+                        item = await queue.get()
+                except TimeoutError as error:
+                    what = "nothing sent to" if connected else "nobody connected to"
+                    raise TimeoutError(f"{what} port {port} for {patience:g} s") from error
+                if isinstance(item, Exception):
+                    raise item
+                yield item
     finally:
-        await close_server(server)
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(0.2):
-                await server.wait_closed()
+        for writer in connected:
+            writer.transport.abort()

@@ -22,7 +22,7 @@ from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.ros.live_source import RosSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.connection import Connection, connected
-from seerob.protocols.links.tcp_server import close_server
+from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import ros1_name, same_type
 from seerob.protocols.ros.ros_serialised import Edition, decode, store
@@ -216,11 +216,9 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
                     raise item
                 yield item
 
-        server = await asyncio.start_server(welcome, self.bind, self.port)
         try:
-            async with aclosing(frames()) as heard:
+            async with tcp_server(welcome, self.bind, self.port), aclosing(frames()) as heard:
                 yield heard
         finally:
-            await close_server(server)
             for writer in newest:
                 writer.transport.abort()

@@ -37,9 +37,9 @@ def arm(link="", limit=LIMIT, kind="revolute", axis="0 0 1"):
     return robot('<link name="base"/>', f'<link name="arm">{link}</link>', moving)
 
 
-def read(tmp_path, text, **options):
-    (tmp_path / "r.urdf").write_text(text)
-    return load_robot("r.urdf", folder=tmp_path, **options)
+def read(folder, text, model="r.urdf", **options):
+    (folder / model).write_text(text)
+    return load_robot(model, folder=folder, **options)
 
 
 def texts(description):
@@ -258,7 +258,7 @@ def package(tmp_path):
     ],
 )
 def test_meshes_are_found(package, uri):
-    made = read(package / "urdf", arm(mesh_link(uri.format(folder=package))))
+    made = read(package, arm(mesh_link(uri.format(folder=package))), "urdf/r.urdf")
     (solid,) = made.link("arm").solids
     np.testing.assert_allclose(np.ptp(solid.mesh.vertices, axis=0), [0.1, 0.2, 0.3], atol=1e-7)
     np.testing.assert_allclose(solid.mesh.vertices.mean(axis=0), [0, 0, 1], atol=1e-7)
@@ -282,15 +282,33 @@ def test_a_package_cannot_be_left(package, tmp_path):
     assert "no such file" in problem.what
 
 
+@pytest.mark.parametrize(
+    "uri",
+    ["../meshes/Part.STL", "file://{folder}/meshes/Part.STL", "package://my_robot/meshes/Part.STL", "m.STL"],
+)
+def test_a_mesh_outside_the_folder_is_refused_unless_allowed(package, uri):
+    (package / "urdf" / "m.STL").symlink_to(package / "meshes" / "Part.STL")
+    text = arm(mesh_link(uri.format(folder=package)))
+    (problem,) = problems(package / "urdf", text)
+    assert "outside the folders" in problem.what or "packages = { my_robot" in problem.remedy
+    assert read(package / "urdf", text, outside=True).link("arm").solids
+
+
+@pytest.mark.parametrize("name", [".ssh", "..", ".", "", "a b", "~", "-"])
+def test_a_package_has_the_name_of_one(tmp_path, name):
+    (tmp_path / name).mkdir(exist_ok=True)
+    assert not list(Resolver("r.urdf", tmp_path, {name: tmp_path}, outside=True).roots(name))
+
+
 def test_scale_and_mirror(package):
-    made = read(package / "urdf", arm(mesh_link("../meshes/Part.STL", scale='scale="-1 2 1"')))
+    made = read(package, arm(mesh_link("../meshes/Part.STL", scale='scale="-1 2 1"')), "urdf/r.urdf")
     mesh = made.link("arm").solids[0].mesh
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), [0.1, 0.4, 0.3], atol=1e-7)
     assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume == pytest.approx(0.1 * 0.4 * 0.3, rel=1e-6)
 
 
 def test_without_collision_the_visual_counts_and_is_said(package):
-    made = read(package / "urdf", arm(mesh_link("../meshes/Part.STL", tag="visual")))
+    made = read(package, arm(mesh_link("../meshes/Part.STL", tag="visual")), "urdf/r.urdf")
     assert len(made.link("arm").solids) == 1
     assert "use the visual one" in texts(made)
 

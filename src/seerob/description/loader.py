@@ -24,6 +24,7 @@ def load_robot(
     meshes: str | None = None,
     arguments: Mapping[str, str] | None = None,
     name: str = "robot",
+    outside: bool = False,
 ) -> Description:
     """A robot, read, repaired where it can be, and checked.
 
@@ -35,6 +36,8 @@ def load_robot(
         meshes: A description (as ``model``) whose geometry replaces the library's envelope.
         arguments: Values of the arguments of a xacro file.
         name: Name of the robot; findings speak of ``name/link``.
+        outside: Whether a description may name files outside ``folder``, its own folder and what is
+            installed.
 
     Raises:
         InputError: The file is missing, not a robot, or wrong beyond repair; all mistakes at once.
@@ -43,23 +46,28 @@ def load_robot(
     if model.startswith("library:"):
         description = library.load(model.removeprefix("library:"), name=name)
     else:
-        description = _from_file(model, folder, packages or {}, arguments or {}, name)
+        description = _from_file(model, folder, packages or {}, arguments or {}, name, outside)
         # Numba is imported only where a file brings shapes of its own.
         from seerob.description.robots.maker_geometry import with_protrusions
 
         description = with_protrusions(description)
     if meshes is None:
         return description
-    maker = load_robot(meshes, folder=folder, packages=packages, name=name)
+    maker = load_robot(meshes, folder=folder, packages=packages, name=name, outside=outside)
     return with_geometry_of(description, maker)
 
 
 def _from_file(
-    model: str, folder: Path, packages: Mapping[str, str], arguments: Mapping[str, str], name: str
+    model: str,
+    folder: Path,
+    packages: Mapping[str, str],
+    arguments: Mapping[str, str],
+    name: str,
+    outside: bool,
 ) -> Description:
-    path = _path(model, folder)
+    path, home = _path(model, folder)
     roots = {package: folder / root for package, root in packages.items()}
-    resolver = Resolver(model, path.parent, roots)
+    resolver = Resolver(model, path.parent, roots, within=(folder, home), outside=outside)
     if path.suffix.lower() == ".xacro":
         text, files = expanded(path, resolver, arguments)
         robot = urdf.from_text(text, resolver=resolver, name=name)
@@ -80,13 +88,14 @@ def _from_file(
     )
 
 
-def _path(model: str, folder: Path) -> Path:
+def _path(model: str, folder: Path) -> tuple[Path, Path]:
+    """A description, and the folder of which it may name files."""
     if model.startswith("package:") and not model.startswith("package://"):
         return of_distribution(model.removeprefix("package:"))
     path = folder / model
     try:
         if path.is_file():
-            return path
+            return path, path.parent
     except (OSError, ValueError) as error:
         raise InputError.at(model[:200], "", f"is no name of a file: {error.args[-1]}", "name one") from error
     found = as_written_or_in_other_case(path)

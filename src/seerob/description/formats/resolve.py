@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -13,6 +14,21 @@ from seerob.core.errors import InputError, Problem, UnknownName
 
 MAX_URI = 4096
 """Longest file reference accepted [characters]."""
+_PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_.-]*")
+"""Names of packages: of ROS and of Python, never of hidden folders."""
+_ROS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
+
+
+def installed_packages() -> tuple[Path, ...]:
+    """Folders that hold the ROS packages installed for whoever started this, as the environment says."""
+    found = ((prefix, inner) for name, inner in _ROS for prefix in os.environ.get(name, "").split(os.pathsep))
+    return tuple(Path(prefix) / inner for prefix, inner in found if prefix)
+
+
+OUTSIDE_REMEDY = (
+    "copy it beside the workstation file, or, if you trust the file, --allow-outside (in Python "
+    "allow_outside=True)"
+)
 
 
 @dataclass(frozen=True)
@@ -34,8 +50,16 @@ class Resolver:
     """The folder it is in; relative references start there."""
     packages: Mapping[str, Path] = field(default_factory=dict)
     """Folder of each ROS package that the user named."""
+    within: tuple[Path, ...] = ()
+    """Folders of which files may be read, besides its own and what is installed, wherever links lead."""
+    outside: bool = False
+    """Whether files elsewhere may be read too."""
+    installed: tuple[Path, ...] = field(default_factory=installed_packages)
+    """Folders that hold installed ROS packages."""
     remarks: list[str] = field(default_factory=list)
     """What was taken as the files have it because the user did not say otherwise."""
+    notes: list[str] = field(default_factory=list)
+    """What was done to read it that whoever opens the file wants to know."""
 
     def find(self, uri: str) -> Found | Problem:
         """The file behind ``package://``, ``model://``, ``file://`` or a path; a problem when there is none.
@@ -61,6 +85,9 @@ class Resolver:
             searched.append(candidate)
             found = as_written_or_in_other_case(candidate)
             if found is not None:
+                if not self.may_read(found):
+                    what = f"is {found.resolve()}, outside the folders that this description may read"
+                    return Problem(self.file, uri, what, OUTSIDE_REMEDY)
                 remark = (
                     "" if found == candidate else f"{uri}: upper and lower case differ, used {found.name}"
                 )
@@ -74,6 +101,12 @@ class Resolver:
             elif not searched:
                 remedies.append("what a package names stays in the package")
         return Problem(self.file, uri, "no such file", "; ".join(remedies))
+
+    def may_read(self, path: Path) -> bool:
+        """Whether a path leads into the folders of which files may be read."""
+        real = path.resolve()
+        folders = (self.folder, *self.within, *self.installed)
+        return self.outside or any(real.is_relative_to(folder.resolve()) for folder in folders)
 
     def _candidates(self, scheme: str, rest: str) -> Iterator[Path]:
         if scheme in {"package", "model"}:
@@ -89,7 +122,11 @@ class Resolver:
             yield self.folder / rest
 
     def roots(self, package: str) -> Iterator[Path]:
-        """Folders that may be the ROS package of that name, the likeliest first."""
+        """Folders that may be the ROS package of that name and may be read, the likeliest first."""
+        if _PACKAGE.fullmatch(package):
+            yield from filter(self.may_read, self._roots(package))
+
+    def _roots(self, package: str) -> Iterator[Path]:
         if package in self.packages:
             yield self.packages[package]
             return
@@ -100,9 +137,8 @@ class Resolver:
         for ancestor in (folder, *folder.parents[:-1]):
             if (ancestor / package).is_dir():
                 yield ancestor / package
-        for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
-            for prefix in filter(None, os.environ.get(variable, "").split(os.pathsep)):
-                yield Path(prefix) / inner / package
+        for folder in self.installed:
+            yield folder / package
 
 
 def _inside(root: Path, path: Path) -> bool:
@@ -132,8 +168,8 @@ def as_written_or_in_other_case(path: Path) -> Path | None:
         return None
 
 
-def of_distribution(reference: str) -> Path:
-    """A file of an installed Python distribution.
+def of_distribution(reference: str) -> tuple[Path, Path]:
+    """A file of an installed Python distribution, and the folder that is installed in.
 
     Args:
         reference: ``<distribution>/<path>``, where the path is any tail of the path of one of its
@@ -164,4 +200,4 @@ def of_distribution(reference: str) -> Path:
             f"{len(matches)} files of {name} end like this",
             "name more folders of " + ", ".join(map(str, matches[:4])),
         )
-    return Path(str(matches[0].locate()))
+    return Path(str(matches[0].locate())), Path(str(distribution.locate_file("")))

@@ -88,6 +88,8 @@ def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Des
     reader = Reader(resolver.file, name)
     for remark in resolver.remarks:
         reader.finding("assumed", "", remark)
+    for note in resolver.notes:
+        reader.finding("note", "", note)
     root = parse_xml(content, resolver.file)
     if root.tag != "robot":
         raise InputError.at(

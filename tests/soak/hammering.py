@@ -5,19 +5,24 @@ import os
 import random
 import sys
 import tempfile
+import time
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from functools import cache
+from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
+from unittest.mock import patch
 
-from seerob.core.errors import InputError
-from soak.made_files import KINDS
+from seerob.core.errors import SeerobError
+from seerob.description.mesh_files import apart
+from seerob.files.tables import workbook
+from soak.corpus import corpus
+from soak.made_cells import KINDS
 
-PATIENCE = 120.0
-"""A file that takes longer [s] is one that hangs."""
-SPARE = 2 << 30
+PATIENCE = 10.0
+"""Computing time [s] after which a file counts as one that hangs."""
+SPARE = 512 << 20
 """Memory that a process may take beyond what it has before the first file [byte]."""
 CHUNK = 2000
 
@@ -26,36 +31,46 @@ def hammer(kind, seed, files):
     """How many of ``files`` broken files of a kind were read and refused; anything else raises."""
     format_ = KINDS[kind]
     counts = Counter(read=0, refused=0)
-    whole, rng = made(kind), random.Random(f"{kind} {seed}")
+    rng = random.Random(f"{kind} {seed}")
     with tempfile.TemporaryDirectory(dir=_memory()) as folder:
         path = Path(folder) / f"f.{format_.suffix}"
         for number in range(files):
-            broken = format_.change(whole, rng)
+            # Half of them are the valid one with one change.
+            broken = format_.change(rng.choice([corpus(kind)[0], rng.choice(corpus(kind))]), rng)
             path.write_bytes(broken)
+            begun = time.thread_time()
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("error")
                     format_.read(path)
-            except InputError:
+            except SeerobError:
                 counts["refused"] += 1
             except BaseException as error:
                 raise AssertionError(f"{kind}, seed {seed}, file {number}: {error!r}\n{broken!r}") from error
             else:
                 counts["read"] += 1
+            taken = time.thread_time() - begun
+            assert taken < PATIENCE, f"{kind}, seed {seed}, file {number}: {taken:.0f} s\n{broken!r}"
     return counts
 
 
-@cache
-def made(kind):
-    """The valid file of a kind, made once in each process."""
-    with tempfile.TemporaryDirectory(dir=_memory()) as folder:
-        path = Path(folder) / f"f.{KINDS[kind].suffix}"
-        KINDS[kind].make(path)
-        return path.read_bytes()
+@contextmanager
+def in_this_process():
+    """Parsers that have a process of their own work in this one, where what they raise is seen."""
+
+    def here(function, *arguments, **_):
+        return function(*arguments)
+
+    with (
+        patch.object(apart, "parsed", here),
+        patch.object(workbook, "parsed", here),
+        patch.object(workbook, "parsed_one_by_one", here),
+    ):
+        yield
 
 
 def hammer_in_processes(kind, files, tell):
-    """The same in as many processes as there are processors; ``tell`` hears how far it is."""
+    """As `hammer` does, in as many processes as there are processors; ``tell`` hears how far it is."""
     total = Counter()
     context = get_context("spawn")
     with ProcessPoolExecutor(os.cpu_count(), mp_context=context, initializer=_guarded) as pool:
@@ -73,9 +88,10 @@ def hammer_in_processes(kind, files, tell):
 
 
 def _watched(kind, seed, files):
-    faulthandler.dump_traceback_later(PATIENCE * 10, exit=True)
+    faulthandler.dump_traceback_later(120 * PATIENCE, exit=True)
     try:
-        return hammer(kind, seed, files)
+        with in_this_process():
+            return hammer(kind, seed, files)
     finally:
         faulthandler.cancel_dump_traceback_later()
 

@@ -263,7 +263,7 @@ def _packed_points(path):
     _workbook(path, (("name", *(f"q{i + 1}_deg" for i in range(6)), "pause_s"), *rows))
 
 
-KINDS = {
+FILES = {
     "bvh": Malformed("bvh", _said(BVH), lambda path: sound(bvh.read(path))),
     "mvnx": Malformed("mvnx", lambda path: made_mvnx(path, Q[:1]), lambda path: sound(mvnx.read(path), 1e4)),
     "c3d": Malformed("c3d", _c3d, lambda path: sound(c3d.read(path, MARKERS)), mutated),

@@ -8,19 +8,30 @@ import zipfile
 
 from seerob.protocols import ProtocolError
 
+PIECE = re.compile(rb"(?<=[\n>,;])")
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 NASTY = (
     *(b"nan", b"inf", b"-inf", b"1e309", b"-1e308", b"1e-320", b"0", b"-0", b"-1", b"0.5", b"2147483648"),
     *(b"99999999999999999999", b"1" * 5000, b"", b"true", b"null", b'"', b"[", b"{", b"}", b"<", b"]]>"),
     *(b"&x;", b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b",", b";", b"\t", b"=", b"#", b"1,5"),
-    *(b"0x10", b"\xb2"),
+    *(
+        b"0x10",
+        b"\xb2",
+        b"1e308",
+        b"5e-324",
+        b"[" * 2000,
+        b"<a>" * 2000,
+        b"{a=" * 2000,
+        b"../../x",
+        b"\x1b[2J",
+    ),
 )
 """What stands where a number was."""
 
 
 def mutated(data, rng):
     """``data`` with one or more bytes changed, moved, cut out, doubled, or lengths blown up."""
-    out = bytearray(data)
+    out = bytearray(data or b" ")
     for _ in range(rng.choice((1, 1, 2, 8))):
         at, size = rng.randrange(len(out)), rng.choice((1, 4, 8, 64, 1000))
         match rng.randrange(7):
@@ -57,14 +68,36 @@ def refusals(read, whole, *, seed, count, refusal=ProtocolError):
 
 
 def mutated_text(data, rng):
-    """``data`` with numbers that are none, or mutated as bytes."""
-    if rng.random() < 0.4:
+    """``data`` with numbers that are none, pieces elsewhere, or mutated as bytes."""
+    kind = rng.random()
+    if kind < 0.3:
         return mutated(data, rng)
+    if kind < 0.5:
+        return _rearranged(data, rng)
     places = [match.span() for match in NUMBER.finditer(data)]
     out = bytearray(data)
     for begin, end in sorted(rng.sample(places, min(len(places), rng.choice((1, 1, 2, 5)))), reverse=True):
         out[begin:end] = rng.choice(NASTY)
     return bytes(out)
+
+
+def _rearranged(data, rng):
+    """Lines, elements or cells left out, doubled, exchanged or moved."""
+    pieces = PIECE.split(data)
+    for _ in range(rng.choice((1, 1, 3))):
+        at, other = (rng.randrange(len(pieces)) for _ in range(2))
+        some = slice(at, at + rng.choice((1, 1, 2, 10)))
+        match rng.randrange(4):
+            case 0:
+                del pieces[some]
+            case 1:
+                pieces[at:at] = pieces[some] * rng.choice((1, 2, 50))
+            case 2:
+                pieces[at], pieces[other] = pieces[other], pieces[at]
+            case 3:
+                pieces[other:other] = [pieces.pop(at)]
+        pieces = pieces or [b""]
+    return b"".join(pieces)
 
 
 def mutated_zip(data, rng):

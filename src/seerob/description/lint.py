@@ -33,6 +33,8 @@ MAX_MASS = 1e4
 """Largest mass of one thing [kg]."""
 NOTHING = 1e-9
 """Up to this a mass is none [kg]."""
+POINT = 1e-8
+"""A radius of gyration up to this is none [m]."""
 DENSITIES = (10.0, 25_000.0)
 """From foam to the heaviest metals [kg/m³]."""
 REPAIRABLE = 0.02
@@ -91,17 +93,19 @@ def plausible_inertial(inertial: Inertial, *, body: bool) -> tuple[Inertial | No
         body: Whether it is one: a joint moves it, or it has a shape. It then has a mass and an inertia.
     """
     mass, inertia = inertial.mass, inertial.inertia
-    if mass <= NOTHING:
+    if mass <= NOTHING and (body or mass <= 0):
         if not body and not inertia.any():
             return None, "", ""
-        return None, "warning", f"mass is {mass:g} kg, expected more than 0: mass and inertia unknown"
+        least = NOTHING if mass > 0 else 0
+        return None, "warning", f"mass is {mass:g} kg, expected more than {least:g}: mass and inertia unknown"
     moments = np.linalg.eigvalsh(inertia)
     largest = float(np.abs(moments).max())
     shown = ", ".join(f"{m:.4g}" for m in moments)
-    if largest == 0.0:
+    if largest <= mass * POINT**2:
+        of = f"mass {mass:g} kg with an inertia of {largest:.4g}" + (" kg·m²" if largest else "")
         if body:
-            return None, "warning", f"mass {mass:g} kg with an inertia of 0: mass and inertia unknown"
-        return inertial, "note", f"mass {mass:g} kg with an inertia of 0: a point mass"
+            return None, "warning", f"{of}: mass and inertia unknown"
+        return inertial, "note", f"{of}: a point mass"
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     values, vectors = np.linalg.eigh(second)
     violation = -float(values[0]) / largest

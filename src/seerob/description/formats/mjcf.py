@@ -8,6 +8,7 @@ also drawn where a body has nothing else.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -233,7 +234,9 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
         model = spec.compile()
     except ValueError as error:
         said = " ".join(str(error).split())
-        raise InputError.at(resolver.file, "", f"MuJoCo cannot read it: {said}", _remedy(said)) from None
+        named = re.search(r"Element name '([^']+)'", said)
+        key = f"element {named[1]!r}" if named else ""
+        raise InputError.at(resolver.file, key, f"MuJoCo cannot read it: {said}", _remedy(said)) from None
     _remarks(reader, spec, model)
     names = _body_names(reader, model)
     links = [_link(reader, spec, model, body, names) for body in range(model.nbody)]
@@ -258,9 +261,11 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
 
 def _remedy(said: str) -> str:
     """What would be right, where MuJoCo only says what is wrong."""
-    if "mass" not in said:
-        return ""
-    return "give every moving body a mass greater than 0: <inertial>, or mass or density of its geoms"
+    if "mass" in said:
+        return "give every moving body a mass greater than 0, and inertia: <inertial>, or mass of its geoms"
+    if "inertia" in said:
+        return "give principal moments greater than 0, none of them larger than the sum of the others"
+    return "correct that element"
 
 
 def _remarks(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:

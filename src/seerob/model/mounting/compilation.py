@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -78,6 +79,7 @@ def listed(mounting: Mounting) -> tuple[Body, ...]:
 mujoco.set_mju_user_warning(logging.getLogger("mujoco").debug)
 
 Progress = Callable[[str], None]
+INERTIA = "principal moments greater than 0, none of them larger than the sum of the others"
 
 
 def compile_workstation(
@@ -145,10 +147,20 @@ class _Compiler:
         try:
             mj = self.mounting.spec.compile()
         except ValueError as error:
-            remedy = "look at the body that it names: its mass and inertia, or what is mounted there"
-            said = " ".join(str(error).split())
-            raise InputError.at(self.file, "", f"MuJoCo refuses the model: {said}", remedy) from error
+            raise self._refused(" ".join(str(error).split())) from error
         return self._model(mj, bodies)
+
+    def _refused(self, said: str) -> InputError:
+        """What MuJoCo says of the model, in the file of the robot or person that it names."""
+        named = re.search(r"Element name '([^/']+)/([^']*)'", said)
+        owner, link = named.groups() if named else ("", "")
+        file, key = (
+            (self.chains[owner].description.source, f"link[{link}]")
+            if owner in self.chains
+            else (self.file, "")
+        )
+        remedy = f"give it a mass greater than 0 and {INERTIA}, or look at what is mounted there"
+        return InputError.at(file, key, f"MuJoCo refuses the model: {said}", remedy)
 
     def _try(self, key: str, build: Callable[[Any], None], table: Any) -> None:
         try:

@@ -20,6 +20,8 @@ from seerob.description.shapes import glb
 
 TINY = 2e-15
 """MuJoCo wants more than 1e-15 kg on a body with a joint; this changes no digit of a mass matrix."""
+LEAST_FULL = 1e-14
+"""Below this it takes no eigenvalue of a full matrix [kg·m²], but principal moments of `TINY`."""
 
 
 @dataclass
@@ -106,8 +108,10 @@ class Mounting:
         body.mass = inertial.mass
         body.ipos = inertial.com
         i = inertial.inertia
-        if not i.any():
-            body.inertia = [TINY] * 3  # MuJoCo knows no point masses
+        moments, axes = np.linalg.eigh(i)
+        if moments[0] < LEAST_FULL:  # MuJoCo knows no point masses; no moment and no mass gets smaller
+            axes = axes * np.sign(np.linalg.det(axes))
+            body.inertia, body.iquat = np.maximum(moments, TINY), wxyz_from_rotation(axes)
             return
         body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 

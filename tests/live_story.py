@@ -17,23 +17,28 @@ from seerob.devices.live.real_time import SETTLE
 
 
 class Story(Kept):
-    """Keeps what goes out, and does things to the server at given ticks."""
+    """Keeps what goes out, and does things to the server at given ticks, or once it is within a limit."""
 
-    def __init__(self, ticks, enough=lambda story: True, **deeds):
+    def __init__(self, ticks, enough=lambda story: True, *, once_within=None, **deeds):
         self.ticks, self.deeds = ticks, {int(k.removeprefix("at_")): deed for k, deed in deeds.items()}
         super().__init__()
-        self.enough = enough
+        self.enough, self.once_within, self.done = enough, once_within, 0
+        """The tick in which that was done; those asked for are counted from there."""
 
     def write(self, snapshot, samples):
         super().write(snapshot, samples)
         self.deeds.get(len(self.snapshots), lambda: None)()
+        if self.once_within and snapshot.results[0].verdict == "within":
+            self.once_within()
+            self.once_within, self.done = None, len(self.snapshots)
 
     def stop(self):
-        ticks = len(self.snapshots)
+        ticks = len(self.snapshots) - self.done
         if ticks < self.ticks:
             return False
         # Asked now and then: it looks at everything that was heard.
-        return ticks >= 30 * self.ticks or (ticks % 20 == 0 and self.enough(self))
+        enough = ticks % 20 == 0 and not self.once_within and self.enough(self)
+        return ticks >= 30 * self.ticks or enough
 
     def joints(self):
         return [s for samples in self.heard for s in samples if isinstance(s, JointSample)]

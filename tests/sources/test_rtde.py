@@ -133,19 +133,18 @@ def test_a_controller_that_comes_late_is_followed(tmp_path):
 )
 def test_a_robot_that_says_that_it_does_not_know_is_undecided_at_once(tmp_path, values, reason):
     with RtdeServer(motion) as server:
-        story = lived(cell(tmp_path, server), Story(60, at_30=lambda: server.values.update(values)))
-    assert "within" in story.verdicts()[:29]
-    assert story.verdicts()[50] == "undecided"
-    assert reason in story.snapshots[50].results[0].reason
+        story = Story(30, once_within=lambda: server.values.update(values))
+        lived(cell(tmp_path, server), story)
+    assert story.verdicts()[story.done + 20] == "undecided"
+    assert reason in story.snapshots[story.done + 20].results[0].reason
 
 
 def test_a_clock_that_stands_still_is_silence(tmp_path):
     """A controller that repeats itself has nothing to say."""
     with RtdeServer(motion) as server:
-        deed = {"at_30": lambda: server.values.update(timestamp=server.now())}
-        story = lived(cell(tmp_path, server), Story(80, **deed))
-    assert "within" in story.verdicts()[:29]
-    assert "not heard for" in story.snapshots[70].results[0].reason
+        story = Story(50, once_within=lambda: server.values.update(timestamp=server.now()))
+        lived(cell(tmp_path, server), story)
+    assert "not heard for" in story.snapshots[story.done + 40].results[0].reason
 
 
 def test_what_was_heard_live_is_computed_again_bit_for_bit(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,7 +22,7 @@ Grand = Callable[[Mapping[str, Ints]], Ints]
 """Score of component scores; central components have a last axis of 1, sided ones of 2."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
     """What `judged` needs to know of a rule."""
 
@@ -97,7 +98,7 @@ def judged(
     # By what is known at least: what is not assessed drives nothing. Sides that are as bad both count.
     worst = np.flatnonzero(measured.low == measured.low.max()).tolist()
     known_least = {key: span.low for key, span in sides.items()}
-    drivers = {side: _drivers(method, known_least, side) for side in worst}
+    drivers = {side: _drivers(method, _of_side(known_least, side)) for side in worst}
     reason = _reason(method, sides, drivers, value, (low, high), missing, verdict)
     bones = [
         bone.format(side=SIDES[side])
@@ -174,9 +175,27 @@ def _both(span: Span) -> Span:
 
 
 def _grand(method: Method, components: Mapping[str, Span]) -> Span:
-    ends = ({key: getattr(span, end) for key, span in components.items()} for end in ("low", "high"))
-    low, high = (np.broadcast_to(method.grand(end), (2,)) for end in ends)
+    low, high = (
+        np.array([_score(method, _of_side(ends, side)) for side in range(len(SIDES))], np.int64)
+        for ends in (
+            {key: span.low for key, span in components.items()},
+            {key: span.high for key, span in components.items()},
+        )
+    )
     return Span(low, high)
+
+
+Scores = tuple[tuple[str, int], ...]
+"""Components of one side and their scores: they seldom change from one tick to the next."""
+
+
+def _of_side(scores: Mapping[str, Ints], side: int) -> Scores:
+    return tuple((key, int(score[side % len(score)])) for key, score in scores.items())
+
+
+@lru_cache(maxsize=4096)
+def _score(method: Method, scores: Scores) -> int:
+    return int(method.grand({key: np.array([score]) for key, score in scores})[0])
 
 
 def _verdict(interval: tuple[int, int], limit: int | None, *, complete: bool) -> Verdict | None:
@@ -186,18 +205,18 @@ def _verdict(interval: tuple[int, int], limit: int | None, *, complete: bool) ->
     return Verdict.UNDECIDED
 
 
-def _drivers(method: Method, scores: Mapping[str, Ints], side: int) -> list[str]:
+@lru_cache(maxsize=4096)
+def _drivers(method: Method, scores: Scores) -> tuple[str, ...]:
     """Components whose least score alone would lower the score most; all that are raised if none does."""
-    own = {key: int(score[side % len(score)]) for key, score in scores.items()}
-    raised = [key for key, score in own.items() if score > method.least[key]]
+    raised = [key for key, score in scores if score > method.least[key]]
     variants = {
         key: np.array([score, *(method.least[key] if key == r else score for r in raised)])
-        for key, score in own.items()
+        for key, score in scores
     }
     found = method.grand(variants)
     gains = found[0] - found[1:]
     best = int(gains.max(initial=0))
-    return raised if best == 0 else [key for key, gain in zip(raised, gains, strict=True) if gain == best]
+    return tuple(key for key, gain in zip(raised, gains, strict=True) if best in (0, gain))
 
 
 def _reason(

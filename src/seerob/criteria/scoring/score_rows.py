@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
+from itertools import pairwise
 
 from seerob.core.snapshot import Aspect, Row, RowState, Verdict
 from seerob.criteria.scoring.spans import Span, fallen, reached
@@ -56,12 +58,15 @@ def band_of(angle: float, edges: Sequence[float], neutral: float = 0.0) -> str:
     """``20° to 45°`` of an angle [rad]; empty for one that is not measured or has no bands."""
     if not edges or math.isnan(angle):
         return ""
-    shown = [f"{math.degrees(edge):.4g}°".replace("-", "−") for edge in sorted(edges)]
     # An edge belongs to the stricter side, which is the one away from the neutral posture.
-    at = sum(bool(reached(angle, edge) if edge >= neutral else not fallen(angle, edge)) for edge in edges)
-    if at == 0:
-        return f"below {shown[0]}"
-    return f"beyond {shown[-1]}" if at == len(shown) else f"{shown[at - 1]} to {shown[at]}"
+    at = sum(reached(angle, edge) if edge >= neutral else not fallen(angle, edge) for edge in edges)
+    return _bands(tuple(edges))[at]
+
+
+@cache
+def _bands(edges: tuple[float, ...]) -> tuple[str, ...]:
+    shown = [f"{math.degrees(edge):.4g}°".replace("-", "−") for edge in sorted(edges)]
+    return f"below {shown[0]}", *(f"{a} to {b}" for a, b in pairwise(shown)), f"beyond {shown[-1]}"
 
 
 BONES_OF: dict[str, tuple[str, ...]] = {

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import reduce
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,17 +25,34 @@ ROUNDING = 1e-6
 """Angles that differ by less [rad] are the same: no device is as good, and no rounding of ours as bad."""
 
 
-def reached(angle: Array | float, edge: float) -> NDArray[np.bool_]:
+@overload
+def reached(angle: float, edge: float) -> bool: ...
+
+
+@overload
+def reached(angle: Array, edge: float) -> NDArray[np.bool_]: ...
+
+
+def reached(angle: Array | float, edge: float) -> NDArray[np.bool_] | bool:
     """Whether an angle is at an edge or beyond it [rad]; at an edge of 0, which is neutral, only beyond.
 
     What is not a number is, so that it never scores least.
     """
-    return np.asarray(~(np.asarray(angle) < (edge - ROUNDING if edge else ROUNDING)))
+    below = angle < (edge - ROUNDING if edge else ROUNDING)
+    return not below if type(angle) is float else np.asarray(~np.asarray(below))
 
 
-def fallen(angle: Array | float, edge: float) -> NDArray[np.bool_]:
+@overload
+def fallen(angle: float, edge: float) -> bool: ...
+
+
+@overload
+def fallen(angle: Array, edge: float) -> NDArray[np.bool_]: ...
+
+
+def fallen(angle: Array | float, edge: float) -> NDArray[np.bool_] | bool:
     """Whether an angle is at an edge or below it [rad]; at an edge of 0 only below."""
-    return reached(-np.asarray(angle), -edge)
+    return reached(-angle, -edge)
 
 
 class Span(NamedTuple):

@@ -28,6 +28,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from seerob.core.errors import InputError
+from seerob.core.orientation import cross
 from seerob.core.snapshot import (
     Arrow,
     Box,
@@ -233,9 +234,10 @@ def _arrow(origin: Array, vector: Array) -> list[Vec3]:
     if length > 0:
         along = vector / length
         helper = np.eye(3)[int(np.abs(along).argmin())]
-        across = np.cross(along, helper)
+        across = cross(along, helper)
         across /= np.linalg.norm(across)
-        for side in (across, -across, np.cross(along, across), -np.cross(along, across)):
+        upward = cross(along, across)
+        for side in (across, -across, upward, -upward):
             points += [tip, tip - length * (0.2 * along + 0.08 * side)]
     return [(float(p[0]), float(p[1]), float(p[2])) for p in points]
 

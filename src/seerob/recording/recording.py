@@ -6,6 +6,7 @@ from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from threading import Lock
 from typing import TypeVar
@@ -15,6 +16,7 @@ import msgspec
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.recording.format import (
+    DIGEST,
     END_METADATA,
     FILE_PREFIX,
     MESH_PREFIX,
@@ -122,22 +124,51 @@ class Recording:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is missing from this recording, as far as it is known by now."""
-        texts = list(self._damage)
+        """What is missing from this recording, as far as it is known by now (`check`).
+
+        Where that is part of what was heard, nothing that is computed from it is within.
+        """
+        short = list(self._damage)
+        texts: list[str] = []
         if not self._ended:
-            texts.append(
+            short.append(
                 f"the recording was cut off: it can be read until t = {self.end:.3f} s, less than a second "
                 f"after that may be lost ({self._index.unread} bytes at the end hold no whole record)"
             )
         end = self._index.metadata.get(END_METADATA, {})
-        for key, text in (
-            ("dropped", "snapshots were dropped because the disk could not keep up; their samples are there"),
-            ("lost", "ticks are missing altogether because the disk could not keep up: replay is not exact"),
-            ("out_of_order", "ticks were left out because their time did not advance"),
+        for key, text, heard in (
+            (
+                "dropped",
+                "snapshots were dropped because the disk could not keep up; their samples are there",
+                1,
+            ),
+            (
+                "lost",
+                "ticks are missing altogether because the disk could not keep up: replay is not exact",
+                0,
+            ),
+            ("out_of_order", "ticks were left out because their time did not advance", 0),
         ):
             if end.get(key, "0") != "0":
-                texts.append(f"{end[key]} {text}")
-        return tuple(Finding(level="warning", subject=self.path.name, text=text) for text in texts)
+                (texts if heard else short).append(f"{end[key]} {text}")
+        name = self.path.name
+        return (
+            *(Finding(level="warning", subject=name, text=text, holds=("*",)) for text in short),
+            *(Finding(level="warning", subject=name, text=text) for text in texts),
+        )
+
+    def check(self) -> tuple[Finding, ...]:
+        """Read all of it, and say what is missing, or not as it was written."""
+        digest = sha256()
+        for chunk in self._tick_chunks:
+            for message in self._chunk(chunk):
+                if self._topics.get(message.channel) in _TICK:
+                    digest.update(message.data)
+        then = self._index.metadata.get(END_METADATA, {}).get(DIGEST)
+        if self._ended and not self._damage and then != digest.hexdigest():
+            what = "changed since it was written" if then else "written by a version that does not seal"
+            self._damage[f"the recording was {what}: nothing says that it is all that was heard"] = None
+        return self.findings
 
     @cached_property
     def meshes(self) -> dict[str, bytes]:

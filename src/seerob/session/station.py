@@ -442,8 +442,9 @@ class Station:
         )
 
     def replay_scene(self, recording: Recording) -> Scene:
-        """The scene of a recording that is computed again, with what was found when it was made."""
+        """The scene of a recording that is computed again, with what was found when it was made and since."""
         findings = [f for f in recording.scene.findings if f not in self.model.findings]
+        findings += recording.check()
         fed = not self.workstation.sources and any(tick.samples for tick in recording.ticks())
         return scene_of(self.model, self.bound, findings, files=self.files, fed=fed)
 
@@ -470,12 +471,13 @@ class Station:
                 f"set engine.tick = {recording.scene.period} in the workstation file",
             )
         scene = self.replay_scene(recording)
-        feed = (tuple(tick.samples) for tick in recording.ticks())
+        from seerob.session.recorded_station import heard_again
+
         return self.run(
             folder=folder,
             sinks=sinks,
             writers=writers,
-            feed=feed,
+            feed=heard_again(recording),
             end=recording.end,
             scene=scene,
             stop=stop,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,8 +72,10 @@ def _verdict(recording: Recording, player: Player) -> Exit:
     verdict, why = found.verdict, ""
     if not found.whole:
         why = "not all of the recording was read"
-    elif recording.findings:
-        why = recording.findings[0].text
+    elif findings := recording.check():
+        why = findings[0].text
+    elif recording.scene.version != version("seerob"):
+        why = f"by seerob {recording.scene.version}, and this is {version('seerob')}"
     if why and verdict is not Verdict.EXCEEDED:
         verdict = Verdict.UNDECIDED
     word, style = WORDS[verdict]

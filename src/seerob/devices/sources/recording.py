@@ -74,7 +74,15 @@ class RecordedMotion(Source, frozen=True, kw_only=True):
         name = self.name or f"recording {target.name}"
         samples = RecordedSamples(recording, recorded, target.name, name)
         trajectory, late = self._check(samples, target)
-        findings = [origin_finding(self.origin, target.name, self.file), *recording.findings]
+        findings = [
+            origin_finding(self.origin, target.name, self.file),
+            *(replace(f, holds=(target.name,)) if f.holds else f for f in recording.check()),
+            *(
+                replace(f, text=f"as it was recorded: {f.text}", subject=target.name, holds=(target.name,))
+                for f in recording.scene.findings
+                if {recorded, "*"} & {*f.holds}
+            ),
+        ]
         if late:
             text = f"{self.file}: {late} samples whose time did not advance were left out"
             findings.append(Finding(level="warning", subject=target.name, text=text))

@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from seerob.outputs.mcap.foxglove import frame_transforms, marker_update, scene_
 from seerob.outputs.versions import versions
 from seerob.recording.column import Column, Spill
 from seerob.recording.format import (
+    DIGEST,
     END_METADATA,
     FILE_PREFIX,
     MESH_PREFIX,
@@ -131,6 +133,7 @@ class McapTape:
         self._people = {m.name: [j.name for j in m.joints] for m in scene.mechanisms if m.role == "human"}
         self._encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
         self._next_view = -math.inf
+        self._digest = sha256()
         self.ticks = 0
         """Ticks that were taken."""
         self.kept = 0
@@ -189,10 +192,10 @@ class McapTape:
     def tick(self, seq: int, t: float, samples: tuple[Sample, ...], snapshot: Snapshot | None) -> None:
         """Append one tick; ``snapshot`` is None when it was dropped and only its input is kept."""
         self.ticks += 1
-        self._put(SAMPLES, seq, t, self._encode(Tick(seq=seq, t=t, samples=samples)))
+        self._seal(SAMPLES, seq, t, self._encode(Tick(seq=seq, t=t, samples=samples)))
         if snapshot is None:
             return
-        self._put(SNAPSHOT, seq, t, self._encode(snapshot))
+        self._seal(SNAPSHOT, seq, t, self._encode(snapshot))
         if t >= self._next_view:
             self._next_view = t + VIEW_PERIOD * (1 - 1e-6)
             self._put(VIEW_FRAMES, seq, t, frame_transforms(self._scene, snapshot).SerializeToString())
@@ -234,7 +237,8 @@ class McapTape:
         """Write the end mark and the index, and close."""
         try:
             self._mcap.flush()
-            self._mcap.add_metadata(END_METADATA, {k: str(n) for k, n in counts.items()})
+            end = {DIGEST: self._digest.hexdigest(), **{k: str(n) for k, n in counts.items()}}
+            self._mcap.add_metadata(END_METADATA, end)
             self._mcap.finish()
             self._file.flush()
             os.fsync(self._file.fileno())
@@ -245,6 +249,10 @@ class McapTape:
         """Close as it is, after an error."""
         with suppress(OSError):  # a full disk does not take what waits to be written either
             self._file.close()
+
+    def _seal(self, topic: str, seq: int, t: float, data: bytes) -> None:
+        self._digest.update(data)
+        self._put(topic, seq, t, data)
 
     def _put(self, topic: str, seq: int, t: float, data: bytes) -> None:
         time = nanoseconds(t)

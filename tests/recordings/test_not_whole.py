@@ -1,0 +1,168 @@
+"""A recording that is not what was written, all of it and in its place, is never within."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from made_cell import TWO_R, made, two_r
+from seerob.app.cli import main
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Verdict
+from seerob.outputs.sinks import recorder
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.format import END_METADATA, SAMPLES, Tick
+from seerob.recording.mcap_index import scan
+from seerob.recording.recording import Recording
+from seerob.session.recorded_station import load_recorded
+
+CELL = (
+    "[engine]\nphysics = false\n"
+    + TWO_R
+    + """
+[[sources]]
+kind = "csv"
+robot = "arm"
+file = "motion.csv"
+timeout = 2
+[[safety]]
+kind = "velocity"
+name = "tip"
+at = "arm"
+limit = 3
+"""
+)
+
+
+def motion(fast: float) -> str:
+    """A second of 0.1 rad/s, one of ``fast``, one of 0.1 rad/s [rad/s]."""
+    t = np.arange(0, 3.001, 0.01)
+    q = np.cumsum(np.where((t > 1) & (t <= 2), fast, 0.1)) * 0.01
+    rows = "".join(f"{a:.3f},{b:.9f},0\n" for a, b in zip(t, q, strict=True))
+    return f"t [s],j1 [rad],j2 [rad]\n{rows}"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recorder, "FLUSH_PERIOD", 0.0)  # many chunks
+        station = made(folder, CELL, {"arm.urdf": two_r(), "motion.csv": motion(0.2)})
+        found = station.run(folder=folder / "run", sinks=[Recorder(lossless=True)])
+    assert found.verdict is Verdict.WITHIN, found.results["tip"].worst().reason
+    return folder / "run" / "run.mcap"
+
+
+def rewritten(path: Path, to: Path, change) -> Path:
+    """A copy by the foreign library, checksums and index in order, of what is left of each message."""
+    with path.open("rb") as old, to.open("wb") as new:
+        reader, writer = make_reader(old), Writer(new)
+        writer.start()
+        channels = {}
+        for entry in reader.iter_metadata():
+            writer.add_metadata(entry.name, entry.metadata)
+        for file in reader.iter_attachments():
+            writer.add_attachment(file.create_time, file.log_time, file.name, file.media_type, file.data)
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            data = change(channel.topic, message)
+            if data is None:
+                continue
+            if channel.id not in channels:
+                told = (
+                    0 if schema is None else writer.register_schema(schema.name, schema.encoding, schema.data)
+                )
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, told)
+            writer.add_message(
+                channels[channel.id], message.log_time, data, message.publish_time, message.sequence
+            )
+        writer.finish()
+    return to
+
+
+def spoiled(whole: Path, how: str, to: Path) -> Path:
+    raw, chunks = bytearray(whole.read_bytes()), [c for c in scan(whole).chunks if c.end > c.start]
+    if how == "cut":
+        del raw[chunks[-1].offset + 3 :]
+    elif how == "damaged":
+        raw[chunks[len(chunks) // 2].offset + 50] ^= 0xFF
+    else:
+
+        def change(topic, message):
+            second = message.log_time // 10**9 == 1
+            if how == "a second less":
+                return None if second else message.data
+            if how == "a micrometre less" and topic == SAMPLES and second:
+                tick = msgspec.msgpack.decode(message.data, type=Tick)
+                moved = [msgspec.structs.replace(s, q=(s.q[0] - 1e-6, s.q[1])) for s in tick.samples]
+                return msgspec.msgpack.encode(msgspec.structs.replace(tick, samples=tuple(moved)))
+            return message.data
+
+        return rewritten(whole, to, change)
+    to.write_bytes(raw)
+    return to
+
+
+@pytest.mark.parametrize("how", ["cut", "damaged", "a second less", "a micrometre less"])
+def test_what_is_not_whole_is_not_within(whole, tmp_path, how, capsys):
+    file = spoiled(whole, how, tmp_path / "run.mcap")
+    recording = Recording.open(file)
+    found = load_recorded(recording).replay(recording).results
+    assert found.verdict is Verdict.UNDECIDED
+    assert recording.findings[0].text in found["tip"].worst().reason
+    assert main(["report", str(file), "-o", str(tmp_path / "again"), "--json"]) == 2
+    assert recording.findings[0].text in capsys.readouterr().out
+    # Nor is another workstation that plays the motion.
+    text = CELL.replace(
+        'kind = "csv"\nrobot = "arm"\nfile = "motion.csv"',
+        'kind = "recording"\ndrives = "arm"\nfile = "run.mcap"',
+    )
+    assert made(tmp_path, text, {"arm.urdf": two_r()}).run().verdict is Verdict.UNDECIDED
+
+
+def test_what_comes_after_a_hole_is_judged_at_its_time(tmp_path, monkeypatch):
+    """The third second moves too fast: it is not lost because the second one is."""
+    monkeypatch.setattr(recorder, "FLUSH_PERIOD", 0.0)
+    rows = motion(0.1).splitlines(keepends=True)
+    fast = "".join(
+        rows[:1] + [f"{t:.3f},{0.2 * t + (max(t - 2.5, 0) * 4):.9f},0\n" for t in np.arange(0, 3.001, 0.01)]
+    )
+    station = made(tmp_path, CELL, {"arm.urdf": two_r(), "motion.csv": fast})
+    whole = station.run(folder=tmp_path / "run", sinks=[Recorder(lossless=True)]).results
+    file = spoiled(tmp_path / "run" / "run.mcap", "a second less", tmp_path / "less.mcap")
+    recording = Recording.open(file)
+    found = load_recorded(recording).replay(recording).results
+    assert (whole.verdict, found.verdict) == (Verdict.EXCEEDED, Verdict.EXCEEDED)
+    assert found.end == whole.end == 3.0
+    assert found["tip"].worst().t == whole["tip"].worst().t > 2.5
+
+
+def test_what_the_other_library_copies_word_for_word_is_whole(whole, tmp_path):
+    file = rewritten(whole, tmp_path / "run.mcap", lambda topic, message: message.data)
+    recording = Recording.open(file)
+    assert recording.check() == ()
+    assert load_recorded(recording).replay(recording).verdict is Verdict.WITHIN
+
+
+def test_a_recording_that_nobody_sealed_is_not_within(whole, tmp_path, monkeypatch):
+    """As of a version before seals, whose end says nothing of them."""
+    file = tmp_path / "run.mcap"
+    rewritten(whole, file, lambda topic, message: message.data)
+    recording = Recording.open(file)
+    del recording._index.metadata[END_METADATA]["sha256"]
+    assert "does not seal" in recording.check()[0].text
+    assert recording.check()[0].holds == ("*",)
+
+
+def test_a_recording_that_lacks_more_than_damage_leaves_out_is_refused(whole, tmp_path):
+    def far(topic, message):
+        if topic != SAMPLES or message.log_time < 10**9:
+            return message.data
+        tick = msgspec.msgpack.decode(message.data, type=Tick)
+        return msgspec.msgpack.encode(msgspec.structs.replace(tick, seq=tick.seq + 10**12))
+
+    recording = Recording.open(rewritten(whole, tmp_path / "run.mcap", far))
+    with pytest.raises(InputError, match="follows tick 99; do not trust this recording"):
+        load_recorded(recording).replay(recording)

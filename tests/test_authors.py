@@ -10,6 +10,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.core.errors import InputError, NotAsked, Undecided
 from seerob.core.snapshot import Result, Row, Verdict
+from seerob.criteria.criterion import GIVEN_A_MODEL, Criterion
 from seerob.criteria.judging import Judge, contradiction
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.velocity import Velocity
@@ -327,6 +328,9 @@ ALTERED = {
     "speeds": "[a.fill(0) for a in (*state.body_velocities(bodies), *state.fastest_points(bodies))]",
     "data": "d = state.data_of('arm'); d.qvel[:] = 0; d.qpos[:] = 0; d.xpos[:] = 0; d.cvel[:] = 0",
     "distances": "c = state.closest_per_body(gap); c.distance[:] = 9; c.point_a[:] = 0",
+    "the model": "state.model.mj.body_mass[:] = 0; state.model.mechanisms['arm'].coupling[:] = 0",
+    "what was bound": "model.mj.body_mass[:] = 0; arm.coupling[:] = 0; frame.body_from_frame[:] = 0; "
+    "[body.corners.fill(0) for body in model.bodies]",
 }
 
 
@@ -354,3 +358,29 @@ def test_what_a_criterion_writes_into_arrays_changes_no_other_and_no_motion(own,
     for name in one:
         np.testing.assert_array_equal(one[name].values, other[name].values, name)
         np.testing.assert_array_equal(one[name].verdicts, other[name].verdicts, name)
+
+
+@pytest.mark.parametrize("method", sorted(GIVEN_A_MODEL))
+def test_every_method_of_ones_own_is_given_a_model_of_its_own(own, method):
+    """Also before a run: what it writes there is in nobody else's figures, shipped or not."""
+    spoil = "model.mj.body_mass[:] = 0; [body.corners.fill(0) for body in model.bodies]"
+    head, text = HEAD, BIND.format("return self.result(1.0)")
+    if method == "bind":
+        text = text.replace("        arm,", f"        {spoil}\n        arm,")
+    elif method == "basis":
+        head = head.replace("model): return Basis", f"model):\n        {spoil}\n        return Basis")
+    else:
+        text += f"    def {method}(self, model, *more):\n        {spoil}\n"
+        text += f"        return Criterion.{method}(self, model, *more)\n"
+    station = own(text, head=head)
+    (rule,) = station.workstation.safety
+    kept = station.model.mj.body_mass.copy(), [body.corners.copy() for body in station.model.bodies]
+    getattr(rule, method)(station.model, *([None] if method in ("falls", "lowest", "follows") else []))
+    np.testing.assert_array_equal(station.model.mj.body_mass, kept[0])
+    for body, corners in zip(station.model.bodies, kept[1], strict=True):
+        np.testing.assert_array_equal(body.corners, corners)
+
+
+def test_every_method_that_takes_a_model_gives_ones_own_its_own():
+    named = {name for name, f in vars(Criterion).items() if "model" in getattr(f, "__annotations__", {})}
+    assert named == GIVEN_A_MODEL

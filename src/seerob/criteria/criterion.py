@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple, Protocol
+from functools import wraps
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol
 
 from msgspec import Meta, Struct
 
@@ -69,6 +70,12 @@ class Claim(Protocol):
         """What is seen to contradict it, asked at every tick; None for nothing."""
 
 
+GIVEN_A_MODEL = {
+    "bind", "batch", "remembers", "falls", "lowest", "bounded_once", "follows", "basis", "looks_ahead",
+    "claims", "depends", "judged", "unshaped",
+}  # fmt: skip
+"""Methods of a criterion whose first argument is the model."""
+
 EvaluateMany = Callable[["States"], "Answers"]
 """Called with many instants; may raise `Undecided`, of all of them."""
 
@@ -118,6 +125,13 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     active: str | None = None
     """Variable of the dictionary, a bool: while it is false, it is not asked (muted, another mode of
     operation); while nobody knows, it is undecided."""
+
+    def __init_subclass__(cls) -> None:
+        """Give methods of one's own kinds a model of their own: what they write into it is nobody else's."""
+        super().__init_subclass__()
+        if not cls.__module__.startswith("seerob."):
+            for name in GIVEN_A_MODEL & vars(cls).keys():
+                setattr(cls, name, _apart(vars(cls)[name]))
 
     def bind(self, model: Model) -> Evaluate:
         """Resolve every name once and return the function that judges a state.
@@ -215,6 +229,16 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def unshaped(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
         return model.unshaped(self.depends(model)) if self.by_shape else ""
+
+
+def _apart(method: Callable[..., Any]) -> Callable[..., Any]:
+    """A method of a criterion, given the copy of the model that is its own."""
+
+    @wraps(method)
+    def of_its_own(self: Criterion, model: Model, *more: Any) -> Any:
+        return method(self, model.own_of(self.name), *more)
+
+    return of_its_own
 
 
 def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:

@@ -443,7 +443,7 @@ class Judge:
         if bodies:
             state.require_bodies(bodies)
         if bound.own:
-            with state.set_apart():
+            with state.set_apart(bound.criterion.name):
                 result = evaluate(state)
         else:
             result = evaluate(state)

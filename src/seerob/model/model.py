@@ -7,7 +7,8 @@ name in the file to an index. Names are resolved here, once; the loop only sees 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from copy import copy, deepcopy
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -198,6 +199,10 @@ class Gap:
         return *self.a, *self.b
 
 
+Owned = tuple[mujoco.MjModel, tuple[Body, ...], dict[str, Frame], dict[str, Mechanism]]
+"""What of a `Model` can be written to, copied."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """A compiled workstation; frozen. Made by `seerob.model.mounting.compilation.compile_workstation`."""
@@ -220,10 +225,24 @@ class Model:
     cache: Path | None = None
     """Folder that keeps what takes long to make between starts."""
     _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
+    _owned: dict[str, Owned] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         of = f"{len(self.bodies)} bodies, {', '.join(self.mechanisms) or 'nobody moves'}"
         return f"<Model {self.workstation.title!r}: {of}>"
+
+    def own_of(self, author: str) -> Model:
+        """The copy that a criterion of one's own is given, by its name.
+
+        Whatever it writes into MuJoCo's model, masses or shapes of bodies, joints and frames changes nothing
+        for anybody else. Distances are asked of the one geometry.
+        """
+        if author not in self._owned:
+            self._owned[author] = copy(self.mj), *deepcopy((self.bodies, self.frames, self.mechanisms))
+        mj, bodies, frames, mechanisms = self._owned[author]
+        if any(piece.rest is not None for piece in self.workstation.workpieces):
+            mj = copy(self.mj)  # what is picked up changes masses from tick to tick
+        return replace(self, mj=mj, bodies=bodies, frames=frames, mechanisms=mechanisms)
 
     @property
     def estimate_uncertainty(self) -> dict[str, float]:

@@ -85,7 +85,6 @@ class State(Validity):
         super().__init__(model, hearings, signals)
         self._data = data
         self._at_least = False
-        self._apart = False
         self._path: Path | None = None
         self._ahead: Foresee = lambda name, t: None
         self.knots: Knots = lambda name, begin, end: ()
@@ -121,7 +120,7 @@ class State(Validity):
 
     def refresh(self, t: float) -> None:
         """Take the engine's new positions and velocities; called once per tick by the engine."""
-        mj, data = self.model.mj, self._data
+        mj, data = self._model.mj, self._data
         # mj_step leaves what follows from positions one step behind.
         mujoco.mj_kinematics(mj, data)
         mujoco.mj_comPos(mj, data)
@@ -213,16 +212,16 @@ class State(Validity):
     def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         rows, q = self._rows_of(bodies), self._hearings[name].captured
         if q is not None and self.captured_qpos is not None:
-            q = self.captured_qpos[self.model.mechanisms[name].q_address]
+            q = self.captured_qpos[self._model.mechanisms[name].q_address]
         if q is None:
             return self._rotations[rows], self._positions[rows]
         key = ("captured", name)
         if key not in self._cache:
             if self._wanted is None:
-                self._wanted = mujoco.MjData(self.model.mj)
+                self._wanted = mujoco.MjData(self._model.mj)
             self._wanted.qpos[:] = self._data.qpos
-            self._wanted.qpos[self.model.mechanisms[name].q_address] = q
-            mujoco.mj_kinematics(self.model.mj, self._wanted)
+            self._wanted.qpos[self._model.mechanisms[name].q_address] = q
+            mujoco.mj_kinematics(self._model.mj, self._wanted)
             self._cache[key] = self._wanted.xmat.reshape(-1, 3, 3).copy(), self._wanted.xpos.copy()
         R, x = self._cache[key]
         ids = self.attachments.ids[rows]
@@ -243,8 +242,8 @@ class State(Validity):
             raise Undecided(f"{name}: no contacts are calculated (engine.physics, [[contacts]])")
         if self._hearings[name].lost > self.t - 2 * self._period:
             raise Undecided(f"{name}: the twin had to be put back to what was heard")
-        own = {body.mj: body.index for body in self.model.bodies if body.owner == name}
-        others = {body.mj: body.name for body in self.model.bodies}
+        own = {body.mj: body.index for body in self._model.bodies if body.owner == name}
+        others = {body.mj: body.name for body in self._model.bodies}
         pressing: dict[int, dict[str, float]] = {}
         for one, other, force in self.touches:
             for mine, its in ((one, other), (other, one)):
@@ -345,21 +344,24 @@ class State(Validity):
         """
         self.require(*names)
         self.speeds_asked.update(names)
-        return copy(self._data) if self._apart else self._data
+        return copy(self._data) if self._author else self._data
 
     @contextmanager
-    def set_apart(self) -> Iterator[None]:
+    def set_apart(self, author: str) -> Iterator[None]:
         """While a criterion of one's own is asked: what it is given is its own, and nobody else reads it.
 
         For the judge: whatever an author writes into an array changes no other criterion and no motion.
+
+        Args:
+            author: Name of that criterion.
         """
         kept = self._cache, self._places
-        self._cache, self._places, self._apart = {}, {}, True
+        self._cache, self._places, self._author = {}, {}, author
         try:
             yield
         finally:
             self._cache, self._places = kept
-            self._apart = False
+            self._author = ""
 
     # -- joints -----------------------------------------------------------------------------
 
@@ -416,9 +418,9 @@ class State(Validity):
 
     def joint_noise(self) -> Array:
         """How far ``MjData.qvel`` may be off by `speed_errors` [rad/s or m/s], shape (nv,)."""
-        found = np.zeros(self.model.mj.nv)
+        found = np.zeros(self._model.mj.nv)
         for name, error in self.speed_errors.items():
-            mechanism = self.model.mechanisms[name]
+            mechanism = self._model.mechanisms[name]
             found[mechanism.v_address] = np.abs(mechanism.coupling) @ error
         return found
 
@@ -432,18 +434,18 @@ class State(Validity):
             name: Of the robot or human.
             by: [rad/s or m/s], shape (n,).
         """
-        data, mechanism = self._data, self.model.mechanisms[name]
+        data, mechanism = self._data, self._model.mechanisms[name]
         speeds, cache = data.qvel.copy(), self._cache
         self._quicker[name] = by
         data.qvel[mechanism.v_address] += mechanism.coupling @ by
-        mujoco.mj_comVel(self.model.mj, data)
+        mujoco.mj_comVel(self._model.mj, data)
         self._cache = {}
         try:
             yield
         finally:
             del self._quicker[name]
             data.qvel[:] = speeds
-            mujoco.mj_comVel(self.model.mj, data)
+            mujoco.mj_comVel(self._model.mj, data)
             # What was written into buffers meanwhile is of other speeds.
             self._cache = {key: kept for key, kept in cache.items() if key[0] not in WRITTEN}
 
@@ -538,7 +540,7 @@ class State(Validity):
 
     def _known(self, mechanisms: tuple[Mechanism, ...], M: Array) -> Array:
         """A mass matrix without the bodies that nobody weighed, and with what keeps it invertible."""
-        mj, rows = self.model.mj, np.zeros((6, self.model.mj.nv))
+        mj, rows = self._model.mj, np.zeros((6, self._model.mj.nv))
         for body in dict.fromkeys(i for mechanism in mechanisms for i in mechanism.unweighed):
             mujoco.mj_jacBodyCom(mj, self._data, rows[:3], rows[3:], body)
             moved = np.hstack([self.columns[mechanism.name].of_rows(rows) for mechanism in mechanisms])
@@ -562,13 +564,13 @@ class State(Validity):
         key = "M", *[mechanism.name for mechanism in mechanisms]
         if key not in self._cache:
             if "M" not in self._cache:
-                mujoco.mj_makeM(self.model.mj, self._data)
-                mujoco.mj_fullM(self.model.mj, self._data, self._full_mass_matrix)
+                mujoco.mj_makeM(self._model.mj, self._data)
+                mujoco.mj_fullM(self._model.mj, self._data, self._full_mass_matrix)
                 self._cache["M"] = self._full_mass_matrix
             if len(mechanisms) == 1:
                 M = self.columns[mechanisms[0].name].of_matrix(self._full_mass_matrix)
             else:
-                every = np.eye(self.model.mj.nv)
+                every = np.eye(self._model.mj.nv)
                 C = np.hstack([self.columns[mechanism.name].of_rows(every) for mechanism in mechanisms])
                 M = C.T @ self._full_mass_matrix @ C
             unknown = any(mechanism.unknown_masses for mechanism in mechanisms)
@@ -611,7 +613,7 @@ class State(Validity):
 
     def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
         """Whom the place of a body of MuJoCo depends on: the innermost robot or machine, or a bone."""
-        model = self.model
+        model = self._model
         bones = tuple(b.index for b in model.bodies if b.role == "human" and b.mj == body)
         moving = [m for m in model.mechanisms.values() if body in m.mj_bodies]
         names = () if bones or not moving else (min(moving, key=lambda m: len(m.mj_bodies)).name,)
@@ -685,7 +687,7 @@ class State(Validity):
     def _moving_point(
         self, key: tuple[Any, ...], frame: Frame, mechanism: Mechanism, offset: Array | None
     ) -> _Point:
-        mj, columns = self.model.mj, self.columns[mechanism.name]
+        mj, columns = self._model.mj, self.columns[mechanism.name]
         bound = self._points.get(key)
         if bound is None or bound[0] is not frame:
             local = frame.body_from_frame[:3, 3]
@@ -721,9 +723,9 @@ class State(Validity):
             directions: Likewise, shape (b, 3).
         """
         self.require(mechanism.name)
-        moves, roots = self.attachments.moves(self.model.mj, bodies), self.attachments.roots
+        moves, roots = self.attachments.moves(self._model.mj, bodies), self.attachments.roots
         rows = np.array(bodies, np.int64)
-        every = np.empty((len(rows), self.model.mj.nv))
+        every = np.empty((len(rows), self._model.mj.nv))
         along(self._cdof, self._com, roots[rows], moves, points, directions, every)
         return self.columns[mechanism.name].of_rows(every)
 
@@ -809,7 +811,7 @@ class State(Validity):
     def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closest:
         """Where two sets are nearest; ``allow_estimated`` and ``strayed`` as in `require_bodies`."""
         self.require_bodies(gap.bodies, allow_estimated=allow_estimated, strayed=strayed)
-        if self._apart:
+        if self._author:
             return self._distances(gap.query, Per.SETS).at(0)
         return self._surveyor.closest(gap.query, self._rotations, self._positions)
 
@@ -825,4 +827,4 @@ class State(Validity):
 
     def _distances(self, query: Query, per: Per) -> Closests:
         found = self._surveyor.ask(query, per, self._rotations, self._positions)
-        return deepcopy(found) if self._apart else found
+        return deepcopy(found) if self._author else found

@@ -59,7 +59,9 @@ class Validity:
     """
 
     def __init__(self, model: Model, hearings: dict[str, Hearing], signals: Signals | None = None) -> None:
-        self.model = model
+        self._model = model
+        self._author = ""
+        """Name of the criterion of one's own that is asked; empty while none is."""
         self.t = 0.0
         """Run time [s]."""
         self.asked: set[str] = set()
@@ -88,6 +90,11 @@ class Validity:
         self._relied_on: set[Hashable] = set()
         self._sound: dict[int, bool] = {}
         """By whom bodies belong to, whether nothing of any of them is in doubt at this tick."""
+
+    @property
+    def model(self) -> Model:
+        """The compiled workstation; while a criterion of one's own is asked, a copy of its own."""
+        return self._model.own_of(self._author) if self._author else self._model
 
     def heard(self) -> None:
         """Work every reason out again: what is known of robots, people and machines has changed."""
@@ -201,7 +208,7 @@ class Validity:
         reason = self._hearings[name].invalid_reason(self.t)
         if reason:
             return f"{name}: {reason}"
-        above = self.model.mechanisms[name].on
+        above = self._model.mechanisms[name].on
         return self.invalid_place_reason(above) if above else ""
 
     def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
@@ -318,7 +325,7 @@ class Validity:
                 continue
             if (
                 not allow_estimated
-                or self.model.estimate_uncertainty.get(name) is None
+                or self._model.estimate_uncertainty.get(name) is None
                 or self.input_reason(name)
             ):
                 raise Undecided(self.invalid_reason(name))
@@ -333,7 +340,7 @@ class Validity:
         if owners.key not in self._lost:
             known = frozenset(name for name in owners.people if not self.invalid_place_reason(name))
             lost = {f"{name}/{bone}" for name in known for bone in self.bones_in_doubt(name)}
-            which = tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
+            which = tuple(i for i in bodies if self._model.bodies[i].name in lost) if lost else ()
             self._lost[owners.key] = known, which
         known, which = self._lost[owners.key]
         self.asked |= known
@@ -357,7 +364,7 @@ class Validity:
             if len(self._owners_of) == MOST:
                 self._owners_of.clear()
                 self.heard()
-            others, people = bones_of(self.model, bodies)
+            others, people = bones_of(self._model, bodies)
             everyone = frozenset((*others, *people))
             found = _Owners(len(self._owners_of), others, people, everyone, frozenset(bodies))
             self._owners_of[bodies] = found

@@ -81,10 +81,14 @@ def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None
 def meant(text: str) -> str:
     """Confirm each ``stop.acceleration`` of a workstation, whatever its robot's motion says of it."""
     tables = text.split("[[safety]]")[1:]
-    stated = ((i, re.search(r"stop = .*\bacceleration = ([0-9.]+)", table)) for i, table in enumerate(tables))
+    stated = (
+        (i, re.search(r'name = "(.*)"', table), re.search(r"stop = .*\bacceleration = ([0-9.]+)", table))
+        for i, table in enumerate(tables)
+    )
     return "".join(
-        f'[[confirmed]]\nkey = "safety[{i}].stop.acceleration"\nvalue = {a[1]}\nwhy = "monitored"\n'
-        for i, a in stated
+        f'[[confirmed]]\nkey = "safety[{i}].stop.acceleration"\nof = "{name[1]}"\nvalue = {a[1]}\n'
+        'why = "monitored"\n'
+        for i, name, a in stated
         if a is not None
     )
 

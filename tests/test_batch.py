@@ -31,10 +31,12 @@ at = { position = [1.3, 0, -0.7] }
 posture = "standing"
 [[confirmed]]
 key = "humans[0].feet"
+of = "worker"
 value = -0.7
 why = "stands in a pit"
 [[confirmed]]
 key = "safety[9].human_speed"
+of = "separation"
 value = 0.2
 why = "so that some instants are within"
 [[parts]]

@@ -614,7 +614,7 @@ intrusion = 0
 human_uncertainty = 0
 robot_uncertainty = 0
 """
-MEANT = '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nvalue = 0\nwhy = "S_p of present speeds"\n'
+MEANT = '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nof = "s"\nvalue = 0\nwhy = "present speeds"\n'
 AROUND = '[[safety]]\nkind = "separation_area"\nname = "c"\nseparation = "s"\nof = "op"\n'
 
 

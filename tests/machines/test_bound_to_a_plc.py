@@ -16,10 +16,12 @@ variables = "variables.toml"
 physics = false
 [[confirmed]]
 key = "sources[0].timeout"
+of = "plc"
 value = 3.0
 why = "of a server that shares a busy machine with its client"
 [[confirmed]]
 key = "safety[7].limit"
+of = "sensor"
 value = 1000.0
 why = "how long they disagree is not what is asked"
 [[sources]]

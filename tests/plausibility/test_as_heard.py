@@ -77,14 +77,16 @@ def test_what_is_plausible_once_is_not_held_any_more(tmp_path):
 
 @pytest.mark.parametrize(("value", "verdict"), [(20.0, Verdict.WITHIN), (12.0, Verdict.UNDECIDED)])
 def test_it_is_confirmed_up_to_a_value(tmp_path, value, verdict):
-    own = f'[[confirmed]]\nkey = "robots[0].nobody_within"\nvalue = {value}\nwhy = "a long hall"\n'
+    own = (
+        f'[[confirmed]]\nkey = "robots[0].nobody_within"\nof = "arm"\nvalue = {value}\nwhy = "a long hall"\n'
+    )
     assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=own)} == {verdict}
 
 
 @pytest.mark.parametrize(("confirmed", "verdict"), [(-0.4, Verdict.WITHIN), (0.4, Verdict.UNDECIDED)])
 def test_it_is_confirmed_to_one_side_only(tmp_path, confirmed, verdict):
     """Who may stand 0.4 m above the floor does not sink 0.3 m into it, nor the other way round."""
-    own = f'[[confirmed]]\nkey = "humans[0].feet"\nvalue = {confirmed}\nwhy = "a pit, or a platform"\n'
+    own = f'[[confirmed]]\nkey = "humans[0].feet"\nof = "op"\nvalue = {confirmed}\nwhy = "a platform"\n'
     assert {v for v, _ in results(tmp_path, [[0, 0, -0.3]], more=own)} == {verdict}
 
 

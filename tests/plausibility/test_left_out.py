@@ -27,7 +27,7 @@ name = "v"
 at = "arm"
 limit = 5.0
 """
-CONFIRMED = '[[confirmed]]\nkey = "robots[0].constraints_left_out"\nvalue = 1\nwhy = "the rod is a dummy"\n'
+CONFIRMED = '[[confirmed]]\nkey = "robots[0].constraints_left_out"\nof = "arm"\nvalue = 1\nwhy = "a dummy"\n'
 
 
 @pytest.mark.parametrize(

@@ -285,9 +285,7 @@ def test_a_mistake_is_found_and_what_rests_on_it_is_not_within(name: str, tmp_pa
     # As the message says, so it is confirmed, and only then.
     line = re.search(r"\[\[confirmed\]\] key = .*, value = .*, why = \"…\"", found[0].text)
     assert line
-    table = tomllib.loads(
-        line[0].replace("]] ", "]]\n").replace(", value", "\nvalue").replace(", why", "\nwhy")
-    )
+    table = tomllib.loads(re.sub(r", (of|value|why) =", r"\n\1 =", line[0].replace("]] ", "]]\n")))
     one = msgspec.convert(table["confirmed"][0], Confirmed)
     workstation = msgspec.structs.replace(station.workstation, confirmed=(one,))
     again = implausible(dataclasses.replace(station.model, workstation=workstation))
@@ -366,7 +364,9 @@ def test_two_things_that_stand_on_one_floor_in_one_place_are_found(tmp_path: Pat
 
 
 def test_another_value_is_not_confirmed(tmp_path: Path) -> None:
-    confirmed = '[[confirmed]]\nkey = "safety[2].stop.reaction"\nvalue = 3\nwhy = "measured"\n'
+    confirmed = (
+        '[[confirmed]]\nkey = "safety[2].stop.reaction"\nof = "separation"\nvalue = 3\nwhy = "measured"\n'
+    )
     mine, typed = ("reaction = 3, stopping = 0.35", "reaction = 30, stopping = 0.35")
     assert doubted(station_of(tmp_path, cell(stop=mine, more=confirmed))) == []
     (found,) = doubted(station_of(tmp_path, cell(stop=typed, more=confirmed)))
@@ -374,7 +374,9 @@ def test_another_value_is_not_confirmed(tmp_path: Path) -> None:
 
 
 def test_a_confirmation_may_have_the_unit_of_the_file(tmp_path: Path) -> None:
-    confirmed = '[[confirmed]]\nkey = "safety[2].human_speed_mm_s"\nvalue = 1.6\nwhy = "a snail"\n'
+    confirmed = (
+        '[[confirmed]]\nkey = "safety[2].human_speed_mm_s"\nof = "separation"\nvalue = 1.6\nwhy = "a snail"\n'
+    )
     station = station_of(tmp_path, cell(separation="human_speed_mm_s = 1.6", more=confirmed))
     assert doubted(station) == []
 
@@ -534,7 +536,7 @@ def test_every_row_of_the_data_is_of_something() -> None:
 @pytest.mark.parametrize("sure", [True, False])
 def test_a_link_that_its_table_makes_lighter_than_a_frame_of_rods(tmp_path: Path, sure: bool) -> None:
     """2 g in the box of 10 litres around a link, as 2 kg come out in tonnes: nothing is within by that."""
-    word = '[[confirmed]]\nkey = "robots[0].masses.l1.bulk_density"\nvalue = 0.2\nwhy = "a balloon"\n'
+    word = '[[confirmed]]\nkey = "robots[0].masses.l1.bulk_density"\nof = "arm"\nvalue = 0.2\nwhy = "gas"\n'
     text = (
         f"{FLOATING}{TWO_R}[robots.masses]\nl1 = {{ mass = 0.002 }}\n"
         '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 5\n'
@@ -567,13 +569,63 @@ limit = 0.2
     assert [f.holds for f in found] == ([("crate", "table")] if told else [])
     if told:
         value = found[0].text.split("value = ")[1].split(",")[0]
-        own = f'[[confirmed]]\nkey = "parts[1].inside.table"\nvalue = {value}\nwhy = "it is built in"\n'
+        own = (
+            f'[[confirmed]]\nkey = "parts[1].inside.table"\nof = "crate"\nvalue = {value}\nwhy = "built in"\n'
+        )
         assert not doubted(station_of(tmp_path, text + own))
+
+
+ORDER = """
+[[robots]]
+name = "{}"
+model = "library:ur5"
+base = {{ position = [62, 0, 0.75] }}
+[[robots]]
+name = "{}"
+model = "library:ur5"
+base = {{ position = [0, 0, 0.75] }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("names", "of", "words"),
+    [
+        ("ab", 'of = "a"', ""),
+        (
+            "ba",
+            'of = "a"',
+            "robots[0] is 'b', not 'a': nothing is confirmed; key = \"robots[1].base.position\"",
+        ),
+        ("bc", 'of = "a"', "robots[0] is 'b', not 'a': nothing is confirmed; confirm it anew"),
+        ("ab", "", 'missing: nothing says which of robots it is of; of = "a", if that is meant'),
+    ],
+)
+def test_a_confirmation_does_not_slide_onto_what_stands_in_its_place(tmp_path, names, of, words) -> None:
+    word = f'[[confirmed]]\nkey = "robots[0].base.position"\n{of}\nvalue = [62, 0, 0.75]\nwhy = "a hall"\n'
+    text = ORDER.format(*names) + word
+    if not words:
+        assert not any("base.position" in f.text for f in doubted(station_of(tmp_path, text)))
+        return
+    with pytest.raises(InputError, match=re.escape(f"confirmed[0].of: {words}")):
+        station_of(tmp_path, text)
+
+
+@pytest.mark.parametrize(("name", "told"), [("", True), ('name = "near"', False)])
+def test_a_name_that_another_has_in_another_order_is_none(tmp_path, name, told) -> None:
+    of = "near" if name else "minimum distance ur5 – table"
+    one = '[[safety]]\nkind = "minimum_distance"\nbetween = ["ur5", "table"]\nlimit = {}\n{}\n'
+    word = f'[[confirmed]]\nkey = "safety[3].limit"\nof = "{of}"\nvalue = 90\nwhy = "far"\n'
+    text = cell(more=one.format(90, name) + one.format(0.1, "") + word)
+    if not told:
+        assert not any("limit = 90" in f.text for f in doubted(station_of(tmp_path, text)))
+        return
+    with pytest.raises(InputError, match=r"confirmed\[0\].of: several of safety are called"):
+        station_of(tmp_path, text)
 
 
 def test_a_vector_is_confirmed_by_all_its_numbers(tmp_path: Path) -> None:
     """One that is equal in some is another value."""
-    said = '[[confirmed]]\nkey = "robots[0].base.position"\nvalue = {}\nwhy = "a hall"\n'
+    said = '[[confirmed]]\nkey = "robots[0].base.position"\nof = "ur5"\nvalue = {}\nwhy = "a hall"\n'
     for value, told in (
         ("[75, 0, 0.75]", False),
         ("[75, 0, 0.5]", True),

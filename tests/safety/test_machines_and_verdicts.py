@@ -26,6 +26,7 @@ mass = 500
 slide = { along = [1, 0, 0], lower = -1, upper = 1 }
 [[confirmed]]
 key = "machines[0].bulk_density"
+of = "axis"
 value = 500000
 why = "the half tonne hangs below, where it touches nothing"
 """

@@ -34,7 +34,9 @@ name = "v"
 of = "arm"
 limit = 10
 """
-CONFIRMED = '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nvalue = {value}\nwhy = "monitored"\n'
+CONFIRMED = (
+    '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nof = "s"\nvalue = {value}\nwhy = "monitored"\n'
+)
 T = np.arange(0, 0.6 + 1e-9, 0.005)
 LEVER = float(np.hypot(2, 0.05))
 """Of the farthest corner of two links in line [m]."""
@@ -70,7 +72,7 @@ def test_nothing_that_rests_on_what_the_motion_contradicts_is_within(tmp_path):
         "safety[0].stop.acceleration = 0 m/s² is contradicted by the robot's own motion: in "
     )
     assert "arm/l2 gets faster by 2.4 m/s from 0.200 s to 0.400 s" in text
-    assert 'confirm it: [[confirmed]] key = "safety[0].stop.acceleration", value = 0.0' in text
+    assert 'confirm it: [[confirmed]] key = "safety[0].stop.acceleration", of = "s", value = 0.0' in text
     results = station.run().results
     for name in ("s", "around"):
         assert results[name].verdict is Verdict.UNDECIDED

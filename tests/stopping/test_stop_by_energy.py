@@ -65,7 +65,7 @@ def swinging(folder, at, stated="", more=""):
     return made(folder, text + more, {"arm.urdf": two_r(), "m.csv": "\n".join(lines) + "\n"})
 
 
-CONFIRMED = '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nvalue = 0\nwhy = "monitored"\n'
+CONFIRMED = '[[confirmed]]\nkey = "safety[0].stop.acceleration"\nof = "s"\nvalue = 0\nwhy = "monitored"\n'
 
 
 @pytest.mark.parametrize(("stated", "more"), [("", ""), (", acceleration = 0", CONFIRMED)])

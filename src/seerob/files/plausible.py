@@ -45,7 +45,7 @@ def noise_of_speeds(motion: Trajectory, description: Description, name: str) -> 
 
 
 def quantities(
-    motion: Trajectory, limits: Sequence[float | None], *, key: str, about: str
+    motion: Trajectory, limits: Sequence[float | None], *, key: str, about: str, of: str
 ) -> Iterator[Quantity]:
     """What is looked at of a motion.
 
@@ -54,6 +54,7 @@ def quantities(
         limits: Largest speed of each joint [rad/s or m/s]; None where nobody stated one.
         key: Of its source in the file.
         about: Whom it drives.
+        of: Name of its source.
     """
     valid = np.ones(len(motion.t), bool) if motion.invalid is None else ~motion.invalid
     if valid.sum() < 2:
@@ -61,12 +62,12 @@ def quantities(
     t, q = motion.t[valid], motion.q[valid]
     step = np.diff(t)
     said = f"median of {motion.file}"
-    yield Quantity(f"{key}.step", "sources.step", "s", (float(np.median(step)),), (about,), said)
+    yield Quantity(f"{key}.step", "sources.step", "s", (float(np.median(step)),), (about,), said, of)
     if motion.degrees:
         largest = float(np.degrees(np.abs(q).max()))
         if largest > RESTS:
             said = f"the largest angle of {motion.file}"
-            yield Quantity(f"{key}.degrees", "sources.degrees", "°", (largest,), (about,), said)
+            yield Quantity(f"{key}.degrees", "sources.degrees", "°", (largest,), (about,), said, of)
     known = [j for j, limit in enumerate(limits) if limit is not None and j < q.shape[1]]
     if not known:
         return
@@ -75,4 +76,4 @@ def quantities(
     if motion.qd is not None:
         speeds = np.maximum(speeds, (np.abs(motion.qd[valid][:, known]) / bounds).max(axis=0))
     said = f"fastest joint of {motion.file}, share of its limit"
-    yield Quantity(f"{key}.speed", "sources.speed", "", (float(speeds.max()),), (about,), said)
+    yield Quantity(f"{key}.speed", "sources.speed", "", (float(speeds.max()),), (about,), said, of)

@@ -7,13 +7,16 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from hashlib import sha256
+from itertools import repeat
 from pathlib import Path, PurePosixPath
 from threading import Lock
 from typing import TypeVar
 
 import msgspec
+from msgspec.structs import replace
 
 from seerob.core.errors import InputError
+from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.recording.format import (
     DIGEST,
@@ -42,6 +45,9 @@ from seerob.recording.mcap_index import (
 
 T = TypeVar("T")
 
+MOST_MISSING = 1_000_000
+"""Ticks in a row that a recording may lack, hours of them."""
+AFTER_HOLE = "the recording lacks what was heard before"
 _POSE = 7 * 4
 _CACHED_CHUNKS = 8
 _TICK = {SAMPLES, SNAPSHOT}
@@ -245,6 +251,23 @@ class Recording:
         for chunk in self._tick_chunks:
             for message in self._messages(chunk, SAMPLES):
                 yield self._decode(_decode_tick, message, SAMPLES)
+
+    def heard(self) -> Iterator[tuple[Sample, ...]]:
+        """What was heard for each tick, in order; nothing for one that is missing.
+
+        Raises:
+            InputError: More are missing than any damage leaves out.
+        """
+        due = 0
+        for tick in self.ticks():
+            lacking = max(tick.seq - due, 0)
+            if lacking > MOST_MISSING:
+                what = f"tick {tick.seq} follows tick {due - 1}"
+                raise InputError.at(self.path, f"at {tick.t:.3f} s", what, "do not trust this recording")
+            yield from repeat((), lacking)
+            # On the way here from what was heard before the hole the twin is as fast as nobody was.
+            yield tuple(replace(s, reason=s.reason or AFTER_HOLE) if lacking else s for s in tick.samples)
+            due = tick.seq + 1
 
     # -- inside ---------------------------------------------------------------------------------
 

@@ -212,7 +212,7 @@ def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
     found = list(opened.findings)
     if isinstance(opened.samples, TrajectorySamples):
         limits = [None if v is None else v.value for v in model.mechanisms[name].velocity_limits]
-        every = quantities(opened.samples.trajectory, limits, key=f"sources[{i}]", about=name)
+        every = quantities(opened.samples.trajectory, limits, key=f"sources[{i}]", about=name, of=source.name)
         found += implausible(every, model.workstation.confirmed)
         motion = opened.samples.trajectory
         if motion.qd is None or opened.samples.qd is not motion.qd:

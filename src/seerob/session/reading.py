@@ -125,12 +125,13 @@ def _convert(table: Mapping[str, Any], file: str, allowed: Allowed = NOTHING) ->
             entry = _entry(table_of_entry, group, f"{group}[{i}]", file, problems, allowed)
             if entry is not None:
                 entries[group][i] = entry
+    numbered: set[str] = set()
     for group in ("sources", "safety", "ergonomics"):
-        entries[group] = _named(entries[group])
+        entries[group] = _named(entries[group], numbered)
     head = _head({key: value for key, value in table.items() if key not in groups}, file, problems)
     names = naming.declared(table)
     between = naming.check(names, entries, file)
-    problems += unknown(entries["confirmed"], entries, head.engine, file)
+    problems += unknown(entries["confirmed"], entries, head.engine, file, numbered)
     return Readable(head, entries, names, [*problems, *between], between)
 
 
@@ -193,8 +194,13 @@ def _plugin(
     return convert(rest, wanted, file=file, key=key, problems=problems, beside=("kind",))
 
 
-def _named(entries: Mapping[int, Any]) -> dict[int, Any]:
-    """Give every criterion and source that has no name one that says what it is."""
+def _named(entries: Mapping[int, Any], numbered: set[str]) -> dict[int, Any]:
+    """Give every criterion and source that has no name one that says what it is.
+
+    Args:
+        entries: By number.
+        numbered: Gets names that are another's in another order.
+    """
     taken = {entry.name for entry in entries.values()}
     named = {}
     for i, entry in entries.items():
@@ -208,6 +214,7 @@ def _named(entries: Mapping[int, Any]) -> dict[int, Any]:
         while name in taken:
             n += 1
             name = f"{base} {n}"
+            numbered |= {base, name}
         taken.add(name)
         named[i] = msgspec.structs.replace(entry, name=name)
     return named

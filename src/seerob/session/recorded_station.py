@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import repeat
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,11 +17,6 @@ from seerob.session.station import Station
 from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import FILE_NAME
-
-MOST_MISSING = 1_000_000
-"""Ticks in a row that a recording may lack, hours of them."""
-
-AFTER_HOLE = "the recording lacks what was heard before"
 
 _REMEDY = "give the workstation that it was made with (--workstation)"
 
@@ -62,24 +56,6 @@ def load_recorded(recording: Recording, *, cache: Path | None = None, allow_plug
 def _workstation_file(recording: Recording) -> str:
     names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
     return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]
-
-
-def heard_again(recording: Recording) -> Iterator[tuple[Sample, ...]]:
-    """What was heard for each tick, in order; nothing for one that is missing.
-
-    Raises:
-        InputError: More are missing than any damage leaves out.
-    """
-    due = 0
-    for tick in recording.ticks():
-        if tick.seq - due > MOST_MISSING:
-            what = f"tick {tick.seq} follows tick {due - 1}"
-            raise InputError.at(recording.path, f"at {tick.t:.3f} s", what, "do not trust this recording")
-        lacking = max(tick.seq - due, 0)
-        yield from repeat((), lacking)
-        # On the way here from what was heard before the hole the twin is as fast as nobody was.
-        yield tuple(replace(s, reason=s.reason or AFTER_HOLE) if lacking else s for s in tick.samples)
-        due = tick.seq + 1
 
 
 def recorded_sources(

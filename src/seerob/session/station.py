@@ -471,13 +471,11 @@ class Station:
                 f"set engine.tick = {recording.scene.period} in the workstation file",
             )
         scene = self.replay_scene(recording)
-        from seerob.session.recorded_station import heard_again
-
         return self.run(
             folder=folder,
             sinks=sinks,
             writers=writers,
-            feed=heard_again(recording),
+            feed=recording.heard(),
             end=recording.end,
             scene=scene,
             stop=stop,

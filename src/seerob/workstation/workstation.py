@@ -344,6 +344,8 @@ class Confirmed(_Table, frozen=True, kw_only=True):
 
     key: Annotated[str, Meta(max_length=300)]
     """Where it stands in the file, with the number of its entry from 0: ``robots[0].base.position``."""
+    of: Annotated[str, Meta(max_length=300)] | None = None
+    """Name of that entry (title of a phase), so that what is put in another order confirms nothing else."""
     value: float | list[Any]
     """The value that is meant, as the file has it; another one later is not confirmed."""
     why: Annotated[str, Meta(min_length=1, max_length=1000)]

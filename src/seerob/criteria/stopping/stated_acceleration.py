@@ -124,7 +124,9 @@ class StatedAcceleration:
     ) -> None:
         self._model, self._bodies = model, bodies
         self._a, self._T_r, self.holds = a, T_r, holds
-        self._quantity = Quantity(key, "safety.separation.stop.acceleration", "m/s²", (a,), holds)
+        self._quantity = Quantity(
+            key, "safety.separation.stop.acceleration", "m/s²", (a,), holds, of=holds[0]
+        )
         self._confirmed, self._other = confirmation(self._quantity, model.workstation.confirmed)
         self._seen: deque[tuple[float, Array]] = deque()
 

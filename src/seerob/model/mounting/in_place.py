@@ -120,7 +120,9 @@ def _sizes(model: Model) -> Iterator[Quantity]:
                 said = f"{mass:g} kg in a box of {volume:.3g} m³{read}"
                 figures.append(("bulk_density", "kg/m³", mass / volume, said))
             for name, unit, value, said in figures:
-                yield Quantity(f"{group}[{i}].{name}", f"{group}.{name}", unit, (value,), (thing.name,), said)
+                yield Quantity(
+                    f"{group}[{i}].{name}", f"{group}.{name}", unit, (value,), (thing.name,), said, thing.name
+                )
 
 
 def _links(model: Model) -> Iterator[Quantity]:
@@ -134,7 +136,7 @@ def _links(model: Model) -> Iterator[Quantity]:
             if volume > 0:
                 said, density = f"{given.mass:g} kg in a box of {volume:.3g} m³", (given.mass / volume,)
                 key, kind = f"robots[{i}].{what}", f"robots.{what}"
-                yield Quantity(key, kind, "kg/m³", density, (robot.name,), said)
+                yield Quantity(key, kind, "kg/m³", density, (robot.name,), said, robot.name)
 
 
 def _payloads(model: Model) -> Iterator[Quantity]:
@@ -149,7 +151,9 @@ def _payloads(model: Model) -> Iterator[Quantity]:
         said = (
             f"{', '.join(f'{name} {m:.4g} kg' for name, m in masses.items())} of {row.kg:g} kg: {row.source}"
         )
-        yield Quantity(f"robots[{i}].payload", "robots.payload", "", (total / row.kg,), (robot.name,), said)
+        yield Quantity(
+            f"robots[{i}].payload", "robots.payload", "", (total / row.kg,), (robot.name,), said, robot.name
+        )
 
 
 def _left_out(model: Model) -> Iterator[Quantity]:
@@ -157,7 +161,9 @@ def _left_out(model: Model) -> Iterator[Quantity]:
     for i, robot in enumerate(model.workstation.robots):
         left_out = model.mechanisms[robot.name].description.left_out
         said, name = ", ".join(left_out), "constraints_left_out"
-        yield Quantity(f"robots[{i}].{name}", f"robots.{name}", "", (len(left_out),), (robot.name,), said)
+        yield Quantity(
+            f"robots[{i}].{name}", f"robots.{name}", "", (len(left_out),), (robot.name,), said, robot.name
+        )
 
 
 def _published(model: Model) -> Iterator[Quantity]:
@@ -174,7 +180,7 @@ def _published(model: Model) -> Iterator[Quantity]:
             continue  # what nobody weighed is undecided by itself
         said = f"{total:.4g} kg of {robot.published_mass:g} kg: {robot.published_mass_source}"
         name = "published_mass.share"
-        yield Quantity(f"robots[{i}].{name}", f"robots.{name}", "", (share,), (robot.name,), said)
+        yield Quantity(f"robots[{i}].{name}", f"robots.{name}", "", (share,), (robot.name,), said, robot.name)
 
 
 def _people(model: Model) -> Iterator[Quantity]:
@@ -184,7 +190,7 @@ def _people(model: Model) -> Iterator[Quantity]:
         if isinstance(stature, float | int):
             bmi = human.mass / stature**2
             said = f"{human.mass:g} kg, {stature:g} m"
-            yield Quantity(f"humans[{i}].bmi", "humans.bmi", "kg/m²", (bmi,), (human.name,), said)
+            yield Quantity(f"humans[{i}].bmi", "humans.bmi", "kg/m²", (bmi,), (human.name,), said, human.name)
 
 
 # -- places -------------------------------------------------------------------------------------
@@ -284,7 +290,7 @@ def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity
             on = place.distance(feet, under, gap)
             if on < gap:
                 gap, said = max(on, 0.0), f"from what {human.name} stands or sits on"
-        yield Quantity(f"humans[{i}].feet", "humans.feet", "m", (gap,), (human.name,), said)
+        yield Quantity(f"humans[{i}].feet", "humans.feet", "m", (gap,), (human.name,), said, human.name)
 
 
 def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
@@ -312,7 +318,13 @@ def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quan
                 said = f"{inner} in {outer}"
                 about = (table.name, owner)
                 yield Quantity(
-                    f"{group}[{i}].inside.{owner}", f"{group}.inside.{owner}", "m", (deep,), about, said
+                    f"{group}[{i}].inside.{owner}",
+                    f"{group}.inside.{owner}",
+                    "m",
+                    (deep,),
+                    about,
+                    said,
+                    table.name,
                 )
 
 
@@ -328,7 +340,13 @@ def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
             about = (part.name, other.name)
             key = f"parts[{i}].inside.{other.name}"
             yield Quantity(
-                key, f"parts.inside.{other.name}", "m", (deep,), about, f"{part.name} in {other.name}"
+                key,
+                f"parts.inside.{other.name}",
+                "m",
+                (deep,),
+                about,
+                f"{part.name} in {other.name}",
+                part.name,
             )
 
 
@@ -348,4 +366,6 @@ def _nobody(
                 near = max(min(at.distance(still, own, SIGHT) for at in places), 0.0)
                 said = f"from {table.name} to whoever is nearest, {where}"
                 key = "nobody_within"
-                yield Quantity(f"{group}[{i}].{key}", f"{group}.{key}", "m", (near,), (table.name,), said)
+                yield Quantity(
+                    f"{group}[{i}].{key}", f"{group}.{key}", "m", (near,), (table.name,), said, table.name
+                )

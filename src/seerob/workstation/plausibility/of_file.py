@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -50,13 +51,20 @@ def listed(entries: Entries, engine: Engine) -> Iterator[Quantity]:
     """Every quantity that somebody typed."""
     for group in LISTS:
         for i, table in entries.get(group, {}).items():
-            yield from quantities(table, key=f"{group}[{i}]", kind=group, about=_about(group, table, entries))
+            yield from quantities(
+                table, key=f"{group}[{i}]", kind=group, about=_about(group, table, entries), of=name_of(table)
+            )
     for group in PLUGINS:
         for i, table in entries.get(group, {}).items():
             kind = f"{group}.{type(table).__module__.rsplit('.', 1)[-1]}"
             about = ((table.target() or "*") if group == "sources" else table.name,)
-            yield from quantities(table, key=f"{group}[{i}]", kind=kind, about=about)
+            yield from quantities(table, key=f"{group}[{i}]", kind=kind, about=about, of=name_of(table))
     yield from quantities(engine, key="engine", kind="engine", about=("*",))
+
+
+def name_of(entry: Any) -> str:
+    """What an entry of a list of tables is called; a phase has a title. Empty for one that has none."""
+    return str(getattr(entry, "name", "") or getattr(entry, "title", ""))
 
 
 def _about(group: str, table: Any, entries: Entries) -> tuple[str, ...]:
@@ -109,8 +117,22 @@ def confirmation(quantity: Quantity, confirmed: Sequence[Confirmed]) -> tuple[st
     return why, f"; the file confirms {said[0][0].value}, another value" if said and not why else ""
 
 
-def unknown(confirmed: Mapping[int, Confirmed], entries: Entries, engine: Engine, file: str) -> list[Problem]:
-    """Confirmations of what the file does not have."""
+def unknown(
+    confirmed: Mapping[int, Confirmed],
+    entries: Entries,
+    engine: Engine,
+    file: str,
+    numbered: Collection[str] = (),
+) -> list[Problem]:
+    """Confirmations of what the file does not have, or that may be of another entry.
+
+    Args:
+        confirmed: By number.
+        entries: What they may be of.
+        engine: Likewise.
+        file: For the messages.
+        numbered: Names that nobody gave, and that are another's in another order.
+    """
     if not confirmed:
         return []
     known = [quantity.key for quantity in listed(entries, engine)]
@@ -118,10 +140,35 @@ def unknown(confirmed: Mapping[int, Confirmed], entries: Entries, engine: Engine
     for i, one in confirmed.items():
         keys = [key for key, _ in canonical(one.key)]
         if any(key in known or _follows(key, entries) for key in keys):
+            problems += _of_another(one, entries, numbered, file, f"confirmed[{i}].of")
             continue
         what = f"{one.key!r} is no quantity of this file: nothing is confirmed"
         problems.append(Problem(file, f"confirmed[{i}].key", what, suggestion(one.key, known)))
     return problems
+
+
+def _of_another(
+    one: Confirmed, entries: Entries, numbered: Collection[str], file: str, place: str
+) -> Iterator[Problem]:
+    """Why a confirmation may be of another entry than it was meant for: it has to say which."""
+    match = KEY.fullmatch(one.key)
+    if match is None:
+        return
+    group, i = match[1], int(match[2])
+    names = {k: name_of(entry) for k, entry in entries[group].items()}
+    if not names[i]:
+        yield Problem(file, place, f"{group}[{i}] has no title", "give it one, and write it here")
+    elif names[i] in numbered or list(names.values()).count(names[i]) > 1:
+        yield Problem(
+            file, place, f"several of {group} are called {names[i]!r}", "give each a name of its own"
+        )
+    elif one.of is None:
+        remedy = f"of = {json.dumps(names[i], ensure_ascii=False)}, if that is meant"
+        yield Problem(file, place, f"missing: nothing says which of {group} it is of", remedy)
+    elif one.of != names[i]:
+        right = next((f'key = "{group}[{k}].{match[3]}"' for k, name in names.items() if name == one.of), "")
+        what = f"{group}[{i}] is {names[i]!r}, not {one.of!r}: nothing is confirmed"
+        yield Problem(file, place, what, right or "confirm it anew where it is meant")
 
 
 def _follows(key: str, entries: Entries) -> bool:

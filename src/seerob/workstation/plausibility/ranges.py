@@ -6,6 +6,7 @@ adds are looked at too. What is only a default is not: nobody typed it.
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,6 +73,8 @@ class Quantity(NamedTuple):
     """Names of what nothing can be said of when it is wrong; ``*`` for everything."""
     said: str = ""
     """What it follows from, where it does not stand in the file."""
+    of: str = ""
+    """Name of the entry that it is of; empty where it is of none in a list."""
 
 
 # -- mathematics --------------------------------------------------------------------------------
@@ -112,7 +115,8 @@ def how_to_confirm(quantity: Quantity) -> str:
     """The lines of the file that say that it is meant."""
     numbers = [float(shown(x)) if quantity.said else x for x in quantity.values]
     value = numbers[0] if len(numbers) == 1 else numbers
-    return f'or confirm it: [[confirmed]] key = "{quantity.key}", value = {value!r}, why = "…"'
+    of = f"of = {json.dumps(quantity.of, ensure_ascii=False)}, " if quantity.of else ""
+    return f'or confirm it: [[confirmed]] key = "{quantity.key}", {of}value = {value!r}, why = "…"'
 
 
 def shown(value: float) -> str:
@@ -157,7 +161,9 @@ def _numbers(value: Any) -> Iterator[float]:
 # -- the quantities of a table ------------------------------------------------------------------
 
 
-def quantities(table: Struct, *, key: str, kind: str, about: tuple[str, ...]) -> Iterator[Quantity]:
+def quantities(
+    table: Struct, *, key: str, kind: str, about: tuple[str, ...], of: str = ""
+) -> Iterator[Quantity]:
     """Every quantity of a table and of the tables in it that is not a default.
 
     Args:
@@ -165,7 +171,13 @@ def quantities(table: Struct, *, key: str, kind: str, about: tuple[str, ...]) ->
         key: Where it stands in the file.
         kind: The same without the numbers of entries, a criterion or a source with its kind.
         about: Of what nothing can be said when a quantity is wrong.
+        of: Name of the entry.
     """
+    for quantity in _quantities(table, key, kind, about):
+        yield quantity._replace(of=of)
+
+
+def _quantities(table: Struct, key: str, kind: str, about: tuple[str, ...]) -> Iterator[Quantity]:
     for field in msgspec.structs.fields(type(table)):
         value = getattr(table, field.name)
         default = field.default
@@ -179,7 +191,7 @@ def quantities(table: Struct, *, key: str, kind: str, about: tuple[str, ...]) ->
 
 def _of_value(value: Any, wanted: Any, key: str, kind: str, about: tuple[str, ...]) -> Iterator[Quantity]:
     if isinstance(value, Struct):
-        yield from quantities(value, key=key, kind=kind, about=about)
+        yield from _quantities(value, key, kind, about)
     elif isinstance(value, Mapping):
         for name, entry in value.items():
             yield from _of_value(entry, wanted, f"{key}.{name}", f"{kind}.{name}", about)

@@ -126,6 +126,57 @@ def test_arrays_are_held_against_it_too(tmp_path):
         assert station.batch({"arm": q}, {"arm": qd}, t=T)["s"].verdict is verdict
 
 
+UNSTATED = SAFE.replace(", acceleration = {a}", "").format()
+LIMITED = TWO_R + "acceleration_limits = {}\n"
+
+
+@pytest.mark.parametrize(
+    ("rate", "limits", "refuted"),
+    [(12.0, "[5, 5]", True), (-12.0, "[5, 5]", True), (12.0, "[5]", True), (12.0, "[11, 5]", False)],
+)
+def test_acceleration_limits_that_a_recorded_motion_contradicts_hold_what_may_rest_on_them(
+    tmp_path, rate, limits, refuted
+):
+    """A joint that gets faster or slower by 2.4 rad/s in 0.2 s."""
+
+    def of(folder, more=""):
+        text = ENGINE + LIMITED.format(limits) + person("op", 9.0, 0, 0) + SOURCE + UNSTATED + more
+        q, qd = faster(rate)
+        motion = csv(*(faster(rate) if rate > 0 else (q + 3 * T, qd + 3)))
+        return made(folder, text, {"arm.urdf": two_r(), "motion.csv": motion})
+
+    station = of(tmp_path)
+    (text,) = told(station) or ("",)
+    results = station.run().results
+    assert results["v"].verdict is Verdict.WITHIN
+    for name in ("s", "around"):
+        # Of a log that ends in motion nobody knows what comes next.
+        assert set(results[name].verdicts[:40]) == {2 if refuted else 0}
+    if not refuted:
+        assert not text
+        return
+    assert text.startswith("robots[0].acceleration_limits is contradicted by the robot's own motion: in ")
+    assert (
+        "j1 changes its speed by 2.4 rad/s from 0.200 s to 0.400 s, which is 12 rad/s², and the limit 5"
+        in text
+    )
+    confirmed = of(
+        tmp_path / "meant",
+        f'[[confirmed]]\nkey = "robots[0].acceleration_limits"\nvalue = {limits}\nwhy = "monitored"\n',
+    )
+    assert not told(confirmed)
+    assert set(confirmed.run().results["s"].verdicts[:40]) == {0}
+
+
+def test_arrays_that_contradict_acceleration_limits_are_not_within(tmp_path):
+    """Of arrays nobody knows what comes next: the limits bound S_p."""
+    text = ENGINE + LIMITED.format("[5, 5]") + person("op", 9.0, 0, 0) + UNSTATED
+    station = made(tmp_path, text, {"arm.urdf": two_r()})
+    for rate, verdict in ((12.0, Verdict.UNDECIDED), (4.0, Verdict.WITHIN)):
+        q, qd = (np.column_stack([x, 0 * x]) for x in faster(rate))
+        assert station.batch({"arm": q}, {"arm": qd}, t=T)["s"].verdict is verdict
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_largest_gain_is_that_of_every_pair_of_instants(seed):
     rng = np.random.default_rng(seed)

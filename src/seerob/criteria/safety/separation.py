@@ -20,6 +20,7 @@ from seerob.core.tolerances import Shifts, Tolerance, deciding
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING
 from seerob.criteria.criterion import (
+    Claim,
     Criterion,
     Evaluate,
     EvaluateMany,
@@ -33,8 +34,9 @@ from seerob.criteria.stopping.largest import LargestSeparation
 from seerob.criteria.stopping.many_instants import separations as at_instants
 from seerob.criteria.stopping.models import MOVING, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
+from seerob.criteria.stopping.reaction import joint_limits
 from seerob.criteria.stopping.search import TOP, factor_by_search
-from seerob.criteria.stopping.stated_acceleration import StatedAcceleration
+from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
 from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shifted, tolerances
 from seerob.description.norms import iso_13855
@@ -267,23 +269,21 @@ class Separation(Criterion, frozen=True, kw_only=True):
         worst = self._by_device(model)[0].at_worst(model).stop.reaction
         return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
 
-    def claims(self, model: Model) -> Sequence[StatedAcceleration]:
-        """Claim that the robot gets no faster than ``stop.acceleration`` says while it reacts."""
+    def claims(self, model: Model) -> Sequence[Claim]:
+        """Claim that the robot gets no faster while it reacts than the file says, of points or of joints."""
         a, station = self.stop.acceleration, model.workstation
-        if a is None or self not in station.safety:
+        if self not in station.safety:
             return ()
         areas = (area for area in station.areas if area.swept and area.swept.separation == self.name)
         on_it = (one for one in station.safety if getattr(one, "separation", None) == self.name)
-        return (
-            StatedAcceleration(
-                model,
-                self.moving(model),
-                a,
-                self._by_device(model)[0].at_worst(model).stop.reaction,
-                f"safety[{station.safety.index(self)}].stop.acceleration",
-                (self.name, *(each.name for each in (*on_it, *areas))),
-            ),
-        )
+        holds = (self.name, *(each.name for each in (*on_it, *areas)))
+        T_r = self._by_device(model)[0].at_worst(model).stop.reaction
+        if a is None:
+            robot = model.mover(self._sides(model)[0])
+            limits = joint_limits(model, robot)
+            return () if limits is None else (JointAccelerations(model, robot, limits[0], T_r, holds),)
+        key = f"safety[{station.safety.index(self)}].stop.acceleration"
+        return (StatedAcceleration(model, self.moving(model), a, T_r, key, holds),)
 
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""

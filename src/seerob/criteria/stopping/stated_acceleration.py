@@ -1,4 +1,4 @@
-r"""Whether a robot's own motion contradicts ``stop.acceleration``, which the file states.
+r"""Whether a robot's own motion contradicts the accelerations that the file states.
 
 S_p of a stated acceleration a is right as long as no point gets faster than with a while the robot reacts:
 
@@ -6,6 +6,13 @@ S_p of a stated acceleration a is right as long as no point gets faster than wit
 
 A motion in which a moving part does is held against it: of a file before the run, over all of it; of whom
 only the run shows, when it is seen, from then on.
+
+So with the ``acceleration_limits`` of its joints, on which S_p rests where nobody knows what comes next:
+
+.. math:: |\dot q_j(t) - \dot q_j(t_0)| \le a_j\,(t - t_0),
+
+whether it gets faster or slower, as a joint that brakes may make a point faster that others move. Of a motion
+from a file here; live sources are looked at where they are heard (`seerob.devices.live.contradictions`).
 """
 
 from __future__ import annotations
@@ -24,7 +31,8 @@ from seerob.core.domains import at_least, number
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.model.model import Model
+from seerob.devices.live.contradictions import SHARE, SPEED_NOISE
+from seerob.model.model import Mechanism, Model
 from seerob.twin.speed_noise import SpeedNoise
 from seerob.twin.state import State
 from seerob.twin.states import Bench, Motion, Questions
@@ -54,22 +62,24 @@ class Gain(NamedTuple):
     """Acceleration that would explain all gains [m/s²]."""
 
 
-def largest_gain(t: Array, v: Array, a: float, window: float, noise: Array | float = 0.0) -> Gain | None:
+def largest_gain(
+    t: Array, v: Array, a: Array | float, window: float, noise: Array | float = 0.0
+) -> Gain | None:
     """The largest gain of speed within a window beyond what an acceleration explains; None for none.
 
     Args:
         t: Instants, increasing [s], shape (m,).
         v: Speeds of parts, shape (m, n) [m/s].
-        a: Acceleration [m/s²].
+        a: Acceleration [m/s²], shape (n,) or a number.
         window: [s].
         noise: Of a gain, which is allowed for [m/s], shape (n,) or a number.
     """
-    number("a", a, 0.0, unit="m/s²")
+    _check(a=a)
     number("window", window, 0.0, unit="s")
     _check(t=t, v=v, noise=noise)
     if not v.size:
         return None
-    left = v - a * t[:, None]
+    left = v - np.asarray(a) * t[:, None]
     first = np.searchsorted(t, t - window * (1 + 1e-9))
     beyond = left - _least_since(left, first) - noise
     j, part = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
@@ -81,7 +91,7 @@ def largest_gain(t: Array, v: Array, a: float, window: float, noise: Array | flo
 
 def _check(**given: Array | float) -> None:
     for name, value in given.items():
-        if not np.isfinite(at_least(name, value, unit="s" if name == "t" else "m/s")).all():
+        if not np.isfinite(at_least(name, value, unit={"t": "s", "a": "m/s²"}.get(name, "m/s"))).all():
             raise ValueError(f"{name} is not a finite number everywhere")
 
 
@@ -199,6 +209,71 @@ class StatedAcceleration:
         text = f"{text}; give {right:g} or more, or leave it out{self._other}"
         text = f"{text}; {how_to_confirm(self._quantity)}"
         return Finding(level="warning", subject=self.holds[0], text=text, holds=self.holds)
+
+
+class JointAccelerations:
+    """The claim that no joint of a robot gets faster or slower than its ``acceleration_limits`` say.
+
+    Args:
+        model: The compiled workstation.
+        robot: The robot.
+        limits: Of its joints [rad/s² or m/s²], shape (j,).
+        T_r: Reaction time [s].
+        holds: Names of what rests on it.
+    """
+
+    def __init__(
+        self, model: Model, robot: Mechanism, limits: Array, T_r: float, holds: tuple[str, ...]
+    ) -> None:
+        self._robot, self._limits, self._T_r, self.holds = robot, limits, T_r, holds
+        i, table = next((i, r) for i, r in enumerate(model.workstation.robots) if r.name == robot.name)
+        kind = "robots.acceleration_limits"
+        self._quantity = Quantity(
+            f"robots[{i}].acceleration_limits", kind, "rad/s²", tuple(table.acceleration_limits or ()), holds
+        )
+        self._confirmed, self._other = confirmation(self._quantity, model.workstation.confirmed)
+
+    def of_motion(self, motion: Motion, what: str = "") -> Finding | None:
+        """What a motion contradicts, anywhere in it; None for nothing.
+
+        Args:
+            motion: Of everybody, each instant after the other.
+            what: Where it is from.
+        """
+        robot, units = self._robot, self._robot.units
+        qd = motion.v[:, robot.v_address[robot.own]]
+        noise = np.array([SPEED_NOISE[unit] for unit in units])
+        errors = motion.speed_errors.get(robot.name)
+        if errors is not None and len(errors):
+            noise = noise + 2 * errors.max(axis=0)
+        known = (
+            np.asarray(motion.doubts[robot.name] == "")
+            if robot.name in motion.doubts
+            else np.ones(len(qd), bool)
+        )
+        both = np.hstack([qd, -qd]) + float(np.abs(qd).max(initial=0.0))
+        most, off = np.tile((1 + SHARE) * self._limits, 2), np.tile(noise, 2)
+        gains = [largest_gain(motion.t[run], both[run], most, self._T_r, off) for run in _runs(known)]
+        worst = max(filter(None, gains), key=lambda gain: gain.gained, default=None)
+        if worst is None:
+            return None
+        k = worst.part % len(units)
+        unit, rate = units[k], worst.gained / (worst.end - worst.begin)
+        text = (
+            f"{self._quantity.key} is contradicted by the robot's own motion: {what}"
+            f"{robot.joints[k].name} changes its speed by {worst.gained:.3g} {unit}/s from "
+            f"{worst.begin:.3f} s to {worst.end:.3f} s, which is {rate:.3g} {unit}/s², "
+            f"and the limit {self._limits[k]:g}"
+        )
+        if self._confirmed:
+            text = f"{text}; confirmed: {self._confirmed}"
+            return Finding(level="note", subject=self.holds[0], text=text)
+        text = f"{text}; give what the joints can do{self._other}; {how_to_confirm(self._quantity)}"
+        return Finding(level="warning", subject=self.holds[0], text=text, holds=self.holds)
+
+    def __call__(self, state: State) -> Finding | None:
+        """Nothing: who is heard live is held against his limits where he is heard."""
+        return None
 
 
 def _runs(valid: NDArray[np.bool_]) -> Iterator[slice]:

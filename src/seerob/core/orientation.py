@@ -86,6 +86,6 @@ def product(p: Array, q: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Vector product of vectors (3,) or rows (n, 3): for a few rows several times faster than `numpy.cross`."""
+    """Vector product of vectors (3,) or rows (n, 3): for a few several times faster than `numpy.cross`."""
     (a0, a1, a2), (b0, b1, b2) = a.T, b.T
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)

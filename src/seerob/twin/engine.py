@@ -522,21 +522,26 @@ class Engine:
             if start + kernel.SLACK < instant < t - kernel.SLACK
         }
         instants = np.array([start, *sorted(inside), t], float)
-        many_q, many_v = np.tile(self._shown.qpos, (len(instants), 1)), np.zeros((len(instants), len(v[0])))
-        for mechanism in self._mechanisms:
-            found, speed, _ = self._references[mechanism.name].course(instants)
-            many_q[:, mechanism.q_address] = found @ mechanism.coupling.T + mechanism.offset
-            many_v[:, mechanism.v_address] = speed @ mechanism.coupling.T
+        many_q, many_v = np.empty((len(instants), len(q[0]))), np.zeros((len(instants), len(v[0])))
         many_q[0], many_v[0] = q[0], v[0]
-        many_q[-1], many_v[-1] = self._shown.qpos, self._shown.qvel
+        many_q[1:] = self._shown.qpos
+        many_v[-1] = self._shown.qvel
+        for mechanism in self._mechanisms if inside else ():
+            if self._references[mechanism.name].waits:
+                continue
+            found, speed, _ = self._references[mechanism.name].course(instants[1:-1])
+            many_q[1:-1, mechanism.q_address] = found @ mechanism.coupling.T + mechanism.offset
+            many_v[1:-1, mechanism.v_address] = speed @ mechanism.coupling.T
         return Path(instants, many_q, many_v, broken)
 
     def _follow(self, t: float) -> None:
         """Put the twin on what was heard, with the velocities of that motion."""
         for mechanism in self._mechanisms:
-            if self._references[mechanism.name].lands(t):
+            reference = self._references[mechanism.name]
+            if reference.landing and reference.lands(t):
                 self._broken.add(mechanism.name)
-            self._put(mechanism, *self._references[mechanism.name].at(t))
+            if not reference.waits:
+                self._put(mechanism, *reference.at(t))
 
     def _aim(self, start: float, end: float) -> None:
         """Where every joint is to be at each step of the tick that begins, and at its end [s]."""
@@ -607,9 +612,12 @@ class Engine:
         self._show(t)
 
     def _put(self, mechanism: Mechanism, q: Array, v: Array, a: Array) -> None:
-        late = 0.5 * self._dt * a if self.controllers and self.physics else np.zeros_like(a)
-        self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
-        self._data.qvel[mechanism.v_address] = mechanism.coupling @ (v - late)
+        self._qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        if not (self.controllers and self.physics):
+            self._qvel[mechanism.v_address] = self._before[mechanism.v_address] = mechanism.coupling @ v
+            return
+        late = 0.5 * self._dt * a
+        self._qvel[mechanism.v_address] = mechanism.coupling @ (v - late)
         self._before[mechanism.v_address] = mechanism.coupling @ (v - 3 * late)
 
     def _put_back(self, step: int, t: float) -> None:
@@ -623,8 +631,8 @@ class Engine:
 
     def _show(self, t: float) -> None:
         shown, data = self._shown, self._data
-        shown.qpos[:] = data.qpos
-        shown.qvel[:] = data.qvel
+        shown.qpos[:] = self._qpos
+        shown.qvel[:] = self._qvel
         if self._centred:
             shown.qvel += 0.5 * (data.qvel - self._before)
         self.state.refresh(t)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from html import escape
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import escape
 
 from seerob.core.snapshot import Verdict
 from seerob.outputs.palette import DARK_HEX, HEX
@@ -180,7 +180,7 @@ def _inline(text: str) -> str:
     """The rest of a cell with a text; what looks like an escaped character is escaped itself."""
     kept = ' xml:space="preserve"' if text != text.strip() else ""
     written = _ESCAPED.sub(r"_x005F\1", text).replace("\r", "_x000D_")
-    return f't="inlineStr"><is><t{kept}>{escape(written)}</t></is></c>'
+    return f't="inlineStr"><is><t{kept}>{escape(written, quote=False)}</t></is></c>'
 
 
 def plain(text: str) -> str:

@@ -84,6 +84,11 @@ class Reference:
         return (*self._times, *ends)
 
     @property
+    def waits(self) -> bool:
+        """Whether nothing was heard yet, so that it stays at home."""
+        return not self._times
+
+    @property
     def until(self) -> float:
         """Instant of the newest sample [s]; -inf before the first."""
         return self._times[-1] if self._times else -np.inf

@@ -28,7 +28,7 @@ def is_possible(sample: JointSample | PoseSample) -> bool:
     said = (
         (*sample.q, *(sample.qd or ())) if isinstance(sample, JointSample) else sample.position + sample.wxyz
     )
-    return math.isfinite(sample.t) and bool((np.abs(said) <= LARGEST).all())
+    return math.isfinite(sample.t) and all(-LARGEST <= value <= LARGEST for value in said)
 
 
 def beyond_limits(sample: JointSample, mechanism: Mechanism) -> str:

@@ -12,8 +12,9 @@ import pytest
 import seerob as sr
 from seerob.app.console.printable import printable
 from seerob.core.errors import InputError
-from seerob.core.files import zip_members
+from seerob.core.files import bounded
 from seerob.description.loader import load_robot
+from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets
 from seerob.outputs.html import text
 
@@ -74,7 +75,7 @@ def test_a_3mf_whose_directory_lies_about_sizes_is_refused_after_a_piece(tmp_pat
     path = tmp_path / "a.3mf"
     with_lies(path, {"[Content_Types].xml": "<x/>"}, "3D/3dmodel.model")
     with pytest.raises(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
-        zip_members.unpacked(archive, "3D/3dmodel.model", HUGE)
+        bounded.unpacked(archive, "3D/3dmodel.model", HUGE)
     said, grown = asked(
         "seerob.description.mesh", f"seerob.description.mesh.load_meshes(Path({str(path)!r}))"
     )
@@ -134,3 +135,19 @@ def test_what_a_terminal_or_a_page_would_obey_is_written_or_left_out():
     obeyed = "\x1b[2J \u061c\u200e\u200f\u2028\u202e\u2066\x07\x9b"
     for shown in (printable(f"a{obeyed}b"), text(f"a{obeyed}b")):
         assert not set(obeyed.replace(" ", "").replace("[2J", "")) & set(shown)
+
+
+def test_a_chunk_of_a_bag_that_unpacks_to_more_than_there_is_ends_the_parser_alone(tmp_path, monkeypatch):
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    path, kind = tmp_path / "a.bag", "std_msgs/msg/Empty"
+    writer = Writer(path)
+    writer.set_compression(Writer.CompressionFormat.LZ4)
+    with writer:
+        topic = writer.add_connection("/a", kind, typestore=get_typestore(Stores.ROS1_NOETIC))
+        writer.write(topic, 1, bytes(400 << 20))
+    assert path.stat().st_size < 4 << 20
+    monkeypatch.setattr(kinect_bag, "MEMORY", 300 << 20)
+    with pytest.raises(InputError, match=r"a.bag: takes more than 300 MiB of memory to read; repair it"):
+        list(kinect_bag.raw_messages(path, "a.bag", ("/a",), 1 << 20))

@@ -23,7 +23,7 @@ from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.rosbridge import Rosbridge
 from seerob.devices.sources.siemens_web import SiemensWeb
 from seerob.devices.sources.web import Web
-from seerob.files.motion_capture.kinect_bag import opened
+from seerob.files.motion_capture.kinect_bag import connections
 from seerob.protocols.ros.ros_serialised import Edition, store
 from seerob.workstation.source import Target
 
@@ -108,7 +108,7 @@ def connected(source):
             lambda: Rosbridge(robot="arm", host="127.0.0.1").open(Path(), Target(name="arm", joints=("a",))),
         ),
         ("rosbags", lambda: store(Edition.ROS2)),
-        ("rosbags", lambda: opened(Path("none.bag"), "none.bag").__enter__()),
+        ("rosbags", lambda: connections(Path("none.bag"), "none.bag")),
         ("asyncua", lambda: OpcuaEmulator().ready()),
         ("pymodbus", lambda: ModbusEmulator().ready()),
         ("rosbags", lambda: RosbridgeEmulator().ready()),

@@ -9,13 +9,14 @@ import time
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from unittest.mock import patch
 
 from seerob.core.errors import SeerobError
 from seerob.description.mesh_files import apart
+from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables import workbook
 from soak.corpus import corpus
 from soak.made_cells import KINDS
@@ -61,11 +62,10 @@ def in_this_process():
     def here(function, *arguments, **_):
         return function(*arguments)
 
-    with (
-        patch.object(apart, "parsed", here),
-        patch.object(workbook, "parsed", here),
-        patch.object(workbook, "parsed_one_by_one", here),
-    ):
+    with ExitStack() as stack:
+        for module in (apart, workbook, kinect_bag):
+            for name in ("parsed", "parsed_one_by_one"):
+                stack.enter_context(patch.object(module, name, here, create=True))
         yield
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from seerob.core.errors import InputError, suggestion
+from seerob.core.files.bounded import TooLarge, content
 from seerob.description.description import Description
 from seerob.description.formats import mjcf, urdf
 from seerob.description.formats.resolve import Resolver, as_written_or_in_other_case, of_distribution
@@ -75,12 +76,13 @@ def _from_file(
     if path.suffix.lower() not in {".urdf", ".xml"}:
         readable = ".urdf, .xacro and .xml (URDF or MJCF) are read"
         raise InputError.at(model, "", f"{path.suffix or 'no ending'!r} is not a robot description", readable)
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError.at(model, "", f"has {path.stat().st_size} bytes", f"at most {MAX_BYTES} are read")
-    content = path.read_bytes()
-    root = parse_xml(content, str(path)).tag
+    try:
+        text = content(path, MAX_BYTES)
+    except (OSError, TooLarge) as error:
+        raise InputError.at(model, "", f"cannot be read: {error}", f"at most {MAX_BYTES} are read") from None
+    root = parse_xml(text, str(path)).tag
     if root == "robot":
-        return urdf.from_text(content, resolver=resolver, name=name)
+        return urdf.from_text(text, resolver=resolver, name=name)
     if root == "mujoco":
         return mjcf.read_mjcf(path, resolver=resolver, name=name)
     raise InputError.at(

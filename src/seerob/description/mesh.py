@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.errors import InputError, suggestion
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.shapes.geometry import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -24,6 +25,8 @@ MAX_BYTES = 512 * 2**20
 """Largest mesh file that is read unless the caller says otherwise [bytes]."""
 MAX_FACES = 20_000_000
 """Most triangles that are read unless the caller says otherwise."""
+FARTHEST = 1e6
+"""No part reaches beyond [m]."""
 
 READERS: dict[str, Callable[[MeshSource], RawFile]] = {
     ".stl": stl.read,
@@ -120,7 +123,9 @@ def load_meshes(
     if not raws:
         source.fail("holds no triangles", "export surfaces, not only points, lines or a B-rep")
     _check(source, raws)
+    _check_reach(source, raws, min(LENGTHS.values()))
     matrix = np.diag(scale) @ _Z_FROM[_up(source, raw, up)] * _meters(source, raw, raws, units)
+    _check_reach(source, raws, float(np.abs(matrix).max()))
     meshes = _finished(source, raws, matrix)
     return LoadedMeshes(meshes, tuple(source.findings), source.files)
 
@@ -153,14 +158,15 @@ def _content(path: Path, max_bytes: int) -> bytes:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "there is no such file"
         raise InputError.at(path, "", what, "name a mesh file")
-    size = path.stat().st_size
-    if size > max_bytes:
-        raise InputError.at(
-            path, "", f"has {size} bytes, more than {max_bytes}", "simplify it or raise max_bytes"
-        )
-    if size == 0:
+    try:
+        held = content(path, max_bytes)
+    except TooLarge as error:
+        raise InputError.at(path, "", str(error), "simplify it or raise max_bytes") from None
+    except OSError as error:
+        raise InputError.at(path, "", f"cannot be read: {error.strerror}", "check its permissions") from error
+    if not held:
         raise InputError.at(path, "", "is empty", "export it again")
-    return path.read_bytes()
+    return held
 
 
 def _check(source: MeshSource, raws: list[RawMesh]) -> None:
@@ -174,6 +180,14 @@ def _check(source: MeshSource, raws: list[RawMesh]) -> None:
         if not np.isfinite(used).all():
             bad = used[~np.isfinite(used).all(axis=1)][0]
             source.fail(f"a vertex is not finite: {bad.tolist()}", "export it again", m.name)
+
+
+def _check_reach(source: MeshSource, raws: list[RawMesh], meters: float) -> None:
+    for m in raws:
+        farthest = float(np.abs(m.vertices[m.faces.ravel()]).max())
+        if not farthest <= FARTHEST / meters:
+            what = f"a coordinate is {farthest:g}, which is beyond {FARTHEST:g} m"
+            source.fail(what, "check its coordinates, units and scale", m.name)
 
 
 def _extent(raws: list[RawMesh]) -> Array:

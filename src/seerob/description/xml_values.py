@@ -16,6 +16,10 @@ from seerob.core.transforms import Array, rotation_from_rpy, transform
 MAX_BYTES = 64 * 2**20
 """Largest description accepted; meshes have their own bound."""
 MAX_ELEMENTS = 200_000
+HEAVIEST = 1e9
+"""No mass [kg] and no moment of inertia [kg·m²] of a link is larger."""
+FARTHEST, SMALLEST = 1e6, 1e-9
+"""No part of a robot is farther from the next or larger than the one, and none smaller than the other [m]."""
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
@@ -69,6 +73,9 @@ class Reader:
         origin = element.find("origin")
         xyz = self.numbers(origin, "xyz", f"{key}.origin", (0.0, 0.0, 0.0))
         rpy = self.numbers(origin, "rpy", f"{key}.origin", (0.0, 0.0, 0.0))
+        if np.abs(xyz).max() > FARTHEST:
+            self.problem(f"{key}.origin.xyz", f"is {xyz.tolist()}", f"must be within {FARTHEST:g} m")
+            xyz = np.zeros(3)
         return transform(rotation_from_rpy(rpy), xyz)
 
     def raise_problems(self) -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.files.bounded import content
+from seerob.core.files.toml_file import MAX_FILE_SIZE
 from seerob.core.snapshot import Finding
 from seerob.workstation.variables.dictionary import Kind, Variable, read
 from seerob.workstation.workstation import Workstation
@@ -46,7 +48,7 @@ def bound(station: Workstation) -> Bound:
     problems = [*_sources(station, variables, str(path)), *_uses(station, by_name, file)]
     if problems:
         raise InputError(problems)
-    files = {Path(station.variables).as_posix(): path.read_bytes()}
+    files = {Path(station.variables).as_posix(): content(path, MAX_FILE_SIZE)}
     return Bound(by_name, files, (*_twice(variables), *_unused(station, variables)))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from seerob.core.errors import InputError
+from seerob.core.files.bounded import TooLarge, content
 
 MAX_FILE_SIZE = 4 << 20
 """A file larger than this [byte] is none that a user wrote."""
@@ -19,17 +20,12 @@ def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
         InputError: Too large, not readable, not UTF-8, or not TOML; names line and column.
     """
     try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_FILE_SIZE + 1)
+        raw = content(path, MAX_FILE_SIZE)
     except OSError as error:
         raise InputError.at(path, "", f"cannot be read: {error.strerror}", "check its permissions") from error
-    if len(raw) > MAX_FILE_SIZE:
-        raise InputError.at(
-            path,
-            "",
-            f"larger than {MAX_FILE_SIZE >> 20} MiB",
-            "give a workstation file, which is far smaller",
-        )
+    except TooLarge:
+        what = f"larger than {MAX_FILE_SIZE >> 20} MiB"
+        raise InputError.at(path, "", what, "give a workstation file, which is far smaller") from None
     try:
         return tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")), raw
     except UnicodeDecodeError as error:

@@ -12,6 +12,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Undecided
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.markers import Marker
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
@@ -82,9 +83,9 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
     def _data(self, model: Model) -> bytes:
         path = Path(model.folder, self.map)
         try:
-            if path.stat().st_size > MAX_SIZE:
-                raise InputError.at(self.map, "", "is too large", f"at most {MAX_SIZE} bytes")
-            return path.read_bytes()
+            return content(path, MAX_SIZE)
+        except TooLarge:
+            raise InputError.at(self.map, "", "is too large", f"at most {MAX_SIZE} bytes") from None
         except OSError as error:
             what = f"cannot be read: {error.strerror}"
             raise InputError.at(self.map, "", what, "give a map.csv of `seerob permissible`") from error

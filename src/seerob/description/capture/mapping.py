@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import Layout
@@ -90,10 +91,9 @@ def read_conventions(path: Path, name: str) -> dict[str, Convention]:
         InputError: The file is missing, or not such a table; every mistake in it.
     """
     try:
-        raw = path.read_bytes()
-        if len(raw) > MAX_FILE:
-            raise InputError.at(name, "", f"{len(raw)} bytes", f"a table has at most {MAX_FILE}")
-        tables = tomllib.loads(raw.decode("utf-8"))
+        tables = tomllib.loads(content(path, MAX_FILE).decode("utf-8"))
+    except TooLarge as error:
+        raise InputError.at(name, "", str(error), f"a table has at most {MAX_FILE}") from None
     except OSError as error:
         raise InputError.at(name, "", "no such file", "give a TOML file of tables of names") from error
     except (ValueError, RecursionError) as error:

@@ -20,7 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from seerob.core.errors import InputError
-from seerob.core.files.zip_members import TooLarge, unpacked
+from seerob.core.files.bounded import TooLarge, content, unpacked
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, transform
 from seerob.description.xml_values import MAX_BYTES, parse_xml
@@ -125,9 +125,11 @@ class Plant:
         file = self.file.parent / name
         if not file.resolve().is_relative_to(self.file.parent.resolve()) or not file.is_file():
             raise InputError.at(self.file, uri, "no such file", "put it beside the plant")
-        if file.stat().st_size > MAX_BYTES:
-            raise InputError.at(self.file, uri, f"larger than {MAX_BYTES >> 20} MiB", "simplify it first")
-        return file.read_bytes()
+        try:
+            return content(file, MAX_BYTES)
+        except TooLarge:
+            what = f"larger than {MAX_BYTES >> 20} MiB"
+            raise InputError.at(self.file, uri, what, "simplify it first") from None
 
 
 def _walk(
@@ -154,10 +156,12 @@ def read(path: Path) -> Plant:
         container = path
         name = _main_part(path, reader)
         data, inside = _unpack(path, name), posixpath.dirname(name)
-    elif path.stat().st_size > MAX_BYTES:
-        raise InputError.at(path, "", f"larger than {MAX_BYTES >> 20} MiB", "export the cell alone")
     else:
-        data = path.read_bytes()
+        try:
+            data = content(path, MAX_BYTES)
+        except TooLarge:
+            what = f"larger than {MAX_BYTES >> 20} MiB"
+            raise InputError.at(path, "", what, "export the cell alone") from None
     root = parse_xml(data, str(path))
     if _local(root.tag) != "CAEXFile":
         raise InputError.at(path, _local(root.tag), "is no CAEXFile", "give an AutomationML file")

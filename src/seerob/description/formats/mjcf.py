@@ -7,8 +7,10 @@ also drawn where a body has nothing else.
 
 from __future__ import annotations
 
+import logging
 import math
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +20,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.shapes.geometry import Mesh, Solid, capsule
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array, rotation_from_wxyz, transform
@@ -31,7 +34,7 @@ from seerob.description.pose import displacement
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.split_surfaces import with_insides
-from seerob.description.xml_values import MAX_BYTES, Reader, parse_xml
+from seerob.description.xml_values import FARTHEST, HEAVIEST, MAX_BYTES, SMALLEST, Reader, parse_xml
 
 if TYPE_CHECKING:
     import mujoco
@@ -148,11 +151,10 @@ def checked_files(path: Path) -> dict[str, bytes]:
         name = current.relative_to(folder).as_posix()
         if name in files:
             continue
-        if current.stat().st_size > MAX_BYTES:
-            raise InputError.at(
-                path, name, f"has {current.stat().st_size} bytes", f"at most {MAX_BYTES} are read"
-            )
-        files[name] = current.read_bytes()
+        try:
+            files[name] = content(current, MAX_BYTES)
+        except (TooLarge, OSError) as error:
+            raise InputError.at(path, name, str(error), f"at most {MAX_BYTES} are read") from None
         root = parse_xml(files[name], str(current))
         elements += root.iter()
         for include in root.iter("include"):
@@ -168,13 +170,12 @@ def checked_files(path: Path) -> dict[str, bytes]:
             roots = _roots(folder, compilers, str(element.tag))
             near = [root / element.attrib[attribute] for root in roots]
             found = _inside(path, folder, element, near, problems)
-            if found and found.stat().st_size > MAX_MESH_BYTES:
-                size = found.stat().st_size
-                problems.append(
-                    Problem(str(path), found.name, f"has {size} bytes", f"at most {MAX_MESH_BYTES}")
-                )
-            elif found:
-                files[found.relative_to(folder).as_posix()] = found.read_bytes()
+            if found is None:
+                continue
+            try:
+                files[found.relative_to(folder).as_posix()] = content(found, MAX_MESH_BYTES)
+            except (TooLarge, OSError) as error:
+                problems.append(Problem(str(path), found.name, str(error), f"at most {MAX_MESH_BYTES}"))
     if problems:
         raise InputError(problems)
     return files
@@ -224,6 +225,8 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
     """
     import mujoco
 
+    # Its own way is the terminal, and a file in the folder where the user happens to be.
+    mujoco.set_mju_user_warning(logging.getLogger("mujoco").debug)
     files = checked_files(path)
     reader = Reader(resolver.file, name)
     try:
@@ -231,12 +234,17 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
         # Names of fixed bodies and shapes for the screen are kept, whatever the file says.
         spec.compiler.fusestatic = False
         spec.compiler.discardvisual = False
-        model = spec.compile()
+        with warnings.catch_warnings(record=True) as said_of_it:
+            warnings.simplefilter("always")
+            model = spec.compile()
     except ValueError as error:
         said = " ".join(str(error).split())
         named = re.search(r"Element name '([^']+)'", said)
         key = f"element {named[1]!r}" if named else ""
         raise InputError.at(resolver.file, key, f"MuJoCo cannot read it: {said}", _remedy(said)) from None
+    for warning in said_of_it:
+        reader.finding("warning", "", f"MuJoCo says: {warning.message}")
+    _check_figures(reader, model)
     _remarks(reader, spec, model)
     names = _body_names(reader, model)
     links = [_link(reader, spec, model, body, names) for body in range(model.nbody)]
@@ -257,6 +265,36 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
         files=files,
     )
     return lint.checked(description, reader)
+
+
+def _check_figures(reader: Reader, model: mujoco.MjModel) -> None:
+    """Raise `InputError` where a place or a size is no number, or none that a robot has."""
+    far, heavy = f"must be within {FARTHEST:g} m", f"must be within {HEAVIEST:g} kg or kg·m²"
+    turned = "must be a finite rotation"
+    for figures, most, named, key, remedy in (
+        (model.body_pos, FARTHEST, model.body, "body[{}].pos", far),
+        (model.body_ipos, FARTHEST, model.body, "body[{}].inertial.pos", far),
+        (model.body_mass[:, None], HEAVIEST, model.body, "body[{}].inertial.mass", heavy),
+        (model.body_inertia, HEAVIEST, model.body, "body[{}].inertial", heavy),
+        (model.body_quat, 2, model.body, "body[{}]", turned),
+        (model.body_iquat, 2, model.body, "body[{}].inertial", turned),
+        (model.jnt_pos, FARTHEST, model.joint, "joint[{}].pos", far),
+        (model.jnt_axis, 2, model.joint, "joint[{}].axis", "must be a direction"),
+        (model.qpos0[:, None], FARTHEST, model.joint, "joint[{}].ref", "must be a position"),
+        (model.geom_pos, FARTHEST, model.geom, "geom[{}].pos", far),
+        (model.geom_quat, 2, model.geom, "geom[{}]", turned),
+        (model.site_pos, FARTHEST, model.site, "site[{}].pos", far),
+        (model.site_quat, 2, model.site, "site[{}]", turned),
+    ):
+        for i in np.flatnonzero(~(np.abs(figures) <= most).all(axis=1)).tolist():
+            name = named(i).name if key[:5] != "joint" or i < len(model.jnt_pos) else ""
+            reader.problem(key.format(name or i), f"is {figures[i].tolist()}", remedy)
+    sizes = model.geom_size
+    fit = (sizes == 0) | ((sizes >= SMALLEST) & (sizes <= FARTHEST))
+    for i in np.flatnonzero(~fit.all(axis=1)).tolist():
+        remedy = f"must be from {SMALLEST:g} m to {FARTHEST:g} m"
+        reader.problem(f"geom[{model.geom(i).name or i}].size", f"is {sizes[i].tolist()}", remedy)
+    reader.raise_problems()
 
 
 def _remedy(said: str) -> str:

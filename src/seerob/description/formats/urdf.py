@@ -22,7 +22,7 @@ from seerob.description.description import Description, Inertial, Joint, JointKi
 from seerob.description.formats.mimic import flattened
 from seerob.description.formats.resolve import Resolver
 from seerob.description.formats.urdf_geometry import Shapes
-from seerob.description.xml_values import Reader, parse_xml
+from seerob.description.xml_values import FARTHEST, HEAVIEST, Reader, parse_xml
 
 
 def in_order(reader: Reader, links: Sequence[str], parents: Mapping[str, str]) -> tuple[str, ...]:
@@ -238,6 +238,9 @@ def _joint(reader: Reader, name: str, element: Element) -> tuple[Joint, ...]:
         reader.problem(f"{key}.type", f"is {kind!r}" if kind else "is missing", suggestion(kind, known))
         return ()
     axis = reader.numbers(element.find("axis"), "xyz", f"{key}.axis", (1.0, 0.0, 0.0))
+    if np.abs(axis).max() > FARTHEST:
+        reader.problem(f"{key}.axis", f"is {axis.tolist()}", "must be a direction, of length 1")
+        return ()
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
         reader.problem(f"{key}.axis", f"is {axis.tolist()}", "must not be zero")
@@ -306,10 +309,6 @@ def _mimic(reader: Reader, element: Element, key: str) -> Mimic | None:
     return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 
-LARGEST = 1e9
-"""No mass [kg] and no moment of inertia [kg·m²] of a link is larger."""
-
-
 def _inertial(
     reader: Reader, name: str, link: Element, *, moves: bool, body: bool
 ) -> tuple[Inertial | None, str, Problem | None]:
@@ -328,8 +327,8 @@ def _inertial(
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
         reader.problem(f"{key}.mass.value", f"is {kilograms:g} kg", "a mass is greater than 0")
-    if max(map(abs, (kilograms, xx, yy, zz, xy, xz, yz))) > LARGEST:
-        reader.problem(key, f"has a figure beyond {LARGEST:g}", "give kg and kg·m²")
+    if max(map(abs, (kilograms, xx, yy, zz, xy, xz, yz))) > HEAVIEST:
+        reader.problem(key, f"has a figure beyond {HEAVIEST:g}", "give kg and kg·m²")
     if len(reader.problems) > before:
         return None, "", None
     rotation = link_from_inertial[:3, :3]

@@ -17,7 +17,7 @@ from seerob.description.mesh import LoadedMeshes, load_meshes
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.split_surfaces import with_insides
-from seerob.description.xml_values import Reader
+from seerob.description.xml_values import FARTHEST, SMALLEST, Reader
 
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
 WITHOUT_UNIT = {".stl", ".obj", ".ply", ".off"}
@@ -112,6 +112,10 @@ class Shapes:
         values = self.reader.numbers(kind, attribute, key, (0.0,) * count)
         if len(self.reader.problems) == before and not (values > 0).all():
             self.reader.problem(f"{key}.{attribute}", f"is {kind.get(attribute)}", "must be greater than 0 m")
+            return np.zeros(count)
+        if values.all() and not ((values >= SMALLEST) & (values <= FARTHEST)).all():
+            remedy = f"must be from {SMALLEST:g} m to {FARTHEST:g} m"
+            self.reader.problem(f"{key}.{attribute}", f"is {kind.get(attribute)}", remedy)
             return np.zeros(count)
         return values
 

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.transforms import Array
 from seerob.description.description import Description
 from seerob.description.humans.motion import Motion, Travel
@@ -76,8 +77,9 @@ def read(file: str, description: Description, *, folder: Path | None = None) -> 
     else:
         path = (folder or Path()) / file
         try:
-            with path.open("rb") as stream:
-                data = stream.read(MAX_BYTES + 1)
+            data = content(path, MAX_BYTES)
+        except TooLarge as error:
+            raise InputError.at(file, "", str(error), "split the motion") from None
         except OSError as error:
             raise InputError.at(file, "", f"cannot be read: {error.strerror}", "give a file") from error
     return parse(data, description, file=file)
@@ -85,8 +87,6 @@ def read(file: str, description: Description, *, folder: Path | None = None) -> 
 
 def parse(data: bytes, description: Description, *, file: str) -> Motion:
     """A motion from the content of a file; see `read`."""
-    if len(data) > MAX_BYTES:
-        raise InputError.at(file, "", f"more than {MAX_BYTES} bytes", "split the motion")
     try:
         table = tomllib.loads(data.decode("utf-8"))
     except (ValueError, RecursionError) as error:

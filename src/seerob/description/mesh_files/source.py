@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, SeerobError
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 
@@ -85,11 +86,17 @@ class MeshSource:
         if not target.is_file():
             self.note(f"refers to {uri[:200]!r}, which is not there", level="warning")
             return None
-        size = target.stat().st_size + sum(map(len, self.files.values()))
-        if size > self.max_bytes:
+        left = self.max_bytes - sum(map(len, self.files.values()))
+        try:
+            held = content(target, max(left, 0))
+        except TooLarge:
             self.fail(f"with {name!r} it is larger than {self.max_bytes} bytes", "raise max_bytes")
-        self.files[target.relative_to(folder).as_posix()] = content = target.read_bytes()
-        return content
+        except OSError as error:
+            self.fail(
+                f"refers to {uri[:200]!r}, which cannot be read: {error.strerror}", "check its permissions"
+            )
+        self.files[target.relative_to(folder).as_posix()] = held
+        return held
 
     @contextmanager
     def parsing(self, what: str) -> Iterator[None]:

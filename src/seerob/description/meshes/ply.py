@@ -21,11 +21,12 @@ def read(source: MeshSource) -> RawFile:
     if not source.data.startswith(b"ply") or not end:
         source.fail("is not a PLY file: no header from 'ply' to 'end_header'", "export it again")
     elements = re.findall(rb"(?m)^element\s+(\w+)\s+(\d+)\s*$", head)
-    counts = {name.decode(): int(number) for name, number in elements}
-    for name, number in counts.items():
+    for name, number in elements:
         # Every row has at least one byte, or two characters.
-        if number > len(source.data):
-            source.fail(f"announces {number} {name} rows in {len(source.data)} bytes: truncated or hostile")
+        if len(number) > 18 or int(number) > len(source.data):
+            what = f"announces {number.decode()[:40]} {name.decode()} rows in {len(source.data)} bytes"
+            source.fail(f"{what}: truncated or hostile", "export it again")
+    counts = {name.decode(): int(number) for name, number in elements}
     if counts.get("face", 0) > source.max_faces:
         source.fail(f"has {counts['face']} faces, more than {source.max_faces}", "raise max_faces")
     if not counts.get("face"):

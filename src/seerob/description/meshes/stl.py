@@ -43,7 +43,8 @@ def _binary(source: MeshSource, count: int) -> RawMesh:
     if extra:
         source.note(f"{extra} bytes after the last triangle were ignored", level="warning")
     records = np.frombuffer(source.data, _RECORD, count, _HEADER)
-    vertices = records["vertices"].reshape(-1, 3).astype(float)
+    with np.errstate(invalid="ignore"):  # a signalling NaN, which is refused later
+        vertices = records["vertices"].reshape(-1, 3).astype(float)
     return RawMesh("", vertices, np.arange(3 * count).reshape(-1, 3))
 
 

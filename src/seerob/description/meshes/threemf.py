@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from seerob.core.files.zip_members import TooLarge, unpacked
+from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.transforms import Array
 from seerob.description.mesh_files.source import Color, MeshSource, RawFile, RawMesh
 

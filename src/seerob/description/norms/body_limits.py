@@ -19,6 +19,7 @@ import msgspec
 from msgspec import Struct
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.files.bounded import TooLarge, content
 
 SHIPPED = "iso_ts_15066_2016.toml"
 REGIONS = (
@@ -194,12 +195,11 @@ def read(path: Path) -> BodyLimits:
         InputError: With every mistake.
     """
     try:
-        with path.open("rb") as stream:
-            raw = stream.read(MAX_FILE_SIZE + 1)
+        raw = content(path, MAX_FILE_SIZE)
     except OSError as error:
         raise InputError.at(path, "", f"cannot be read: {error.strerror}", "give a TOML file") from error
-    if len(raw) > MAX_FILE_SIZE:
-        raise InputError.at(path, "", "larger than 1 MiB", "a table of limits is far smaller")
+    except TooLarge:
+        raise InputError.at(path, "", "larger than 1 MiB", "a table of limits is far smaller") from None
     return parse(raw, file=str(path))
 
 

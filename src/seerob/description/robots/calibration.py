@@ -23,6 +23,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from seerob.core.errors import InputError
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, inverse, rotation_from_axis_angle, transform
 from seerob.description.description import Description, Joint, JointKind, Link
@@ -79,27 +80,26 @@ def calibrated_by(description: Description, name: str, folder: Path) -> Descript
     Raises:
         InputError: There is no such file, it is something else, or of another type of robot.
     """
+    remedy = "let seerob probe rtde ADDRESS --calibration FILE write it"
     try:
-        with (folder / name).open("rb") as file:
-            content = file.read(LARGEST + 1)
+        held = content(folder / name, LARGEST)
+    except TooLarge:
+        raise InputError.at(name, "", f"more than {LARGEST} bytes are no calibration", remedy) from None
     except OSError as error:
-        remedy = "let seerob probe rtde ADDRESS --calibration FILE write it"
         raise InputError.at(name, "", f"cannot be read: {error.strerror}", remedy) from error
-    found = calibrated(description, read_calibration(content, name), name)
-    return replace(found, files={**found.files, Path(name).name: content})
+    found = calibrated(description, read_calibration(held, name), name)
+    return replace(found, files={**found.files, Path(name).name: held})
 
 
-def read_calibration(content: bytes, file: str) -> Calibration:
+def read_calibration(held: bytes, file: str) -> Calibration:
     """A file that ``seerob probe rtde --calibration`` has written.
 
     Raises:
         InputError: It is something else.
     """
     remedy = "let seerob probe rtde ADDRESS --calibration FILE write it"
-    if len(content) > LARGEST:
-        raise InputError.at(file, "", f"more than {LARGEST} bytes are no calibration", remedy)
     try:
-        found = msgspec.convert(tomllib.loads(content.decode()), Calibration)
+        found = msgspec.convert(tomllib.loads(held.decode()), Calibration)
     except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", f"no calibration: {error}", remedy) from error
     if not np.isfinite([found.theta, found.a, found.d, found.alpha]).all():

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
+from seerob.core.files.bounded import regular
 from seerob.core.orientation import about, cross, product
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -156,6 +157,7 @@ def read_bvh(path: Path, file: str) -> BvhFile:
         InputError: It is missing, or is not BVH with one root and at least one frame.
     """
     try:
+        regular(path)
         with path.open(encoding="utf-8", errors="replace") as text:
             reader = _Reader(text, file)
             joints, channels = _hierarchy(reader)

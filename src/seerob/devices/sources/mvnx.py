@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.files.bounded import regular
 from seerob.core.orientation import product
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -173,6 +174,7 @@ def stream(path: Path, file: str) -> Iterator[Head | RawFrame]:
     parser: Any = XMLParser(target=target, forbid_dtd=True)
     told = False
     try:
+        regular(path)
         with path.open("rb") as opened:
             for _ in _fed(opened, parser, target):
                 if target.frames and not told:

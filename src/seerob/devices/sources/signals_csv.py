@@ -12,6 +12,7 @@ from typing import Annotated, ClassVar, Literal, TextIO
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.files.bounded import regular
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.workstation.source import Opened, Source, Target
@@ -47,6 +48,7 @@ class SignalsCsv(Source, frozen=True, kw_only=True):
         variables = () if target is None else tuple(v for v in target.variables if not v.write)
         path = folder / self.file
         try:
+            regular(path)
             with path.open(encoding="utf-8-sig", newline="") as table:
                 began, samples = self._samples(table, variables)
         except FileNotFoundError as error:

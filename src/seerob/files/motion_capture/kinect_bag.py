@@ -8,7 +8,7 @@ is a picture in which nobody was seen. ROS 1 bags, and ROS 2 bags in SQLite and 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
@@ -19,6 +19,7 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.extras import need
+from seerob.core.files.parser_process import parsed, parsed_one_by_one
 from seerob.core.snapshot import Finding
 from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture.frame_arrays import check_size
@@ -32,6 +33,9 @@ MAX_MESSAGE = 16 << 20
 PER_BODY = 100
 SPHERE, ADD = 2, 0
 MAX_STAMP = 4_000_000_000
+MEMORY = 2 << 30
+"""What reading a bag may take [byte]: its chunks are unpacked whole."""
+REMEDY = "repair it with rosbag reindex or ros2 bag reindex, or record anew"
 
 
 def read(path: Path, reading: Reading, *, topic: str = "") -> Captured:
@@ -87,9 +91,9 @@ def pictures(path: Path, topic: str, reading: Reading) -> tuple[list[Picture], s
 
 
 def _topic(path: Path, file: str, topic: str) -> str:
-    with opened(path, file) as bag:
-        topics = sorted({c.topic for c in bag.connections if c.msgtype == TYPE})
-        others = sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})[:12]
+    listed = connections(path, file)
+    topics = sorted({name for name, kind in listed if kind == TYPE})
+    others = sorted({f"{name} ({kind})" for name, kind in listed})[:12]
     if topic and topic not in topics:
         raise InputError.at(file, "topic", f"no {TYPE} called {topic!r}", f"there are: {', '.join(others)}")
     if not topics:
@@ -108,65 +112,120 @@ def _store(name: str) -> Any:
     return get_typestore(Stores[name])
 
 
-def _definitions(connection: Any, *, ros2: bool) -> Any:
-    """The definitions that a connection was written with; textures of markers came with ROS 2 Humble."""
-    if not ros2:
-        return _store("ROS1_NOETIC")
-    text = getattr(connection.msgdef, "data", "") or ""
-    return _store("ROS2_FOXY" if text and "texture_resource" not in text else "ROS2_HUMBLE")
-
-
 def _is_ros2(path: Path) -> bool:
     return path.suffix.lower() != ".bag"
 
 
-@contextmanager
-def opened(path: Path, file: str) -> Iterator[Any]:
-    """A bag that is opened and closed, with what is wrong with it as an `InputError`."""
+def connections(path: Path, file: str) -> list[tuple[str, str]]:
+    """Topics of a bag with the types of their messages.
+
+    Args:
+        path: A ROS 1 bag, or the folder or file of a ROS 2 bag.
+        file: It, as messages name it.
+
+    Raises:
+        InputError: It is no bag.
+    """
+    _check(path, file)
+    return parsed(_connections, path, file, file=file, remedy=REMEDY, memory=MEMORY)
+
+
+def raw_messages(
+    path: Path, file: str, topics: Sequence[str], most: int
+) -> Iterator[tuple[str, str, int, bytes, bool]]:
+    """Topic, type, instant of recording [ns], bytes, and whether markers have textures, of each message.
+
+    Args:
+        path: The bag.
+        file: It, as messages name it.
+        topics: Of whose messages.
+        most: Bytes of one message.
+
+    Raises:
+        InputError: It is no bag that can be read, or a message is larger.
+    """
+    _check(path, file)
+    given = path, file, tuple(topics), most
+    return parsed_one_by_one(_raw, *given, file=file, remedy=REMEDY, memory=MEMORY)
+
+
+def _check(path: Path, file: str) -> None:
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.glob("*"))
     if size > MAX_BYTES:
         raise InputError.at(file, "", f"{size} bytes, more than {MAX_BYTES}", "split the bag")
     need("rosbags")
+
+
+def _messages(path: Path, topic: str, file: str) -> Iterator[tuple[float, Any]]:
+    """Instant of recording [s] and content of each message."""
+    ros2 = _is_ros2(path)
+    for _, kind, recorded, raw, textures in raw_messages(path, file, (topic,), MAX_MESSAGE):
+        if kind != TYPE:
+            continue
+        try:
+            # Textures of markers came with ROS 2 Humble.
+            store = _store("ROS2_HUMBLE" if textures else "ROS2_FOXY") if ros2 else _store("ROS1_NOETIC")
+            message = (store.deserialize_cdr if ros2 else store.deserialize_ros1)(raw, TYPE)
+        except Exception as error:  # the reader of messages trusts their bytes
+            raise _wrong(file, error) from error
+        yield recorded * 1e-9, message
+
+
+def _wrong(file: str, error: Exception) -> InputError:
+    """What the reader of bags says, as a mistake in the file."""
+    what = f"not a ROS bag that can be read: {type(error).__name__}: {str(error)[:200]}"
+    return InputError.at(file, "", what, REMEDY)
+
+
+# -- in the parsers' process: what is packed in a bag may be of any size ------------------------
+
+
+@contextmanager
+def _opened(path: Path, file: str) -> Iterator[Any]:
+    from rosbags import rosbag1, rosbag2
+
     # The reader of bags trusts their bytes: whatever it raises, the file is wrong.
     try:
-        from rosbags import rosbag1, rosbag2
-
         bag: Any = rosbag2.Reader(path) if _is_ros2(path) else rosbag1.Reader(path)
         bag.open()
+    except MemoryError:
+        raise
     except Exception as error:
-        raise wrong_bag(file, error) from error
+        raise _wrong(file, error) from error
     try:
         yield bag
     finally:
         bag.close()
 
 
-def wrong_bag(file: str, error: Exception) -> InputError:
-    """What the reader of bags says, as a mistake in the file."""
-    what = f"not a ROS bag that can be read: {type(error).__name__}: {str(error)[:200]}"
-    return InputError.at(file, "", what, "repair it with rosbag reindex or ros2 bag reindex, or record anew")
+def _connections(path: Path, file: str) -> list[tuple[str, str]]:
+    with _opened(path, file) as bag:
+        return [(str(c.topic), str(c.msgtype)) for c in bag.connections]
 
 
-def _messages(path: Path, topic: str, file: str) -> Iterator[tuple[float, Any]]:
-    """Instant of recording [s] and content of each message."""
-    with opened(path, file) as bag:
-        wanted = [c for c in bag.connections if c.topic == topic and c.msgtype == TYPE]
-        messages = bag.messages(connections=wanted)
+def _raw(
+    path: Path, file: str, topics: Sequence[str], most: int
+) -> Iterator[tuple[str, str, int, bytes, bool]]:
+    with _opened(path, file) as bag:
+        wanted = [c for c in bag.connections if c.topic in topics]
+        if not wanted:
+            return
+        listed = bag.messages(connections=wanted)
         while True:
             try:
-                connection, recorded, raw = next(messages)
-                if len(raw) > MAX_MESSAGE:
-                    raise InputError.at(file, topic, f"a message of {len(raw)} bytes")
-                store = _definitions(connection, ros2=_is_ros2(path))
-                unpack = store.deserialize_cdr if _is_ros2(path) else store.deserialize_ros1
-                message = unpack(raw, TYPE)
-            except StopIteration:
-                return
-            except InputError:
+                item = next(listed, None)
+            except MemoryError:
                 raise
             except Exception as error:
-                raise wrong_bag(file, error) from error
-            yield recorded * 1e-9, message
+                raise _wrong(file, error) from error
+            if item is None:
+                return
+            connection, recorded, raw = item
+            if len(raw) > most:
+                raise InputError.at(file, str(connection.topic), f"a message of {len(raw)} bytes")
+            said = getattr(connection.msgdef, "data", "") or ""
+            textures = not said or "texture_resource" in said
+            yield str(connection.topic), str(connection.msgtype), int(recorded), bytes(raw), textures
 
 
 def _stamp(markers: Any) -> float | None:

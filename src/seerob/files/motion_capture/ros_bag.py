@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from seerob.core.errors import InputError
-from seerob.files.motion_capture.kinect_bag import opened, wrong_bag
+from seerob.files.motion_capture.kinect_bag import connections, raw_messages
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros.ros_messages import Content, Said, same_type
-from seerob.protocols.ros.ros_serialised import Edition, decode
+from seerob.protocols.ros.ros_serialised import MAX_BYTES, Edition, decode
 
 MOST_MESSAGES = 5_000_000
 
@@ -49,8 +49,7 @@ def topics_of(path: Path, file: str) -> dict[str, str]:
     """
     if not path.exists():
         raise InputError.at(file, "", "no such file", "give the path from the workstation's folder")
-    with opened(path, file) as bag:
-        return {str(c.topic): str(c.msgtype) for c in bag.connections}
+    return dict(connections(path, file))
 
 
 def chosen(found: dict[str, str], content: Content, topic: str, file: str) -> str:
@@ -88,22 +87,12 @@ def messages(path: Path, content: Content, topics: Sequence[str], file: str) -> 
         InputError: A message that cannot be read; names its number.
     """
     edition = Edition.ROS1 if path.suffix.lower() == ".bag" else Edition.ROS2
-    with opened(path, file) as bag:
-        wanted = [c for c in bag.connections if c.topic in topics]
-        if not wanted:
-            return
-        listed: Iterator[Any] = bag.messages(connections=wanted)
-        for index in range(MOST_MESSAGES + 1):
-            try:
-                item = next(listed, None)
-            except Exception as error:  # the reader of bags trusts their bytes
-                raise wrong_bag(file, error) from error
-            if item is None:
-                return
-            connection, received, raw = item
-            try:
-                said = decode(content, bytes(raw), edition)
-            except ProtocolError as error:
-                raise InputError.at(file, f"{connection.topic} message {index}", str(error)) from error
-            yield Recorded(str(connection.topic), received * 1e-9, said)
-        raise InputError.at(file, "", f"more than {MOST_MESSAGES} messages", "split the bag")
+    for index, item in enumerate(raw_messages(path, file, topics, MAX_BYTES)):
+        topic, _, received, raw, _ = item
+        if index >= MOST_MESSAGES:
+            raise InputError.at(file, "", f"more than {MOST_MESSAGES} messages", "split the bag")
+        try:
+            said = decode(content, raw, edition)
+        except ProtocolError as error:
+            raise InputError.at(file, f"{topic} message {index}", str(error)) from error
+        yield Recorded(topic, received * 1e-9, said)

@@ -17,6 +17,7 @@ from typing import TextIO
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.files.bounded import regular
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.live_messages import MAX_MESSAGE
 from seerob.protocols.tracking.vive import MOST_DEVICES, Device, Devices, decode, device, encode
@@ -39,7 +40,7 @@ def read(path: Path, *, file: str) -> Iterator[Devices]:
         InputError: The file is missing, too large, or a line is wrong; with its number.
     """
     try:
-        if path.stat().st_size > LARGEST:
+        if regular(path) > LARGEST:
             raise InputError.at(file, "", f"more than {LARGEST >> 30} GiB", "cut the recording")
         with path.open(encoding="utf-8", newline="") as text:
             yield from _from_table(text, file) if path.suffix.lower() == ".csv" else _from_lines(text, file)

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from seerob.core.errors import InputError
+from seerob.core.files.bounded import TooLarge, sizes
 from seerob.core.files.parser_process import parsed, parsed_one_by_one
-from seerob.core.files.zip_members import TooLarge, sizes
 from seerob.files.tables.grid import MAX_COLUMNS, Cell
 from seerob.files.tables.text import check_file
 
@@ -108,19 +108,23 @@ def _rows(path: Path, name: str, title: str) -> Iterator[Sequence[Cell]]:
         sheet = book[title]
         # The stated extent may be wrong by any amount; what is there counts.
         sheet.reset_dimensions()
-        cells = _parsed(sheet.iter_rows(values_only=True), name, title)
-        left_out = 0
-        for count, row in enumerate(cells, start=1):
-            if count > MAX_ROWS:
-                raise InputError.at(name, f"sheet {title!r}", f"more than {MAX_ROWS} rows")
-            left_out = 0 if row else left_out + 1
-            if left_out > MAX_LEFT_OUT:
-                what = f"leaves out more than {MAX_LEFT_OUT} rows before row {count}"
-                raise InputError.at(name, f"sheet {title!r}", what, SAVE_AS)
-            if len(row) > MAX_COLUMNS:
-                what = f"{len(row)} columns, more than {MAX_COLUMNS}"
-                raise InputError.at(name, f"sheet {title!r}", what)
-            yield row
+        yield from _bounded(_parsed(sheet.iter_rows(values_only=True), name, title), name, title)
+
+
+def _bounded(rows: Iterator[Sequence[Any]], name: str, title: str) -> Iterator[Sequence[Any]]:
+    """Rows, as long as there are no more of them, none is longer and none is further down than in a sheet."""
+    left_out = 0
+    for count, row in enumerate(rows, start=1):
+        if count > MAX_ROWS:
+            raise InputError.at(name, f"sheet {title!r}", f"more than {MAX_ROWS} rows")
+        left_out = 0 if row else left_out + 1
+        if left_out > MAX_LEFT_OUT:
+            what = f"leaves out more than {MAX_LEFT_OUT} rows before row {count}"
+            raise InputError.at(name, f"sheet {title!r}", what, SAVE_AS)
+        if len(row) > MAX_COLUMNS:
+            what = f"{len(row)} columns, more than {MAX_COLUMNS}"
+            raise InputError.at(name, f"sheet {title!r}", what)
+        yield row
 
 
 def _uncalculated(path: Path, name: str, title: str) -> Iterator[tuple[int, int]]:
@@ -128,7 +132,7 @@ def _uncalculated(path: Path, name: str, title: str) -> Iterator[tuple[int, int]
         both = book[title], written[title]
         for sheet in both:
             sheet.reset_dimensions()
-        values, formulas = (_parsed(sheet.iter_rows(), name, title) for sheet in both)
+        values, formulas = (_bounded(_parsed(sheet.iter_rows(), name, title), name, title) for sheet in both)
         for row, cells in enumerate(zip(values, formulas, strict=True), start=1):
             for column, (value, formula) in enumerate(zip(*cells, strict=False), start=1):
                 # An empty text is a result.

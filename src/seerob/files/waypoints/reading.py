@@ -22,6 +22,7 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.extras import need
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.orientation import wxyz_from
 from seerob.core.quantities import Metres3, Pose, Radians, Table, unit
 from seerob.core.samples import Vec4
@@ -362,9 +363,12 @@ def read_program(path: Path, file: str) -> Program:
         return read_sheet(path, file)
     if suffix not in KNOWN.split():
         raise InputError.at(file, "", f"{suffix or 'no'} extension", f"waypoints are read from {KNOWN}")
-    content = path.read_bytes()
+    try:
+        held = content(path, MAX_BYTES)
+    except TooLarge as error:
+        raise InputError.at(file, "", str(error), "split the file") from None
     if suffix == ".script":
-        return read_urscript(content, file)
+        return read_urscript(held, file)
     if suffix == ".urp":
-        return read_urp(content, file)
-    return read_structured(content, file, yaml=suffix != ".toml")
+        return read_urp(held, file)
+    return read_structured(held, file, yaml=suffix != ".toml")

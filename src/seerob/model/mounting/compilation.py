@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -145,9 +146,14 @@ class _Compiler:
         add_contacts(self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache)
         self.progress("compiling")
         try:
-            mj = self.mounting.spec.compile()
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                mj = self.mounting.spec.compile()
         except ValueError as error:
             raise self._refused(" ".join(str(error).split())) from error
+        self.mounting.findings += [
+            Finding(level="warning", subject="", text=f"MuJoCo says: {warning.message}") for warning in said
+        ]
         return self._model(mj, bodies)
 
     def _refused(self, said: str) -> InputError:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.files.bounded import TooLarge, content
 from seerob.core.files.toml_file import read_toml
 from seerob.core.quantities import Coordinate, Corners, Metres3, Name, Pose, Table, unit
 from seerob.core.shapes.floor_polygon import check_polygon
@@ -151,14 +152,13 @@ def _read(path: Path) -> tuple[Mapping[str, Any], bytes]:
         remedy = suggestion(path.suffix, [".toml", ".json"])
         raise InputError.at(path, "", f"{path.suffix or 'no ending'!r} is no format of zones", remedy)
     try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_SIZE_OF_JSON + 1)
+        raw = content(path, MAX_SIZE_OF_JSON)
     except OSError as error:
-        raise InputError.at(
-            path, "", f"cannot be read: {error.strerror}", "check name and permissions"
-        ) from error
-    if len(raw) > MAX_SIZE_OF_JSON:
-        raise InputError.at(path, "", "larger than 1 MiB", "give a table of zones, which is far smaller")
+        what = f"cannot be read: {error.strerror}"
+        raise InputError.at(path, "", what, "check name and permissions") from error
+    except TooLarge:
+        remedy = "give a table of zones, which is far smaller"
+        raise InputError.at(path, "", "larger than 1 MiB", remedy) from None
     try:
         table = msgspec.json.decode(raw)
     except (msgspec.DecodeError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""What zip archives hold, bounded by the bytes that are unpacked and never by what the archive says of them.
+"""What files and zip archives hold, bounded by the bytes that are read and never by what they declare.
 
 `zipfile.ZipFile.read` unpacks a member as far as it goes before it looks at the size that was declared; here
 it is unpacked piece by piece, so that one that declares less than it holds fails after a piece.
@@ -6,7 +6,10 @@ it is unpacked piece by piece, so that one that declares less than it holds fail
 
 from __future__ import annotations
 
+import errno
+import stat
 from collections.abc import Iterator
+from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 PIECE = 1 << 16
@@ -14,7 +17,40 @@ PIECE = 1 << 16
 
 
 class TooLarge(ValueError):
-    """More was unpacked than is taken."""
+    """More was read or unpacked than is taken."""
+
+
+def regular(path: Path) -> int:
+    """How many bytes a file says that it has.
+
+    Raises:
+        OSError: It is not there, or a pipe or a device, which may never end.
+    """
+    there = path.stat()
+    if not stat.S_ISREG(there.st_mode) and not stat.S_ISDIR(there.st_mode):
+        raise OSError(errno.EINVAL, "is a pipe or a device and no file")
+    return there.st_size
+
+
+def content(path: Path, most: int) -> bytes:
+    """A file whole.
+
+    Args:
+        path: The file.
+        most: How much of it is taken [byte].
+
+    Raises:
+        TooLarge: It holds more.
+        OSError: It cannot be read.
+    """
+    said = regular(path)
+    with path.open("rb") as file:
+        held = file.read(min(said, most) + 1)
+        while len(held) <= most and (piece := file.read(PIECE)):
+            held += piece
+    if len(held) > most:
+        raise TooLarge(f"has more than {most} bytes")
+    return held
 
 
 def pieces(archive: ZipFile, member: str | ZipInfo, most: int) -> Iterator[bytes]:

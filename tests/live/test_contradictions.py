@@ -76,6 +76,18 @@ def test_positions_and_velocities_that_are_no_one_motion_are_found_before_much_h
     assert t < SPAN
 
 
+def test_a_joint_that_stands_at_once_is_found_also_while_another_one_is_in_doubt():
+    motion = []
+    for k in range(200):
+        t = 0.01 * k
+        moved = 0.5 * min(t, 1.0) + 1e-5 * math.sin(700 * min(t, 1.0))
+        doubtful = 0.3 if 0.9 < t < 1.1 else 0.0
+        motion.append(said(t, (0.2, moved), (doubtful, 0.5 * (t < 1.0))))
+    why = found(motion)
+    assert "joint 1" in why[105]
+    assert all("joint 2 stands" in each for each in why[160:])
+
+
 def test_a_step_farther_than_anybody_goes_is_found_also_without_velocities_and_time():
     for device in (True, False):
         motion = [said(0.01 * k, (0.1 if k != 5 else 0.9,), device=device) for k in range(10)]

@@ -230,7 +230,9 @@ class Contradictions:
             before = None
         if isinstance(sample, JointSample):
             jump = self._leap(before, sample, step) if isinstance(before, JointSample) else ""
-            return jump or self._compare(sample, t) or self._hangs(sample, t)
+            # Each is told every sample: what it looks for may begin while another one has found something.
+            differs, hangs = self._compare(sample, t), self._hangs(sample, t)
+            return jump or differs or hangs
         if isinstance(sample, PoseSample):
             return _moved(before, sample, step) if isinstance(before, PoseSample) else ""
         return _flew(before, sample, step) if isinstance(before, BodySample) else ""

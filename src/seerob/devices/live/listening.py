@@ -340,7 +340,8 @@ class Listener:
         if sample.t_device is not None:
             late = self._clock.latency
         distrusted, until = self._distrusted
-        reason = heard.invalid_reason or self._contradiction(sample, what, host)
+        # Also beside another doubt: what stands at once is seen by the one sample in which it stopped.
+        reason = self._contradiction(sample, what, host) or heard.invalid_reason
         if host <= until:
             reason = distrusted
         if sample.t_device is None and not self._source.asked and self._source.delay is None:

@@ -69,13 +69,13 @@ def person(name: str = "op", *at: float) -> str:
     return f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n{place}'
 
 
-def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None) -> Station:
+def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None, **allowed: bool) -> Station:
     """Write a workstation and the files it names, and load it."""
     for name, content in {"workstation.toml": text, **(files or {})}.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return load(folder, allow_plugins=True)
+    return load(folder, allow_plugins=True, **allowed)
 
 
 def meant(text: str) -> str:

@@ -168,22 +168,29 @@ def test_a_file_outside_the_folder_is_told_not_guessed(tmp_path):
     outside.parent.mkdir()
     outside.write_text(two_r())
     text = FLOATING + TWO_R.replace("arm.urdf", "../elsewhere/arm.urdf") + "q = [0, 1]\n"
-    station = made(tmp_path / "cell", text)
+    with pytest.raises(
+        InputError, match=r"robots\[0\]\.model: leads to .*arm\.urdf, outside the folder.*--allow-"
+    ):
+        made(tmp_path / "cell", text)
+    station = made(tmp_path / "cell", text, allow_outside=True)
     recording = record(station, tmp_path / "out")
     with pytest.raises(InputError, match="--workstation"):
-        load_recorded(recording)
+        load_recorded(recording, allow_outside=True)
     assert replayed(station, recording)[0]
 
 
 def test_a_file_that_has_changed_since_is_told(tmp_path):
     urdf = tmp_path / "arm.urdf"
     urdf.write_text(two_r())
-    station = made(tmp_path / "cell", FLOATING + TWO_R.replace("arm.urdf", str(urdf)) + "q = [0, 1]\n")
+    text = FLOATING + TWO_R.replace("arm.urdf", str(urdf)) + "q = [0, 1]\n"
+    station = made(tmp_path / "cell", text, allow_outside=True)
     recording = record(station, tmp_path / "out")
-    assert load_recorded(recording).model.files == station.model.files
+    with pytest.raises(InputError, match=r"outside the folder of the workstation.*--allow-outside"):
+        load_recorded(recording)
+    assert load_recorded(recording, allow_outside=True).model.files == station.model.files
     urdf.write_text(two_r(masses=(1, 2)))
     with pytest.raises(InputError, match=r"other files than are found now: outside/arm/.*--workstation"):
-        load_recorded(recording)
+        load_recorded(recording, allow_outside=True)
 
 
 def test_robot_of_an_installed_package_is_recomputed_where_it_is_installed(tmp_path):

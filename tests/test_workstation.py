@@ -89,6 +89,7 @@ def test_the_type_of_the_file_names_every_table_once():
         "allow_writing",
         "engine",
         "folder",
+        "outside",
         "files",
     }
     assert all(kind.__struct_config__.frozen for kind in TABLES.values())

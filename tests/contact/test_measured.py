@@ -255,6 +255,18 @@ def test_a_record_that_may_miss_its_peak_is_never_within(tmp_path: Path, force, 
     assert why in part.reason
 
 
+def test_a_curve_outside_the_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "away.csv").write_text("Time [s];Force [N]\n0;0\n0,01;290\n0,4;10\n")
+    (tmp_path / "cell").mkdir()
+    for name in ("../away.csv", "link.csv"):
+        station = cell(tmp_path / "cell", entry(curve=f'"{name}"', force_N=None))
+        (tmp_path / "cell" / "link.csv").unlink(missing_ok=True)
+        (tmp_path / "cell" / "link.csv").symlink_to("../away.csv")
+        with pytest.raises(InputError, match=r"leads to .*away\.csv, outside the folder.*--allow-out"):
+            _ = station.bound
+        assert not any(b"290" in content for content in station.files.values())
+
+
 def test_a_curve_is_judged_like_its_peaks_and_goes_with_the_recording(tmp_path: Path) -> None:
     curve = {"files": {"curves/a.csv": "Time [s];Force [N]\n0;0\n0,01;290\n0,4;10\n"}}
     station = cell(tmp_path, entry(curve='"curves/a.csv"', force_N=None), **curve)

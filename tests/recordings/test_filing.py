@@ -29,12 +29,14 @@ def test_a_large_file_and_a_folder_are_kept_as_the_hashes_that_sha256sum_prints(
     monkeypatch.setattr(filing, "LARGEST", 100)
     named = ("small.csv", "large.bag", "walk", "../beside.csv", "none.csv", "library:walk")
     parts = [line(f"walk/{name}", name.encode()) for name in ("metadata.yaml", "walk_0.db3")]
-    assert source_files(named, folder=folder) == {
+    kept = {
         "small.csv": b"t;q\n",
         f"{SOURCES}large.bag.sha256": line("large.bag", bytes(200)).encode(),
         f"{SOURCES}walk.sha256": "".join(parts).encode(),
-        f"{SOURCES}beside.csv": b"elsewhere",
     }
+    assert source_files(named, folder=folder) == kept
+    beside = {f"{SOURCES}beside.csv.sha256": line("beside.csv", b"elsewhere").encode()}
+    assert source_files(named, folder=folder, outside=True) == kept | beside
 
 
 def test_a_run_from_a_large_file_is_computed_again_without_it(tmp_path, monkeypatch):

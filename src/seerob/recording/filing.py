@@ -12,6 +12,8 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 
+from seerob.core.files.outside import leads_outside
+
 OUTSIDE = "outside"
 
 
@@ -46,35 +48,38 @@ def filed(
 
 
 SOURCES = f"{OUTSIDE}/sources/"
-"""Below it, files of sources that lie outside the folder: replaying needs samples, not these."""
+"""Below it, hashes of files of sources and criteria that lie outside the folder: what was used of them is in
+samples and bases."""
 LARGEST = 64 * 2**20
 """A file of a source that is larger [B] is not kept, only its hash: bags with pictures have gigabytes."""
 MOST = 1000
 """Files of a folder, such as a bag of ROS 2, whose hashes are kept."""
 
 
-def source_files(references: Iterable[str], *, folder: Path) -> dict[str, bytes]:
+def source_files(references: Iterable[str], *, folder: Path, outside: bool = False) -> dict[str, bytes]:
     """Trajectories and motions that the sources of a workstation name, as far as they are files.
 
-    Of a folder and of a large file there are only hashes, in the words of ``sha256sum``.
+    Of what lies outside the folder, of a folder and of a large file there are only hashes, in the words of
+    ``sha256sum``.
 
     Args:
         references: What the workstation file calls them; ``library:walk`` is no file.
         folder: Folder of the workstation file.
+        outside: Whether what lies outside it may be read.
     """
     found: dict[str, bytes] = {}
     for reference in references:
         path = folder / reference
         inside = _inside(PurePosixPath(os.path.relpath(path, folder).replace(os.sep, "/")))
-        outside, hashes = SOURCES + path.name, f"{SOURCES}{path.name}.sha256"
+        hashes = f"{SOURCES}{path.name}.sha256"
         try:
-            if path.is_dir() or (path.is_file() and path.stat().st_size > LARGEST):
-                found[hashes] = _hashes(path)
-            elif path.is_file():
-                found[outside if inside is None else inside] = path.read_bytes()
-            else:  # in what was unpacked from a recording; else opening the source has said so
-                kept = next((name for name in (outside, hashes) if (folder / name).is_file()), None)
-                found |= {} if kept is None else {kept: (folder / kept).read_bytes()}
+            away = leads_outside(path, folder) is not None
+            if path.is_dir() or (path.is_file() and (away or path.stat().st_size > LARGEST)):
+                found |= {hashes: _hashes(path)} if outside or not away else {}
+            elif path.is_file() and inside is not None:
+                found[inside] = path.read_bytes()
+            if hashes not in found and (folder / hashes).is_file():  # unpacked from a recording
+                found[hashes] = (folder / hashes).read_bytes()
         except OSError:
             continue  # opening the source has said so, or says so better
     return found

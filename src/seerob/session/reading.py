@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,6 +19,7 @@ from seerob.outputs.sink import Sink
 from seerob.workstation import naming
 from seerob.workstation.allowed import NOTHING, Allowed
 from seerob.workstation.conversion import convert, tables
+from seerob.workstation.outside import named_outside
 from seerob.workstation.plausibility.of_file import unknown
 from seerob.workstation.source import Source
 from seerob.workstation.tables.controller_zones import zones_of
@@ -31,8 +33,10 @@ BASES: dict[str, type[Struct]] = {
 }
 """Plug-in table → base class of its entries."""
 
-_NOT_IN_FILE = ("folder", "files")
+_NOT_IN_FILE = ("folder", "outside", "files")
 _MAX_PROBLEMS = 200
+
+_log = logging.getLogger(__name__)
 
 
 class Readable(NamedTuple):
@@ -75,19 +79,30 @@ def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
         allowed: What the file may do.
 
     Raises:
-        InputError: There is no such file, or it is not TOML.
+        InputError: There is no such file, it is not TOML, or it names files outside its folder, which are
+            not allowed; nothing is read then that it names.
     """
     file = locate(path)
     table, raw = read_toml(file)
     files = {file.name: raw}
     problems: list[Problem] = []
+    for outside in named_outside(table, file.parent):
+        if allowed.replayed and outside.key.startswith("sources["):
+            continue
+        if not allowed.outside:
+            problems.append(outside.problem(str(file)))
+        else:
+            _log.warning("%s: %s: reads %s, outside its folder", file, outside.key, outside.real)
+    if problems:
+        raise InputError(shortened(problems))
     if "zones" in table:
         zones = zones_of(table["zones"], file.parent, str(file), problems)
         files |= zones.files
         own = table.get("areas", [])
         table |= {"areas": [*own, *zones.areas] if isinstance(own, list) else own}
     found = _convert(table, str(file), allowed)
-    head = msgspec.structs.replace(found.head, folder=str(file.parent.resolve()), files=files)
+    folder = str(file.parent.resolve())
+    head = msgspec.structs.replace(found.head, folder=folder, outside=allowed.outside, files=files)
     return found._replace(head=head, problems=[*problems, *found.problems])
 
 

@@ -21,22 +21,30 @@ from seerob.workstation.workstation import FILE_NAME
 _REMEDY = "give the workstation that it was made with (--workstation)"
 
 
-def load_recorded(recording: Recording, *, cache: Path | None = None, allow_plugins: bool = False) -> Station:
+def load_recorded(
+    recording: Recording,
+    *,
+    cache: Path | None = None,
+    allow_plugins: bool = False,
+    allow_outside: bool = False,
+) -> Station:
     """The workstation that a recording was made with, from the files inside it.
 
     Args:
         recording: The recording.
         cache: Folder that keeps what takes long to make between starts.
         allow_plugins: Whether dotted kinds that no installed package offers are imported by their names.
+        allow_outside: Whether descriptions that it names outside its folder are read from this machine.
 
     Raises:
         InputError: It needs files that the recording does not carry, or that have changed since.
     """
     with TemporaryDirectory(prefix="seerob-") as folder:
         recording.extract(Path(folder))
+        allowed = Allowed(allow_plugins, allow_outside, replayed=True)
         try:
             file = Path(folder) / _workstation_file(recording)
-            station = Station(read(file, Allowed(plugins=allow_plugins)), cache=cache)
+            station = Station(read(file, allowed), cache=cache)
         except InputError as error:
             problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
             raise InputError(

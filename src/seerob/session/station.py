@@ -173,7 +173,10 @@ class Station:
         ]
         named += [*measured, *(curve for name in measured for curve in curves(self.model.folder / name))]
         references = [name for name in named if isinstance(name, str)]
-        return {**self.model.files, **source_files(references, folder=self.model.folder)}
+        return {
+            **self.model.files,
+            **source_files(references, folder=self.model.folder, outside=station.outside),
+        }
 
     def with_criteria(self, *criteria: Criterion) -> Station:
         """Return the compiled workstation with more safety criteria; nothing is compiled again."""
@@ -487,15 +490,19 @@ def _digests(files: Mapping[str, bytes]) -> dict[str, str]:
     return {name: sha256(content).hexdigest() for name, content in files.items()}
 
 
-def load(path: Path | str, *, cache: Path | None = None, allow_plugins: bool = False) -> Station:
+def load(
+    path: Path | str, *, cache: Path | None = None, allow_plugins: bool = False, allow_outside: bool = False
+) -> Station:
     """Read and compile a workstation.
 
     Args:
         path: A workstation file, or a folder with a ``workstation.toml``.
         cache: Folder that keeps what takes long to make between starts.
         allow_plugins: Whether dotted kinds that no installed package offers are imported by their names.
+        allow_outside: Whether files outside the workstation's folder are read that it, or a description in
+            it, names; which is logged before.
 
     Raises:
         InputError: With every mistake in the file and in the files it names.
     """
-    return Station(read(path, Allowed(allow_plugins)), cache=cache)
+    return Station(read(path, Allowed(allow_plugins, allow_outside)), cache=cache)

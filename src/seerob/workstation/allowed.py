@@ -10,6 +10,10 @@ class Allowed(NamedTuple):
 
     plugins: bool = False
     """A dotted kind that no installed package offers is imported by its name (``--allow-plugins``)."""
+    outside: bool = False
+    """Files outside the workstation's folder are read (``--allow-outside``)."""
+    replayed: bool = False
+    """Its sources are not opened, for their samples are there: what they name need not be."""
 
 
 NOTHING = Allowed()

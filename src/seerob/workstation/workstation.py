@@ -391,6 +391,8 @@ class Workstation(_Table, frozen=True, kw_only=True):
 
     folder: str = ""
     """Folder of the file; not written in it."""
+    outside: bool = False
+    """Whether files outside it may be read, as whoever opens the file says; not written in it."""
     files: dict[str, bytes] = {}
     """The file itself, and after `compile` every file it names; not written in it."""
 

@@ -62,7 +62,12 @@ def run(options: argparse.Namespace) -> int:
         compile_loops()
         from seerob.session.recorded_station import load_recorded
 
-        station = load_recorded(recording, cache=cache_folder(), allow_plugins=options.allow_plugins)
+        station = load_recorded(
+            recording,
+            cache=cache_folder(),
+            allow_plugins=options.allow_plugins,
+            allow_outside=options.allow_outside,
+        )
     folder = run_folder(options.recording.parent, options.output)
     sinks = sinks_of(station.workstation, lossless=True, record=False)
     refuse_existing(sinks, folder)

@@ -134,14 +134,16 @@ def add_workstation(sub: argparse.ArgumentParser) -> None:
 
 
 def add_allowed(sub: argparse.ArgumentParser) -> None:
-    """Option by which a file that is trusted may do more."""
+    """Options by which a file that is trusted may do more."""
     text = "import kinds of the file by their dotted names, which runs their code"
     sub.add_argument("--allow-plugins", action="store_true", help=text)
+    text = "read files outside the folder of the workstation file that it or a description in it names"
+    sub.add_argument("--allow-outside", action="store_true", help=text)
 
 
 def allowed(options: argparse.Namespace) -> Allowed:
     """What the command line allows the workstation file to do."""
-    return Allowed(options.allow_plugins)
+    return Allowed(options.allow_plugins, options.allow_outside)
 
 
 def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> None:

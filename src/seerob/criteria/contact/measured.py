@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.files.outside import REMEDY, leads_outside
 from seerob.core.files.toml_file import read_toml
 from seerob.core.snapshot import Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
@@ -257,6 +258,9 @@ class Measurements:
         transient, static = said.force_N, said.static_force_N
         unshown: tuple[str, ...] = ()
         if said.curve is not None:
+            if not model.workstation.outside and (real := leads_outside(folder / said.curve, folder)):
+                what = f"leads to {real}, outside the folder of the workstation"
+                raise InputError.at(self._file, f"curve {said.curve}", what, REMEDY)
             record = read_curve(folder / said.curve, said.curve)
             (transient, static), unshown = peaks(*record), missing(*record)
         pressure = None if said.pressure_N_cm2 is None else said.pressure_N_cm2 * 1e4

@@ -11,6 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.files.outside import REMEDY
 
 MAX_URI = 4096
 """Longest file reference accepted [characters]."""
@@ -23,12 +24,6 @@ def installed_packages() -> tuple[Path, ...]:
     """Folders that hold the ROS packages installed for whoever started this, as the environment says."""
     found = ((prefix, inner) for name, inner in _ROS for prefix in os.environ.get(name, "").split(os.pathsep))
     return tuple(Path(prefix) / inner for prefix, inner in found if prefix)
-
-
-OUTSIDE_REMEDY = (
-    "copy it beside the workstation file, or, if you trust the file, --allow-outside (in Python "
-    "allow_outside=True)"
-)
 
 
 @dataclass(frozen=True)
@@ -87,7 +82,7 @@ class Resolver:
             if found is not None:
                 if not self.may_read(found):
                     what = f"is {found.resolve()}, outside the folders that this description may read"
-                    return Problem(self.file, uri, what, OUTSIDE_REMEDY)
+                    return Problem(self.file, uri, what, REMEDY)
                 remark = (
                     "" if found == candidate else f"{uri}: upper and lower case differ, used {found.name}"
                 )

@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.files.outside import REMEDY
 from seerob.core.files.parser_process import parsed
 from seerob.description.formats.resolve import Resolver
 
@@ -302,7 +303,7 @@ def _remedy(error: Exception) -> str:
     if "no package" in text:
         return 'say where it is: packages = { name = "folder of the package" }'
     if "outside the folders" in text:
-        return "copy it beside the workstation file, or, if you trust the file, --allow-outside"
+        return REMEDY
     return "correct it, or expand the file elsewhere and name the URDF"
 
 

@@ -197,6 +197,7 @@ class _Compiler:
             meshes=robot.meshes,
             arguments=robot.arguments,
             name=robot.name,
+            outside=self.station.outside,
         )
         description = overridden(description, robot, self.file)
         if robot.calibration is not None:

@@ -53,7 +53,7 @@ def swing(speed):
 
 
 def passing(
-    folder, criterion, thing, *, physics="true", tick=0.01, at=0.195, rate=125, speed=1.45, told=None
+    folder, criterion, thing, *, physics="true", tick=0.01, at=0.195, rate=125, speed=1.45, told=None, arm=""
 ):
     """A tool that passes a thing at 3 m/s at an instant between two ticks."""
     angle = speed * at
@@ -64,7 +64,7 @@ def passing(
     if told is not None:
         engine, criterion = f'variables = "v.toml"\n{engine}', f'{criterion}active = "door"\n{PLC}'
         files |= {"v.toml": DOOR, "s.csv": "t,x\n" + "".join(f"{t},{x}\n" for t, x in told)}
-    return made(folder, engine + TWO_R + STICK + placed + SOURCE + criterion, files)
+    return made(folder, engine + TWO_R + arm + STICK + placed + SOURCE + criterion, files)
 
 
 THROUGH = {
@@ -137,7 +137,7 @@ UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\nalong 
 def test_a_run_of_which_nothing_is_known_between_ticks_is_within_only_where_the_file_accepts_that(
     tmp_path, accepted
 ):
-    station = passing(tmp_path, UNBOUNDED + accepted, POST)
+    station = passing(tmp_path, UNBOUNDED + accepted, POST, arm="mass_tolerance = 0.01\n")
     summary = station.run()
     assert set(summary.results["c"].verdicts.tolist()) == {0}  # every tick is within
     assert summary.verdict is (Verdict.WITHIN if accepted else Verdict.UNDECIDED)

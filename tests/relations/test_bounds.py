@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from random_cells import files, random_cell
@@ -21,7 +22,10 @@ from seerob.files.trajectories.path_map import (
     WHY,
     joint_columns,
 )
+from seerob.session.run import engine_of, pump, ticks
 from seerob.session.station import load
+from seerob.twin.joint_torques import bind_needed_in_span
+from seerob.twin.spans import Points
 from worst_between import worst_found
 
 JOINT = (
@@ -102,6 +106,76 @@ def test_no_bound_is_beaten_by_what_is_met_between_two_ticks(tmp_path, seed):
     for name, found in room.items():
         assert min(found) >= -1e-9, name
         assert np.isfinite(found).mean() > 0.5, name  # it bounds something
+
+
+def masses_of(seed):
+    """Effective masses of a random arm that swings from rest or on: along its motion and the heaviest."""
+    rng = np.random.default_rng(seed)
+    cell = random_cell(seed, published=False)
+    more = "".join(
+        f'[[safety]]\nkind = "effective_mass"\nname = "{along}"\nat = "arm"\nalong = "{along}"\n'
+        f"limit = 1e4\noffset = {rng.normal(0, 0.1, 3).tolist()}\n"
+        for along in ("motion", "worst")
+    )
+    return files(
+        replace(
+            cell, physics=bool(seed % 2), more=more, machine=None, mass_tolerance=0.0,
+            left_out=OTHERS | {"energy"},
+        )
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5])
+def test_no_effective_mass_between_two_ticks_is_above_its_bound(tmp_path, seed):
+    for name, text in masses_of(seed).items():
+        (tmp_path / name).write_text(text)
+    room = worst_found(load(tmp_path), looks=3)
+    assert set(room) <= {"motion", "worst"}
+    assert "motion" in room
+    for name, found in room.items():
+        assert min(found) >= -1e-9, name
+    assert np.isfinite(room["motion"]).mean() > 0.3
+
+
+def needed_between(station):
+    """How far the bound on each torque is above the largest that the motion needs between two ticks [N·m]."""
+    model, robot, room = station.model, station.model.robot("arm"), []
+    points = Points(model)
+    bound = bind_needed_in_span(model, robot, points)
+    data, stepped = mujoco.MjData(model.mj), model.workstation.engine.physics
+
+    def look(state):
+        path = state.path
+        if path is None:
+            return ()
+        most = bound(state, points.span(path, *path.t[[0, -1]], state.attachments.ids, model.mj))
+        for t in np.linspace(path.t[0], path.t[-1], 23)[1:-1].tolist():
+            k = np.searchsorted(path.t, t) - 1
+            before, after = (path.at(t + h)[1] for h in (-1e-6, 1e-6))
+            data.qacc[:] = np.diff(path.v[k : k + 2], axis=0)[0] / np.diff(path.t[k : k + 2])
+            if not stepped:
+                data.qacc[:] = (after - before) / 2e-6
+            data.qpos[:], data.qvel[:] = path.at(t)
+            mujoco.mj_fwdPosition(model.mj, data)
+            mujoco.mj_fwdVelocity(model.mj, data)
+            tau = np.empty(model.mj.nv)
+            mujoco.mj_rne(model.mj, data, 1, tau)
+            tau += model.mj.dof_armature * data.qacc
+            room.append(most - np.abs(robot.coupling.T @ tau[robot.v_address]))
+        return ()
+
+    for _ in ticks(engine_of(model), look, pump(station.sources, model.workstation.engine.tick)):
+        pass
+    return np.array(room)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_no_torque_that_a_motion_needs_between_two_ticks_is_above_its_bound(tmp_path, seed):
+    for name, text in masses_of(seed).items():
+        (tmp_path / name).write_text(text.replace("gravity = [0, 0, 0]", ""))
+    room = needed_between(load(tmp_path))
+    assert room.min() >= -1e-6
+    assert np.isfinite(room).all()
 
 
 # -- and what exceeds between two ticks is not within ---------------------------------------------

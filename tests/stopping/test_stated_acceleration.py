@@ -162,7 +162,8 @@ def test_acceleration_limits_that_a_recorded_motion_contradicts_hold_what_may_re
     )
     confirmed = of(
         tmp_path / "meant",
-        f'[[confirmed]]\nkey = "robots[0].acceleration_limits"\nvalue = {limits}\nwhy = "monitored"\n',
+        '[[confirmed]]\nkey = "robots[0].acceleration_limits"\nof = "arm"\n'
+        f'value = {limits}\nwhy = "monitored"\n',
     )
     assert not told(confirmed)
     assert set(confirmed.run().results["s"].verdicts[:40]) == {0}

@@ -7,13 +7,16 @@ with :math:`f` the force and moment that the robot exerts on its surroundings.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 
 from seerob.core.errors import Undecided
 from seerob.core.transforms import Array
 from seerob.kernels.chain import held
-from seerob.model.model import Mechanism
+from seerob.model.model import Mechanism, Model
+from seerob.twin.spans import Points, Span, coupling_of, joints_of, rows_of
 from seerob.twin.state import State
 
 LONGEST = 0.05
@@ -54,6 +57,41 @@ def bias(state: State, mechanism: Mechanism) -> Array:
     every = np.zeros(state.model.mj.nv)
     mujoco.mj_rne(state.model.mj, state.data_of(mechanism.name), 0, every)
     return np.asarray(mechanism.coupling.T @ every[mechanism.v_address])
+
+
+def bind_needed_in_span(model: Model, mechanism: Mechanism, points: Points) -> Callable[[State, Span], Array]:
+    """Resolve what bounds the torques that a motion needs at any instant of a span, given one end of it.
+
+    The mathematics is told by `seerob.criteria.safety.joint_torque.JointTorque.lowest`.
+
+    Returns:
+        Largest absolute torques [N·m or N], shape (n,); infinity where nothing bounds them.
+    """
+    mj, coupling, own = model.mj, coupling_of(model, mechanism), mechanism.v_address[mechanism.own]
+    heavy = [int(body) for body in mechanism.mj_bodies if mj.body_mass[body] > 0]
+    masses = mj.body_mass[heavy]
+    radii = np.sqrt(mj.body_inertia[heavy].sum(axis=1) / 2 / masses)
+    rows = rows_of(points.add(b, mj.body_ipos[b], r) for b, r in zip(heavy, radii.tolist(), strict=True))
+    chains = [mj.jnt_dofadr[joints_of(mj, body)] for body in heavy]
+    moved = np.array([coupling.shares[chain].any(axis=0) for chain in chains]).reshape(-1, len(own))
+    g, stepped = float(np.linalg.norm(mj.opt.gravity)), model.workstation.engine.physics
+
+    def most(state: State, span: Span) -> Array:
+        M, now = state.mass_matrix(mechanism), bias(state, mechanism)
+        qdd = span.path.accelerations(span.begin, span.end, own, stepped=stepped)
+        changes = np.array([points.column_changes(row, span, coupling) for row in rows.tolist()])
+        changes = changes.reshape(-1, len(own)) * span.T
+        # Accelerations from speeds that were derived from noisy positions are anybody's guess.
+        if not np.isfinite(changes).all() or span.joint_noise[own].any():
+            return np.full(len(own), np.inf)
+        at_speed, varies = (each[rows] for each in points.at_constant_speeds(span))
+        D, root = np.sqrt(masses @ changes**2), np.sqrt(np.diagonal(M))
+        of_M = np.outer(D, root) + np.outer(root, D) + np.outer(D, D)
+        of_bias = (masses * (at_speed + g)) @ changes + root * np.sqrt((masses * varies**2) @ moved)
+        found = np.abs(qdd @ M + now).max(axis=0) + of_M @ np.abs(qdd).max(axis=0) + of_bias
+        return np.asarray(found)
+
+    return most
 
 
 class Needed:

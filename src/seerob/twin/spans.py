@@ -91,6 +91,27 @@ class Path:
         joints_at(self.t, self.q, self.v, t, q, v)
         return q, v
 
+    def accelerations(self, begin: float, end: float, dofs: Indices, *, stepped: bool) -> Array:
+        """Accelerations of joints from one instant to another, of which all others there are means, (m, d).
+
+        Args:
+            begin: [s].
+            end: [s].
+            dofs: Which joints, in the order of ``MjData.qvel``.
+            stepped: Whether the knots are the physics' steps, in each of which they are constant.
+        """
+        found = []
+        for k in np.flatnonzero((self.t[1:] > begin) & (self.t[:-1] < end)).tolist():
+            T = self.t[k + 1] - self.t[k]
+            v, then = self.v[k, dofs], self.v[k + 1, dofs]
+            if stepped:
+                found.append((then - v) / T)
+                continue
+            mean = 6 * (self.q[k + 1, dofs] - self.q[k, dofs]) / T
+            x = (np.array([max(begin, self.t[k]), min(end, self.t[k + 1])]) - self.t[k]) / T
+            found += [(mean - 4 * v - 2 * then + s * (6 * (v + then) - 2 * mean)) / T for s in x.tolist()]
+        return np.array(found).reshape(-1, len(dofs))
+
     def middle(self, begin: float, end: float) -> float:
         """Where a span is best cut [s]: at the knot that is nearest to its middle, else there."""
         inside = self.t[(self.t > begin) & (self.t < end)]
@@ -244,6 +265,23 @@ class Points:
         found = np.empty(coupling.shares.shape[1])
         column_changes(*self.chain(point), span.qd, span.away, *coupling, found)
         return found
+
+    def at_constant_speeds(self, span: Span) -> tuple[Array, Array]:
+        """Largest acceleration of each point from the speeds of joints alone [m/s²], shape (p,).
+
+        Returns:
+            That, and a bound on how far it changes within the span: `seerob.kernels.spans` bounds each term
+            of how the whole acceleration does by its size, and those of this part are among them.
+        """
+        none, (most, varies) = np.zeros(len(span.qd)), np.empty((2, self.count))
+        for change, found in ((none, most), (span.qdd, varies)):
+            fast, quick, bend = np.empty((3, self.count))
+            point_bounds(
+                span.qd, change, none, span.away, span.T,
+                self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
+            )  # fmt: skip
+            found[:] = quick if change is none else 4 * bend / span.T
+        return most, varies
 
     def _chains(self, mj: mujoco.MjModel, ids: Indices) -> None:
         """Resolve which joints move each point, from base to tip, and how long the segments between are."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Literal
 
+import mujoco
 import numpy as np
 from msgspec import Meta
 
@@ -15,13 +16,14 @@ from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.core.tolerances import Shifts, Spread, deciding, spread
 from seerob.core.transforms import Array
 from seerob.criteria.contact.impact_mass import simplified_mass
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, Lowest, judge, judge_interval
 from seerob.kernels.axes import mobility, principal_axes, reciprocals
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.recording.answers import Answers
 from seerob.twin.accuracy.mass_tolerances import MassTolerances, Matrices
 from seerob.twin.moving_base import velocity_of
+from seerob.twin.spans import Points, Span, coupling_of
 from seerob.twin.state import State
 from seerob.twin.states import States
 
@@ -89,6 +91,35 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     principal_axes(used_up, values, axes)
     values[np.isnan(values).any(axis=-1)] = np.nan
     return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
+
+
+def _turned(before: Array, after: Array, off: float) -> tuple[Array, float]:
+    r"""A direction, and how far that of a motion is from it wherever that is faster than `STANDSTILL`.
+
+    Two unit vectors are no farther apart than :math:`\sqrt 2 \sin` of their angle up to a right angle.
+
+    Args:
+        before: A velocity [m/s], shape (3,).
+        after: Another one.
+        off: By how much the velocity may be off the straight line between both [m/s].
+
+    Returns:
+        Unit vector, and 2 where it may be opposite.
+    """
+    slow, fast = sorted((before, after), key=lambda v: float(v @ v))
+    slowest, speed = math.sqrt(float(slow @ slow)), math.sqrt(float(fast @ fast))
+    if speed == 0:
+        return np.array([1.0, 0, 0]), 2.0
+    u = fast / speed
+
+    def chord(error: float, least: float) -> float:
+        return math.sqrt(2) * error / least if error < least else 2.0
+
+    # Either the slower one is an error too, or all between both is in their cone.
+    along = float(slow @ u)
+    in_cone = math.sqrt(max(2 - 2 * along / slowest, 0.0)) if along > 0 else 2.0
+    in_cone += chord(off, max(along - off, STANDSTILL))
+    return u, min(chord(off + slowest, STANDSTILL), in_cone, 2.0)
 
 
 class EffectiveMass(Criterion, frozen=True, kw_only=True):
@@ -193,6 +224,86 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             )
 
         return evaluate
+
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        r"""Least margin in a span; None of what moves something else too, and of tolerances of masses.
+
+        :math:`m_u = \min_x x^T M x` over joint rates with :math:`u^T J x = 1`, at one end of the span by
+        :math:`x^* = m_u M^{-1} J^T u`. Elsewhere in the span these rates are no longer the best, so
+
+        .. math:: m_{u'}(q') \le \frac{x^{*T} M(q') x^*}{(u'^T J(q') x^*)^2}
+            \le \Big(\frac{\sqrt{m_u} + a}{1 - |u' - u| |J x^*| - b}\Big)^2
+
+        where :math:`\sqrt{x^T M x}` is a norm of the velocities of all masses that the rates x make, each
+        of which changes by no more than its columns do: :math:`a^2 = T^2 \sum_b m_b (\sum_j |x_j| c_{bj})^2`,
+        and :math:`b = T \sum_j |x_j| c_{pj}` (`seerob.kernels.spans.column_changes`; a body counts at its
+        radius of gyration, as in `seerob.twin.spans.change_of_motion`; rotors turn with the rates
+        alone). Of the heaviest direction, with :math:`|x_j| \le \sqrt{m\,(M^{-1})_{jj}}` by Cauchy and
+        Schwarz,
+
+        .. math:: m(q')^{-1/2} \ge \frac{m^{-1/2} - b'}{1 + a'}
+
+        with :math:`\sqrt{(M^{-1})_{jj}}` for x in a and b. The velocity of the point is within ``bend`` of
+        the line between those at both ends, which says how far its direction turns where it is faster than
+        `STANDSTILL`; the direction toward somebody may be any.
+        """
+        limit, frame = self.limit, model.frame(self.at)
+        robot = model.carrier(frame)
+        if limit is None or not robot.alone or len(MassTolerances(model, robot)):
+            return None
+        if any(body.holder for body in model.bodies):
+            return None
+        mj, coupling, own = model.mj, coupling_of(model, robot), robot.v_address[robot.own]
+        offset = np.array(self.offset)
+        local = frame.body_from_frame[:3, :3] @ offset + frame.body_from_frame[:3, 3]
+        point = points.add(frame.mj, local)
+        heavy = [int(b) for b in robot.mj_bodies if mj.body_mass[b] > 0]
+        masses = mj.body_mass[heavy]
+        radii = np.sqrt(mj.body_inertia[heavy].sum(axis=1) / 2 / masses)
+        rows = [points.add(b, mj.body_ipos[b], r) for b, r in zip(heavy, radii.tolist(), strict=True)]
+        data = mujoco.MjData(mj)
+
+        def velocity(q: Array, v: Array) -> Array:
+            """Of the point where the joints are so [m/s], shape (3,)."""
+            data.qpos[:], data.qvel[:] = q, v
+            mujoco.mj_kinematics(mj, data)
+            mujoco.mj_comPos(mj, data)
+            J, at = np.empty((3, mj.nv)), data.xpos[frame.mj] + data.xmat[frame.mj].reshape(3, 3) @ local
+            mujoco.mj_jac(mj, data, J, None, at, frame.mj)
+            return J @ v
+
+        def lowest(state: State, span: Span) -> float:
+            J, M = state.jacobian(frame, robot, offset)[:3], state.mass_matrix(robot)
+            changes = span.T * points.column_changes(point, span, coupling)
+            noise = float((np.linalg.norm(J, axis=0) + changes) @ span.joint_noise[own])
+            if not np.isfinite(changes).all():
+                return -math.inf
+            if self.toward is None and self.along == "motion" and span.fast[point] + noise <= STANDSTILL:
+                return math.inf
+            of_masses = span.T * np.array([points.column_changes(row, span, coupling) for row in rows])
+            inverse = np.linalg.inv(M)
+
+            def grown(rates: Array) -> tuple[float, float]:
+                """How much more the masses move by some rates, and the point less."""
+                return math.sqrt(masses @ (of_masses @ rates) ** 2), float(changes @ rates)
+
+            if self.toward is None and self.along == "motion":
+                before, after = (velocity(*span.path.at(t)) for t in (span.begin, span.end))
+                u, turned = _turned(before, after, float(span.bend[point]) + noise)
+                pushed = inverse @ J.T @ u
+                if (along := float(u @ J @ pushed)) > 0:
+                    x = pushed / along
+                    more, less = grown(np.abs(x))
+                    left = 1 - turned * float(np.linalg.norm(J @ x)) - less
+                    if left > 0:
+                        return limit - ((math.sqrt(float(x @ M @ x)) + more) / left) ** 2
+                return -math.inf
+            more, less = grown(np.sqrt(np.diagonal(inverse)))
+            heaviest = float(principal_masses(inverse_effective_mass(J, M))[0][-1])
+            left = 1 / math.sqrt(heaviest) - less
+            return limit - ((1 + more) / left) ** 2 if left > 0 else -math.inf
+
+        return lowest
 
     def _ends(self, matrices: Matrices, inputs: int, J_v: Array, u: Array) -> Spread:
         """Of the mass along u, or of the heaviest direction there is at each end."""

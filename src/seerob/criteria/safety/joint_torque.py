@@ -156,22 +156,49 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
 
         return evaluate
 
-    def lowest(self, model: Model, points: Points) -> Lowest | None:
-        """Least margin in a span of torques that are measured: they lie on straight lines between samples.
+    def bounded_once(self, model: Model) -> bool:
+        """Say that torques that a model needs are looked at at ticks alone."""
+        return self.torques == "model"
 
-        Nothing bounds what a model needs, whose accelerations are differences of ticks.
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        r"""Least margin in a span of torques that are measured: they lie on straight lines between samples.
+
+        Of those that a model needs from how :math:`\tau = M \ddot q + b` can change within the span, T long.
+        With :math:`c_{bj}` the largest rates of columns of the Jacobian of mass b at its radius of gyration
+        (`seerob.kernels.spans.column_changes`), :math:`a_b` its largest acceleration at constant speeds of
+        the joints, by up to :math:`a'_b` another one, and :math:`D_j^2 = T^2 \sum_b m_b c_{bj}^2`,
+
+        .. math::
+            |\Delta M_{jk}| &\le D_j \sqrt{M_{kk}} + \sqrt{M_{jj}} D_k + D_j D_k, \\
+            |\Delta b_j| &\le T \sum_b m_b c_{bj} (a_b + g) + \sqrt{M_{jj} \sum_{b \ni j} m_b a_b'^2}
+
+        as M is the Gram matrix of the columns, and b the product of columns with the accelerations less
+        gravity, both over all masses (Cauchy and Schwarz); rotors change nothing. With M and b of the end
+        that is known, :math:`M \ddot q + b` is largest at a knot of the accelerations.
+
+        None with ``largest_residual``, and of what others move or what it picks up.
         """
-        if self.torques == "model" or self.largest_residual is not None:
+        if self.largest_residual is not None:
             return None
         robot = model.robot(self.robot)
         limits, given = self._limits(model, robot), self._per_joint(model, robot, "torque_uncertainty")
         uncertainty = np.zeros(len(limits)) if given is None else given
+        if self.torques == "measured":
 
-        def lowest(state: State, span: Span) -> float:
-            _, _, high = shares(state.torques_within(robot, span.begin, span.end), limits, uncertainty)
+            def lowest(state: State, span: Span) -> float:
+                _, _, high = shares(state.torques_within(robot, span.begin, span.end), limits, uncertainty)
+                return self.limit - float(high.max())
+
+            return lowest
+        if not robot.alone or any(body.holder for body in model.bodies):
+            return None
+        needed = joint_torques.bind_needed_in_span(model, robot, points)
+
+        def lowest_needed(state: State, span: Span) -> float:
+            _, _, high = shares(needed(state, span), limits, uncertainty)
             return self.limit - float(high.max())
 
-        return lowest
+        return lowest_needed
 
     def _limits(self, model: Model, robot: Mechanism) -> Array:
         """Of every joint [N·m or N], NaN where nobody knows, shape (n,)."""

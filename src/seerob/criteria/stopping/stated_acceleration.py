@@ -229,8 +229,9 @@ class JointAccelerations:
         i, table = next((i, r) for i, r in enumerate(model.workstation.robots) if r.name == robot.name)
         kind = "robots.acceleration_limits"
         self._quantity = Quantity(
-            f"robots[{i}].acceleration_limits", kind, "rad/s²", tuple(table.acceleration_limits or ()), holds
-        )
+            f"robots[{i}].acceleration_limits", kind, "rad/s²", tuple(table.acceleration_limits or ()), holds,
+            of=robot.name,
+        )  # fmt: skip
         self._confirmed, self._other = confirmation(self._quantity, model.workstation.confirmed)
 
     def of_motion(self, motion: Motion, what: str = "") -> Finding | None:

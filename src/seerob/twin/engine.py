@@ -255,7 +255,8 @@ class Engine:
             elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
                 if mechanism.name in self._unread:
-                    reason = reason or beyond_limits(sample, mechanism) or self._contradicted(sample)
+                    contradicted = self._contradicted(sample)
+                    reason = reason or beyond_limits(sample, mechanism) or contradicted
                 taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
             else:
                 taken, missed = self._take_pose(mechanism, sample)

@@ -237,7 +237,8 @@ class LiveWords:
         if self._robot is None or (sample.tcp is None and sample.tcp_speed is None):
             return ""
         posture = self._robot.arm.posture(np.array([sample.q]))
-        return self._place(sample, posture, looks=looks) or self._speed(sample, posture)
+        place, speed = self._place(sample, posture, looks=looks), self._speed(sample, posture)
+        return place or speed
 
     def _place(self, sample: JointSample, posture: Posture, *, looks: bool) -> str:
         robot = self._robot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -210,3 +211,30 @@ def test_S_p_never_falls_with_what_makes_it_worse(tmp_path):
         figures.append(separation(tmp_path / str(k), stop, WALKS).limit)
     assert figures == sorted(figures)
     assert len(set(figures)) == len(figures)
+
+
+def strongest(folder, kg):
+    """What torque limits allow at rest, by MuJoCo [rad/s²], (postures, 6), and the speed limits [rad/s]."""
+    cell = made(folder, UR10.replace("library:ur10", "library:ur10e").replace("mass = 3", f"mass = {kg}"))
+    mj, robot, rng = cell.model.mj, cell.model.robot("arm"), np.random.default_rng(0)
+    tau, largest = (np.array([x.value for x in of]) for of in (robot.effort_limits, robot.velocity_limits))
+    data, M, found = mujoco.MjData(mj), np.zeros((mj.nv, mj.nv)), []
+    for _ in range(60):
+        data.qpos[robot.q_address] = rng.uniform(-np.pi, np.pi, 6)
+        mujoco.mj_forward(mj, data)
+        mujoco.mj_fullM(mj, data, M)
+        inverse = np.linalg.inv(M[np.ix_(robot.v_address, robot.v_address)])
+        found.append(np.abs(inverse) @ tau - np.abs(inverse @ data.qfrc_bias[robot.v_address]))
+    return np.array(found), largest
+
+
+def test_torques_and_masses_say_no_more_than_speed_limits_at_once(tmp_path):
+    """Why nothing bounds S_p by them: no bound is less than what an arm can do, and that is anything.
+
+    With 12.5 kg, its rated payload, each joint of a UR10e can be at its speed limit within some 10 ms; and a
+    payload that nobody knows may make others faster, through the coupling of M.
+    """
+    (light, largest), (loaded, _) = (strongest(tmp_path / f"{kg}", kg) for kg in (0.001, 12.5))
+    assert (np.median(largest / loaded, axis=0) < 0.015).all()
+    assert (np.median(largest / light, axis=0) < 0.012).all()
+    assert (loaded / light).max() > 1.3

@@ -136,7 +136,7 @@ def unknown(
     if not confirmed:
         return []
     known = [quantity.key for quantity in listed(entries, engine)]
-    problems = []
+    problems: list[Problem] = []
     for i, one in confirmed.items():
         keys = [key for key, _ in canonical(one.key)]
         if any(key in known or _follows(key, entries) for key in keys):

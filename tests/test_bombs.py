@@ -10,9 +10,9 @@ import zlib
 import pytest
 
 import seerob as sr
-from seerob.app.console.printable import printable
 from seerob.core.errors import InputError
 from seerob.core.files import bounded
+from seerob.core.printable import printable
 from seerob.description.loader import load_robot
 from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets

@@ -1,15 +1,23 @@
 """What files, recordings and devices call things reaches neither the terminal nor the page as a command."""
 
 import logging
+import re
 import sys
 import tomllib
 import unicodedata
 
+import msgspec
 import openpyxl
 import pytest
 from made_cells import make_cell, seerob
 
-from seerob.app.console.printable import PrintableLines, printable
+import seerob as sr
+from seerob.app.console.printable import PrintableLines
+from seerob.core.errors import InputError
+from seerob.core.printable import obeyed, printable
+from seerob.description.loader import load_robot
+from seerob.description.mesh import load_meshes
+from seerob.recording.recording import Recording
 
 OBEYED = "\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202egnirts\u2066"
 WORDS = "操作员 – Рука 🤖 ½ m²\tπ"
@@ -60,3 +68,47 @@ def test_a_name_is_one_line_of_words_on_the_terminal_and_in_the_files(capsys, tm
     book = openpyxl.load_workbook(tmp_path / "out" / "results.xlsx", read_only=True)
     assert book.sheetnames
     book.close()
+
+
+def test_what_any_text_of_a_workstation_holds_is_in_no_message_result_scene_or_file(capsys, tmp_path):
+    """Planted in every text: names are taken with escapes, the rest is told with escapes."""
+    toml = "".join(f"\\u{ord(c):04x}" for c in OBEYED)
+    cell = tmp_path / "cell"
+    assert seerob(capsys, "new", cell)[0] == 0
+    file = cell / "workstation.toml"
+    starter = file.read_text()
+    texts = sorted(set(re.findall(r'(?m)^[a-z][^#\n"]*"([^"\n]+)"', starter)))
+    assert len(texts) > 15
+    taken = {"My cell", "tcp speed"}
+    for text in texts:
+        file.write_text(starter.replace(f'"{text}"', f'"{text} {toml}"'))
+        said = ""
+        try:
+            sr.read(cell)
+        except sr.SeerobError as error:
+            said = str(error)
+        assert not obeyed(said.replace("\n", " "))
+        assert not (said and text in taken)
+    for text in taken:
+        starter = starter.replace(f'"{text}"', f'"{text} {toml}"')
+    file.write_text(starter)
+    station = sr.load(cell)
+    assert printable(OBEYED) in station.workstation.title
+    assert not obeyed(msgspec.json.encode(station.scene()).decode())
+    _, out, err = seerob(capsys, "assess", cell, "-o", tmp_path / "out")
+    assert not obeyed((out + err).replace("\n", " ").replace("\t", " "))
+    for written in (tmp_path / "out").rglob("*"):
+        if written.suffix in (".html", ".csv", ".json", ".toml", ".md", ".svg", ".txt"):
+            for line in written.read_text().splitlines():
+                assert not obeyed(line.replace("\t", " ")), written
+    recording = Recording.open(tmp_path / "out" / "run.mcap")
+    assert not obeyed(msgspec.json.encode(recording.scene).decode())
+
+
+def test_names_in_files_of_robots_and_parts_that_turn_the_reading_are_refused_or_escaped(tmp_path):
+    (tmp_path / "a.urdf").write_text('<robot name="a"><link name="b&#x202e;"/></robot>')
+    with pytest.raises(InputError, match=r"a.urdf: link.name: holds U\+202E"):
+        load_robot("a.urdf", folder=tmp_path)
+    (tmp_path / "a.obj").write_text("o b\u202e\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (mesh,) = load_meshes(tmp_path / "a.obj", units="m", up="z").meshes
+    assert mesh.name == "b\\u202e"

@@ -48,6 +48,14 @@ URDF = """<robot name="a"><material name="m"><color rgba="1 0 0 1"/></material>
 <joint name="k" type="prismatic"><parent link="l"/><child link="f"/><axis xyz="1 0 0"/>
 <limit lower="0" upper="0.1" effort="5" velocity="1"/><mimic joint="j" multiplier="0.1" offset="0.01"/>
 </joint></robot>"""
+XACRO = """<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="n" default="2"/>
+<xacro:property name="r" value="0.05"/><link name="base"/>
+<xacro:macro name="arm" params="k *more"><link name="l${k}"><xacro:insert_block name="more"/>
+<collision><geometry><sphere radius="${r*k + 0.1}"/></geometry></collision></link>
+<joint name="j${k}" type="continuous"><parent link="base"/><child link="l${k}"/></joint></xacro:macro>
+<xacro:if value="${1 &lt; 2}"><xacro:arm k="$(arg n)"><inertial><mass value="${1 + 2.5}"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></xacro:arm></xacro:if>
+</robot>"""
 MJCF = """<mujoco model="a"><compiler angle="degree" autolimits="true"/>
 <default><joint damping="0.1"/><default class="c"><geom rgba="1 0 0 1" density="500"/></default></default>
 <worldbody><body name="base" pos="0 0 0.1"><geom type="box" size="0.1 0.1 0.1"/>
@@ -269,6 +277,7 @@ def _bag(path):
 CELLS = {
     "urdf": Malformed("urdf", _said(URDF), _robot),
     "mjcf": Malformed("xml", _said(MJCF), _robot),
+    "xacro": Malformed("xacro", _said(XACRO), _robot),
     "stl": Malformed("stl", _box("stl"), _meshes, mutated),
     "stl text": Malformed("stl", _box("stl_ascii"), _meshes),
     "obj": Malformed("obj", _box("obj"), _meshes),

@@ -5,6 +5,7 @@ import io
 import random
 import re
 import zipfile
+import zlib
 
 from seerob.protocols import ProtocolError
 
@@ -104,6 +105,13 @@ def mutated_zip(data, rng):
     """A container whose members are mutated and packed again, or mutated as bytes."""
     if rng.random() < 0.3:
         return mutated(data, rng)
+    try:
+        return _repacked(data, rng)
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, NotImplementedError):  # broken already
+        return mutated(data, rng)
+
+
+def _repacked(data, rng):
     packed = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(data)) as whole, zipfile.ZipFile(packed, "w") as broken:
         names = whole.namelist()
@@ -118,4 +126,7 @@ def mutated_gzip(data, rng):
     """The same of one packed file."""
     if rng.random() < 0.3:
         return mutated(data, rng)
-    return gzip.compress(mutated_text(gzip.decompress(data), rng), 1)
+    try:
+        return gzip.compress(mutated_text(gzip.decompress(data), rng), 1)
+    except (OSError, EOFError, zlib.error):  # broken already
+        return mutated(data, rng)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+import msgspec
 from msgspec import Struct
 
 from seerob.core.markers import (
@@ -37,6 +38,7 @@ from seerob.core.page_messages import (
     Tracking,
     Transport,
 )
+from seerob.core.printable import printable
 from seerob.core.verdict import Verdict
 
 __all__ = [
@@ -140,6 +142,10 @@ class Finding(Struct, frozen=True, kw_only=True):
     holds: tuple[str, ...] = ()
     """Robots, people, machines, parts, variables (``variable door``), or ``*`` for everything, of which no
     criterion is WITHIN as long as it stands."""
+
+    def __post_init__(self) -> None:
+        if not self.text.isprintable():  # it may quote a file or a device
+            msgspec.structs.force_setattr(self, "text", printable(self.text))
 
 
 # -- results ------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, suggestion
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.printable import printable
 from seerob.core.shapes.geometry import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -232,7 +233,7 @@ def _finished(source: MeshSource, raws: list[RawMesh], matrix: Array) -> tuple[N
     taken: set[str] = set()
     meshes = []
     for raw in raws:
-        name = _unique(raw.name or source.path.stem, taken)
+        name = _unique(printable(raw.name) or source.path.stem, taken)
         faces = raw.faces[:, ::-1] if mirrored else raw.faces
         mesh = Mesh(raw.vertices @ matrix.T, faces.astype(np.int32), raw.color or Mesh.color)
         mesh, said = tidied(mesh)

@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.printable import obeyed
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, transform
 
@@ -101,6 +102,11 @@ def parse_xml(content: bytes, file: str) -> Element:
         raise InputError.at(file, "", "declares XML entities", "write the text where it is used") from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError.at(file, "", f"is not XML: {error}", "check the file at that line") from None
-    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
-        raise InputError.at(file, "", f"has more than {MAX_ELEMENTS} elements", "split it")
+    for count, element in enumerate(root.iter()):
+        if count >= MAX_ELEMENTS:
+            raise InputError.at(file, "", f"has more than {MAX_ELEMENTS} elements", "split it")
+        for name, value in element.items():
+            if found := obeyed(value.replace("\n", " ").replace("\t", " ")):
+                what = f"holds {found}, which terminals obey or which turns the direction of reading"
+                raise InputError.at(file, f"{element.tag}.{name}", what, "leave it out")
     return root

@@ -10,9 +10,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from seerob.app.console.printable import printable
 from seerob.app.console.terminal import STATUS
 from seerob.core.errors import SeerobError
+from seerob.core.printable import printable
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Snapshot
 from seerob.outputs.sink import AtEnd, KeepsResults, Writer

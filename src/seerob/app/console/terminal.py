@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from rich.console import Console as RichConsole
 
-from seerob.app.console.printable import printable
 from seerob.core.figures import against, with_unit
+from seerob.core.printable import printable
 from seerob.core.snapshot import Finding, Verdict
 from seerob.workstation.allowed import Allowed
 

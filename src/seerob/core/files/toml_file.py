@@ -8,13 +8,14 @@ from typing import Any
 
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.printable import printable_table
 
 MAX_FILE_SIZE = 4 << 20
 """A file larger than this [byte] is none that a user wrote."""
 
 
 def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
-    """Content of a TOML file, parsed and raw.
+    """Content of a TOML file, parsed, with every text `printable`, and raw.
 
     Raises:
         InputError: Too large, not readable, not UTF-8, or not TOML; names line and column.
@@ -27,7 +28,8 @@ def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
         what = f"larger than {MAX_FILE_SIZE >> 20} MiB"
         raise InputError.at(path, "", what, "give a workstation file, which is far smaller") from None
     try:
-        return tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")), raw
+        table = tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n"))
+        return printable_table(table), raw
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError.at(path, f"line {line}", "not UTF-8", "save it as UTF-8 text") from error

@@ -279,7 +279,6 @@ def _check_figures(reader: Reader, model: mujoco.MjModel) -> None:
         (model.body_quat, 2, model.body, "body[{}]", turned),
         (model.body_iquat, 2, model.body, "body[{}].inertial", turned),
         (model.jnt_pos, FARTHEST, model.joint, "joint[{}].pos", far),
-        (model.jnt_axis, 2, model.joint, "joint[{}].axis", "must be a direction"),
         (model.qpos0[:, None], FARTHEST, model.joint, "joint[{}].ref", "must be a position"),
         (model.geom_pos, FARTHEST, model.geom, "geom[{}].pos", far),
         (model.geom_quat, 2, model.geom, "geom[{}]", turned),
@@ -289,6 +288,9 @@ def _check_figures(reader: Reader, model: mujoco.MjModel) -> None:
         for i in np.flatnonzero(~(np.abs(figures) <= most).all(axis=1)).tolist():
             name = named(i).name if key[:5] != "joint" or i < len(model.jnt_pos) else ""
             reader.problem(key.format(name or i), f"is {figures[i].tolist()}", remedy)
+    for i in np.flatnonzero(~(np.abs(np.linalg.norm(model.jnt_axis, axis=1) - 1) <= 1e-6)).tolist():
+        key = f"joint[{model.joint(i).name or i}].axis"
+        reader.problem(key, f"is {model.jnt_axis[i].tolist()}", "must be a direction")
     sizes = model.geom_size
     fit = (sizes == 0) | ((sizes >= SMALLEST) & (sizes <= FARTHEST))
     for i in np.flatnonzero(~fit.all(axis=1)).tolist():

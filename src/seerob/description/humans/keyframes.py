@@ -32,6 +32,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.printable import printable_table
 from seerob.core.transforms import Array
 from seerob.description.description import Description
 from seerob.description.humans.motion import Motion, Travel
@@ -88,7 +89,7 @@ def read(file: str, description: Description, *, folder: Path | None = None) -> 
 def parse(data: bytes, description: Description, *, file: str) -> Motion:
     """A motion from the content of a file; see `read`."""
     try:
-        table = tomllib.loads(data.decode("utf-8"))
+        table = printable_table(tomllib.loads(data.decode("utf-8")))
     except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", f"is not TOML: {error}", "correct the line") from error
     problems = _unknown(file, "", table, _TOP)

@@ -31,6 +31,7 @@ from msgspec.structs import replace
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.extras import need
 from seerob.core.host_name import check_host, check_url
+from seerob.core.printable import printable
 from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding
 from seerob.description.capture.frozen import Frozen
@@ -197,7 +198,7 @@ def because(error: BaseException) -> str:
     if isinstance(error, OSError) and error.errno is not None and error.errno > 0:
         # asyncio's own text hides the reason behind the address.
         return os.strerror(error.errno)
-    return str(error) or type(error).__name__
+    return printable(str(error)) or type(error).__name__
 
 
 def delay_of(sources: Iterable[Source]) -> float:

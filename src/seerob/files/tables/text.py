@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from seerob.core.errors import InputError
+from seerob.core.printable import printable
 
 MAX_BYTES = 4 << 30
 MAX_LINE = 4 << 20
@@ -76,7 +77,9 @@ def lines(path: Path, name: str, encoding: str) -> Iterator[str]:
             if not line:
                 return
             count += 1
-            yield line
+            body = line.rstrip("\r\n")
+            # Names of columns and cells that are no number go into messages and results.
+            yield line if body.replace("\t", " ").isprintable() else printable(body) + line[len(body) :]
 
 
 def _line(file: TextIO, name: str, number: int) -> str:

@@ -24,6 +24,7 @@ from seerob.core.errors import InputError, Problem
 from seerob.core.extras import need
 from seerob.core.files.bounded import TooLarge, content
 from seerob.core.orientation import wxyz_from
+from seerob.core.printable import printable_table
 from seerob.core.quantities import Metres3, Pose, Radians, Table, unit
 from seerob.core.samples import Vec4
 from seerob.core.transforms import rotation_from_rpy, wxyz_from_rotation
@@ -284,7 +285,7 @@ def read_structured(content: bytes, file: str, *, yaml: bool) -> Program:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError.at(file, "", f"is not text: {error}") from error
-    table = _yaml(text, file) if yaml else _toml(text, file)
+    table = printable_table(_yaml(text, file) if yaml else _toml(text, file))
     unknown = [key for key in table if key != "waypoints"]
     points = table.get("waypoints")
     if not isinstance(points, list) or unknown:

@@ -107,7 +107,7 @@ def mutated_zip(data, rng):
         return mutated(data, rng)
     try:
         return _repacked(data, rng)
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, NotImplementedError):  # broken already
+    except Exception:  # it is no container any more
         return mutated(data, rng)
 
 
@@ -128,5 +128,5 @@ def mutated_gzip(data, rng):
         return mutated(data, rng)
     try:
         return gzip.compress(mutated_text(gzip.decompress(data), rng), 1)
-    except (OSError, EOFError, zlib.error):  # broken already
+    except (OSError, EOFError, zlib.error):  # it is none any more
         return mutated(data, rng)

@@ -139,3 +139,12 @@ def test_a_folder_of_a_source_has_no_link_that_leaves(cell):
 def test_what_is_no_file_outside(cell, text):
     (cell / "round").symlink_to("round")
     assert not list(named_outside({"a": [{"b": text}]}, cell))
+
+
+def test_the_file_itself_allows_nothing(cell):
+    text = "outside = true\n" + written(cell, "two dots")
+    (cell / "workstation.toml").write_text(text)
+    with pytest.raises(InputError, match="outside the folder of the workstation"):
+        sr.load(cell)
+    with pytest.raises(InputError, match="outside: unknown key"):
+        sr.load(cell, allow_outside=True)

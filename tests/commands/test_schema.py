@@ -58,7 +58,7 @@ def test_every_workstation_and_the_starter_are_valid(validator):
 def test_every_table_and_every_kind_is_in_it(validator):
     properties = validator.schema["properties"]
     assert set(TABLES) | set(PLUGINS) <= set(properties)
-    assert not {"folder", "files"} & set(properties)
+    assert not {"folder", "outside", "files"} & set(properties)
     for group in PLUGINS:
         kinds = [body["properties"]["kind"].get("const") for body in properties[group]["items"]["anyOf"]]
         assert set(plugin.kinds(group)) == set(kinds) - {None}

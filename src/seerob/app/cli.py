@@ -19,6 +19,7 @@ from seerob.core.printable import printable
 
 COMMANDS = (
     "new",
+    "inspect",
     "check_file",
     "run",
     "assess",

@@ -13,13 +13,14 @@ from msgspec import Struct
 
 from seerob.core import plugin
 from seerob.core.errors import InputError, Problem, SeerobError
+from seerob.core.files.outside import leads_outside
 from seerob.core.files.toml_file import read_toml
 from seerob.criteria.criterion import Criterion
 from seerob.outputs.sink import Sink
 from seerob.workstation import naming
 from seerob.workstation.allowed import NOTHING, Allowed
 from seerob.workstation.conversion import convert, tables
-from seerob.workstation.outside import named_outside
+from seerob.workstation.outside import Named, named_outside
 from seerob.workstation.plausibility.of_file import unknown
 from seerob.workstation.source import Source
 from seerob.workstation.tables.controller_zones import zones_of
@@ -86,7 +87,7 @@ def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
     table, raw = read_toml(file)
     files = {file.name: raw}
     problems: list[Problem] = []
-    for outside in named_outside(table, file.parent):
+    for outside in _outside(table, file):
         if allowed.replayed and outside.key.startswith("sources["):
             continue
         if not allowed.outside:
@@ -104,6 +105,20 @@ def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
     folder = str(file.parent.resolve())
     head = msgspec.structs.replace(found.head, folder=folder, outside=allowed.outside, files=files)
     return found._replace(head=head, problems=[*problems, *found.problems])
+
+
+def _outside(table: Mapping[str, Any], file: Path) -> list[Named]:
+    """The file itself where it is a link that leaves its folder, and what it names outside.
+
+    Raises:
+        InputError: It is nested more deeply than any table is.
+    """
+    real = leads_outside(file, file.parent)
+    itself = [] if real is None else [Named("", file.name, real)]
+    try:
+        return [*itself, *named_outside(table, file.parent)]
+    except ValueError as error:
+        raise InputError.at(file, "", str(error), "no table needs more than four levels") from None
 
 
 def convert_workstation(

@@ -16,6 +16,8 @@ from seerob.core.files.outside import REMEDY, leads_outside
 
 MOST = 1000
 """Files of a folder that a source names which are looked at."""
+DEEPEST = 32
+"""No table of a workstation, nor of a plug-in, is nested more deeply."""
 _LONGEST = 4096
 """Of a path [characters]."""
 
@@ -41,8 +43,11 @@ def named_outside(table: Mapping[str, Any], folder: Path) -> Iterator[Named]:
     Args:
         table: The file as TOML has it.
         folder: Its folder.
+
+    Raises:
+        ValueError: It is nested more deeply than any table is.
     """
-    for key, text in _texts(table, ""):
+    for key, text in texts(table):
         if len(text) > _LONGEST:
             continue
         path = folder / text
@@ -59,12 +64,21 @@ def _linked(folder: Path, within: Path) -> Iterator[Path]:
             yield real
 
 
-def _texts(value: Any, key: str) -> Iterator[tuple[str, str]]:
-    if isinstance(value, str):
-        yield key, value
-    elif isinstance(value, Mapping):
-        for name, inner in value.items():
-            yield from _texts(inner, f"{key}.{name}" if key else name)
-    elif isinstance(value, list):
-        for i, inner in enumerate(value):
-            yield from _texts(inner, f"{key}[{i}]")
+def texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Every text of a file with its key, in order.
+
+    Raises:
+        ValueError: It is nested more deeply than any table is.
+    """
+    waiting: list[tuple[str, Any, int]] = [("", table, 0)]
+    while waiting:
+        key, value, depth = waiting.pop()
+        if depth > DEEPEST:
+            raise ValueError(f"{key[:80]} …: nested too deeply")
+        if isinstance(value, str):
+            yield key, value
+        elif isinstance(value, Mapping):
+            inner = [(f"{key}.{name}" if key else name, one, depth + 1) for name, one in value.items()]
+            waiting += reversed(inner)
+        elif isinstance(value, list):
+            waiting += reversed([(f"{key}[{i}]", one, depth + 1) for i, one in enumerate(value)])

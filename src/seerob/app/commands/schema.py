@@ -47,7 +47,7 @@ def schema() -> dict[str, Any]:
     for kind in _tables_in(order):
         _add_suffixes(found.get(kind) or definitions[kind.__name__], kind)
     station = found[Workstation]
-    for hidden in ("folder", "files"):
+    for hidden in ("folder", "outside", "files"):
         station["properties"].pop(hidden)
     for group in PLUGINS:
         bodies = [_with_kind(found[c], kind) for (owner, kind), c in classes.items() if owner == group]

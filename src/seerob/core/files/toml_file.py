@@ -27,9 +27,14 @@ def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
     except TooLarge:
         what = f"larger than {MAX_FILE_SIZE >> 20} MiB"
         raise InputError.at(path, "", what, "give a workstation file, which is far smaller") from None
+    return parsed_toml(raw, path), raw
+
+
+def parsed_toml(raw: bytes, path: Path) -> dict[str, Any]:
+    """Content of a TOML file that was read; raises as `read_toml` does."""
     try:
-        table = tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n"))
-        return printable_table(table), raw
+        table: dict[str, Any] = printable_table(tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")))
+        return table
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError.at(path, f"line {line}", "not UTF-8", "save it as UTF-8 text") from error

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import gzip
+import json
+import re
+import struct
 import subprocess
 import sys
 import zipfile
 import zlib
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +22,7 @@ from seerob.description.loader import load_robot
 from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets
 from seerob.outputs.html import text
+from soak import made_cells
 
 HUGE = 1 << 30
 ROBOT = (
@@ -135,6 +141,107 @@ def test_what_a_terminal_or_a_page_would_obey_is_written_or_left_out():
     obeyed = "\x1b[2J \u061c\u200e\u200f\u2028\u202e\u2066\x07\x9b"
     for shown in (printable(f"a{obeyed}b"), text(f"a{obeyed}b")):
         assert not set(obeyed.replace(" ", "").replace("[2J", "")) & set(shown)
+
+
+BOMBED = """
+import os, resource, sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from seerob.core.errors import SeerobError
+from soak.made_cells import KINDS
+own = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGESIZE")
+resource.setrlimit(resource.RLIMIT_AS, (own + (700 << 20), own + (700 << 20)))
+for line in sys.stdin.read().splitlines():
+    kind, path = line.split("|")
+    try:
+        KINDS[kind].read(Path(path))
+    except SeerobError as error:
+        print(kind, "|", " ".join(str(error).split())[:400])
+    except BaseException as error:
+        print(kind, "| RAISED", repr(error)[:200])
+    else:
+        print(kind, "| read")
+"""
+DEEP = 100_000
+
+
+def bombs(folder):
+    """Kind, file and what its message says, of files that ask for more than anybody has."""
+
+    def put(name, data):
+        (folder / name).write_bytes(data if isinstance(data, bytes) else data.encode())
+        return folder / name
+
+    def sparse(name, size):
+        with (folder / name).open("wb") as file:
+            file.truncate(size)
+        return folder / name
+
+    def nested(name, tag, around="{}"):
+        return put(name, around.format(f"<{tag}>" * DEEP + f"</{tag}>" * DEEP))
+
+    ply = "ply\nformat {} 1.0\nelement vertex 1000000000000\nproperty float x\nelement face 1\nend_header\n"
+    tree = {
+        "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "buffers": [{"byteLength": 36}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 10**12, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36 * 10**12}],
+    }  # fmt: skip
+    lying = json.dumps(tree).encode()
+    lying += b" " * (-len(lying) % 4)
+    body = struct.pack("<I4s", len(lying), b"JSON") + lying + struct.pack("<I4s", 36, b"BIN\0") + bytes(36)
+    number = "9" * DEEP
+    yield "ply", put("a.ply", ply.format("binary_little_endian")), "announces 1000000000000 vertex rows"
+    yield "ply text", put("b.ply", ply.format("ascii")), "announces 1000000000000 vertex rows"
+    yield "stl", put("a.stl", bytes(80) + b"\xff" * 4), "announces 4294967295 triangles"
+    yield "off", put("a.off", "OFF\n1000000000000 1 0\n"), "1000000000000 vertices"
+    yield "glb", put("a.glb", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body), "a.glb"
+    for kind, name in (
+        ("obj", "a.obj"),
+        ("stl", "b.stl"),
+        ("ply", "c.ply"),
+        ("dae", "a.dae"),
+        ("3mf", "a.3mf"),
+    ):
+        yield kind, sparse(name, 2 << 30), "has more than 536870912 bytes"
+    yield "obj", put("b.obj", b"v 0 0 0\nv " + bytes(30 << 20)), "line 2: is longer than"
+    yield "urdf", sparse("a.urdf", 2 << 30), "has more than"
+    yield "workstation", sparse("a.toml", 2 << 30), "larger than 4 MiB"
+    yield "motion csv", sparse("a.csv", 2 << 30), "binary data, not text"
+    yield "bvh", sparse("a.bvh", 2 << 30), "characters"
+    yield "trackers jsonl", sparse("a.jsonl", 2 << 30), "r: line 1"
+    yield "signals csv", sparse("b.csv", 2 << 30), "no end"
+    yield "c3d", sparse("a.c3d", 2 << 30), "no C3D file"
+    yield "urdf", nested("b.urdf", "link", "<robot>{}</robot>"), "b.urdf"
+    yield "mjcf", nested("a.xml", "body", "<mujoco><worldbody>{}</worldbody></mujoco>"), "a.xml"
+    yield "automationml", nested("a.aml", "InternalElement", "<CAEXFile><InstanceHierarchy>{}"), "a.aml"
+    yield "mvnx", nested("a.mvnx", "subject", "<mvnx>{}</mvnx>"), "a.mvnx"
+    yield "dae", nested("b.dae", "node", "<COLLADA><library_nodes>{}</library_nodes></COLLADA>"), "b.dae"
+    yield "waypoints urp", put("a.urp", gzip.compress(b"<URProgram>" + b"<children>" * DEEP)), "w: "
+    yield "gltf", put("a.gltf", "[" * DEEP), "a.gltf"
+    yield "kinect json", put("a.json", '{"frames": [' + "[" * DEEP), "f: "
+    yield "trackers jsonl", put("b.jsonl", "[" * DEEP), "r: line 1"
+    yield "waypoints yaml", put("a.yaml", "waypoints: " + "[" * DEEP), "w: "
+    for kind in ("workstation", "variables", "measured contacts", "keyframes", "skeleton", "zones toml"):
+        yield kind, put(f"{kind}1.toml", "a = " + "[" * DEEP), "nested|recursion|TOML"
+        yield kind, put(f"{kind}2.toml", f"a = {number}"), "digits"
+    yield "urdf", put("c.urdf", made_cells.URDF.replace("1.5", number)), "must be finite"
+    yield "motion csv", put("c.csv", f"Time [s],J1 [rad]\n0,{number}\n1,0\n"), "c.csv"
+
+
+def test_files_that_ask_for_more_than_anybody_has_are_refused_by_name_within_700_mib(tmp_path):
+    listed = list(bombs(tmp_path))
+    done = subprocess.run(
+        [sys.executable, "-c", BOMBED.format(tests=str(Path(__file__).parent))],
+        input="\n".join(f"{kind}|{path}" for kind, path, _ in listed),
+        capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    said = done.stdout.splitlines()
+    assert (done.returncode, len(said)) == (0, len(listed)), done.stderr[-2000:]
+    for line, (kind, _, expected) in zip(said, listed, strict=True):
+        assert re.search(expected, line), line
+        assert line.startswith(f"{kind} | ")
+        assert "RAISED" not in line
 
 
 def test_a_chunk_of_a_bag_that_unpacks_to_more_than_there_is_ends_the_parser_alone(tmp_path, monkeypatch):

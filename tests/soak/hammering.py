@@ -29,15 +29,20 @@ CHUNK = 2000
 
 
 def hammer(kind, seed, files):
-    """How many of ``files`` broken files of a kind were read and refused; anything else raises."""
+    """How many of ``files`` broken files of a kind were read and refused; anything else raises.
+
+    The first are those of the corpus as they are, the others are changed ones.
+    """
     format_ = KINDS[kind]
     counts = Counter(read=0, refused=0)
     rng = random.Random(f"{kind} {seed}")
     with tempfile.TemporaryDirectory(dir=_memory()) as folder:
         path = Path(folder) / f"f.{format_.suffix}"
         for number in range(files):
-            # Half of them are the valid one with one change.
-            broken = format_.change(rng.choice([corpus(kind)[0], rng.choice(corpus(kind))]), rng)
+            if number < len(corpus(kind)):
+                broken = corpus(kind)[number]
+            else:  # half of them from the valid one
+                broken = format_.change(rng.choice([corpus(kind)[0], rng.choice(corpus(kind))]), rng)
             path.write_bytes(broken)
             begun = time.thread_time()
             try:

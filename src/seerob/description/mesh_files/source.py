@@ -17,6 +17,9 @@ from seerob.core.files.bounded import TooLarge, content
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 
+MAX_LINE = 4 << 20
+"""Longest line of a text file that is read [byte]."""
+
 Color = tuple[float, float, float, float]
 
 
@@ -62,6 +65,21 @@ class MeshSource:
     def note(self, text: str, *, level: str = "note") -> None:
         """Remember something the reader of a result must know."""
         self.findings.append(Finding(level=level, subject=self.path.name, text=text))
+
+    def text(self, data: bytes) -> str:
+        """Content of a text file, with � for what is none.
+
+        Raises:
+            InputError: A line is longer than any that a program writes.
+        """
+        at = 0
+        while len(data) - at > MAX_LINE:
+            end = data.rfind(b"\n", at, at + MAX_LINE)
+            if end < 0:
+                line = data.count(b"\n", 0, at) + 1
+                self.fail(f"is longer than {MAX_LINE} bytes", "export it again", f"line {line}")
+            at = end + 1
+        return data.decode("utf-8", errors="replace")
 
     def beside(self, uri: str) -> bytes | None:
         """Content of a file that this one names, or None, with a finding, when it is not there.

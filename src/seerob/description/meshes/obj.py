@@ -22,7 +22,7 @@ _Key = tuple[str, str]
 
 def read(source: MeshSource) -> RawFile:
     """One mesh per object (or group, in files without objects) and material."""
-    text = source.data.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
+    text = source.text(source.data).replace("\\\n", " ").replace("\\\r\n", " ")
     points: list[list[str]] = []
     objects: dict[_Key, list[list[str]]] = {}
     groups: dict[_Key, list[list[str]]] = {}
@@ -113,7 +113,7 @@ def _read_library(source: MeshSource, name: str, colors: dict[str, Color]) -> No
         return
     material = None
     textures = set()
-    for line in data.decode("utf-8", errors="replace").splitlines():
+    for line in source.text(data).splitlines():
         words = line.split()
         if len(words) < 2:
             continue

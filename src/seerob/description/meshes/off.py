@@ -10,7 +10,7 @@ from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh
 
 def read(source: MeshSource) -> RawFile:
     """The one mesh of an OFF or COFF file; colours are not used."""
-    text = source.data.decode("utf-8", errors="replace")
+    text = source.text(source.data)
     lines = [words for line in text.splitlines() if (words := line.partition("#")[0].split())]
     if not lines or lines[0][0].upper() not in {"OFF", "COFF"}:
         source.fail("is not an OFF file: it does not begin with OFF", "export it as ASCII OFF")

@@ -49,7 +49,7 @@ def _binary(source: MeshSource, count: int) -> RawMesh:
 
 
 def _ascii(source: MeshSource) -> tuple[RawMesh, ...]:
-    text = source.data.decode("utf-8", errors="replace")
+    text = source.text(source.data)
     meshes: list[RawMesh] = []
     blocks = re.split(r"(?im)^[ \t]*solid\b", text)[1:]
     for number, block in enumerate(blocks):

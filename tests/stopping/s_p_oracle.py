@@ -56,6 +56,12 @@ class Chain:
             found.append((v.linear + np.cross(v.angular, corners)) @ R.T)
         return np.array(found)
 
+    def places(self, q):
+        """Of each corner of each box [m], shape (n, 8, 3)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        every = ((self._data.oMi[k + 1], corners) for k, corners in enumerate(self._corners))
+        return np.array([corners @ M.rotation.T + M.translation for M, corners in every])
+
     def speeds(self, q, qd):
         """Of the fastest corner of each box at instants [m/s], shape (m, n)."""
         every = [self.corners(a, b) for a, b in zip(q, qd, strict=True)]
@@ -107,5 +113,36 @@ def required(v, model, v_h=V_H):
         tau = np.arange(lead + 1) * STEP
         person = v_h * (tau + T_s)
         every = person[:, None] + way[k : k + lead + 1] - way[k] + share * onset * T_s[:, None] + K
+        found.append(every.max(axis=0))
+    return np.array(found)
+
+
+def required_by_joints(chain, t, q, qd, rates):
+    """S_p at each instant where each joint brakes by itself with a rate of its own [rad/s²], by sums.
+
+    Args:
+        chain: Of joints that turn.
+        t: Instants at steps of `STEP`, shape (m,).
+        q: Positions then, shape (m, n).
+        qd: Velocities, likewise.
+        rates: Shape (n,).
+
+    Returns:
+        Shape (m - T_R / STEP, n).
+    """
+    lead, v = round(T_R / STEP), chain.speeds(q, qd)
+    way = np.concatenate([np.zeros((1, v.shape[1])), np.cumsum((v[1:] + v[:-1]) / 2 * STEP, axis=0)])
+    stops, times = np.zeros_like(way), np.abs(qd / rates).max(axis=1)
+    for k in range(len(t)):
+        after = np.linspace(0, times[k], 25)[:, None]
+        left = np.maximum(np.abs(qd[k]) - rates * after, 0.0)
+        turned = np.sign(qd[k]) * (qd[k] ** 2 - left**2) / (2 * rates)
+        corners = [chain.places(q[k] + each) for each in turned]
+        stops[k] = np.linalg.norm(np.array(corners) - chain.places(q[k]), axis=-1).max(axis=(0, 2))
+    found = []
+    for k in range(len(t) - lead):
+        tau = np.arange(lead + 1) * STEP
+        onset = slice(k, k + lead + 1)
+        every = V_H * (tau + times[onset])[:, None] + way[onset] - way[k] + stops[onset] + K
         found.append(every.max(axis=0))
     return np.array(found)

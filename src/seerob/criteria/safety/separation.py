@@ -543,7 +543,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return self._by_device(model)[0]._stop(model).lasts
 
     def rises(self, model: Model) -> Callable[[Span], Array] | None:
-        """How much S_p of each of `moving` can change within a span [m]; None where not known."""
+        """How much S_p of each of `moving` can change within a span [m]; None where not known.
+
+        Where S_p follows from the speeds of the instant, it never falls as one of them grows
+        (`StopModel.by_speed`, and the larger of assumed and seen v_h): so at every instant it lies between
+        those of the least and of the largest speeds in the span. Where what is known ahead is in it (`lasts`), S_p of the begin covers
+        every stop that begins until the next tick, and this is added on top.
+        """
         gap = self._gap(model)
         people, parts = rows_of(gap.a), rows_of(gap.b)
         required: list[Callable[[Array, float], Array]] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -269,7 +270,7 @@ def _parts(components: Mapping[str, Span], spread: Mapping[str, Span] | None, an
 def _shown(angles: Angles, names: Sequence[str], side: int | None) -> str:
     words = []
     for name in names:
-        values = np.degrees(getattr(angles, name))
+        values = getattr(angles, name).tolist()
         label = name.replace("_", " ")
         if side is not None and name in SIDED:
             words.append(f"{label} {_degrees(values[side])}")
@@ -280,5 +281,5 @@ def _shown(angles: Angles, names: Sequence[str], side: int | None) -> str:
     return ", ".join(words)
 
 
-def _degrees(value: float) -> str:
-    return "not measured" if np.isnan(value) else f"{round(float(value))}°"
+def _degrees(angle: float) -> str:
+    return "not measured" if math.isnan(angle) else f"{round(math.degrees(angle))}°"

@@ -14,7 +14,7 @@ from msgspec.structs import asdict
 
 from seerob.core.transforms import Array
 from seerob.criteria.scoring.published import Ints
-from seerob.criteria.scoring.spans import ROUNDING, Span, beyond, graded
+from seerob.criteria.scoring.spans import ROUNDING, Span, any_of, beyond, graded
 from seerob.criteria.scoring.thresholds import Angle, Thresholds
 from seerob.description.humans.angles import Angles
 
@@ -212,7 +212,7 @@ def arm_score(measured: Measured, score: Callable[[Array], Ints], policy: ArmPol
         lowest = np.where(possible, np.minimum(lowest, span.low), lowest)
         highest = np.where(rounded, np.maximum(highest, span.high), highest)
     missing = np.isnan(flexion)
-    return Span(lowest if np.any(accuracy) else np.where(missing, BASE[0], highest), highest)
+    return Span(lowest if accuracy else np.where(missing, BASE[0], highest), highest)
 
 
 def _projected(
@@ -226,6 +226,6 @@ def _projected(
         return np.asarray((flexion - off < -np.pi / 2) | (flexion + off > 3 * np.pi / 2))
 
     high = np.where(around(spread + rounding), np.maximum(span.high, ends.max()), span.high)
-    if not np.any(spread):
+    if not any_of(spread):
         return Span(np.where(np.isnan(flexion), span.low, high), high)
     return Span(np.where(around(spread), np.minimum(span.low, ends.min()), span.low), high)

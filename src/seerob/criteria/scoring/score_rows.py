@@ -130,11 +130,16 @@ def component_rows(
                     if spread is None and known
                     else (float(wide.low.flat[i]), float(wide.high.flat[i])),
                     reason="" if known else "not measured or not entered",
-                    bones=tuple(f"{human}/{bone.format(side=side)}" for bone in BONES_OF.get(key, ())),
+                    bones=_bones(human, key, side),
                     aspects=aspects(angles, ANGLES_OF.get(key, ()), i if side else None, edges),
                 )
             )
     return tuple(rows)
+
+
+@cache
+def _bones(human: str, component: str, side: str) -> tuple[str, ...]:
+    return tuple(f"{human}/{bone.format(side=side)}" for bone in BONES_OF.get(component, ()))
 
 
 def total_row(
@@ -174,14 +179,14 @@ def aspects(angles: Angles, names: Sequence[str], side: int | None, edges: Edges
     """Angles with the bands that they fall into; of both sides where a component has none."""
     found = []
     for name in names:
-        values = getattr(angles, name)
+        values = getattr(angles, name).tolist()
         label = name.replace("_", " ")
         if name not in SIDED:
-            pairs = [(label, float(values))]
+            pairs = [(label, values)]
         elif side is not None:
-            pairs = [(label, float(values[side]))]
+            pairs = [(label, values[side])]
         else:
-            pairs = [(f"{own} {label}", float(x)) for own, x in zip(SIDES, values, strict=True)]
+            pairs = [(f"{own} {label}", x) for own, x in zip(SIDES, values, strict=True)]
         for text, value in pairs:
             measured = value == value  # noqa: PLR0124 - not a NaN
             found.append(

@@ -55,6 +55,11 @@ def fallen(angle: Array | float, edge: float) -> NDArray[np.bool_] | bool:
     return reached(-angle, -edge)
 
 
+def any_of(values: Array | float) -> bool:
+    """Whether any of some numbers is not 0."""
+    return bool(values) if type(values) is float else bool(np.any(values))
+
+
 class Span(NamedTuple):
     """Least and greatest score; equal when it is known."""
 
@@ -112,9 +117,9 @@ def graded(
         neutral: [rad]
         rounding: How far rounding alone may turn it [rad], shaped likewise: the worst of that counts.
     """
-    if not np.any(accuracy):
+    if not any_of(accuracy):
         low = high = score(angle)
-        if np.any(rounding):
+        if any_of(rounding):
             worst = np.maximum(high, np.maximum(score(angle - rounding), score(angle + rounding)))
             low = high = np.where(rounding >= np.pi, within[1], worst)
     else:

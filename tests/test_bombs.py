@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zipfile
 import zlib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,11 @@ import pytest
 import seerob as sr
 from seerob.core.errors import InputError
 from seerob.core.files import bounded
+from seerob.core.files.parser_process import parsed
 from seerob.core.printable import printable
 from seerob.description.loader import load_robot
+from seerob.description.mesh import load_meshes
+from seerob.description.mesh_files import apart
 from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets
 from seerob.outputs.html import text
@@ -258,3 +262,22 @@ def test_a_chunk_of_a_bag_that_unpacks_to_more_than_there_is_ends_the_parser_alo
     monkeypatch.setattr(kinect_bag, "MEMORY", 300 << 20)
     with pytest.raises(InputError, match=r"a.bag: takes more than 300 MiB of memory to read; repair it"):
         list(kinect_bag.raw_messages(path, "a.bag", ("/a",), 1 << 20))
+
+
+def test_a_collada_file_that_takes_too_much_ends_its_parser_with_a_message_and_the_next_is_read(
+    tmp_path, monkeypatch
+):
+    import trimesh
+
+    good = trimesh.creation.box((1, 1, 1)).export(file_type="dae")
+    (tmp_path / "good.dae").write_bytes(good)
+    large = re.sub(rb'(id="verts-array-array">)[^<]*', rb"\g<1>" + b"0 " * 3_000_000, good, count=1)
+    (tmp_path / "large.dae").write_bytes(large)
+    assert len(load_meshes(tmp_path / "good.dae").meshes) == 1
+    monkeypatch.setattr(apart, "parsed", partial(parsed, memory=32 << 20))
+    with pytest.raises(InputError, match=r"large.dae: .*(takes|asks for) more (than 32 MiB of )?memory"):
+        load_meshes(tmp_path / "large.dae")
+    assert len(load_meshes(tmp_path / "good.dae").meshes) == 1
+    monkeypatch.setattr(apart, "parsed", partial(parsed, seconds=1e-3))
+    with pytest.raises(InputError, match=r"large.dae: takes more than 0.001 s to read; export it"):
+        load_meshes(tmp_path / "large.dae")

@@ -23,8 +23,8 @@ import { type History, SCHEMA, type Scene } from "./wire";
 
 /** Numbers change at most this often: faster cannot be read. */
 const NUMBERS_EVERY_MS = 110;
-/** A live run that says nothing for so long is not trusted any more. */
-const SILENCE_MS = 1000;
+/** A frame of a live run that is older is not trusted any more, whatever holds up page or worker. */
+const OLD_MS = 1000;
 /** Points per trace of a live run; a recording comes thinned already. */
 const LIVE_POINTS = 40_000;
 
@@ -45,7 +45,9 @@ export interface ConnectionEvents {
 export class Connection {
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
   private posted: PostedPoses | null = null;
-  private heardAt = 0;
+  /** When the newest that is known here came [ms since 1970], and whether that is too long ago. */
+  private heard = Number.NEGATIVE_INFINITY;
+  private silent = false;
   private numbersAt = 0;
   private pending: Frame | null = null;
 
@@ -113,7 +115,13 @@ export class Connection {
         this.posted?.put(message.buffer, message.t);
         return;
       case "frame":
+        this.heard = message.heard;
+        this.silent = message.silent;
         this.show(message.frame);
+        return;
+      case "silence":
+        this.silent = true;
+        this.watch();
         return;
     }
   }
@@ -138,10 +146,9 @@ export class Connection {
   }
 
   private show(next: Frame): void {
-    this.heardAt = performance.now();
     this.pending = next;
     now.value = next.t;
-    stale.value = link.value.state !== "open";
+    this.watch();
     this.events.frame(next);
     requestAnimationFrame(() => this.send({ kind: "want" }));
   }
@@ -150,7 +157,7 @@ export class Connection {
   private watch(): void {
     if (link.value.state !== "open") stale.value = true;
     else if (isLive.value && lookingAt.value === null)
-      stale.value = performance.now() - this.heardAt > SILENCE_MS;
+      stale.value = this.silent || performance.timeOrigin + performance.now() - this.heard > OLD_MS;
     else stale.value = frame.value === null && this.pending === null;
   }
 }

@@ -39,7 +39,10 @@ export type FromWorker =
   | { kind: "so_far"; soFar: SoFar }
   /** What became of what this page's headset sees. */
   | { kind: "tracked"; tracked: Tracked }
-  | { kind: "frame"; frame: Frame }
+  /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
+  | { kind: "frame"; frame: Frame; heard: number; silent: boolean }
+  /** A live run has said nothing for too long. */
+  | { kind: "silence" }
   | { kind: "points"; points: TracePoints[]; newest: number; oldest: number }
   | { kind: "poses"; buffer: ArrayBuffer; t: number; seq: number };
 

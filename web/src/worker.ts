@@ -13,6 +13,9 @@ import type { Scene, ServerMessage, Snapshot } from "./wire";
 const RECENT_BYTES = 64 * 1024 * 1024;
 const RECENT_SPACING_S = 0.04;
 const POINTS_EVERY_MS = 80;
+/** A live run that says nothing for so long is not trusted any more; a slow one, for three of its ticks. */
+const SILENCE_MS = 300;
+const LISTEN_EVERY_MS = 50;
 
 let socket: Socket | null = null;
 let mayShare = false;
@@ -24,6 +27,10 @@ let pageWants = true;
 let waiting: Frame | null = null;
 let newest = Number.NaN;
 let newestRaw: Uint8Array | null = null;
+/** When the newest snapshot came [ms since 1970]. */
+let heardAt = Number.NEGATIVE_INFINITY;
+let silence = SILENCE_MS;
+let saidSilent = false;
 const spare: ArrayBuffer[] = [];
 const collector = new PointCollector();
 const recent = new Recent(RECENT_BYTES, RECENT_SPACING_S);
@@ -69,6 +76,7 @@ function begin(scene: Scene): void {
   waiting = null;
   newest = Number.NaN;
   newestRaw = null;
+  silence = Math.max(SILENCE_MS, 3000 * scene.period);
   recent.clear();
   collector.clear();
   post({ kind: "scene", scene, shared });
@@ -78,6 +86,8 @@ function heard(snapshot: Snapshot, raw: Uint8Array): void {
   socket?.send({ type: "command", action: "ack", value: snapshot.seq });
   if (snapshot.poses.byteLength !== poseBytes) return; // belongs to another scene
   newest = snapshot.t;
+  heardAt = clock();
+  saidSilent = false;
   if (live) {
     collector.add(snapshot);
     // One may go to the worst instant of an exceedance, and a neighbour would show another verdict.
@@ -108,8 +118,18 @@ function deliver(): void {
   pageWants = false;
   const frame = waiting;
   waiting = null;
-  post({ kind: "frame", frame });
+  post({ kind: "frame", frame, heard: heardAt, silent: isSilent() });
 }
+
+const clock = () => performance.timeOrigin + performance.now();
+const isSilent = () => live && clock() - heardAt > silence;
+
+// Here, because the page itself may be late: what it has not drawn yet is no silence.
+setInterval(() => {
+  if (saidSilent || !isSilent()) return;
+  saidSilent = true;
+  post({ kind: "silence" });
+}, LISTEN_EVERY_MS);
 
 function look(t: number | null): void {
   lookingAt = t;

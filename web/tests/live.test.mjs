@@ -177,7 +177,41 @@ test("a lost server greys everything out; the page finds it again by itself", as
   assert.equal(await page.locator(".criteria table.stale").count(), 1);
   await served.tell("start");
   await page.waitForSelector(".pill:not(.state-off)", { timeout: 20_000 });
-  assert.equal(await page.locator(".criteria table.stale").count(), 0);
+  await page.waitForFunction(() => !document.querySelector(".criteria table.stale"));
+});
+
+test("while the run is stopped as a whole the page says so by its own clock, and then shows the present only", async () => {
+  await page.evaluate(() => {
+    window.pictures = [];
+    const look = (at) => {
+      const current = !document.querySelector(".pill.state-off") || !document.querySelector("table.stale");
+      window.pictures.push({ at, t: window.seerob.t, current });
+      requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look);
+  });
+  served.signal("SIGSTOP");
+  try {
+    await page.waitForSelector(".pill.state-off");
+    await page.waitForTimeout(2000);
+    assert.match(await page.locator(".source").innerText(), /nothing heard/);
+    assert.equal(await page.locator(".criteria .badge:not(.state-off)").count(), 0);
+    assert.equal(await page.locator(".legend").count(), 0);
+  } finally {
+    served.signal("SIGCONT");
+  }
+  const stopped = await page.evaluate(() => window.pictures.at(-1).t);
+  await page.waitForFunction((t) => window.seerob.t > t, stopped);
+  await page.waitForSelector(".pill:not(.state-off)");
+  const pictures = await page.evaluate(() => window.pictures);
+  const slowest = Math.max(...pictures.slice(1).map(({ at }, i) => at - pictures[i].at));
+  const begun = pictures.find(({ t }) => t === stopped).at;
+  const late = pictures.filter(
+    ({ at, t, current }) => t === stopped && current && at - begun > 500 + slowest,
+  );
+  assert.deepEqual(late, []);
+  const next = pictures.find(({ t, current }) => t > stopped && current);
+  assert.ok(next.t > stopped + 1.9, `${next.t} is of before the run went on, ${stopped}`);
 });
 
 test("a narrow screen loses nothing to the right", async () => {

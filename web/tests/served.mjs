@@ -11,7 +11,7 @@ const HERE = path.dirname(fileURLToPath(import.meta.url));
  * Start serving.
  *
  * @param {...string} options Options of serve.py, such as "--mode", "replay".
- * @returns The address, `tell` (a line in, its answer out) and `close`.
+ * @returns The address, `tell` (a line in, its answer out), `signal` and `close`.
  */
 export async function serve(...options) {
   const child = python(path.join(HERE, "serve.py"), ...options);
@@ -31,5 +31,5 @@ export async function serve(...options) {
       child.once("exit", resolve);
       child.stdin.end();
     });
-  return { url, tell, close };
+  return { url, tell, signal: (name) => child.kill(name), close };
 }

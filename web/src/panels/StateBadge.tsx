@@ -1,15 +1,18 @@
-// A verdict as people see it: icon, word and look together, never colour alone.
+// A verdict as people see it: icon, word and look together, never colour alone. Out of date it is none.
 
+import { stale } from "../page_state";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
 
 /** @param brief Whether the word is only for those who hear it. */
 export function StateBadge({ state, brief = false }: { state: State; brief?: boolean }) {
+  const old = stale.value;
+  const word = old ? "stale" : STATE_WORDS[state];
   return (
-    <span class={`badge state-${state}`} title={brief ? STATE_WORDS[state] : undefined}>
+    <span class={`badge state-${old ? "off" : state}`} title={brief ? word : undefined}>
       <span class="badge-icon" aria-hidden="true">
-        {STATE_ICONS[state]}
+        {old ? "–" : STATE_ICONS[state]}
       </span>
-      {brief ? <span class="visually-hidden">{STATE_WORDS[state]}</span> : STATE_WORDS[state]}
+      {brief ? <span class="visually-hidden">{word}</span> : word}
     </span>
   );
 }

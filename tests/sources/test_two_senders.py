@@ -85,25 +85,27 @@ def a_socket():
     return socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
 
-def test_packets_of_the_first_that_are_played_again_leave_the_person_undecided():
+@pytest.mark.parametrize(("kind", "back"), [("kinect", 12), ("mvn", 60)])
+def test_packets_of_the_first_that_are_played_again_leave_the_person_undecided(kind, back):
+    send, source = SENDERS[kind]
     port, inner = free_port(), free_port()
     samples = []
-    listener = Listener(Kinect(human="op", port=port, name="camera"), None, samples.append)
+    listener = Listener(source(port), None, samples.append)
     listener.start()
     # All of them from one socket: address and port are the sender's own.
     with a_socket() as tap, a_socket() as way:
         tap.bind((HERE, inner))
         tap.settimeout(PATIENCE)
-        sender = kinect(inner).start()
+        sender = send(inner).start()
         try:
             seen = []
-            while len(seen) < 40 or sum(not s.reason for s in samples) < 10:
+            while len(seen) < 2 * back or sum(not s.reason for s in samples) < 10:
                 seen.append(tap.recv(1 << 16))
                 way.sendto(seen[-1], (HERE, port))
             begun = len(samples)
             end = time.monotonic() + 3 * HOLD
             while time.monotonic() < end:
-                way.sendto(seen[-12], (HERE, port))
+                way.sendto(seen[-back], (HERE, port))
                 seen.append(tap.recv(1 << 16))
                 way.sendto(seen[-1], (HERE, port))
         finally:

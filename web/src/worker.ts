@@ -30,7 +30,11 @@ let newestRaw: Uint8Array | null = null;
 /** When the newest snapshot came [ms since 1970]. */
 let heardAt = Number.NEGATIVE_INFINITY;
 let silence = SILENCE_MS;
+/** Whether the newest came soon after another: one that was on its way when the run was stopped is old. */
+let steady = false;
 let saidSilent = false;
+/** A live run that has ended: no present any more. */
+let ended = false;
 const spare: ArrayBuffer[] = [];
 const collector = new PointCollector();
 const recent = new Recent(RECENT_BYTES, RECENT_SPACING_S);
@@ -56,6 +60,7 @@ function received(message: ServerMessage, raw: Uint8Array): void {
       post({ kind: "history", history: message });
       return;
     case "transport":
+      ended = !message.playing;
       post({ kind: "transport", transport: message });
       return;
     case "so_far":
@@ -86,7 +91,9 @@ function heard(snapshot: Snapshot, raw: Uint8Array): void {
   socket?.send({ type: "command", action: "ack", value: snapshot.seq });
   if (snapshot.poses.byteLength !== poseBytes) return; // belongs to another scene
   newest = snapshot.t;
-  heardAt = clock();
+  const at = clock();
+  steady = at - heardAt <= silence;
+  heardAt = at;
   saidSilent = false;
   if (live) {
     collector.add(snapshot);
@@ -122,7 +129,7 @@ function deliver(): void {
 }
 
 const clock = () => performance.timeOrigin + performance.now();
-const isSilent = () => live && clock() - heardAt > silence;
+const isSilent = () => live && (ended || !steady || clock() - heardAt > silence);
 
 // Here, because the page itself may be late: what it has not drawn yet is no silence.
 setInterval(() => {

@@ -39,14 +39,15 @@ export function browserPath() {
 /**
  * Open a browser with an empty profile.
  *
+ * @param view Size of the window, and `flags` of the command line.
  * @returns The page, everything it complained about, and `close`.
  */
-export async function openBrowser({ width = 960, height = 640 } = {}) {
+export async function openBrowser({ width = 960, height = 640, flags = [] } = {}) {
   const executablePath = browserPath();
   const profile = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-web-"));
   const context = await chromium.launchPersistentContext(profile, {
     executablePath,
-    args: FLAGS,
+    args: [...FLAGS, ...flags],
     ignoreDefaultArgs: ["--headless"],
     viewport: { width, height },
   });

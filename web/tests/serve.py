@@ -1,24 +1,31 @@
 """Serves a made-up workstation through the real server, for the page's tests.
 
-``python serve.py [--mode live|replay] [--port N] [--seconds S]`` prints one line of JSON with the
-address, then obeys lines on standard input (``freeze``, ``go``, ``finish``, ``stop``, ``start``,
-``snapshot T``) and ends with it. Each answers with a line of JSON. Everything is a function of run time:
-`snapshot`.
+``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER]`` prints one line of JSON with
+the address (with ``--tls`` those of each role, by an authority that is made in the folder), then obeys lines
+on standard input (``freeze``, ``go``, ``finish``, ``stop``, ``start``, ``snapshot T``) and ends with it. Each
+answers with a line of JSON. Everything is a function of run time: `snapshot`.
 """
 
 from __future__ import annotations
 
 import argparse
+import base64
+import hashlib
 import json
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import msgspec
 import numpy as np
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from made_up_cell import PERIOD, snapshot, workstation
 
+from seerob.app.server import certificates
+from seerob.app.server.access import Tokens
 from seerob.app.server.live import Live
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
@@ -48,6 +55,13 @@ class Remembered:
 def _say(**fields: object) -> None:
     sys.stdout.write(json.dumps(fields) + "\n")
     sys.stdout.flush()
+
+
+def _pin(certificate: Path) -> str:
+    """What browsers take for the key of a certificate on their command line."""
+    key = x509.load_pem_x509_certificate(certificate.read_bytes()).public_key()
+    der = key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
+    return base64.b64encode(hashlib.sha256(der).digest()).decode()
 
 
 def _publish(live: Live, frozen: threading.Event, over: threading.Event) -> None:
@@ -80,7 +94,9 @@ def main() -> None:
     parser.add_argument("--mode", choices=("live", "replay"), default="live")
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=24.0)
+    parser.add_argument("--tls", type=Path)
     options = parser.parse_args()
+    tls = certificates.own(options.tls, "127.0.0.1") if options.tls else None
     scene, meshes = workstation()
     frozen, over = threading.Event(), threading.Event()
     recording = Remembered(scene, options.seconds) if options.mode == "replay" else None
@@ -89,8 +105,10 @@ def main() -> None:
 
     def open_server(port: int) -> Server:
         feed = Player(recording) if recording else live
-        server = Server(scene=scene, meshes=meshes, feed=feed, port=port)
-        _say(url=server.start(), port=server.port)
+        tokens = Tokens.made() if tls else None
+        server = Server(scene=scene, meshes=meshes, feed=feed, port=port, tokens=tokens, tls=tls)
+        pin = _pin(tls.authority) if tls and tls.authority else None
+        _say(url=server.start(), port=server.port, urls=server.urls, pin=pin)
         return server
 
     server = open_server(options.port)

@@ -17,6 +17,9 @@ LARGEST = 1e6
 """A value beyond it is no motion of a robot [rad, m, and per second; N·m or N]."""
 LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
 """Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
+REPEATED = 2e-6
+"""What is said again with a doubt follows by less [s] (`device_clock.AFTER`): it is of the same
+instant, also where that lies ahead."""
 
 
 class Quality(StrEnum):

@@ -330,7 +330,7 @@ class Engine:
                 jump = said if t <= until else ""
             torques = None if sample is None else torques_of(sample)
             off = None if sample is None else self._speed_error(name, sample)
-            hearing.heard.append(Heard(t, reason or jump, torques, off))
+            hearing.take(Heard(t, reason or jump, torques, off))
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
 
     def _speed_error(self, name: str, sample: JointSample | PoseSample) -> Array | None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from seerob.core.errors import Undecided
-from seerob.core.samples import Quality, SignalSample
+from seerob.core.samples import REPEATED, Quality, SignalSample
 from seerob.workstation.variables.dictionary import Value, Variable
 
 DEFAULT_TIMEOUT = 1.0
@@ -51,10 +53,15 @@ class Signals:
         self._heard: dict[str, list[SignalSample]] = {}
 
     def take(self, sample: SignalSample) -> None:
-        """Hear a picture; one that is older than the newest is dropped."""
+        """Hear a picture; one that is older than the newest is dropped.
+
+        What is said again because run time fell behind is late from now on, also where that lies ahead.
+        """
         heard = self._heard.setdefault(sample.source, [])
         if heard and sample.t < heard[-1].t:
             return
+        if heard and sample.quality is Quality.LATE and sample.t - heard[-1].t < REPEATED:
+            heard[:] = [replace(s, quality=sample.quality) if s.quality is Quality.GOOD else s for s in heard]
         heard.append(sample)
         del heard[: len(heard) - MAX_KEPT]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from math import inf
 from time import monotonic
 from typing import NamedTuple
 
@@ -37,7 +38,7 @@ class Client:
     def __init__(self, socket: WebSocket, *, patience: float) -> None:
         self._socket, self._patience = socket, patience
         self._waiting: dict[str, bytes] = {}
-        self._seq = 0
+        self._seq, self._until = 0, inf
         self._in_flight: deque[int] = deque(maxlen=WINDOW)
         self._waiting_since: float | None = None
         self._wake = asyncio.Event()
@@ -45,7 +46,7 @@ class Client:
         self.sent = 0
         """Frames sent."""
         self.skipped = 0
-        """Frames that a newer one replaced before they could be sent."""
+        """Frames that a newer one replaced, or that got too old, before they could be sent."""
 
     @property
     def over(self) -> asyncio.Future[Closing]:
@@ -57,8 +58,14 @@ class Client:
         self._waiting[kind] = payload
         self._wake.set()
 
-    def offer_frame(self, seq: int, payload: bytes) -> None:
-        """Let a frame wait; it replaces an earlier one, and patience ends here."""
+    def offer_frame(self, seq: int, payload: bytes, until: float = inf) -> None:
+        """Let a frame wait; it replaces an earlier one, and patience ends here.
+
+        Args:
+            seq: Its number.
+            payload: It.
+            until: Monotonic time after which it is not sent any more [s].
+        """
         now = monotonic()
         if FRAME in self._waiting:
             self.skipped += 1
@@ -66,7 +73,7 @@ class Client:
             self._waiting_since = now
         elif now - self._waiting_since > self._patience:
             self.end(Closing(1013, f"nothing acknowledged for {self._patience:g} s"))
-        self._seq = seq
+        self._seq, self._until = seq, until
         self.offer(FRAME, payload)
 
     def acknowledge(self, seq: int) -> None:
@@ -89,6 +96,12 @@ class Client:
             if kind != FRAME:
                 return self._waiting.pop(kind)
             if len(self._in_flight) < WINDOW:
+                if monotonic() > self._until:
+                    # The process was stopped, or held up: what it had begun to send is no longer the present.
+                    del self._waiting[kind]
+                    self._waiting_since = None
+                    self.skipped += 1
+                    return self._next()
                 self._in_flight.append(self._seq)
                 self._waiting_since = None
                 self.sent += 1

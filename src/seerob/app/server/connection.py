@@ -177,6 +177,12 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
         self._held = False
         self._read_on()
 
+    async def send(self, message: Any) -> None:
+        """Send; who was refused has been answered, too, which is no error for the log."""
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
+            self.handshake_complete = True
+
     async def receive(self) -> Any:
         """Give what came to the application, which makes it read on."""
         message = await super().receive()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Protocol
 
 from seerob.core.snapshot import Command, History, Snapshot, SoFar, Transport
@@ -10,8 +11,13 @@ from seerob.core.snapshot import Command, History, Snapshot, SoFar, Transport
 class Audience(Protocol):
     """The pages that are connected. Only to be called in the server's own loop."""
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Send a snapshot; a page that is behind gets the newest only."""
+    def show(self, snapshot: Snapshot, until: float = inf) -> None:
+        """Send a snapshot; a page that is behind gets the newest only, and none that is sent later.
+
+        Args:
+            snapshot: It.
+            until: Monotonic time from which on it is not the present any more [s].
+        """
 
     def tell(self, message: Transport | History | SoFar) -> None:
         """Send what changed; of each kind the newest only."""

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import msgspec
@@ -89,17 +89,18 @@ class Hub:
         self._scene = _encode(scene)
         self._shared = {kind: Allowance(*rate) for kind, rate in SHARED.items()}
         self._newest: Snapshot | None = None
+        self._until = inf
         self._ended: Closing | None = None
         self.clients: set[Client] = set()
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Send a snapshot to every page."""
-        self._newest = snapshot
+    def show(self, snapshot: Snapshot, until: float = inf) -> None:
+        """Send a snapshot to every page, if it is sent before ``until`` [s], monotonic time."""
+        self._newest, self._until = snapshot, until
         if not self.clients:
             return
         payload = _encode(snapshot)
         for client in self.clients:
-            client.offer_frame(snapshot.seq, payload)
+            client.offer_frame(snapshot.seq, payload, until)
 
     def tell(self, message: Transport | History | SoFar) -> None:
         """Send a change to every page."""
@@ -144,7 +145,7 @@ class Hub:
             client.offer("SoFar", _encode(so_far))
         client.offer("Transport", _encode(self._feed.transport()))
         if self._newest is not None:
-            client.offer_frame(self._newest.seq, _encode(self._newest))
+            client.offer_frame(self._newest.seq, _encode(self._newest), self._until)
         self.clients.add(client)
         visit = self._visits.come(state["role"], address)
         listening = self._listen(client, socket, visit, state["roles"])

@@ -162,7 +162,7 @@ class Live:
         self._pause = 1.0 / rate
         self._inbox: deque[tuple[Snapshot, float]] = deque(maxlen=WAITING)
         self._published: tuple[float, float] | None = None
-        self._interrupted = False
+        self._slow = 0.0
         self._past = Past()
         self._newest = 0.0
         self._finished = False
@@ -173,13 +173,13 @@ class Live:
         """Hand over what is now; returns at once."""
         # The server's thread comes and looks. Waking it would be a system call, after which this
         # thread may have to wait for the interpreter's lock: 5 ms of a 10 ms tick.
-        now = monotonic()
+        now, interrupted = monotonic(), False
         if self._published is not None:
             pause = now - self._published[1] - max(snapshot.t - self._published[0], 0.0)
-            # One that always takes so long is slow, not interrupted.
-            self._interrupted = pause > OLD and not self._interrupted
+            # One that always takes about so long is slow, not interrupted.
+            interrupted, self._slow = pause > max(OLD, 2 * self._slow), pause
         self._published = snapshot.t, now
-        self._inbox.append((snapshot, -inf if self._interrupted else now))
+        self._inbox.append((snapshot, -inf if interrupted else now))
 
     def finish(self) -> None:
         """Say that no more will come, so that no page takes the last picture for the present."""
@@ -203,6 +203,7 @@ class Live:
     async def run(self, audience: Audience) -> None:
         """Show the newest, at most ``rate`` times a second, until cancelled."""
         said_finished = False
+        last: Snapshot | None = None
         told: tuple[object, ...] = ()
         again = 0.0
         while True:
@@ -212,9 +213,10 @@ class Live:
                 newest, then = self._inbox.popleft()
                 self._past.add(newest)
             if newest is not None:
+                last = newest
                 self._newest = newest.t
                 if finished or monotonic() - then <= OLD:
-                    audience.show(newest)
+                    audience.show(newest, inf if finished else then + OLD)
                 self._past.tidy()
             now = monotonic()
             if (
@@ -226,6 +228,8 @@ class Live:
                 audience.tell(self.log.so_far(whole=finished))
             if finished and not said_finished:
                 audience.tell(self.transport())
+                if last is not None:
+                    audience.show(last)
                 said_finished = True
             await asyncio.sleep(self._pause)
 

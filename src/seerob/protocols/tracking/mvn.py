@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.datagrams import distrust
 
 PORT = 9763
 LARGEST = 1 << 16
@@ -354,6 +355,10 @@ def pack_scale(
 
 LATE = 64
 """Samples back that are late; further back it is a new start."""
+REORDERED = 0.25
+"""What is older than the newest by more was not overtaken on the way [s]: it is played again, or of two."""
+FASTEST = 240.0
+"""Samples per second at most [Hz]."""
 MAX_PARTS = 16
 """Of one sample: 67 segments of 44 bytes fill two."""
 MAX_WAITING = 32
@@ -398,7 +403,7 @@ class Assembly:
 
     def __init__(self) -> None:
         self.losses = Losses()
-        self._newest: dict[_Key, int] = {}
+        self._newest: dict[_Key, Header] = {}
         self._waiting: OrderedDict[tuple[_Key, int], _Waiting] = OrderedDict()
 
     def feed(self, datagram: Items) -> Items | None:
@@ -407,12 +412,15 @@ class Assembly:
         key = _Key(header.character, -1 if header.kind is None else int(header.kind))
         newest = self._newest.get(key)
         if newest is not None:
-            back = (newest - header.sample) % _TURN
+            back = (newest.sample - header.sample) % _TURN
             if back == 0:
                 self.losses.doubled += 1
                 return None
             if back <= LATE:
                 self.losses.late += 1
+                old = max((newest.time_code - header.time_code) / 1000, back / FASTEST)
+                if old > REORDERED:
+                    distrust(f"MVN says again what is {old:.2f} s old: played again, or of two senders")
                 return None
         if header.last and header.part == 0:
             self._done(key, header)
@@ -448,9 +456,9 @@ class Assembly:
     def _done(self, key: _Key, header: Header) -> None:
         """A sample is whole: it is the newest, and what waits that is older is lost."""
         before = self._newest.get(key)
-        if before is not None and (ahead := (header.sample - before) % _TURN) < _TURN // 2:
+        if before is not None and (ahead := (header.sample - before.sample) % _TURN) < _TURN // 2:
             self.losses.skipped += ahead - 1
-        self._newest[key] = header.sample
+        self._newest[key] = header
         self._waiting.pop((key, header.sample), None)
         if self._waiting:
             old = [

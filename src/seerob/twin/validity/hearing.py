@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seerob.core.samples import REPEATED
 from seerob.core.transforms import Array
 from seerob.description.capture.estimated import estimated
 from seerob.description.capture.following import Followed, PartDoubt
@@ -19,11 +20,6 @@ from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 STANDS = 1e-2
 """Speed below which a motion that ends has stopped [rad/s or m/s]: noise of encoders makes standing robots
 as fast, and within the time-out nothing gets farther than some millimetres."""
-
-
-REPEATED = 2e-6
-"""What is said again with a doubt follows by less [s] (`device_clock.AFTER`): it is of the same
-instant, also where that lies ahead."""
 
 
 class Places(NamedTuple):
@@ -116,9 +112,19 @@ class Hearing:
     coarse: str = ""
     """Why what is heard is too coarse for energies and forces; empty when it is not."""
 
+    def take(self, said: Heard) -> None:
+        """Take what one sample said.
+
+        What is said again with a doubt holds from now on: also what was heard before it and lies ahead of the
+        tick is in doubt.
+        """
+        if said.reason and self.heard and said.t - self.heard[-1].t < REPEATED:
+            self.heard = [h if h.reason else h._replace(reason=said.reason) for h in self.heard]
+        self.heard.append(said)
+
     def follow(self, found: Followed) -> None:
         """Take what devices told of a person at one instant."""
-        self.heard.append(Heard(found.t, found.reason))
+        self.take(Heard(found.t, found.reason))
         places = Places(found.unplaced, found.displaced, found.slack)
         self.bones_heard.append(
             BonesHeard(found.t, found.parts, found.observed, found.bare, found.unaimed, found.untold, places)

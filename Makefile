@@ -123,10 +123,11 @@ build: $(DEV) $(PAGE)
 	$(BIN)/python -m build --no-isolation --wheel --sdist
 	$(BIN)/python scripts/sbom dist/seerob.cdx.json
 
-# Known flaws of what is locked: asks the advisory database, and needs pip-audit (pipx install pip-audit).
+# Known flaws of what is locked: asks the advisory database, fails where that does not answer, and needs pip-audit
+# (pipx install pip-audit).
 audit:
-	pip-audit --require-hashes --disable-pip -r requirements/run.txt
-	pip-audit --require-hashes --disable-pip -r requirements/dev.txt
+	pip-audit --strict --require-hashes --disable-pip -r requirements/run.txt
+	pip-audit --strict --require-hashes --disable-pip -r requirements/dev.txt
 
 # Each limit, sign, unit and comparison of the verdicts changed in turn: minutes.
 mutate: $(DEV)

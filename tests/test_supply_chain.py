@@ -9,12 +9,14 @@ from pathlib import Path
 
 HERE = Path(__file__).parents[1]
 FLAWED_BELOW = {
-    "starlette": "0.49.1",  # CVE-2025-62727
-    "pillow": "12.1.1",  # CVE-2026-25990
+    "starlette": "1.0.1",  # CVE-2025-62727 (0.49.1), CVE-2026-48710: a Host header that poisons the path
+    "pillow": "12.3",  # CVE-2026-25990 (12.1.1), CVE-2026-40192 (12.2), thirteen more in 12.3
     "protobuf": "6.33.5",  # CVE-2026-0994
-    "cbor2": "5.9",  # CVE-2026-26209
-    "cryptography": "46.0.5",  # CVE-2026-26007
+    "cbor2": "5.9",  # CVE-2025-68131 (5.8), CVE-2026-26209
+    # CVE-2026-26007 (46.0.5), CVE-2026-34073 (46.0.6), CVE-2026-39892 (46.0.7), CVE-2026-69247 and 69248
+    "cryptography": "50.0",
     "h11": "0.16",  # CVE-2025-43859
+    "lxml": "6.1",  # CVE-2026-41066; of tests only
 }
 
 
@@ -28,6 +30,13 @@ def test_floors_are_above_releases_with_known_flaws():
     floors = dict(m.groups() for d in wanted if (m := re.match(r"([\w.-]+)>=([\d.]+)", d)))
     for name, least in FLAWED_BELOW.items():
         assert version(floors[name]) >= version(least), name
+
+
+def test_an_audit_that_can_ask_nobody_fails():
+    said = subprocess.run(["make", "-n", "audit"], cwd=HERE, capture_output=True, text=True, check=True).stdout
+    lines = [line for line in said.splitlines() if line.startswith("pip-audit")]
+    assert lines
+    assert all("--strict" in line for line in lines)
 
 
 def test_the_bill_of_materials_lists_what_is_locked_and_asks_nobody(tmp_path):

@@ -33,7 +33,9 @@ def test_floors_are_above_releases_with_known_flaws():
 
 
 def test_an_audit_that_can_ask_nobody_fails():
-    said = subprocess.run(["make", "-n", "audit"], cwd=HERE, capture_output=True, text=True, check=True).stdout
+    said = subprocess.run(
+        ["make", "-n", "audit"], cwd=HERE, capture_output=True, text=True, check=True
+    ).stdout
     lines = [line for line in said.splitlines() if line.startswith("pip-audit")]
     assert lines
     assert all("--strict" in line for line in lines)

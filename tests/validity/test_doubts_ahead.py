@@ -1,4 +1,4 @@
-"""What is said again with a doubt holds from now on: also what was heard before and lies ahead of the tick."""
+"""What is said again with a doubt holds from now on: also for what was heard before and lies ahead."""
 
 from seerob.core.samples import Quality, SignalSample
 from seerob.twin.signals import Signals

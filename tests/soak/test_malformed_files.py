@@ -1,7 +1,14 @@
 """Any file may be given to a reader: it is read, or refused with what is wrong, and nothing else happens."""
 
+import contextlib
+import io
+import warnings
+import zipfile
+
 import pytest
 
+from seerob.core.errors import SeerobError
+from soak.corpus import corpus
 from soak.hammering import hammer, hammer_in_processes, in_this_process
 from soak.made_cells import KINDS
 
@@ -24,6 +31,51 @@ def test_broken_files_are_read_or_refused(kind):
         counts = hammer(kind, 0, FEW - IN_THEIR_PROCESS)
     assert counts["read"] > 0
     assert counts["refused"] > FEW // 8
+
+
+FOUND = [
+    ("urdf", b'axis xyz="0 0 1"', b'axis xyz="0 -1e308 1"'),
+    (
+        "urdf",
+        b'radius="0.05"/></geometry></collision></link>\n<joint',
+        b'radius="1e-320"/></geometry></collision></link><joint',
+    ),
+    ("mjcf", b'size="0.05"/>\n<body', b'size="nan"/><body'),
+    ("mjcf", b'pos="0 0 0.1" mass', b'pos="-1e308 0 0.1" mass'),
+    ("mjcf", b'axis="1 0 0"', b'axis="-1e-320 0 0"'),
+    ("mjcf", b'euler="0 90 0"', b'euler="0 1e308 0"'),
+    ("mjcf", b'fromto="0 0 0 0 0 0.3"', b'fromto="0 0 0 0 0 1e308"'),
+    ("ply text", b"vertex 8", b"vertex " + b"1" * 5000),
+    ("obj", b"f ", b"v inf 0 0\nf "),
+    ("waypoints xlsx", b'<row r="2">', b'<row r="999999999">'),
+]
+"""Kind of file, what stands in the valid one, and what a hunt put there that hung, warned or raised."""
+
+
+@pytest.mark.parametrize(("kind", "there", "put"), FOUND)
+def test_what_a_hunt_found_is_read_or_refused(tmp_path, kind, there, put):
+    whole = corpus(kind)[0]
+    path = tmp_path / f"f.{KINDS[kind].suffix}"
+    if kind.endswith("xlsx"):
+        with zipfile.ZipFile(io.BytesIO(whole)) as old, zipfile.ZipFile(path, "w") as new:
+            for name in old.namelist():
+                new.writestr(name, old.read(name).replace(there, put))
+    else:
+        assert there in whole
+        path.write_bytes(whole.replace(there, put, 1))
+    with warnings.catch_warnings(), in_this_process(), contextlib.suppress(SeerobError):
+        warnings.simplefilter("error")
+        KINDS[kind].read(path)
+
+
+def test_a_signalling_nan_of_an_stl_is_refused(tmp_path):
+    whole = bytearray(corpus("stl")[0])
+    whole[96:100] = b"\x01\x00\x80\x7f"
+    (tmp_path / "f.stl").write_bytes(whole)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(SeerobError, match="not finite"):
+            KINDS["stl"].read(tmp_path / "f.stl")
 
 
 @pytest.mark.soak

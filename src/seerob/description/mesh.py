@@ -235,8 +235,9 @@ def _finished(source: MeshSource, raws: list[RawMesh], matrix: Array) -> tuple[N
     for raw in raws:
         name = _unique(printable(raw.name) or source.path.stem, taken)
         faces = raw.faces[:, ::-1] if mirrored else raw.faces
-        mesh = Mesh(raw.vertices @ matrix.T, faces.astype(np.int32), raw.color or Mesh.color)
-        mesh, said = tidied(mesh)
+        with np.errstate(all="ignore"):  # a vertex that no face uses may be anything
+            vertices = raw.vertices @ matrix.T
+        mesh, said = tidied(Mesh(vertices, faces.astype(np.int32), raw.color or Mesh.color))
         if said:
             source.note(f"{name}: {said}")
         if len(mesh.faces):

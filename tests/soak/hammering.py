@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from unittest.mock import patch
 
-from seerob.core.errors import SeerobError
+from seerob.core.errors import InputError, SeerobError
 from seerob.description.mesh_files import apart
 from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables import workbook
@@ -64,13 +64,22 @@ def hammer(kind, seed, files):
 def in_this_process():
     """Parsers that have a process of their own work in this one, where what they raise is seen."""
 
-    def here(function, *arguments, **_):
-        return function(*arguments)
+    def parsed(function, *arguments, file="", **_):
+        try:
+            return function(*arguments)
+        except MemoryError:  # which is a message of that process
+            raise InputError.at(file, "", "takes too much memory to read") from None
+
+    def parsed_one_by_one(function, *arguments, file="", **_):
+        try:
+            yield from function(*arguments)
+        except MemoryError:
+            raise InputError.at(file, "", "takes too much memory to read") from None
 
     with ExitStack() as stack:
         for module in (apart, workbook, kinect_bag):
-            for name in ("parsed", "parsed_one_by_one"):
-                stack.enter_context(patch.object(module, name, here, create=True))
+            for name, instead in (("parsed", parsed), ("parsed_one_by_one", parsed_one_by_one)):
+                stack.enter_context(patch.object(module, name, instead, create=True))
         yield
 
 

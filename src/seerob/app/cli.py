@@ -26,6 +26,7 @@ COMMANDS = (
     "replay",
     "report",
     "repair",
+    "share",
     "swept",
     "permissible",
     "plan",

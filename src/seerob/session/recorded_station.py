@@ -43,7 +43,7 @@ def load_recorded(
         recording.extract(Path(folder))
         allowed = Allowed(allow_plugins, allow_outside, replayed=True)
         try:
-            file = Path(folder) / _workstation_file(recording)
+            file = Path(folder) / workstation_file(recording)
             station = Station(read(file, allowed), cache=cache)
         except InputError as error:
             problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
@@ -61,7 +61,8 @@ def load_recorded(
     return station
 
 
-def _workstation_file(recording: Recording) -> str:
+def workstation_file(recording: Recording) -> str:
+    """Name of the workstation file among the files of a recording."""
     names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
     return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]
 

@@ -163,6 +163,17 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "tools[0].mass",
         set(),
     ),
+    "base under a roof": ({"base": "position = [0, 0, 9]"}, "robots[0].height", set()),
+    "x of the base with the other sign": (
+        {"base": "position = [-0.8, 0, 0.74]"},
+        "robots[0].stands_on_nothing",
+        set(),
+    ),
+    "y of the base with the other sign": (
+        {"base": "position = [0.8, -1.6, 0.74]", "table": "at = { position = [0.8, 1.6, 0.37] }"},
+        "robots[0].stands_on_nothing",
+        set(),
+    ),
     "above the payload": (
         {"tool": "shape = { box = [0.08, 0.1, 0.12] }\nmass = 8"},
         "robots[0].payload",

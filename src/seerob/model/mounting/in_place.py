@@ -28,6 +28,8 @@ SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
 """Bones that a person stands, sits or kneels with."""
 LEVEL = 0.05
 """What is not farther from z = 0 stands there [m]."""
+TOUCHES = 0.01
+"""A base that is so near to something stands on it, or beside it [m]."""
 SIGHT = 50.0
 """Farther apart is not measured [m]."""
 
@@ -58,6 +60,7 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _feet(model, place, place.still)
     yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
     yield from _parts(model, place)
+    yield from _bases(model, place)
     yield from _nobody(model, [place])
 
 
@@ -226,9 +229,13 @@ class _Home:
         ]
         return min(heights, default=0.0)
 
-    def distance(self, a: Sequence[int], b: Sequence[int], cap: float) -> float:
-        """Between two sets of bodies [m], at most ``cap``."""
-        return Query(self.shapes, a, b, cap=cap).minimum(self.rotations, self.positions).distance
+    def distance(self, a: Sequence[int], b: Sequence[int], cap: float, shift: Array | None = None) -> float:
+        """Between two sets of bodies [m], at most ``cap``; the first one moved by ``shift`` [m]."""
+        positions = self.positions
+        if shift is not None:
+            positions = positions.copy()
+            positions[list(a)] += shift
+        return Query(self.shapes, a, b, cap=cap).minimum(self.rotations, positions).distance
 
     def depth(self, outer: Body, inner: Body) -> float:
         """How deep one reaches into the other [m]."""
@@ -326,6 +333,36 @@ def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quan
                     said,
                     table.name,
                 )
+
+
+def _bases(model: Model, place: _Home) -> Iterator[Quantity]:
+    """How high bases of robots are, and how far from anything that they would stand on with another sign."""
+    standing = _standing(model)
+    for i, robot in enumerate(model.workstation.robots):
+        own = [b for b in standing if b.owner == robot.name]
+        if robot.on or not own:
+            continue
+        at = robot.base.position[2]
+        said = f"the base of {robot.name} above z = 0"
+        yield Quantity(f"robots[{i}].height", "robots.height", "m", (at,), (robot.name,), said, robot.name)
+        base, others = [b.index for b in own], [b.index for b in standing if b.owner != robot.name]
+        if not others or abs(place.lowest(own)) <= LEVEL:
+            continue
+        gap = place.distance(base, others, SIGHT)
+        if gap <= LEVEL:
+            continue
+        for words, sign in (("x", (-1, 1)), ("y", (1, -1)), ("x and of y", (-1, -1))):
+            moved = [*robot.base.position]
+            moved[0], moved[1] = sign[0] * moved[0], sign[1] * moved[1]
+            shift = np.subtract(moved, robot.base.position)
+            if not shift.any() or place.distance(base, others, LEVEL, shift) > TOUCHES:
+                continue
+            said = f"from the base of {robot.name} to anything; with the other sign of {words} on something"
+            key = "stands_on_nothing"
+            yield Quantity(
+                f"robots[{i}].{key}", f"robots.{key}", "m", (gap,), (robot.name,), said, robot.name
+            )
+            break
 
 
 def _parts(model: Model, place: _Home) -> Iterator[Quantity]:

@@ -30,7 +30,15 @@ Entries = Mapping[str, Mapping[int, Any]]
 LISTS = ("robots", "tools", "workpieces", "parts", "machines", "areas", "sensors", "humans", "phases")
 PLUGINS = ("sources", "safety", "ergonomics")
 FOLLOWS: dict[str, tuple[str, ...]] = {
-    "robots": ("payload", "published_mass.share", "constraints_left_out", "nobody_within", "inside."),
+    "robots": (
+        "payload",
+        "published_mass.share",
+        "constraints_left_out",
+        "nobody_within",
+        "inside.",
+        "height",
+        "stands_on_nothing",
+    ),
     "tools": ("mass", "extent", "bulk_density"),
     "workpieces": ("mass", "extent", "bulk_density"),
     "parts": ("extent", "bulk_density", "inside."),

@@ -183,6 +183,48 @@ def test_peaks_are_those_of_the_first_half_second_and_of_the_rest() -> None:
     assert peaks(t[:500], force[:500]) == (250.0, None)
 
 
+def pressed(peak: float, zero: float = 0.0, gone: float = 0.0) -> str:
+    """A contact of 200 ms after 0.1 s of rest, about a zero that is off, with nothing said for a while."""
+    t = np.arange(0, 0.6, 1e-3)
+    force = peak * np.sin(np.pi * np.clip((t - 0.1) / 0.2, 0, 1))
+    force[(t > 0.18) & (t <= 0.18 + gone)] = 0
+    return "Time [s];Force [N]\n" + "".join(
+        f"{a:.4f};{b + zero:.4f}\n" for a, b in zip(t, force, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("record", "verdict", "reason"),
+    [
+        (pressed(250), Verdict.WITHIN, ""),
+        (pressed(290), Verdict.EXCEEDED, "above its limit"),
+        (pressed(290, zero=-30), Verdict.EXCEEDED, "above its limit"),  # tells 260
+        (pressed(250, zero=40), Verdict.EXCEEDED, "above its limit"),  # what it tells counts, too
+        (pressed(290, gone=0.05), Verdict.UNDECIDED, "it drops out at 0.18"),
+    ],
+)
+def test_a_zero_that_is_off_and_a_loose_cable_hide_no_peak(tmp_path, record, verdict, reason) -> None:
+    files = {"belt.csv": record}
+    part = chest(cell(tmp_path, entry(curve='"belt.csv"', force_N=None), files=files))
+    assert part.verdict is verdict
+    assert reason in part.reason
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"spring_N_mm": "25000"}, "spring_N_mm = 25000 N/mm"),
+        ({"pressure_N_cm2": "1.5"}, "contact_area = 0.0133333 m²"),  # N/mm²
+    ],
+)
+def test_units_that_nobody_means_leave_it_open_and_relieve_nothing(tmp_path, changed, reason) -> None:
+    part = chest(cell(tmp_path / "a", entry(**changed)))
+    assert part.verdict is Verdict.UNDECIDED
+    assert reason in part.reason
+    more = "281" if "pressure_N_cm2" not in changed else "2810"
+    assert chest(cell(tmp_path / "b", entry(**changed, force_N=more))).verdict is not Verdict.WITHIN
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_no_sample_of_a_contact_is_in_neither_peak(seed: int) -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -41,6 +41,7 @@ from seerob.criteria.criterion import worst
 from seerob.files.tables.grid import read_numbers
 from seerob.files.tables.text import TextGrid, check_file, encoding_of, head
 from seerob.model.model import Mechanism, Model
+from seerob.workstation.plausibility.ranges import Quantity, implausible, row_of, sentence
 
 Flags = NDArray[np.bool_]
 
@@ -54,6 +55,8 @@ working range and not linear (GTE, 1S)."""
 COARSE = 2e-3
 """Largest step of a record that shows its peak [s]: of half a sine of 9 ms, the shortest contact of the table
 (a hand, 0.6 kg and 75 N/mm: π √(m/k)), samples so far apart meet 94 % at least. Own choice (D)."""
+DROPS = 0.3
+"""Share of its largest force from which no contact falls to nothing in a sample. Own choice (D)."""
 FLAT = 10
 """So many samples in a row at the largest force are the end of a device's range, rather than a peak."""
 CALIBRATED = dt.timedelta(days=366)
@@ -133,6 +136,8 @@ class Measured:
     """Why it may say more than a body part would feel."""
     unshown: tuple[str, ...] = ()
     """Why its record may not show the largest force."""
+    odd: tuple[str, ...] = ()
+    """What of it nobody would type."""
 
     @property
     def name(self) -> str:
@@ -162,6 +167,13 @@ def peaks(t: Array, force: Array) -> tuple[float, float | None]:
     return float(force[early].max()), static
 
 
+def risen(force: Array) -> Array:
+    """Forces [N], shape (n,), by which they rose, where the device rests below 0: its zero is off."""
+    force = number("force", force)
+    before = force[: int(np.argmax(force >= BEGIN * float(force.max())))]
+    return force - min(float(np.median(before)), 0.0) if len(before) else force
+
+
 def missing(t: Array, force: Array) -> tuple[str, ...]:
     """Why a record may not show the largest force of its contact.
 
@@ -183,6 +195,10 @@ def missing(t: Array, force: Array) -> tuple[str, ...]:
     step = float(np.diff(seen).max(initial=0.0))
     if step > COARSE * (1 + ROUNDING):
         found.append(f"samples are {1e3 * step:.3g} ms apart, and a peak between them is not seen")
+    # Who is let go feels less and less; a loose cable says nothing from one sample to the next.
+    gone = np.flatnonzero((force[:-1] >= DROPS * peak) & ~touches[1:])
+    if len(gone) and touches[gone[0] + 1 :].any():
+        found.append(f"it drops out at {t[gone[0] + 1]:.4g} s, from {force[gone[0]]:.4g} N, and comes back")
     top = np.concatenate([[False], force == peak, [False]]).astype(int)
     starts, ends = (np.flatnonzero(np.diff(top) == way) for way in (1, -1))
     if int((ends - starts).max()) >= FLAT:
@@ -261,8 +277,9 @@ class Measurements:
             if not model.workstation.outside and (real := leads_outside(folder / said.curve, folder)):
                 what = f"leads to {real}, outside the folder of the workstation"
                 raise InputError.at(self._file, f"curve {said.curve}", what, REMEDY)
-            record = read_curve(folder / said.curve, said.curve)
-            (transient, static), unshown = peaks(*record), missing(*record)
+            t, force = read_curve(folder / said.curve, said.curve)
+            force = risen(force)
+            (transient, static), unshown = peaks(t, force), missing(t, force)
         pressure = None if said.pressure_N_cm2 is None else said.pressure_N_cm2 * 1e4
         rows = tuple(k for k, body in enumerate(robot.moving) if body in bodies)
         k = float(self._arrays.stiffness[column])
@@ -278,7 +295,8 @@ class Measurements:
         elif sorted(set(said.tools)) != self._carried:
             now, then = (", ".join(those) or "nothing" for those in (self._carried, sorted(said.tools)))
             doubts.append(f"the robot carried {then}, and carries {now} here")
-        return Measured(said, rows, column, transient, static, pressure, tuple(doubts), stiff, unshown)
+        odd = tuple(_implausible(said, transient, pressure))
+        return Measured(said, rows, column, transient, static, pressure, tuple(doubts), stiff, unshown, odd)
 
     def results(self, column: int, v: Array, near: Flags, clamped: Flags) -> tuple[Result, ...]:
         """What was measured of a body region, against its limits.
@@ -318,7 +336,7 @@ class Measurements:
         said, arrays, column = one.said, self._arrays, one.column
         multiplier, F = float(arrays.multiplier[column]), float(arrays.force[column])
         free = said.contact == "free"
-        doubts, above = list(one.doubts), [*(d for d in one.doubts if "softer" not in d)]
+        doubts, above = [*one.doubts, *one.odd], [*(d for d in one.doubts if "softer" not in d)]
         above += [one.stiff] if one.stiff else []
         if v > said.speed * (1 + ROUNDING):
             doubts.append(f"measured at {said.speed:g} m/s, and it moves at {v:.3g} m/s here")
@@ -379,6 +397,20 @@ class Measurements:
                         Input(name=of, value=value, unit=unit, origin=Origin.MEASURED, source=source)
                     )
         return tuple(found)
+
+
+def _implausible(said: Measurement, force: float | None, pressure: float | None) -> Iterator[str]:
+    """What of a measurement nobody would type: units of springs and pressures."""
+    figures = {"spring_N_mm": ("N/mm", said.spring_N_mm)}
+    if force is not None and pressure is not None:
+        figures["contact_area"] = ("m²", force / pressure)
+    for name, (unit, value) in figures.items():
+        if value is None:
+            continue
+        quantity = Quantity(name, f"measurements.{name}", unit, (value,), (), f"{said.part} on {said.region}")
+        row = row_of(quantity)
+        if row is not None and implausible(quantity.values, row) is not None:
+            yield sentence(quantity, value, row)
 
 
 def _undated(said: Measurement) -> list[str]:

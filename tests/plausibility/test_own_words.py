@@ -428,3 +428,35 @@ def test_noise_of_derived_speeds_is_an_interval(tmp_path: Path) -> None:
 def test_small_torques_tell_no_sign() -> None:
     assert sign_or_unit(np.array([[1.0, -1.0]]), np.array([[-1.0, 1.0]])) == ""
     assert "opposite" in sign_or_unit(np.array([[10.0, -10.0]]), np.array([[-10.0, 10.0]]))
+
+
+@pytest.mark.parametrize(
+    ("payload", "share"),
+    [
+        (0.0, 0.0),
+        (1.5, 0.0),
+        (1.6, 0.0),
+        (1.7, 1.0),
+        (np.where(np.arange(len(T)) < len(T) // 2, 1.5, 4), 0.5),
+    ],
+)
+@pytest.mark.parametrize("asked", ["run", "batch"])
+def test_what_a_log_has_at_the_flange_and_the_twin_has_not(tmp_path, payload, share, asked) -> None:
+    """From where on it says more than the twin carries, nothing that rests on the robot is within."""
+    log_of(tmp_path, MOVING, None)
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    figures = ["payload", *np.broadcast_to(payload, len(T))]
+    (tmp_path / "log.csv").write_text("".join(f"{a} {b}\n" for a, b in zip(lines, figures, strict=True)))
+    tool = '[[tools]]\nname = "gripper"\non = "arm/tool0"\nshape = { box = [0.1, 0.1, 0.1] }\nmass = 1.5\n'
+    made = station(tmp_path, tools=tool)
+    if asked == "batch":
+        found = made.batch()["distance"]
+        said, reasons = found.answers.verdict, found.reasons
+    else:
+        found = made.run().results["distance"]
+        said, reasons = found.verdicts, found.reasons
+    undecided = np.asarray(said) == 2
+    assert abs(undecided.mean() - share) < 0.05
+    assert all(
+        "kg at its flange, and the twin carries 1.5 kg" in reasons[k] for k in np.flatnonzero(undecided)
+    )

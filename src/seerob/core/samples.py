@@ -87,6 +87,8 @@ class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):
     """Where the source itself has the tool's working point, in the base frame of its controller [m]."""
     tcp_speed: float | None = None
     """How fast the source itself has that point [m/s]."""
+    payload: float | None = None
+    """What the source itself has at the robot's flange [kg]."""
     placed: bool = True
     """Whether it says where a person stands; if not, it is of the posture alone."""
 

@@ -195,6 +195,7 @@ class Engine:
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
         self._said: dict[str, own_words.LiveWords] = {}
+        self._carried = {name: own_words.carried(model, name) for name in model.mechanisms}
         """By robot, what its live source says of itself."""
         self._followings: dict[str, Following] = {}
         """By person that devices see."""
@@ -257,6 +258,8 @@ class Engine:
                 if mechanism.name in self._unread:
                     contradicted = self._contradicted(sample)
                     reason = reason or beyond_limits(sample, mechanism) or contradicted
+                if sample.payload is not None:
+                    reason = reason or own_words.heavier(sample.payload, self._carried[mechanism.name])
                 taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
             else:
                 taken, missed = self._take_pose(mechanism, sample)

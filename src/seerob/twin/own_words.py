@@ -62,6 +62,9 @@ ANCHORS = 10
 """Instants of a span that the newest is compared with."""
 EVERY, FEWEST = 0.1, 5
 """Live torques are looked at so often [s], and judged from so many on."""
+PAYLOAD_FLOOR, PAYLOAD_SHARE = 0.15, 0.1
+"""By so much more than the twin carries a controller may have at its flange [kg, share]: it is weighed by the
+arm's own torques, or typed in. Own choice."""
 UNITS = {1e3: "N·mm read as N·m", 1e-3: "kN·m read as N·m", 100.0: "N·cm read as N·m"}
 ROWS = 200
 """Samples whose torques are compared, evenly."""
@@ -120,6 +123,19 @@ def other_speed(said: Array, twin: Array) -> str:
     return (
         f"its own tool centre point moves at {a:.3g} m/s, the twin's at {b:.3g} m/s "
         f"(means over {int(seen.sum())} samples): are the times and the units of its joints right?"
+    )
+
+
+def heavier(said: float, twin: float) -> str:
+    """Why what a source has at the flange is not what the twin carries [kg]; empty when it may be.
+
+    Less than the twin carries is no contradiction: many programs never tell their controller.
+    """
+    if said <= twin + max(PAYLOAD_FLOOR, PAYLOAD_SHARE * twin):
+        return ""
+    return (
+        f"its source has {said:.4g} kg at its flange, and the twin carries {twin:.4g} kg: was the tool "
+        "changed, or something picked up (tools, workpieces)?"
     )
 
 
@@ -316,6 +332,12 @@ def _differ(then: _Ways, now: _Ways) -> str:
         f"its own tool centre point went {1e3 * said:.0f} mm in {span:.2g} s, "
         f"the twin's {1e3 * twin[k]:.0f} mm: the speeds that its source says are of no one motion"
     )
+
+
+def carried(model: Model, name: str) -> float:
+    """What the twin has on a robot, with all that its grippers ever hold, as far as weighed [kg]."""
+    masses = (model.bodies[i].mass for i in model.mechanisms[name].carried)
+    return sum(mass.value for mass in masses if mass is not None)
 
 
 def bound(model: Model, name: str) -> SaidTool | None:

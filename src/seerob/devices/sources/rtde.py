@@ -91,6 +91,7 @@ def joint_sample(values: Mapping[str, Value], *, target: str, arrived: float) ->
         tau=_vector(values["actual_current_as_torque"]) if "actual_current_as_torque" in values else None,
         tcp=_place(values["actual_TCP_pose"]) if "actual_TCP_pose" in values else None,
         tcp_speed=math.hypot(*_place(values["actual_TCP_speed"])) if "actual_TCP_speed" in values else None,
+        payload=_number(values["payload"]) if "payload" in values else None,
         quality=quality(_whole(values.get("robot_mode")), _safety(values)),
     )
 

@@ -53,8 +53,9 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
         tau = _vector(log, "actual_current_as_torque")
         # The rotation vector behind it tells nothing that the joints do not.
         tcp, speed = (_vector(log, f"{prefix}_TCP_{what}")[:3] for what in ("pose", "speed"))
+        payload = [c for c in ("payload",) if c in log.names]
         status: list[str] = [c for c in ("robot_mode", "safety_status", "safety_mode") if c in log.names]
-        values = log.read(["timestamp", *q, *qd, *tau, *tcp, *speed, *status])
+        values = log.read(["timestamp", *q, *qd, *tau, *tcp, *speed, *payload, *status])
         invalid, warnings = _status(values, status)
         trajectory = Trajectory(
             file=self.file,
@@ -64,6 +65,7 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
             tau=values.table(tau) if len(tau) == len(q) else None,
             tcp_position=values.table(tcp) if tcp else None,
             tcp_speed=np.linalg.norm(values.table(speed), axis=1) if speed else None,
+            payload=values.column("payload") if payload else None,
             tcp_in_base=True,
             invalid=invalid,
             rows=values.rows,

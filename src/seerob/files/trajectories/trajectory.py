@@ -187,6 +187,8 @@ class Trajectory(Timed):
     """Orientation of the tool in whatever frame the file uses, unit quaternions, shape (n, 4)."""
     tcp_speed: Array | None = None
     """Speed of that point as the file gives it [m/s], shape (n,)."""
+    payload: Array | None = None
+    """What the file has at the robot's flange [kg], shape (n,)."""
     tcp_in_base: bool = False
     """Whether that frame is the base of the robot's controller."""
     degrees: bool = False
@@ -339,4 +341,5 @@ class TrajectorySamples:
                 tau=None if motion.tau is None else tuple(motion.tau[i].tolist()),
                 tcp=None if tcp is None else tuple(tcp[i].tolist()),
                 tcp_speed=None if motion.tcp_speed is None else float(motion.tcp_speed[i]),
+                payload=None if motion.payload is None else float(motion.payload[i]),
             )

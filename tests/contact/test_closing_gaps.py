@@ -104,7 +104,7 @@ def case(request, shapes):
     left_out = frozenset({(ARM, WRIST), (BASE, ARM)})
     pairs = pinch_pairs(shapes, [ARM, WRIST, HAND], [SHELL], left_out, others=[WALL], still=[BASE], cap=CAP)
     speed, moving = brute_force(pairs, R, x, *v)
-    flags = clamps(pairs.batch(R, x), speed, TICK, thickness_of(pairs))
+    flags = clamps(pairs.batch(R, x), speed, thickness_of(pairs))
     fastest = np.array([pairs.fastest(f, v) for f, v in zip(flags, speed, strict=True)])
     return (R, x, np.stack(v, axis=1), moving), pairs, pairs.per_body(flags), fastest
 
@@ -119,7 +119,7 @@ def test_the_cases_have_something_to_say(case):
 def test_what_is_wanted_is_what_all_gaps_say(case, shapes, share):
     instants, pairs, every, fastest = case
     wanted = np.random.default_rng(7).random(every.shape) < share
-    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs), period=TICK)
+    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs))
     found = [gaps.clamped(*one) for one in zip(*instants, wanted, strict=True)]
     np.testing.assert_array_equal([flags for flags, _ in found], every & wanted)
     speeds = np.array([speed for _, speed in found])
@@ -138,16 +138,16 @@ def test_the_answer_is_that_of_the_instant_whatever_was_asked_before(case, shape
         return gaps.clamped(*(of[k] for of in instants), all_)[0]
 
     order = [*range(200, 260), *range(60, 0, -1), 299, 0]
-    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs), period=TICK)
+    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs))
     np.testing.assert_array_equal([asked(gaps, k) for k in order], every[order])
     for k in range(0, N, 60):
-        alone = ClosingGaps(shapes, pairs, thickness_of(pairs), period=TICK)
+        alone = ClosingGaps(shapes, pairs, thickness_of(pairs))
         np.testing.assert_array_equal(asked(alone, k), every[k])
 
 
 def test_without_gaps_nothing_is_clamped(shapes):
     pairs = pinch_pairs(shapes, [ARM], [], frozenset(), cap=CAP)
-    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs), period=TICK)
+    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs))
     R, x = np.tile(np.eye(3), (6, 1, 1)), np.zeros((6, 3))
     v = np.zeros((2, 6, 3))
     flags, speeds = gaps.clamped(R, x, v, np.ones(1), np.ones((1, 3), bool))
@@ -156,14 +156,14 @@ def test_without_gaps_nothing_is_clamped(shapes):
 
 
 @pytest.mark.parametrize(("farther", "clamps_it"), [(-1e-9, True), (1e-9, False)])
-def test_a_gap_counts_where_it_may_close_by_the_next_tick(shapes, farther, clamps_it):
-    """0.41 m from the wall's face to the capsule's axis less its radius; it goes 0.02 m in a tick."""
+def test_a_gap_counts_up_to_the_thickness_of_a_body_part(shapes, farther, clamps_it):
+    """0.39 m from the wall's face to the capsule's axis less its radius."""
     pairs = pinch_pairs(shapes, [ARM], [WALL], frozenset(), cap=CAP)
     thin = np.array([[True, False, False]])
     place = np.zeros((6, 3))
-    place[WALL, 0], place[ARM, 0] = 0.5, 0.34 - farther
+    place[WALL, 0], place[ARM, 0] = 0.5, 0.36 - farther
     R = np.tile(np.eye(3), (6, 1, 1))
-    assert pairs.gaps(R, place)[0] == pytest.approx(THICKNESS[0] + 0.02 + farther, abs=1e-12)
-    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs), period=TICK)
+    assert pairs.gaps(R, place)[0] == pytest.approx(THICKNESS[0] + farther, abs=1e-12)
+    gaps = ClosingGaps(shapes, pairs, thickness_of(pairs))
     found, _ = gaps.clamped(R, place, np.zeros((2, 6, 3)), np.array([2.0]), thin)
     assert found.tolist() == [[clamps_it, False, False]]

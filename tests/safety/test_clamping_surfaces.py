@@ -11,7 +11,7 @@ import trimesh
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.core.snapshot import Origin, Result
 from seerob.criteria.contact.clamped_regions import FloorGap
-from seerob.kernels.approach import lowest_and_falling
+from seerob.kernels.approach import lowest_points
 from seerob.session.station import Station, load
 
 HAND = "Hands and fingers"
@@ -135,31 +135,11 @@ def test_floor_clamps_as_a_part_in_its_place_does(tmp_path: Path) -> None:
     assert clamped(plane[HAND])
 
 
-@pytest.mark.parametrize(("tick", "expected"), [(0.01, False), (0.1, True)])
-def test_floor_counts_where_the_arm_may_be_by_the_next_tick(
-    tmp_path: Path, tick: float, expected: bool
-) -> None:
-    """0.11 m above the floor and falling at up to 0.4 m/s: in 10 ms above 0.1 m, in 100 ms below.
-
-    When it was asked before does not matter.
-    """
-    station = over_floor(tmp_path, 0.16)
-    state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
-    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0, period=tick)
-    thickness, wanted = np.array([0.1]), np.ones((2, 1), bool)
-    for t in (0.0, 0.1, 0.11, 0.05):
-        state.t = t
-        assert floor.clamped(state, thickness, wanted)[1, 0] == expected, t
-
-
 def test_a_gap_exactly_as_wide_as_the_body_part_clamps_it(tmp_path: Path) -> None:
     station = over_floor(tmp_path, 0.16)
     state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
-    floor = FloorGap(
-        station.model, station.model.robot("arm").moving, 0.0, period=station.model.workstation.engine.tick
-    )
-    gap, fall = floor.lowest_and_falling(state)[1]
-    exactly = gap - fall * station.model.workstation.engine.tick
+    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0)
+    exactly = floor.lowest(state)[1]
     thickness, wanted = np.array([exactly, np.nextafter(exactly, 0)]), np.ones((2, 2), bool)
     assert floor.clamped(state, thickness, wanted)[1].tolist() == [True, False]
 
@@ -170,7 +150,7 @@ def test_twice_what_surfaces_may_stick_out_is_added_to_body_parts(
 ) -> None:
     """Of two surfaces; the arm's visual is 20 mm thicker to either side: 100 mm of the hand become 140 mm.
 
-    The gap is z - 50 mm, at the next instant 4 mm less.
+    The gap is z - 50 mm.
     """
     thicker = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1 0.1 0.14"/></geometry></visual>'
     station = over_floor(tmp_path, z)
@@ -213,25 +193,22 @@ def test_basis_says_what_the_floor_is(tmp_path: Path, options: str, value: objec
     assert found.unit == ("" if value == "left out" else "m")
 
 
-def test_lowest_point_and_fall_of_a_dilated_mesh_are_those_of_its_vertices() -> None:
-    """And of points all over its rounded surface none is lower or falls faster."""
+def test_lowest_point_of_a_dilated_mesh_is_that_of_its_vertices() -> None:
+    """And of points all over its rounded surface none is lower."""
     rng = np.random.default_rng(5)
     points = trimesh.creation.box([0.3, 0.2, 0.1]).subdivide().vertices
     R, x = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3], rng.normal(size=3)
-    v, w, r = rng.normal(size=3) - [0, 0, 3], rng.normal(size=3), 0.04
-    found = np.empty((2, 2))
-    lowest_and_falling(
-        np.array([0, 0]), R[None].copy(), x[None], v[None], w[None],
+    r, found = 0.04, np.empty(2)
+    lowest_points(
+        np.array([0, 0]), R[None].copy(), x[None],
         np.ascontiguousarray(np.tile(points, (2, 1)), float), np.array([0, len(points), 2 * len(points)]),
         np.array([0.0, r]), found,
     )  # fmt: skip
     a = points @ R.T
-    np.testing.assert_allclose(found[0], [(x + a)[:, 2].min(), -(v + np.cross(w, a))[:, 2].min()], atol=1e-12)
+    assert found[0] == pytest.approx((x + a)[:, 2].min(), abs=1e-12)
     u = rng.normal(size=(20_000, 1, 3))
     a = (a + r * u / np.linalg.norm(u, axis=2, keepdims=True)).reshape(-1, 3)
-    brute = np.array([(x + a)[:, 2].min(), -(v + np.cross(w, a))[:, 2].min()])
-    assert found[1, 0] <= brute[0] < found[1, 0] + 1e-4
-    assert found[1, 1] >= brute[1] > found[1, 1] - 1e-2
+    assert found[1] <= (x + a)[:, 2].min() < found[1] + 1e-4
 
 
 # -- other robots -------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""How fast bodies move seen from other bodies, and how low they are and how fast they fall."""
+"""How fast bodies move seen from other bodies, and how low they are."""
 
 from __future__ import annotations
 
@@ -62,43 +62,32 @@ def relative_speeds(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lowest_and_falling(
+def lowest_points(
     bodies: Indices,
     rotations: Array,
     positions: Array,
-    linear: Array,
-    angular: Array,
     corners: Array,
     start: Indices,
     radius: Array,
     found: Array,
 ) -> None:
-    """Height of the lowest point of bodies and the largest downward speed of any of their points.
+    """Height of the lowest point of bodies; writes into the last argument.
 
-    Both are linear in the point: over a dilated hull they are extreme at a corner, moved by the radius.
+    It is linear in the point: over a dilated hull it is least at a corner, moved by the radius.
 
     Args:
         bodies: Which, shape (b,).
         rotations: World from body, shape (n, 3, 3).
         positions: World positions of the bodies' origins [m], shape (n, 3).
-        linear: Velocities of the origins, world axes [m/s], shape (n, 3).
-        angular: World axes [rad/s], shape (n, 3).
         corners: Points of these bodies whose hull, dilated by ``radius``, contains each [m], shape (k, 3).
         start: Where those of each begin, shape (b + 1,).
         radius: [m], shape (b,).
-        found: Receives height [m] and speed [m/s], infinity and 0 of a body without corners, shape (b, 2).
+        found: Receives heights [m], infinity of a body without corners, shape (b,).
     """
     for k in range(len(bodies)):
-        b = bodies[k]
-        R, w = rotations[b], angular[b]
-        low, fall = np.inf, -np.inf
+        R = rotations[bodies[k]]
+        low = np.inf
         for q in range(start[k], start[k + 1]):
             c = corners[q]
-            ax = R[0, 0] * c[0] + R[0, 1] * c[1] + R[0, 2] * c[2]
-            ay = R[1, 0] * c[0] + R[1, 1] * c[1] + R[1, 2] * c[2]
             low = min(low, R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
-            # What falls has a negative z of its velocity: that of ω × a is w_x a_y - w_y a_x.
-            fall = max(fall, w[1] * ax - w[0] * ay - linear[b, 2])
-        tilt = math.sqrt(w[0] * w[0] + w[1] * w[1])
-        found[k, 0] = positions[b, 2] + low - radius[k]
-        found[k, 1] = max(fall + tilt * radius[k], 0.0)
+        found[k] = positions[bodies[k], 2] + low - radius[k]

@@ -2,8 +2,7 @@
 
 People stand on z = 0 by definition, whether or not a part of the workstation is drawn there: unless told
 otherwise it is a surface like any other, endless and horizontal. A body that moves clamps against it where
-its lowest point is no higher than the body part is thick, or may be by the next tick at its present speed;
-see `seerob.criteria.contact.clamping`.
+its lowest point is no higher than the body part is thick; see `seerob.criteria.contact.clamping`.
 
 Shapes are asked about a gap only where the answer can depend on it. The rule is
 that of `seerob.criteria.contact.clamping.clamps`. Most gaps need not be measured to know that
@@ -21,7 +20,6 @@ import numpy as np
 from seerob.core.snapshot import Input, Origin
 from seerob.core.transforms import Array
 from seerob.criteria.contact.clamping import (
-    AHEAD,
     STILL,
     Flags,
     PinchPairs,
@@ -32,7 +30,7 @@ from seerob.criteria.contact.clamping import (
 from seerob.criteria.contact.joint_gaps import JointGaps
 from seerob.description.norms.crushing_gaps import crushing_gaps, openings, sizes
 from seerob.distance.least import DistanceKind, Survey
-from seerob.kernels.approach import lowest_and_falling, relative_speeds
+from seerob.kernels.approach import lowest_points, relative_speeds
 from seerob.kernels.pairs import CORNERS
 from seerob.kernels.shapes import Shapes
 from seerob.kernels.speed import stacked
@@ -48,16 +46,15 @@ ROUNDING = 1e-9
 class ClosingGaps:
     """The gaps of a robot, bound once."""
 
-    def __init__(self, shapes: Shapes, pairs: PinchPairs, thickness: Array, *, period: float) -> None:
+    def __init__(self, shapes: Shapes, pairs: PinchPairs, thickness: Array) -> None:
         """Bind.
 
         Args:
             shapes: Of the model.
             pairs: Its gaps.
             thickness: Of the body parts that each can clamp [m], shape (g, r).
-            period: Of the ticks at which they are asked for [s].
         """
-        self._pairs, self._thickness, self._period = pairs, thickness, period
+        self._pairs, self._thickness = pairs, thickness
         self._shapes = shapes
         self._survey = Survey(shapes, pairs.queries) if pairs.queries else None
         self._hulls = stacked([_corners(shapes, body) for body in range(len(shapes.names))])
@@ -135,13 +132,13 @@ class ClosingGaps:
         rows = np.concatenate([wanted, np.zeros((1, wanted.shape[1]), bool)])
         of_gaps = (rows[pairs.first] | rows[pairs.second]) & (speed > STILL)[:, None]
         widest = np.where(of_gaps, self._thickness, -np.inf).max(axis=1)
-        caps = widest + np.minimum(speed * self._period, AHEAD) + ways + ROUNDING
+        caps = widest + ways + ROUNDING
         if not (caps > -np.inf).any():
             return nothing
         found = self._survey.within(rotations, positions, caps)
         known = (caps > -np.inf) & (found.kind != DistanceKind.BEYOND_CAP)
         gaps = np.where(known, found.distance - ways, np.inf)
-        flags = clamps(gaps, speed, self._period, self._thickness) & of_gaps
+        flags = clamps(gaps, speed, self._thickness) & of_gaps
         return np.asarray(pairs.per_body(flags) & wanted), pairs.fastest(flags, speed) * wanted
 
 
@@ -162,30 +159,24 @@ ROOM = 0.1
 class FloorGap:
     """The gap between the moving bodies of a robot and the floor, bound once."""
 
-    def __init__(self, model: Model, moving: Sequence[int], height: float, *, period: float) -> None:
+    def __init__(self, model: Model, moving: Sequence[int], height: float) -> None:
         """Bind.
 
         Args:
             model: The compiled workstation.
             moving: Bodies that the robot's joints move.
             height: Of the floor, z in the world [m].
-            period: At which it is asked for [s].
         """
         bodies = [model.bodies[i] for i in moving]
         self._height, self._moving, self._bodies = height, np.array(moving, np.int64), tuple(moving)
         self._corners = stacked([body.corners for body in bodies])
         self._radius = np.array([body.radius for body in bodies], float)
-        self._period = period
 
-    def lowest_and_falling(self, state: State) -> Array:
-        """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
-        found = np.empty((len(self._moving), 2))
-        lowest_and_falling(
-            self._moving, *state.placed(self._bodies), *state.body_velocities(self._bodies),
-            *self._corners, self._radius, found,
-        )  # fmt: skip
-        found[:, 0] -= self._height
-        return found
+    def lowest(self, state: State) -> Array:
+        """Gap between each moving body and the floor [m], shape (b,)."""
+        found = np.empty(len(self._moving))
+        lowest_points(self._moving, *state.placed(self._bodies), *self._corners, self._radius, found)
+        return found - self._height
 
     def clamped(self, state: State, thickness: Array, wanted: Flags) -> Flags:
         """Which moving bodies clamp which body parts.
@@ -195,19 +186,12 @@ class FloorGap:
             thickness: Of body parts [m], shape (r,).
             wanted: Of which bodies and body parts that matters, shape (b, r).
         """
-        gap, fall = self.lowest_and_falling(state).T
-        return self._clamped(gap, fall, thickness, wanted)
+        return np.asarray((self.lowest(state)[:, None] <= thickness) & wanted)
 
     def ever(self, state: State, span: Span, thickness: Array, wanted: Flags) -> Flags:
         """Which moving bodies clamp which body parts at any instant of a span, given the twin at one end."""
-        fast = span.fast[self._moving]
-        gap = self.lowest_and_falling(state)[:, 0] - fast * span.T
-        return self._clamped(gap, fast + span.noise[self._moving], thickness, wanted)
-
-    def _clamped(self, gap: Array, fall: Array, thickness: Array, wanted: Flags) -> Flags:
-        # As for other surfaces: where it may be no wider by the next tick, whatever way it goes.
-        ahead = gap - np.clip(fall * self._period, 0.0, AHEAD)
-        return np.asarray((ahead[:, None] <= thickness) & wanted)
+        gap = self.lowest(state) - span.fast[self._moving] * span.T
+        return np.asarray((gap[:, None] <= thickness) & wanted)
 
 
 class Clamping:
@@ -220,8 +204,6 @@ class Clamping:
         gaps: dict[str, float],
         regions: Sequence[str],
         floor: float | None,
-        *,
-        every: float | None = None,
     ) -> None:
         """Bind.
 
@@ -231,7 +213,6 @@ class Clamping:
             gaps: Thickness of body regions by name [m], instead of those of ISO 13854.
             regions: Body regions in the order of the answers.
             floor: Height of the floor [m]; None when it is no surface.
-            every: Period at which it is asked for [s]; None: at every tick.
         """
         known = {**crushing_gaps()[0], **gaps}
         others = [b for b in model.bodies if b.role not in ("human", "area")]
@@ -243,17 +224,15 @@ class Clamping:
         cap = float(self._thickness.max(initial=0.0)) + ROOM
         thinnest = float(plain.min(initial=np.inf))
         pairs, widest, placed = robot_pinch_pairs(model, robot, cap=cap, thinnest=thinnest)
-        period = max(model.workstation.engine.tick, every or 0.0)
         least = min(openings()[0].values())
         between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
-        self._gaps = ClosingGaps(model.shapes, pairs, between, period=period)
+        self._gaps = ClosingGaps(model.shapes, pairs, between)
         self._relative = self._gaps.relative(model)
         self._joints = JointGaps(
-            model, robot, placed, self._thickness, np.maximum(fits - deviation, 0.0),
-            least=least, period=period,
-        )  # fmt: skip
+            model, robot, placed, self._thickness, np.maximum(fits - deviation, 0.0), least=least
+        )
         self._moving = robot.moving
-        self._floor = None if floor is None else FloorGap(model, robot.moving, floor, period=period)
+        self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
         self._asked = tuple(b.index for b in others)
         # All that carries a surface: where a machine is not known, nor are the gaps to it.
         self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]

@@ -1,12 +1,12 @@
 r"""Where a part of a person could be clamped: in a gap no wider than the body part, of parts that move.
 
 A gap :math:`g` between a moving part of a robot and another surface clamps a body part of the
-thickness :math:`D` where it is no wider than it, or may be by the next tick, while its sides move against
-each other:
+thickness :math:`D` where it is no wider than it while its sides move against each other:
 
-.. math:: |v| > 0, \qquad g - |v| T \le D
+.. math:: |v| > 0, \qquad g \le D
 
-with T the period of a tick. Whether the *least* distance closes does not count: a nearer surface at a
+What gets narrow between two ticks is found there (`seerob.criteria.between_ticks`): how often it is asked
+makes no gap clamp. Whether the *least* distance closes does not count: a nearer surface at a
 constant distance, or a part that tilts, hides another place where the gap closes. A part that moves past a
 surface or away from it counts as well: the rule errs on the side of clamping, and one more surface never
 permits more. Nothing is remembered: the answer at an instant follows from the poses and speeds then.
@@ -43,8 +43,6 @@ Coordinate = tuple[str, int]
 STILL = 1e-6
 """Parts that move more slowly against each other stay as they are [m/s]: rounding, and nothing else. What
 moves slowly clamps as what is fast does; noise of speeds is for `seerob.criteria.noisy_speeds`."""
-AHEAD = 0.09
-"""Largest way that is looked ahead to the next instant [m]."""
 SAMPLED = 64
 """Positions of several joints in which it is looked how far two parts can be apart."""
 MISSED = 0.1
@@ -55,21 +53,19 @@ ENDLESS = 1.0
 """How far to either side a slide without ends is looked at [m]."""
 
 
-def clamps(gaps: Array, speed: Array, period: float, thickness: Array) -> Flags:
+def clamps(gaps: Array, speed: Array, thickness: Array) -> Flags:
     """Which gaps clamp which body parts.
 
     Args:
         gaps: Distances of pairs of surfaces [m], shape (..., g).
         speed: Of one side seen from the other [m/s], shape (..., g).
-        period: Until it is asked again [s].
         thickness: Of body parts in each gap [m], -infinity of one that does not get in, shape (g, r).
 
     Returns:
         Shape (..., g, r).
     """
-    ahead = np.asarray(gaps, float) - np.minimum(speed * period, AHEAD)
     # What is not a number clamps: nobody knows that it does not.
-    return np.asarray(~(speed <= STILL)[..., None] & ~(ahead[..., None] > thickness))
+    return np.asarray(~(speed <= STILL)[..., None] & ~(np.asarray(gaps, float)[..., None] > thickness))
 
 
 def thickest(widest: Array, fits: Array, thickness: Array, sizes: Sequence[float], *, least: float) -> Array:

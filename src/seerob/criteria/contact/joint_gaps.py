@@ -207,7 +207,6 @@ class JointGaps:
         fits: Array,
         *,
         least: float,
-        period: float,
     ) -> None:
         """Bind.
 
@@ -218,9 +217,7 @@ class JointGaps:
             thickness: Of body parts [m], shape (r,).
             fits: Thinnest that a body part is [m], shape (r,).
             least: See `closing`.
-            period: At which it is asked for [s].
         """
-        self._period = period
         row = {body: k for k, body in enumerate(robot.moving)}
         joints = OwnJoints(model)
         self._tables: list[_Table] = []
@@ -262,8 +259,7 @@ class JointGaps:
                     dof = mechanism.v_address[mechanism.own[joint.column]]
                     way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T + span.joint_noise[dof]
                 least, most = qd - change, qd + change
-                start, end = q - way + min(least, 0.0) * self._period, q + way + max(most, 0.0) * self._period
-                ways.append((start, end))
+                ways.append((q - way, q + way))
                 speeds.append((least, most))
             if any(least or most for least, most in speeds):
                 found[rows] = np.maximum(found[rows], table.at(ways, speeds))

@@ -343,9 +343,7 @@ class Contacts:
             area=spec.area_tolerance,
         )
         floor = spec.floor_height if spec.floor else None
-        self.clamping = Clamping(
-            model, self.robot, spec.thickness, tuple(self.columns), floor, every=spec.every
-        )
+        self.clamping = Clamping(model, self.robot, spec.thickness, tuple(self.columns), floor)
         if spec.human is not None:
             model.human(spec.human)
         self.humans = [human.name for human in model.workstation.humans]

@@ -1,36 +1,27 @@
-"""A stream that is spoiled on its way, compared tick by tick with a motion in closed form.
-
-Everything between socket and verdict is what a run has: the listener with its clock and its checks, the
-mailbox in which the newest wins, run time, the engine, a criterion. Only the time is the test's own.
-"""
+"""A stream that is spoiled on its way, compared tick by tick with a motion in closed form."""
 
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from live_stream import BEGIN, OFFSET, Stream
 from made_cell import TWO_R, made, two_r
-from seerob.core.samples import JointSample, Mailbox
-from seerob.devices.live import real_time
+from seerob.core.samples import JointSample
 from seerob.devices.live.device_clock import SETTLED, SLEW
-from seerob.devices.live.listening import Listener, delay_of
-from seerob.devices.live.real_time import Clock, hear
 from seerob.session.run import Judge, bind, engine_of, ticks
 from seerob.twin.engine import NEAR
 
-RATE, TICK = 125.0, 0.01
+RATE = 125.0
 OMEGA, SIZE = 2.0, np.array([0.5, -0.3])
 FASTEST, HARDEST = 0.5 * OMEGA, 0.5 * OMEGA**2
 """Of a joint [rad/s, rad/s²]."""
 WAY = 0.001
 """From the device to here [s]."""
-OFFSET = -900.0
-"""Device time less the host's [s]."""
 
 STATION = (
     TWO_R
@@ -85,68 +76,22 @@ SWING = NEAR * 2 * math.pi * 20 / math.e * 3 + 0.01
 """Of the tip, when both joints are pulled to where they are found to be, at 20 Hz [m/s]."""
 
 
-class Spoiled:
-    """A run of so many ticks whose packets a test sends as it likes.
+class Spoiled(Stream):
+    """A run of so many ticks of the arm; other arguments as of `Stream`."""
 
-    Args:
-        packets: Arrival [s], device time [s] and what is said, in order of arrival.
-        pauses: Tick → how long the run is held still in front of it [s].
-        again: When the connection is made anew [s].
-    """
-
-    def __init__(self, station, patch, packets, *, ticks=600, pauses=None, again=()):
-        self.now = 1000.0
-        patch.setattr(real_time, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
-        (source,) = station.workstation.sources
-        self.box = Mailbox()
-        self.ears = Listener(source, None, self.box.post)
-        self.delay = delay_of([source])
-        self.packets, self.again = list(packets), list(again)
-        self.pauses = pauses or {}
-        self.ticks = ticks
-        self.clock = Clock()
-        self.station = station
-
-    def _sleep(self, seconds):
-        self.now += seconds
-
-    def first(self):
-        self.now += 0.05
-        return self.take()
-
-    def take(self):
-        while self.packets and self.packets[0][0] <= self.now - 1000.0:
-            arrived, device, (q, qd) = self.packets.pop(0)
-            while self.again and self.again[0] <= arrived:
-                self.again.pop(0)
-                self.ears._clock.reconnect()
-            self.ears._take(
-                JointSample(
-                    source="", seq=0, target="arm", t=1000.0 + arrived, t_device=device,
-                    q=tuple(q), qd=None if qd is None else tuple(qd),
-                )
-            )  # fmt: skip
-        return self.box.take()
+    def __init__(self, station, patch, packets, *, ticks=600, **more):
+        super().__init__(station, patch, "arm", packets, **more)
+        self.count = ticks
 
     def live(self):
         """Per tick: whether it is decided, how far the arm and its speed are from the truth, and why not."""
-        model = self.station.model
-        engine, judge = engine_of(model), Judge(bind(model))
-        arm = model.mechanism("arm")
-        feed = hear(iter(lambda: (), None), self, self.clock)
+        arm = self.station.model.mechanism("arm")
         told = []
-        for k in range(self.ticks):
-            self.now += self.pauses.get(k, 0.0)
-            engine.take(next(feed))
-            state = engine.tick() if k else engine.start()
-            (result,) = judge(state)
-            there = self.clock.start - self.delay + state.t + OFFSET
+        for state, (result,), there in self.ticks(self.count):
             off = np.abs(state.joint_positions(arm) - motion(there)[0]).max()
             value = math.nan if result.value is None else result.value - tip_speed(there)
             noise = max(result.interval) - result.value if result.interval else 0.0
             told.append(Tick(state.t, result.verdict == "within", off, abs(value), result.reason, noise))
-            self.now += 0.003
-            self.clock.wait(state.t + TICK)
         return told
 
 
@@ -156,7 +101,7 @@ def stream(seconds=7.0, way=lambda t: WAY, device=lambda t: t, said=motion):
     for k in range(int(seconds * RATE)):
         t = k / RATE
         last = max(last, t + way(t))
-        stamp = 1000.0 + t + OFFSET
+        stamp = BEGIN + t + OFFSET
         found.append((last, device(stamp), said(stamp)))
     return found
 
@@ -348,7 +293,7 @@ def test_who_sends_no_time_is_as_old_as_the_file_allows(station, monkeypatch):
     told = bounded.live()
     assert [tick.decided for tick in told[10:190]] == [True] * 180
     silent = next(tick.t for tick in told if "not heard for" in tick.reason)
-    last = 1000.0 + packets[-1][0] - bounded.clock.start + bounded.delay
+    last = BEGIN + packets[-1][0] - bounded.clock.start + bounded.delay
     assert silent == pytest.approx(last + 0.2 - bounded.delay - 0.05, abs=0.011)
 
 

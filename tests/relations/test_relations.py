@@ -1,22 +1,28 @@
 """What must hold between the verdicts of two cells, whatever the truth is, on random cells.
 
-Less, later or wider input never turns anything into WITHIN; a heavier, thicker or faster world never
+Less, later or wider input never turns anything into WITHIN; a heavier, thicker, nearer or faster world never
 relieves; names, units, order, place and time of day change nothing; nobody's verdict hangs on what else
-is asked.
+is asked. What is said of a cell as it is, all its relations share.
 """
 
 from __future__ import annotations
 
 import os
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
+from live_cells import SPOILED, greener_than_the_truth
 from random_cells import (
+    ALL,
+    FOUND,
     Cell,
     faster,
     heavier,
     least_margin,
+    nearer,
     random_cell,
     random_machine,
     said,
@@ -29,17 +35,18 @@ from seerob.core.snapshot import Verdict
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
 
-EACH = 17
-"""Random cells that each relation is asked of."""
+CELLS = 300
+"""Random cells."""
+EACH = 2
+"""Relations that are asked of a cell; of these in `FOUND`, and of cells that somebody names, all are."""
 WITHIN = 0
 RANK = {Verdict.WITHIN: 0, None: 0, Verdict.UNDECIDED: 1, Verdict.EXCEEDED: 2}
-SEEDS = [int(seed) for seed in os.environ.get("SEEROB_CELLS", "").split()] or range(EACH)
-"""Cells; ``SEEROB_CELLS="1234 5678"`` asks of these alone, as `make soak` says of what it finds."""
-CELLS = pytest.mark.parametrize("seed", SEEDS)
+NAMED = [int(seed) for seed in os.environ.get("SEEROB_CELLS", "").split()]
+"""``SEEROB_CELLS="1234 5678"`` asks of these alone, as `make soak` says of what it finds."""
 
 
-def pair(tmp_path, cell: Cell, other: Cell) -> tuple[ResultLog, ResultLog]:
-    return said(cell, tmp_path / "one"), said(other, tmp_path / "other")
+def pair(folder, cell: Cell, other: Cell) -> tuple[ResultLog, ResultLog]:
+    return said(cell, folder / "one"), said(other, folder / "other")
 
 
 def same(one: ResultLog, other: ResultLog, *, within: float = 1e-6) -> None:
@@ -88,49 +95,46 @@ SAME = {
 }
 
 
-@CELLS
-@pytest.mark.parametrize("what", SAME)
-def test_nothing_changes(what, seed, tmp_path):
+def nothing_changes(what, seed, folder):
     cell = random_cell(seed, published=not what.startswith("links"))
-    one, other = pair(tmp_path, cell, SAME[what](cell))
+    one, other = pair(folder, cell, SAME[what](cell))
     # Speeds of what a PLC tells are derived as it comes: a row that rounding puts beyond a tick comes later.
     spoken = cell.machine is not None and not cell.machine.by_file
     same(one, other, within=1e-3 if spoken and what == "another start time" else 1e-5)
 
 
-@CELLS
-def test_a_criterion_changes_no_other(seed, tmp_path):
+def a_criterion_changes_no_other(seed, folder):
     cell = random_cell(seed)
     rng = np.random.default_rng(seed)
     names = ["speed", "fastest", "energy", "distance", "separation", "area", "felt", "contact"]
     names += ["cart distance", "cart contact"] * (cell.machine is not None)
     # Who asks for no speed of what carries a robot is told so.
     left_out = frozenset(rng.choice(names, rng.integers(1, 8), replace=False).tolist())
-    one, other = pair(tmp_path, cell, replace(cell, left_out=left_out))
+    one, other = pair(folder, cell, replace(cell, left_out=left_out))
     for name in other:
         assert one[name].verdict is other[name].verdict, name
         np.testing.assert_array_equal(one[name].values, other[name].values, name)
 
 
-@CELLS
-def test_another_tick_does_not_contradict(seed, tmp_path):
+def another_tick_does_not_contradict(seed, folder):
     cell = random_cell(seed)
-    one, other = pair(tmp_path, cell, replace(cell, tick=0.002))
+    one, other = pair(folder, cell, replace(cell, tick=0.002))
     for name in one:
         verdicts = one[name].verdict, other[name].verdict
-        # What may clamp by the next tick counts as clamped: a coarser one is stricter, and never a finer one.
-        strict = "contact" in name and verdicts == (Verdict.EXCEEDED, Verdict.WITHIN)
-        assert strict or set(verdicts) != {Verdict.WITHIN, Verdict.EXCEEDED}, name
+        assert set(verdicts) != {Verdict.WITHIN, Verdict.EXCEEDED}, (
+            name,
+            one[name].worst(),
+            other[name].worst(),
+        )
 
 
-@CELLS
-def test_replayed_and_in_arrays_it_says_the_same(seed, tmp_path):
+def replayed_and_in_arrays_it_says_the_same(seed, folder):
     cell = random_cell(seed)
-    made = station(cell, tmp_path)
+    made = station(cell, folder)
     from seerob.outputs.sinks.recorder import Recorder
 
-    run = made.run(folder=tmp_path / "run", sinks=[Recorder()]).results
-    (file,) = (tmp_path / "run").glob("*.mcap")
+    run = made.run(folder=folder / "run", sinks=[Recorder()]).results
+    (file,) = (folder / "run").glob("*.mcap")
     again = made.replay(Recording.open(file)).results
     same(run, again, within=0.0)
     batch = made.batch()
@@ -141,72 +145,75 @@ def test_replayed_and_in_arrays_it_says_the_same(seed, tmp_path):
 # -- a worse world ------------------------------------------------------------------------------
 
 
-@CELLS
-def test_heavier_never_relieves(seed, tmp_path):
+def heavier_never_relieves(seed, folder):
     cell = random_cell(seed, published=False)
-    no_relief(*pair(tmp_path, cell, heavier(cell)))
+    no_relief(*pair(folder, cell, heavier(cell)))
 
 
-THICKNESS = "distance", "separation", "fastest", "cart distance", "cart separation", "cart speed"
-SPEED = "speed", "fastest", "energy", "separation", "contact", "cart speed", "cart energy", "cart separation"
+ELSEWHERE = "felt", "contact", "cart contact"
+"""Of what is nearest, or fastest, of a part: of a thicker one that is another place, where less may move."""
 
 
-@CELLS
-def test_thicker_never_relieves(seed, tmp_path):
+def thicker_never_relieves(seed, folder):
     cell = random_cell(seed, published=False)
-    no_relief(*pair(tmp_path, cell, thicker(cell)), *THICKNESS)
+    no_relief(*pair(folder, cell, thicker(cell)), *(name for name in ALL if name not in ELSEWHERE))
 
 
-@CELLS
-def test_faster_never_relieves(seed, tmp_path):
+def faster_never_relieves(seed, folder):
     cell = replace(random_cell(seed), walks=False)
-    no_relief(*pair(tmp_path, cell, faster(cell)), *SPEED, "cart contact", slack=1e-6)
+    no_relief(*pair(folder, cell, faster(cell)), slack=1e-6)
 
 
-@CELLS
-def test_wider_tolerances_never_relieve(seed, tmp_path):
+def nearer_never_relieves(seed, folder):
+    """The person, along the shortest distance at the worst instant, by less than what there is of it."""
     cell = random_cell(seed)
-    one, other = pair(tmp_path, cell, replace(cell, uncertainty=0.05, mass_tolerance=0.2))
+    names = ["distance", "separation"] + ["cart distance", "cart separation"] * (cell.machine is not None)
+    name = names[seed // 2 % len(names)]
+    cell = replace(cell, left_out=frozenset(ALL) - {name})
+    one, moved = nearer(cell, name, folder / "one")
+    if moved is not None:
+        no_relief(one, said(moved, folder / "other"), name)
+
+
+def wider_tolerances_never_relieve(seed, folder):
+    cell = random_cell(seed)
+    one, other = pair(folder, cell, replace(cell, uncertainty=0.05, mass_tolerance=0.2))
     for name in one:
         assert not (other[name].verdict is Verdict.WITHIN and one[name].verdict is not Verdict.WITHIN), name
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_finer_tick_never_finds_a_larger_separation(seed, tmp_path):
+def a_finer_tick_never_finds_a_larger_separation(seed, folder):
     """What a tick says of a motion that is known ahead holds until the next one."""
-    others = {"speed", "fastest", "energy", "distance", "area", "felt", "contact", "posture"}
-    cell = replace(random_cell(seed), walks=False, left_out=frozenset(others))
-    coarse, fine = (each["separation"] for each in pair(tmp_path, cell, replace(cell, tick=0.002)))
-    said = {round(t, 6): m for t, m in zip(coarse.t.tolist(), coarse.values - coarse.limits, strict=True)}
+    cell = replace(random_cell(seed), duration=0.3, walks=False, left_out=frozenset(ALL) - {"separation"})
+    coarse, fine = (each["separation"] for each in pair(folder, cell, replace(cell, tick=0.002)))
+    told = {round(t, 6): m for t, m in zip(coarse.t.tolist(), coarse.values - coarse.limits, strict=True)}
     compared = 0
     for t, margin in zip(fine.t.tolist(), fine.values - fine.limits, strict=True):
         if t > cell.duration - 0.1 - cell.tick:
             break  # what it does after the log nobody knows, and S_p is at least what is shown
-        if round(t, 6) in said and np.isfinite(margin) and np.isfinite(said[round(t, 6)]):
-            assert margin >= said[round(t, 6)] - 1e-6, t
+        if round(t, 6) in told and np.isfinite(margin) and np.isfinite(told[round(t, 6)]):
+            assert margin >= told[round(t, 6)] - 1e-6, t
             compared += 1
-    assert compared > 10
+    assert compared > 10 or (cell.machine is not None and cell.machine.carries)
 
 
 # -- less is known ------------------------------------------------------------------------------
 
 
-@CELLS
-def test_a_gap_in_the_log_is_never_greener(seed, tmp_path):
-    cell = replace(random_cell(seed), duration=0.6, speeds=bool(seed % 2))
+def a_gap_in_the_log_is_never_greener(seed, folder):
+    cell = replace(random_cell(seed), duration=0.6, speeds=bool(seed // 2 % 2))
     # Of given speeds and slopes the larger counts: beside the gap there are fewer slopes.
     unsure = (0.2 - 1 / cell.rate, 0.5 + 1 / cell.rate) if cell.speeds else (np.inf, 0.0)
-    never_greener(*pair(tmp_path, cell, replace(cell, gap=(0.2, 0.5))), unsure=unsure)
+    never_greener(*pair(folder, cell, replace(cell, gap=(0.2, 0.5))), unsure=unsure)
 
 
 APART = "cart speed", "cart distance", "cart separation"
 """Of a machine that carries a robot, what does not depend on that."""
 
 
-@CELLS
-def test_a_robot_that_nobody_heard_is_never_within(seed, tmp_path):
+def a_robot_that_nobody_heard_is_never_within(seed, folder):
     cell = random_cell(seed)
-    log = said(replace(cell, heard=False), tmp_path)
+    log = said(replace(cell, heard=False), folder)
     carried = cell.machine is not None and cell.machine.carries
     for name in log:
         if name.startswith("cart"):  # which rests on the robot where it carries that
@@ -215,38 +222,90 @@ def test_a_robot_that_nobody_heard_is_never_within(seed, tmp_path):
             assert log[name].verdict is Verdict.UNDECIDED, name
 
 
-@CELLS
-def test_a_machine_that_nobody_heard_is_never_within(seed, tmp_path):
+def a_machine_that_nobody_heard_is_never_within(seed, folder):
     """Nor is what it carries."""
     cell = random_cell(seed)
     machine = cell.machine or random_machine(np.random.default_rng(seed))
-    log = said(replace(cell, machine=replace(machine, heard=False, by_file=False)), tmp_path)
-    carried = {"speed", "fastest", "distance", "separation", "area", "contact"} if machine.carries else set()
+    log = said(replace(cell, machine=replace(machine, heard=False, by_file=False)), folder)
     for name in log:
-        if name.startswith("cart") or name in carried:
+        if name.startswith("cart") or (machine.carries and name != "posture"):
             assert log[name].verdict is not Verdict.WITHIN, name
 
 
-@CELLS
-def test_a_mass_that_nobody_gave_is_never_within(seed, tmp_path):
+def a_mass_that_nobody_gave_is_never_within(seed, folder):
     cell = random_cell(seed, published=False)
     k = seed % len(cell.links)
     links = tuple(replace(each, inertial=None) if i == k else each for i, each in enumerate(cell.links))
-    one, other = pair(tmp_path, cell, replace(cell, links=links))
+    one, other = pair(folder, cell, replace(cell, links=links))
     for name in ("energy", "felt", "contact"):
         assert other[name].verdict is not Verdict.WITHIN, name
     never_greener(one, other)
 
 
-@CELLS
-def test_a_shape_that_nobody_gave_is_never_within(seed, tmp_path):
+def a_shape_that_nobody_gave_is_never_within(seed, folder):
     cell = random_cell(seed, published=False)
     k = seed % len(cell.links)
     links = tuple(replace(each, shaped=False) if i == k else each for i, each in enumerate(cell.links))
     try:
-        one, other = pair(tmp_path, cell, replace(cell, links=links))
+        one, other = pair(folder, cell, replace(cell, links=links))
     except Undecided:
         return
     for name in ("fastest", "distance", "separation", "area", "contact"):
         assert other[name].verdict is not Verdict.WITHIN, name
     never_greener(one, other)
+
+
+def a_live_stream_is_never_greener_than_the_truth(seed, folder):
+    """What happens to a stream turns nothing into within that was exceeded all the while."""
+    what = list(SPOILED)[seed % len(SPOILED)]
+    found, _ = greener_than_the_truth(what, seed, random_cell(seed), folder)
+    assert not found, (what, found)
+
+
+# -- and of which cells that is asked -----------------------------------------------------------
+
+RELATIONS = {
+    **{what: partial(nothing_changes, what) for what in SAME},
+    **{
+        asked.__name__.replace("_", " "): asked
+        for asked in (
+            a_criterion_changes_no_other,
+            another_tick_does_not_contradict,
+            replayed_and_in_arrays_it_says_the_same,
+            heavier_never_relieves,
+            thicker_never_relieves,
+            faster_never_relieves,
+            nearer_never_relieves,
+            wider_tolerances_never_relieve,
+            a_finer_tick_never_finds_a_larger_separation,
+            a_gap_in_the_log_is_never_greener,
+            a_robot_that_nobody_heard_is_never_within,
+            a_machine_that_nobody_heard_is_never_within,
+            a_mass_that_nobody_gave_is_never_within,
+            a_shape_that_nobody_gave_is_never_within,
+            a_live_stream_is_never_greener_than_the_truth,
+        )
+    },
+}
+
+
+def asked_of(seed):
+    """Names of the relations that are asked of a cell: every one comes up equally often."""
+    if seed in FOUND or NAMED:
+        return list(RELATIONS)
+    return np.random.default_rng([seed, 2]).choice(list(RELATIONS), EACH, replace=False).tolist()
+
+
+def ask(name, seed, folder):
+    """Ask a relation of a cell; what it says when it does not hold names both."""
+    try:
+        RELATIONS[name](seed=seed, folder=folder / name.replace(" ", "_"))
+    except BaseException as error:
+        error.add_note(f"cell {seed}: {name}; again: SEEROB_CELLS={seed} pytest {Path(__file__).name}")
+        raise
+
+
+@pytest.mark.parametrize("seed", NAMED or [*range(CELLS - len(FOUND)), *FOUND])
+def test_what_must_hold_of_a_random_cell(seed, tmp_path):
+    for name in asked_of(seed):
+        ask(name, seed, tmp_path)

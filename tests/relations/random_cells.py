@@ -211,7 +211,7 @@ def more_of(rng: np.random.Generator, cell: Cell) -> dict[str, object]:
     if rng.random() < 0.5:
         found["post"] = far * np.array([np.cos(heading), np.sin(heading)])
     if found["anyone"]:
-        found["amplitude"] = cell.amplitude * 10 ** rng.uniform(-2, 0)
+        found["frequency"] = cell.frequency * 10 ** rng.uniform(-2, 0)
     return found
 
 

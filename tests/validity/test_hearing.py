@@ -206,3 +206,6 @@ def test_a_doubt_about_what_was_said_before_counts_where_that_lies_ahead_too():
     assert repeated.invalid_reason(1.0) == repeated.invalid_reason(1.005) == "run time fell behind"
     later = Hearing(given=False, driven=True, heard=[*good, Heard(1.013, "robot off")])
     assert not later.invalid_reason(1.0)
+    behind = [*good, Heard(1.013), Heard(1.013 + AFTER, "run time fell behind")]
+    hearing = Hearing(given=False, driven=True, heard=behind)
+    assert {hearing.invalid_reason(t) for t in (1.0, 1.005, 1.01)} == {"run time fell behind"}

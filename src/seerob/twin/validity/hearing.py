@@ -159,10 +159,13 @@ class Hearing:
         if k == len(self.heard) and t - last > self.grace + SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
-        until = k + 1
-        while until < len(self.heard) and self.heard[until].t - self.heard[until - 1].t < REPEATED:
-            until += 1
+        # Who falls behind has more than one sample ahead: the last takes all of them back.
+        again = (j for j in range(len(self.heard) - 1, k, -1) if self._repeats(j))
+        until = next(again, k) + 1
         return next((said.reason for said in self.heard[k - 1 : until] if said.reason), "")
+
+    def _repeats(self, j: int) -> bool:
+        return self.heard[j].t - self.heard[j - 1].t < REPEATED
 
     def around(self, t: float) -> list[Heard]:
         """Return the last sample at or before ``t`` [s] and the next one, where there are such."""

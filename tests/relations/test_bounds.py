@@ -68,7 +68,7 @@ def map_csv(units, places):
 def bounded(seed):
     """A random cell whose criteria are within almost throughout, and the files of its workstation."""
     rng = np.random.default_rng(seed)
-    cell = random_cell(seed, published=False)
+    cell = random_cell(seed, published=False, around=False)
     turn = rng.uniform(-np.pi, np.pi)
     more = by_table("held", len(cell.links), ", acceleration = 0") + by_table("ahead", len(cell.links), "")
     more += by_table("ever", len(cell.links), ", acceleration = 0", 'mode = "fixed"\n')
@@ -111,7 +111,7 @@ def test_no_bound_is_beaten_by_what_is_met_between_two_ticks(tmp_path, seed):
 def masses_of(seed):
     """Effective masses of a random arm that swings from rest or on: along its motion and the heaviest."""
     rng = np.random.default_rng(seed)
-    cell = random_cell(seed, published=False)
+    cell = random_cell(seed, published=False, around=False)
     more = "".join(
         f'[[safety]]\nkind = "effective_mass"\nname = "{along}"\nat = "arm"\nalong = "{along}"\n'
         f"limit = 1e4\noffset = {rng.normal(0, 0.1, 3).tolist()}\n"

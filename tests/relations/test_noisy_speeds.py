@@ -75,7 +75,7 @@ def slow(seed, *, told):
         seed: Of the cell.
         told: Whether the speeds that follow from the log's positions are in it, as if they were measured.
     """
-    cell = random_cell(seed, published=False)
+    cell = random_cell(seed, published=False, around=False)
     everything = {
         "speed",
         "fastest",

@@ -547,8 +547,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         Where S_p follows from the speeds of the instant, it never falls as one of them grows
         (`StopModel.by_speed`, and the larger of assumed and seen v_h): so at every instant it lies between
-        those of the least and of the largest speeds in the span. Where what is known ahead is in it (`lasts`), S_p of the begin covers
-        every stop that begins until the next tick, and this is added on top.
+        those of the least and of the largest speeds in the span. Where what is known ahead is in it
+        (`lasts`), S_p of the begin covers every stop that begins until the next tick; this is on top.
         """
         gap = self._gap(model)
         people, parts = rows_of(gap.a), rows_of(gap.b)

@@ -15,17 +15,18 @@ from worst_between import worst_found
 FLOOR = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [9, 0, 0] }\n'
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [*range(6), 7, 10, 12])
 def test_no_simulated_stop_within_a_span_is_longer_than_its_bound(tmp_path, seed):
     rng = np.random.default_rng(seed)
-    chain = Chain(rng, turning=True)
+    chain = Chain(rng, turning=seed < 6)
+    assert chain.slides.any() == (seed >= 6)
     n = len(chain.slides)
     base = f"base = {{ rpy = [{rng.normal() * (seed % 2)}, 0, 0] }}\n"
     text = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n' + base + "rotor_inertia = "
     cell = made(tmp_path, f"{text}{[0.02] * n}\n{FLOOR}", {"arm.urdf": chain.urdf})
     robot = cell.model.robot("arm")
     gap = cell.model.gap(cell.model.select("wall"), robot.moving)
-    brakes = tuple(rng.uniform(200, 500, n).tolist())
+    brakes = tuple((rng.uniform(200, 500, n) * (5 if chain.slides.any() else 1)).tolist())
     stop = bind_stop(
         Stop(acceleration=0.0, reaction=0.1, model="simulated", brakes=brakes), cell.model, robot, gap
     )
@@ -33,7 +34,8 @@ def test_no_simulated_stop_within_a_span_is_longer_than_its_bound(tmp_path, seed
     at_most = stop.in_span(points)
     shares = []
     for _ in range(25):
-        q, qd = rng.normal(size=n) * 2, rng.normal(size=n) * 10 ** rng.uniform(-1.5, 0.5)
+        q = rng.normal(size=n) * np.where(chain.slides, 0.3, 2.0)
+        qd = rng.normal(size=n) * 10 ** rng.uniform(-1.5, 0.5)
         path = Path(np.array([0, T]), np.array([q, q + T * qd]), np.array([qd, qd]))
         ids = np.array([body.mj for body in cell.model.bodies], np.int64)
         bound = at_most(points.span(path, 0.0, T, ids, cell.model.mj))

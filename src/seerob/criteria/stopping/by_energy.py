@@ -38,33 +38,42 @@ class _Levers:
         self._gravity = np.asarray(mj.opt.gravity, float)
         self._data = mujoco.MjData(mj)
         mujoco.mj_kinematics(mj, self._data)
+        kinds = mj.jnt_type[mj.dof_jntid[robot.v_address]]
+        self._slides = kinds != mujoco.mjtJoint.mjJNT_HINGE
         self._all: tuple[Array, Array, Array] | None = None
 
-    def _rows(self, point: int) -> tuple[Array, Array]:
-        """Farthest that a point can be from each joint [m], and how much of that gravity can load, (j,)."""
+    def _rows(self, point: int, out: Array) -> tuple[Array, Array]:
+        """Farthest that a point can be from each joint [m], 1 of one that slides, and its load by gravity.
+
+        The latter as a share of the point's weight, times the former; shape (j,) each.
+        """
         dofs, turns, lengths = self._points.chain(point)
         rows, robot = {int(dof): k for k, dof in enumerate(self._robot.v_address)}, self._robot
         far, loaded = np.zeros((2, len(robot.v_address)))
-        if not turns.all():
+        if not all(dof in rows for dof in dofs.tolist()):
             return np.full(len(robot.joints), np.inf), far[: len(robot.joints)]
-        reach = np.cumsum(lengths[::-1])[::-1]
-        for k, (dof, arm) in enumerate(zip(dofs.tolist(), reach.tolist(), strict=True)):
-            if dof not in rows:
-                return np.full(len(robot.joints), np.inf), far[: len(robot.joints)]
+        own = np.array([rows[dof] for dof in dofs.tolist()], np.int64)
+        reach = np.cumsum((lengths + np.where(turns, 0.0, out[own]))[::-1])[::-1]
+        for k, (row, arm) in enumerate(zip(own.tolist(), np.where(turns, reach, 1.0).tolist(), strict=True)):
             share = 1.0
             if k == 0:  # nothing turns its axis
-                axis = self._data.xaxis[int(self._points.model.mj.dof_jntid[dof])]
+                axis = self._data.xaxis[int(self._points.model.mj.dof_jntid[int(dofs[0])])]
                 g = float(np.linalg.norm(self._gravity))
-                share = float(np.linalg.norm(np.cross(axis, self._gravity))) / g if g else 0.0
-            far[rows[dof]], loaded[rows[dof]] = arm, arm * share
+                along = np.cross(axis, self._gravity) if turns[0] else axis @ self._gravity
+                share = float(np.linalg.norm(along)) / g if g else 0.0
+            far[row], loaded[row] = arm, arm * share
         coupling = np.abs(robot.coupling)
         return far @ coupling, loaded @ coupling
 
-    def at_all(self) -> tuple[Array, Array, Array]:
-        """Of the parts [m], shape (n, j), of all that has a mass [√kg m], and torques of gravity, (j,)."""
-        if self._all is None:
-            parts = np.array([self._rows(row)[0] for row in self._parts])
-            heavy = [self._rows(row) for row in self._heavy]
+    def at_all(self, out: Array) -> tuple[Array, Array, Array]:
+        """Of the parts [m], shape (n, j), of all that has a mass [√kg m], and torques of gravity, (j,).
+
+        Args:
+            out: How far each joint that slides is from the model's pose at most [m], of all the robot's.
+        """
+        if self._all is None or self._slides.any():
+            parts = np.array([self._rows(row, out)[0] for row in self._parts])
+            heavy = [self._rows(row, out) for row in self._heavy]
             far, loaded = (np.array([each[k] for each in heavy]) for k in (0, 1))
             weight = self._masses * float(np.linalg.norm(self._gravity))
             self._all = parts, np.sqrt(self._masses @ far**2 + self._rotors), weight @ loaded
@@ -86,6 +95,10 @@ def bind_braked_in_span(
         \dot E \le -\sum_j b_j |\dot q_j|, \qquad \frac{d}{dt}\sqrt{2E}
         \le -\frac{\sum_j b_j |\dot q_j|}{\sum_j r_j |\dot q_j|} \le -\min_j \frac{b_j}{r_j}.
 
+    A joint that slides has R and :math:`\rho` of 1, and lengthens those of joints before it by how far it is
+    from the model's pose: by no more than at the onset and :math:`E_0 / b_j`, E_0 the energy then, as E never
+    falls below 0 and its own :math:`b_j` does not hang on the posture.
+
     All stand after :math:`T_s \le \sqrt{2E} \max_j r_j / b_j`, and no point of a part has gone farther than
     :math:`\sum_j R_{ij} \int |\dot q_j|\,dt \le E \max_j R_{ij} / b_j`.
 
@@ -98,11 +111,12 @@ def bind_braked_in_span(
         held: Whether nothing gets faster during that time.
 
     Returns:
-        None where others move with it, or its parts change hands, or a joint of it slides.
+        None where others move with it, its parts change hands, or a joint both turns and slides something.
     """
-    turns = model.mj.jnt_type[model.mj.dof_jntid[robot.v_address]] == mujoco.mjtJoint.mjJNT_HINGE
     carries = robot.on or robot.riders or any(model.bodies[i].holder for i in gap.b)
-    if carries or T_r > LARGEST_WINDOW or not turns.all():
+    turns = model.mj.jnt_type[model.mj.dof_jntid[robot.v_address]] == mujoco.mjtJoint.mjJNT_HINGE
+    moves = robot.coupling != 0
+    if carries or T_r > LARGEST_WINDOW or (moves[turns].any(axis=0) & moves[~turns].any(axis=0)).any():
         return None
     own_v, period = robot.v_address[robot.own], model.workstation.engine.tick
 
@@ -116,13 +130,17 @@ def bind_braked_in_span(
                 if known is None:
                     return None
                 u = np.maximum(u, known[0] + span.joint_noise[own_v])
-            R, r, G = levers.at_all()
-            left = brakes - G
-            if not (
-                np.isfinite(u).all() and np.isfinite(R).all() and np.isfinite(r).all() and (left > 0).all()
-            ):
-                return None
+            moving = np.abs(robot.coupling)
+            out = span.away[robot.v_address] + moving @ u * T_r
+            _, r, G = levers.at_all(out)
             root = float(r @ u)
+            if not (np.isfinite(root) and (brakes > G).all()):
+                return None
+            # No slide goes on by more than the energy can move it.
+            R, r, G = levers.at_all(out + moving @ (root**2 / 2 / (brakes - G)))
+            left = brakes - G
+            if not (np.isfinite(R).all() and np.isfinite(r).all() and (left > 0).all()):
+                return None
             v = R @ u
             # A simulation counts the faster end of every step.
             way = root**2 / 2 * (R / left).max(axis=1) + 2 * STEP * v

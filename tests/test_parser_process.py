@@ -25,6 +25,15 @@ def test_a_process_answers_for_one_file_after_the_other_and_is_not_this_one():
     assert first == parsed(os.getpid, file="b") != os.getpid()
 
 
+def test_one_that_was_begun_ahead_has_imported_what_it_will_need_and_is_asked_first():
+    parser_process._end_all()
+    parser_process.begin("colorsys", "no_such_module")
+    begun = parser_process._idle[-1].process.pid
+    assert parsed(os.getpid, file="a") == begun
+    assert parsed(eval, "'colorsys' in __import__('sys').modules", file="a")
+    assert parsed(os.getpid, file="a") == begun
+
+
 def test_dates_come_back_as_they_are_and_no_class_does():
     assert parsed(operator.sub, date(2026, 1, 2), date(2026, 1, 1), file="a") == timedelta(1)
     with pytest.raises(InputError, match=r"a: ends the process that reads it \(decimal.Decimal is no plain"):

@@ -20,6 +20,7 @@ from seerob.app.console.loops import compile_loops
 from seerob.app.console.progress import spinner
 from seerob.app.console.terminal import cache_folder
 from seerob.core.errors import InputError, Problem
+from seerob.core.files.parser_process import begin
 from seerob.description.formats.resolve import as_written_or_in_other_case
 from seerob.session.reading import with_entries
 from seerob.workstation.allowed import NOTHING, Allowed
@@ -204,9 +205,12 @@ def uncollected() -> Iterator[None]:
 def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources: bool) -> Station:
     compile_loops()  # before the imports: many loops are compiled by them
     from seerob.session.reading import readable, shortened
-    from seerob.session.station import Station
 
     found = readable(path, allowed)
+    if sources and any(_is_workbook(source) for source in found.entries["sources"].values()):
+        begin("seerob.files.tables.workbook", "openpyxl")
+    from seerob.session.station import Station
+
     problems = list(found.problems)
     whole = Draft(str(file), found.head, found.entries, tuple(found.names))
     draft = whole.without(found.between)
@@ -231,6 +235,10 @@ def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources:
         unseen = whole if station is None else whole.less(draft)
         raise InputError(shortened([*problems, *unseen.missing_files(problems, sources=sources)]))
     return station
+
+
+def _is_workbook(source: object) -> bool:
+    return str(getattr(source, "file", "")).lower().endswith((".xlsx", ".xlsm"))
 
 
 def _unprepared(station: Station, *, sources: bool) -> list[Problem]:

@@ -110,11 +110,11 @@ class _Answer(NamedTuple):
 class _Child:
     """One process and the two pipes to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, modules: tuple[str, ...] = ()) -> None:
         kept = {name: os.environ[name] for name in (*_KEPT, *_KEPT_OF_PYTHON) if name in os.environ}
         path = os.pathsep.join(entry for entry in sys.path if entry)
         self.process = subprocess.Popen(  # noqa: S603 - of our own
-            COMMAND,
+            (*COMMAND, *modules),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -122,7 +122,7 @@ class _Child:
             process_group=0,  # Ctrl-C is for this process, which ends it
         )
         self.owner = os.getpid()
-        self.answered = 0.0
+        self.answered = time.monotonic()
 
     def ask(self, request: bytes, seconds: float) -> _Answer:
         """Its answer.
@@ -182,6 +182,12 @@ class _Plain(pickle.Unpickler):
         if module == "datetime" and name in _DATES:
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name} is no plain data")
+
+
+def begin(*modules: str) -> None:
+    """Start a process that imports modules meanwhile, where a file for it comes soon."""
+    with contextlib.suppress(OSError):  # whoever has the file is told
+        _give_back(_Child(modules), tired=False)
 
 
 _idle: list[_Child] = []
@@ -315,6 +321,9 @@ def _main() -> None:
     # What a library prints is no answer.
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as out:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+        for module in sys.argv[1:]:
+            with contextlib.suppress(ImportError):  # who needs it is told
+                importlib.import_module(module)
         questions = sys.stdin.buffer
         while os.name != "posix" or select.select([questions], [], [], ENDS_AFTER)[0]:
             request = _received(questions)

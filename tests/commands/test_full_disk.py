@@ -1,5 +1,6 @@
 """A disk that is full: the verdict is there, the report elsewhere, and what is missing is said."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -24,8 +25,15 @@ def limited(size, *arguments, cwd):
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300)
 
 
-def on_a_full_disk(folder, size, *arguments):
-    """A command with a disk of its own of ``size`` mounted at a folder, which is copied away afterwards."""
+def on_a_full_disk(folder, size, *arguments, nowhere_else=False):
+    """A command with a disk of its own of ``size`` mounted at a folder, which is copied away afterwards.
+
+    Args:
+        folder: Of the disk.
+        size: As ``mount`` has it.
+        arguments: Of the command.
+        nowhere_else: Whether temporary folder and home are on it, too.
+    """
     folder.mkdir()
     kept = folder.with_name("kept")
     script = 'mount -t tmpfs -o size="$1" none "$2" || exit 99; shift; d=$1; k=$2; shift 2; "$@"; c=$?; '
@@ -43,8 +51,17 @@ def on_a_full_disk(folder, size, *arguments):
         folder,
         kept,
     ]
-    command += [sys.executable, "-m", "seerob.app.cli", *arguments]
-    return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=300), kept
+    # The temporary folder is chosen before it is full.
+    code = "import sys, tempfile; tempfile.gettempdir(); from seerob.app.cli import main; "
+    command += [sys.executable, "-c", code + "sys.exit(main(sys.argv[1:]))", *arguments]
+    environment = dict(os.environ)
+    if nowhere_else:
+        kept_loops = os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))
+        environment |= {"TMPDIR": str(folder), "HOME": str(folder), "XDG_CACHE_HOME": kept_loops}
+    said = subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, timeout=300, env=environment
+    )
+    return said, kept
 
 
 def can_mount():
@@ -78,6 +95,22 @@ def test_a_full_disk_keeps_the_verdict_and_the_report_is_written_elsewhere(tmp_p
     recording = Recording.open(kept / "run.mcap")
     assert not recording.complete
     assert recording.findings
+
+
+@pytest.mark.skipif(not can_mount(), reason="this system mounts no disk of one's own")
+def test_where_nothing_can_be_written_anywhere_the_verdict_is_said_and_what_is_missing(tmp_path):
+    cell = workstation(tmp_path / "cell")
+    out = tmp_path / "disk"
+    said, kept = on_a_full_disk(
+        out, "590k", "run", cell, "-o", out, "--port", "0", "--seconds", "12", nowhere_else=True
+    )
+    assert said.returncode == 3, said.stderr
+    assert "undecided    arm – post" in said.stdout
+    for name in ("run.mcap", "report.html", "results.xlsx"):
+        assert f"not written  {out / name}" in said.stdout
+    assert "wrote" not in said.stdout
+    assert "Traceback" not in said.stderr + said.stdout
+    assert sorted(file.name for file in kept.iterdir()) == ["run.mcap"]
 
 
 def test_a_recording_that_may_not_grow_keeps_the_verdict(tmp_path):

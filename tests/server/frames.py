@@ -77,6 +77,7 @@ class Visitor:
 
     def __init__(self, server, *, acknowledge=True, path="/ws", **options):
         options.setdefault("subprotocols", [wire.PROTOCOL])
+        options.setdefault("open_timeout", PATIENCE)
         scheme = "wss" if "ssl" in options else "ws"
         self._open = connect(
             f"{scheme}://127.0.0.1:{server.port}{path}", compression=None, max_size=2**26, **options

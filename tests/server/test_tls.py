@@ -36,10 +36,14 @@ def tls(folder):
 @pytest.fixture(scope="module")
 def server(tls):
     feed = Player(Remembered([snapshot(0), snapshot(1)]))
-    with Server(
-        scene=scene(), meshes=MESHES, feed=feed, host="0.0.0.0", port=0, tokens=TOKENS, tls=tls
-    ) as server:
-        yield server
+    with pytest.MonkeyPatch.context() as patch:
+        # A machine that is held up for seconds cuts who is not meant.
+        patch.setattr(connection, "HANDSHAKE", PATIENCE)
+        patch.setattr(connection.PromptRequests, "promptness", PATIENCE)
+        with Server(
+            scene=scene(), meshes=MESHES, feed=feed, host="0.0.0.0", port=0, tokens=TOKENS, tls=tls
+        ) as server:
+            yield server
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +54,7 @@ def trusting(tls):
 def test_a_client_that_trusts_the_authority_is_served_under_every_name(server, tls, trusting):
     assert server.url.startswith("https://localhost:")
     for name in {"localhost", "127.0.0.1", *(n for n in tls.names if n.count(".") == 3)}:
-        with httpx.Client(verify=trusting) as browser:
+        with httpx.Client(verify=trusting, timeout=PATIENCE) as browser:
             first = browser.get(f"https://{name}:{server.port}/?token={TOKENS.view}")
             assert (first.status_code, first.headers["location"]) == (303, "/")
             assert "secure" in first.headers["set-cookie"].lower()

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from shutil import rmtree
 from types import TracebackType
 from typing import Any, Self
 
@@ -150,10 +151,15 @@ class Announced:
         writer: Any = self._writer
         for near in (tempfile.gettempdir(), Path.home()):
             with suppress(SeerobError, OSError):
-                writer.path = Path(tempfile.mkdtemp(prefix="seerob-", dir=near)) / self.file
-                writer.close()
-                self.elsewhere = writer.path
-                return
+                folder = Path(tempfile.mkdtemp(prefix="seerob-", dir=near))
+                try:
+                    writer.path = folder / self.file
+                    writer.close()
+                    self.elsewhere = writer.path
+                    return
+                finally:
+                    if self.elsewhere is None:
+                        rmtree(folder, ignore_errors=True)
 
     def _announce(self) -> None:
         self._say(f"writing {self.file}")

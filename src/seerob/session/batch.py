@@ -239,25 +239,30 @@ def _uncleared(
             off = high - answers.value if at_most else answers.value - low
         ends[name] = bare, off
         within, exceeded = verdict == WITHIN, verdict == CODES[Verdict.EXCEEDED]
-        either = (within[1:] | within[:-1]) & ~(exceeded[1:] | exceeded[:-1])
-        open_[name][1:] = either & ~(within[1:] & within[:-1])
+        undecided = ~(exceeded[1:] | exceeded[:-1])
+        either = (within[1:] | within[:-1]) & ~(within[1:] & within[:-1])
+        assert one.watch is not None
+        # What is bounded by a judgement of its own is judged on the road, idle or not.
+        open_[name][1:] = undecided & (either if one.watch.falls is not None else True)
     # A figure without a limit, or one that is never within, has nothing to lose on the way.
-    watches = {name: one for name, one in watches.items() if (said[name][0].verdict == WITHIN).any()}
-    points = next((one.watch.points for one in watches.values() if one.watch is not None), None)
+    simple = {
+        name: (one, one.watch.falls)
+        for name, one in watches.items()
+        if one.watch is not None and one.watch.falls is not None and (said[name][0].verdict == WITHIN).any()
+    }
+    points = next((one.watch.points for one, _ in simple.values() if one.watch is not None), None)
     ids = np.array([body.mj for body in model.bodies], np.int64)
     for k, way in enumerate(motion.ways if points is not None else ()):
         assert points is not None
         span = points.span(way, float(motion.t[k]), float(motion.t[k + 1]), ids, model.mj)
         span.between_speeds(speeds[k], speeds[k + 1])
-        for name, one in watches.items():
+        for name, (_, falls) in simple.items():
             verdict = said[name][0].verdict
             if verdict[k] != WITHIN or verdict[k + 1] != WITHIN:
                 continue
-            assert one.watch is not None
-            assert one.watch.falls is not None  # who judges many instants at once has no other bound
             bare, off = ends[name]
             m, other = bare[k], bare[k + 1]
-            fall, bend = one.watch.falls(span, min(m - off[k], other - off[k + 1]))
+            fall, bend = falls(span, min(m - off[k], other - off[k + 1]))
             low = np.maximum((m + other - fall) / 2, min(m, other) - bend) - max(off[k], off[k + 1])
             open_[name][k + 1] = not np.min(low) >= 0
     for name, one in watches.items():

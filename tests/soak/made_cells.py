@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from seerob.app.commands.import_aml import Made
 from seerob.core.errors import InputError
 from seerob.criteria.contact import measured
 from seerob.description.formats import automationml
@@ -167,6 +168,10 @@ def _packed_plant(path):
         archive.writestr("cell.aml", AML)
 
 
+def _plant(path):
+    Made(automationml.read(path)).files()
+
+
 def _heard(opened):
     for sample in opened.samples:
         assert np.isfinite(sample.t)
@@ -288,10 +293,8 @@ CELLS = {
     "gltf": Malformed("gltf", _gltf, _meshes),
     "dae": Malformed("dae", _box("dae"), _meshes),
     "3mf": Malformed("3mf", _box("3mf"), _meshes, mutated_zip),
-    "automationml": Malformed("aml", _said(AML), lambda path: automationml.read(path)),
-    "automationml container": Malformed(
-        "amlx", _packed_plant, lambda path: automationml.read(path), mutated_zip
-    ),
+    "automationml": Malformed("aml", _said(AML), _plant),
+    "automationml container": Malformed("amlx", _packed_plant, _plant, mutated_zip),
     "motion csv": Malformed(
         "csv", _table(["Time [s]", *(f"J{i + 1} [rad]" for i in range(DOF))], _joints), _motion(Csv)
     ),

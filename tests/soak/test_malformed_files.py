@@ -2,11 +2,14 @@
 
 import contextlib
 import io
+import re
 import warnings
 import zipfile
+from importlib import resources
 
 import pytest
 
+import seerob as sr
 from seerob.core.errors import SeerobError
 from soak.corpus import corpus
 from soak.hammering import hammer, hammer_in_processes, in_this_process
@@ -47,6 +50,8 @@ FOUND = [
     ("mjcf", b'fromto="0 0 0 0 0 0.3"', b'fromto="0 0 0 0 0 1e308"'),
     ("ply text", b"vertex 8", b"vertex " + b"1" * 5000),
     ("obj", b"f ", b"v inf 0 0\nf "),
+    ("motion csv", b"\n0.01,", b"\n5e-324,"),
+    ("motion csv", b"\n0.01,", b"\n-1e308,"),
     ("waypoints xlsx", b'<row r="2">', b'<row r="999999999">'),
 ]
 """Kind of file, what stands in the valid one, and what a hunt put there that hung, warned or raised."""
@@ -66,6 +71,30 @@ def test_what_a_hunt_found_is_read_or_refused(tmp_path, kind, there, put):
     with warnings.catch_warnings(), in_this_process(), contextlib.suppress(SeerobError):
         warnings.simplefilter("error")
         KINDS[kind].read(path)
+
+
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
+
+
+@pytest.mark.parametrize("step", [12, pytest.param(1, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("bad", ["nan", "inf", "1e308", "-1e308", "5e-324"])
+def test_a_number_that_nothing_has_is_taken_or_told_with_its_place(tmp_path, step, bad):
+    """In each ``step``-th figure of the starter, all the way to the compiled twin."""
+    starter = resources.files("seerob.app.commands") / "starter"
+    (tmp_path / "motion.csv").write_bytes((starter / "motion.csv").read_bytes())
+    text = re.sub(r"#.*", "", (starter / "workstation.toml").read_text())
+    places = [found.span() for found in NUMBER.finditer(text) if text.count('"', 0, found.start()) % 2 == 0]
+    said = []
+    for at, end in places[::step]:
+        (tmp_path / "workstation.toml").write_text(text[:at] + bad + text[end:])
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                sr.load(tmp_path)
+            except SeerobError as error:
+                said.append(str(error))
+    assert said or bad == "5e-324"
+    assert all(re.search(r"\b(robots|tools|parts|humans|safety)\[\d\]", each) for each in said), said
 
 
 def test_a_signalling_nan_of_an_stl_is_refused(tmp_path):

@@ -269,7 +269,8 @@ def guess_units(layout: Layout, columns: Columns, given: Mapping) -> Units:
     )
     # What to do without a declaration: unit by range, and the range in words.
     time = _values(layout, columns.indices.get("time", ()), comma)
-    step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else 0.0
+    with np.errstate(over="ignore"):  # instants that nothing has, which are refused where they are read
+        step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else 0.0
     _unit(
         layout,
         columns,

@@ -117,7 +117,8 @@ def _judged(trajectory: Trajectory) -> NDArray[np.bool_]:
 
 def _slopes(trajectory: Trajectory) -> Array:
     """Mean velocity of each interval [rad/s or m/s], shape (n - 1, dof); 0 beside an invalid row."""
-    slopes = np.diff(trajectory.q, axis=0) / np.diff(trajectory.t)[:, None]
+    with np.errstate(over="ignore"):  # two instants may be as near as numbers can be
+        slopes = np.diff(trajectory.q, axis=0) / np.diff(trajectory.t)[:, None]
     judged = _judged(trajectory)
     return np.asarray(np.where((judged[1:] & judged[:-1])[:, None], slopes, 0.0))
 

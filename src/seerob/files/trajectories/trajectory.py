@@ -255,7 +255,8 @@ def derive_velocities(
         known: Whether each row says where it is, shape (n,); all do when not given.
     """
     known = np.ones(len(t), bool) if known is None else known
-    slopes = np.abs(np.diff(q, axis=0)) / np.diff(t)[:, None]
+    with np.errstate(over="ignore"):  # two instants may be as near as numbers can be
+        slopes = np.abs(np.diff(q, axis=0)) / np.diff(t)[:, None]
     apart = (slopes > largest).any(axis=1) | ~known[1:] | ~known[:-1]
     starts = np.concatenate([[0], np.flatnonzero(apart) + 1, [len(t)]])
     qd, errors = np.zeros_like(q, dtype=float), []

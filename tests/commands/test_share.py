@@ -201,3 +201,17 @@ def test_one_that_would_be_judged_otherwise_is_not_shared(recorded, tmp_path, mo
     with pytest.raises(InputError, match="fast: was exceeded, and is"):
         share(sr.Recording.open(recorded), tmp_path / "out.mcap")
     assert not (tmp_path / "out.mcap").exists()
+
+
+def test_a_recording_is_inspected_without_its_sources(recorded, capsys):
+    assert main(["inspect", str(recorded)]) == 0
+    said = capsys.readouterr().out
+    assert "reads        plantedfile.csv, " in said
+    assert "connects" not in said
+
+
+def test_one_without_a_workstation_file_is_no_traceback(tmp_path, recorded):
+    recording = sr.Recording.open(recorded)
+    recording.files = {"a.csv": b""}
+    with pytest.raises(InputError, match=r"workstation\.toml: is not in it"):
+        share(recording, tmp_path / "out.mcap")

@@ -23,7 +23,7 @@ from seerob.recording.recording import Recording
 from seerob.workstation.conversion import convert
 from seerob.workstation.outside import Named, named_outside, texts
 from seerob.workstation.source import Source
-from seerob.workstation.workstation import FILE_NAME, PLUGINS, locate
+from seerob.workstation.workstation import PLUGINS, file_among, locate
 
 LARGEST = 64 * 2**20
 """A description that is larger [byte] is not looked into."""
@@ -69,13 +69,13 @@ def inspected(path: Path | str) -> list[Fact]:
 
 
 def _of_recording(recording: Recording) -> list[Fact]:
-    file = FILE_NAME if FILE_NAME in recording.files else next(iter(recording.files), "")
+    file = file_among(recording.files)
     facts = [Fact("reads", f"{recording.path}, with {len(recording.files)} files in it")]
     facts += [Fact("reads", f"{name}, {len(data)} bytes, in it") for name, data in recording.files.items()]
     facts.append(
         Fact("note", "replay opens none of its files and serves the page; report opens them, as here:")
     )
-    table = parsed_toml(recording.files[file], Path(file)) if file.endswith(".toml") else {}
+    table = parsed_toml(recording.files[file], Path(file)) if file in recording.files else {}
     nowhere = recording.path.parent / "…"
     found = (outside for outside in _outside(table, file, nowhere) if not outside.key.startswith("sources["))
     facts += [_refused(outside) for outside in found]

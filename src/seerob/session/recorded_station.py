@@ -16,7 +16,7 @@ from seerob.session.reading import read
 from seerob.session.station import Station
 from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
-from seerob.workstation.workstation import FILE_NAME
+from seerob.workstation.workstation import file_among
 
 _REMEDY = "give the workstation that it was made with (--workstation)"
 
@@ -43,7 +43,7 @@ def load_recorded(
         recording.extract(Path(folder))
         allowed = Allowed(allow_plugins, allow_outside, replayed=True)
         try:
-            file = Path(folder) / workstation_file(recording)
+            file = Path(folder) / file_among(recording.files)
             station = Station(read(file, allowed), cache=cache)
         except InputError as error:
             problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
@@ -59,12 +59,6 @@ def load_recorded(
         what = f"was made with other files than are found now: {', '.join(changed[:6])}"
         raise InputError.at(recording.path, "", what, _REMEDY)
     return station
-
-
-def workstation_file(recording: Recording) -> str:
-    """Name of the workstation file among the files of a recording."""
-    names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
-    return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]
 
 
 def recorded_sources(

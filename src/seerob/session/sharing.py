@@ -28,15 +28,14 @@ from seerob.core.samples import BodySample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.files.tables.mapping import toml_value
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.recording.filing import OUTSIDE
+from seerob.recording.filing import OUTSIDE, SOURCES
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import log_of
 from seerob.session.reading import read
-from seerob.session.recorded_station import workstation_file
 from seerob.session.scene import scene_of
 from seerob.session.station import Station
 from seerob.workstation.allowed import Allowed
-from seerob.workstation.workstation import FILE_NAME
+from seerob.workstation.workstation import FILE_NAME, file_among
 
 NOWHERE = "192.0.2.1"
 """Instead of hosts: an address for documentation, which nobody has (RFC 5737)."""
@@ -114,7 +113,9 @@ def share(
     """
     if missing := recording.check():
         raise InputError(Problem(str(recording.path), "", f.text, "share one that is whole") for f in missing)
-    table = parsed_toml(recording.files[workstation_file(recording)], recording.path)
+    if (own := file_among(recording.files)) not in recording.files:
+        raise InputError.at(recording.path, own, "is not in it", "share one that seerob recorded")
+    table = parsed_toml(recording.files[own], recording.path)
     words = _Words()
     dropped: list[str] = []
     _learn(words, table, recording)
@@ -200,7 +201,7 @@ def _learn(words: _Words, table: Mapping[str, Any], recording: Recording) -> Non
 
 def _is_file(value: str, recording: Recording) -> bool:
     plain = PurePosixPath(value).as_posix()
-    outside = f"{OUTSIDE}/sources/{PurePosixPath(value).name}.sha256"
+    outside = f"{SOURCES}{PurePosixPath(value).name}.sha256"
     return plain in recording.files or outside in recording.files
 
 
@@ -236,9 +237,11 @@ def _written(
     }
     kept = {}
     for name, content in recording.files.items():
-        if name == workstation_file(recording):
+        if name == file_among(recording.files):
             continue
-        if name in own - others or name.startswith(f"{OUTSIDE}/"):
+        if name.startswith(f"{OUTSIDE}/") and not name.startswith(SOURCES):
+            continue  # what ships or is installed is found again
+        if name in own - others or name.startswith(SOURCES):
             dropped.append(f"the file {name}: what was asked of it is in the samples")
         else:
             kept[name] = _cleaned(name, content, words)

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -435,6 +436,12 @@ def locate(path: Path | str) -> Path:
         remedy = f"give a folder with a {FILE_NAME}, or make one with `seerob new`"
         raise InputError.at(file, "", "no such file", remedy)
     return file
+
+
+def file_among(names: Iterable[str]) -> str:
+    """Which of the files of a recording is the workstation file."""
+    own = [name for name in names if "/" not in name and name.endswith(".toml")]
+    return FILE_NAME if FILE_NAME in own or len(own) != 1 else own[0]
 
 
 def content_hash(files: dict[str, bytes]) -> str:

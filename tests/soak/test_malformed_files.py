@@ -11,6 +11,7 @@ import pytest
 
 import seerob as sr
 from seerob.core.errors import SeerobError
+from seerob.core.files import parser_process
 from soak.corpus import corpus
 from soak.hammering import hammer, hammer_in_processes, in_this_process
 from soak.made_cells import KINDS
@@ -95,6 +96,26 @@ def test_a_number_that_nothing_has_is_taken_or_told_with_its_place(tmp_path, ste
                 said.append(str(error))
     assert said or bad == "5e-324"
     assert all(re.search(r"\b(robots|tools|parts|humans|safety)\[\d\]", each) for each in said), said
+
+
+def test_one_process_reads_what_parsers_of_others_read_one_file_after_the_other(tmp_path):
+    processes = set()
+    for kind in (
+        "xacro",
+        "dae",
+        "xacro",
+        "zones xlsx",
+        "ply",
+        "ros bag",
+        "kinect bag",
+        "xacro",
+        "motion xlsx",
+    ):
+        path = tmp_path / f"{kind}.{KINDS[kind].suffix}"
+        path.write_bytes(corpus(kind)[0])
+        KINDS[kind].read(path)
+        processes.add(tuple(child.process.pid for child in parser_process._idle))
+    assert len(processes) == 1
 
 
 def test_a_signalling_nan_of_an_stl_is_refused(tmp_path):

@@ -173,7 +173,10 @@ class _Compiler:
             build(table)
         except InputError as error:
             self.problems += [
-                p._replace(key=f"{key} ({p.key})" if p.key and key else p.key or key) for p in error.problems
+                p._replace(
+                    file=p.file or self.file, key=f"{key} ({p.key})" if p.key and key else p.key or key
+                )
+                for p in error.problems
             ]
         except UnknownName as error:
             self.problems.append(Problem(self.file, key, str(error)))

@@ -198,8 +198,9 @@ def _spread(thing: Thing, meshes: list[Mesh]) -> tuple[Inertial, tuple[Finding, 
                 meshes, density=thing.density, mass=thing.mass, subject=thing.name
             )
         except InputError as error:
-            source = thing.mesh or thing.name
-            raise InputError([problem._replace(file=source) for problem in error.problems]) from None
+            raise InputError(
+                [problem._replace(file=thing.mesh or "") for problem in error.problems]
+            ) from None
     volume, moments = _capsule(*rounded)
     what = "capsule" if rounded[1] else "sphere"
     mass, origin, source = thing.mass, Origin.GIVEN, f"{what}, shape in the workstation file"

@@ -19,10 +19,14 @@ import seerob as sr
 from seerob.core.errors import InputError
 from seerob.core.files import bounded
 from seerob.core.files.parser_process import parsed
+from seerob.core.files.toml_file import read_toml
 from seerob.core.printable import printable
+from seerob.description.capture.mapping import read_conventions
 from seerob.description.loader import load_robot
 from seerob.description.mesh import load_meshes
 from seerob.description.mesh_files import apart
+from seerob.description.norms import body_limits
+from seerob.description.robots.calibration import read_calibration
 from seerob.files.motion_capture import kinect_bag
 from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets
 from seerob.outputs.html import text
@@ -281,3 +285,23 @@ def test_a_collada_file_that_takes_too_much_ends_its_parser_with_a_message_and_t
     monkeypatch.setattr(apart, "parsed", partial(parsed, seconds=1e-3))
     with pytest.raises(InputError, match=r"large.dae: takes more than 0.001 s to read; export it"):
         load_meshes(tmp_path / "large.dae")
+
+
+@pytest.mark.parametrize(
+    "text", ["a" + ".a" * 2_000_000 + " = 1", "[a" + ' . "b"' * 600_000 + "]", "a = '" + "x" * 4_000_000]
+)
+@pytest.mark.parametrize(
+    "read",
+    [
+        read_toml,
+        lambda file: read_calibration(file.read_bytes(), file.name),
+        lambda file: read_conventions(file, file.name),
+        body_limits.read,
+    ],
+)
+def test_a_key_of_a_million_parts_is_refused(tmp_path, text, read):
+    """Python's own parser would take hours for it."""
+    file = tmp_path / "a.toml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"a\.toml: "):
+        read(file)

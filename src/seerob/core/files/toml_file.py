@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,9 @@ from seerob.core.printable import printable_table
 
 MAX_FILE_SIZE = 4 << 20
 """A file larger than this [byte] is none that a user wrote."""
+_PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{100}}")
+"""The time that `tomllib` takes for a key grows with the square of its dots."""
 
 
 def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -30,10 +34,22 @@ def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
     return parsed_toml(raw, path), raw
 
 
+def loads(text: str) -> dict[str, Any]:
+    """As `tomllib.loads`, of what strangers wrote.
+
+    Raises:
+        tomllib.TOMLDecodeError: It is not TOML, or a key has more parts than any table has levels.
+    """
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise tomllib.TOMLDecodeError(f"a key of more than 100 parts (at line {line})")
+    return tomllib.loads(text)
+
+
 def parsed_toml(raw: bytes, path: Path) -> dict[str, Any]:
     """Content of a TOML file that was read; raises as `read_toml` does."""
     try:
-        table: dict[str, Any] = printable_table(tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")))
+        table: dict[str, Any] = printable_table(loads(raw.decode("utf-8-sig").replace("\r\n", "\n")))
         return table
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1

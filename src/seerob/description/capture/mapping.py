@@ -8,7 +8,6 @@ compared without case, punctuation and a prefix that ends in a colon (``mixamori
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -19,6 +18,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.files.toml_file import loads
 from seerob.core.printable import printable_table
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -92,7 +92,7 @@ def read_conventions(path: Path, name: str) -> dict[str, Convention]:
         InputError: The file is missing, or not such a table; every mistake in it.
     """
     try:
-        tables = printable_table(tomllib.loads(content(path, MAX_FILE).decode("utf-8")))
+        tables = printable_table(loads(content(path, MAX_FILE).decode("utf-8")))
     except TooLarge as error:
         raise InputError.at(name, "", str(error), f"a table has at most {MAX_FILE}") from None
     except OSError as error:

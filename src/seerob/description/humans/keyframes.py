@@ -22,7 +22,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -32,6 +31,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.files.toml_file import loads
 from seerob.core.printable import printable_table
 from seerob.core.transforms import Array
 from seerob.description.description import Description
@@ -89,7 +89,7 @@ def read(file: str, description: Description, *, folder: Path | None = None) -> 
 def parse(data: bytes, description: Description, *, file: str) -> Motion:
     """A motion from the content of a file; see `read`."""
     try:
-        table = printable_table(tomllib.loads(data.decode("utf-8")))
+        table = printable_table(loads(data.decode("utf-8")))
     except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", f"is not TOML: {error}", "correct the line") from error
     problems = _unknown(file, "", table, _TOP)

@@ -20,6 +20,7 @@ from msgspec import Struct
 
 from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.files.toml_file import loads
 
 SHIPPED = "iso_ts_15066_2016.toml"
 REGIONS = (
@@ -210,7 +211,7 @@ def parse(raw: bytes, *, file: str) -> BodyLimits:
         InputError: With every mistake; nothing is taken over in part.
     """
     try:
-        table = msgspec.convert(tomllib.loads(raw.decode("utf-8-sig")), _File)
+        table = msgspec.convert(loads(raw.decode("utf-8-sig")), _File)
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
         raise InputError.at(file, "", str(error), f"take {SHIPPED} as the pattern") from error
     builder = _Builder(table, file)

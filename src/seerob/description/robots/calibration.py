@@ -12,7 +12,6 @@ metres of d that cancel out, which is why frames cannot simply be replaced by fr
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from msgspec import Meta, Struct
 
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import TooLarge, content
+from seerob.core.files.toml_file import loads
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, inverse, rotation_from_axis_angle, transform
 from seerob.description.description import Description, Joint, JointKind, Link
@@ -99,7 +99,7 @@ def read_calibration(held: bytes, file: str) -> Calibration:
     """
     remedy = "let seerob probe rtde ADDRESS --calibration FILE write it"
     try:
-        found = msgspec.convert(tomllib.loads(held.decode()), Calibration)
+        found = msgspec.convert(loads(held.decode()), Calibration)
     except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", f"no calibration: {error}", remedy) from error
     if not np.isfinite([found.theta, found.a, found.d, found.alpha]).all():

@@ -298,10 +298,10 @@ def read_structured(content: bytes, file: str, *, yaml: bool) -> Program:
 
 
 def _toml(text: str, file: str) -> Mapping[str, Any]:
-    import tomllib
+    from seerob.core.files.toml_file import loads
 
     try:
-        return tomllib.loads(text)
+        return loads(text)
     except (ValueError, RecursionError) as error:
         # Also what tomllib lets through: a number of 10 000 digits.
         raise InputError.at(file, "", f"is not TOML: {error}") from error

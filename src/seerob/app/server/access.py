@@ -134,7 +134,7 @@ def read_tokens(file: Path) -> Tokens:
         raise InputError.at(file, "", what, f"chmod 600 {file}")
     try:
         given = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", str(error), 'write view = "…", track = "…", control = "…"') from None
     return Tokens.checked({name: str(token) for name, token in given.items()}, file)
 

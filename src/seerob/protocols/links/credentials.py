@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import stat
+import tomllib
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -76,7 +77,8 @@ def credential(variable: str) -> Credential | None:
     if os.name == "posix" and (about.st_uid != os.getuid() or stat.S_IMODE(about.st_mode) & 0o077):
         what = f"mode {stat.S_IMODE(about.st_mode):o} of user {about.st_uid}: others may read or change it"
         raise InputError.at(file, "", what, f"chmod 600 {file}, as its owner")
-    table, _ = read_toml(file)
+    _, raw = read_toml(file)
+    table = tomllib.loads(raw.decode("utf-8-sig"))  # a secret may have any character
     if variable not in table:
         return None
     try:

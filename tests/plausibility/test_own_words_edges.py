@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, two_r
+from made_cell import FLOATING, TWO_R, heard, made, two_r
 from seerob.core.transforms import transform
 from seerob.twin.own_words import (
+    LiveWords,
     SaidTool,
     _differ,
     _Ways,
@@ -166,3 +167,19 @@ def test_ways_of_one_motion(said: float, twins: tuple[float, float], told: str) 
     # What either of both speeds was at one end may lag, not at both.
     for a, b in ((speeds, slow), (slow, speeds)):
         assert bool(_differ(_Ways(4.0, a, before), _Ways(4.5, b, before + ways))) is bool(told)
+
+
+def test_ways_begin_anew_after_half_a_second_and_of_one_instant_nothing_follows(tmp_path) -> None:
+    """Of a tip at 2 m/s that is said to stand."""
+    words = LiveWords(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
+
+    def told(t: float, speed: float = 0.0) -> str:
+        return words.invalid_reason(heard("arm", t, (0.0, 0.0), (1.0, 0.0), tcp_speed=speed))
+
+    assert told(1.0) == ""
+    assert "went 0 mm in 0.25 s, the twin's 500 mm" in told(1.25)
+    assert told(1.75) == ""
+    assert "went 0 mm in 0.25 s" in told(2.0)
+    assert told(2.0) == ""
+    assert "is no number" in told(2.1, float("nan"))
+    assert told(2.15) == ""

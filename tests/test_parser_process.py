@@ -73,6 +73,14 @@ def test_mistakes_that_a_parser_finds_are_the_same_as_here(tmp_path):
     assert here.value.problems == there.value.problems
 
 
+def test_relative_paths_are_from_where_this_process_is(tmp_path, monkeypatch):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}.txt").touch()
+        monkeypatch.chdir(tmp_path / name)
+        assert parsed(os.listdir, ".", file="a") == [f"{name}.txt"]
+
+
 def test_nothing_of_the_environment_is_there(monkeypatch):
     monkeypatch.setenv("SEEROB_PRESS_TOKEN", "secret")
     parser_process._end_all()

@@ -237,7 +237,7 @@ class _Conversation:
         seconds: float,
     ) -> None:
         self.name = f"{function.__module__}:{function.__qualname__}"
-        self.request = pickle.dumps((self.name, arguments, memory, seconds))
+        self.request = pickle.dumps((self.name, arguments, memory, seconds, os.path.realpath(".")))
         self.file, self.remedy, self.memory, self.seconds = file, remedy, memory, seconds
 
     def only(self) -> Any:
@@ -336,7 +336,10 @@ def _answer(request: bytes, questions: BinaryIO, out: BinaryIO) -> None:
     def say(kind: str, value: Any, *, last: bool = True) -> None:
         _send(out, pickle.dumps((kind, value, last, _peak() > TIRED)))
 
-    name, arguments, memory, seconds = pickle.loads(request)  # noqa: S301 - of the process that started this
+    # Of the process that started this one.
+    name, arguments, memory, seconds, folder = pickle.loads(request)  # noqa: S301
+    with contextlib.suppress(OSError):  # relative paths are from where that one is now
+        os.chdir(folder)
     module, _, function = name.partition(":")
     try:
         called = getattr(importlib.import_module(module), function)

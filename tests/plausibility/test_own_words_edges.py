@@ -183,3 +183,31 @@ def test_ways_begin_anew_after_half_a_second_and_of_one_instant_nothing_follows(
     assert told(2.0) == ""
     assert "is no number" in told(2.1, float("nan"))
     assert told(2.15) == ""
+
+
+DOWN = "engine = { gravity = [0, -9.81, 0] }\n"
+
+
+@pytest.mark.parametrize(
+    ("engine", "q", "qd", "torques"),
+    [
+        (DOWN, (0.0, 0.0), None, (29.43, 9.81)),  # of 1 kg at 1 and at 2 m
+        (FLOATING, (0.0, np.pi / 2), (3.0, 2.0), (-16.0, 9.0)),  # q̇₂(2q̇₁ + q̇₂) and q̇₁²
+    ],
+)
+def test_live_torques_are_judged_from_five_on_where_masses_are_known(
+    tmp_path, engine, q, qd, torques
+) -> None:
+    """Of the opposite sign; looked at every 0.1 s."""
+    known = two_r()
+    unknown = known[: known.index("<inertial>")] + known[known.index("</inertial>") + len("</inertial>") :]
+    for name, urdf, told in (("known", known, True), ("unknown", unknown, False)):
+        words = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
+        for k in range(6):
+            tau = tuple(-t for t in torques)
+            assert words.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=tau)) == ""
+            assert ("the opposite sign" in words.torque_doubt) is (told and k >= 4), k
+        right = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
+        for k in range(6):
+            right.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=torques))
+        assert right.torque_doubt == ""

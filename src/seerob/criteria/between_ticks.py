@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
 from seerob.core.errors import Undecided, UnknownName
@@ -26,15 +27,12 @@ from seerob.criteria.criterion import Criterion, Evaluate, Follows, Lowest, Mome
 from seerob.model.model import Model
 from seerob.twin.spans import (
     AllFalls,
-    Approaching,
     Fall,
     Falls,
-    Indices,
     Margin,
     Path,
     Points,
     Span,
-    Speeding,
 )
 from seerob.twin.state import State
 
@@ -98,7 +96,7 @@ def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
     return tuple(h.name for h in model.workstation.humans if h.name in found)
 
 
-class End(NamedTuple):
+class End(Struct, frozen=True, eq=False):
     """What is known of one end of a span."""
 
     t: float
@@ -140,13 +138,17 @@ class Asking(NamedTuple):
     """Makes what is within undecided, with a reason."""
 
 
-class Told(NamedTuple):
+class Told(Struct, frozen=True, eq=False):
     """What a way between two instants came to."""
 
     exceeded: Result | None = None
     """At an instant between."""
     open: str = ""
     """Why it is not known; empty when all of it is within or something is exceeded."""
+
+
+NOTHING = Told()
+"""Of a way on which all is within, or where no margin says anything."""
 
 
 class BetweenTicks:
@@ -159,7 +161,8 @@ class BetweenTicks:
     def __init__(self, watches: Sequence[Watch | None]) -> None:
         self._watches = watches
         self._before: list[End | None] = [None] * len(watches)
-        self._ids: Indices | None = None
+        self._ids: bytes | None = None
+        """Which of MuJoCo's bodies moved each body at the last tick."""
         self._speeds: Array | None = None
         self._shadow: State | None = None
         self._whole: Span | None = None
@@ -194,24 +197,27 @@ class BetweenTicks:
         if path is None or self._ids is None or self._speeds is None:
             path, self._before, self._followed = None, [None] * len(found), {}
         self._way, self._asking, self._whole, self._falls = path, asking, None, None
+        if path is not None:
+            self._begins, self._ends = float(path.t[0]), float(path.t[-1])
+            self._same = self._ids == ids.tobytes()
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
             try:
-                if i not in self._failed:
+                if not self._failed or i not in self._failed:
                     found[i] = self._one(i, watch, found[i], state, speeds)
             except Exception as error:
                 # One's own bound that fails must not end a run that others are judged in.
                 self._failed[i] = f"what bounds it between two ticks failed: {type(error).__name__}: {error}"
-            if i in self._failed:
+            if self._failed and i in self._failed:
                 found[i] = asking.take_back(found[i], self._failed[i])
-        self._ids, self._speeds = ids.copy(), speeds
+        self._ids, self._speeds = ids.tobytes(), speeds
         return tuple(found)
 
     def _one(self, i: int, watch: Watch, result: Result, state: State, speeds: Array) -> Result:
         """What a criterion says of a tick, with what happened since the last one."""
         before = self._before[i]
-        switches = self._switches(watch, before, state)
+        switches = () if watch.criterion.active is None else self._switches(watch, before, state)
         if watch.follows is not None:
             self._follow(watch, watch.follows, state, speeds, muted=result.muted)
         if result.t is not None and result.t != state.t and before is not None:
@@ -221,20 +227,24 @@ class BetweenTicks:
             result = self._asking.now(i)
         now = _end(watch.criterion, result, state.t, speeds)
         if watch.follows is not None:
-            now = now._replace(figure=self._figure(watch, watch.follows, result, state.t))
+            now = replace(now, figure=self._figure(watch, watch.follows, result, state.t))
         if self._way is not None and before is not None:
             told = (
                 self._switched(i, watch, (before, now), switches, state)
                 if switches
                 else self._judge(i, watch, (before, now), state)
             )
-            idle = now.idle and watch.lowest is not None
             if told.exceeded is not None:
                 result = told.exceeded
-            elif told.open and not watch.accepted and (now.verdict is _WITHIN or idle or now.muted):
+            elif told.open and not watch.accepted and self._green(watch, now):
                 result = replace(self._asking.take_back(result, told.open), muted=False)
         self._before[i] = now
         return result
+
+    @staticmethod
+    def _green(watch: Watch, now: End) -> bool:
+        """Whether it says that all is well, or nothing."""
+        return now.verdict is _WITHIN or now.muted or (now.idle and watch.lowest is not None)
 
     def _follow(self, watch: Watch, follows: Follows, state: State, speeds: Array, *, muted: bool) -> None:
         """Bound what a limit follows from on the way to this tick."""
@@ -348,7 +358,7 @@ class BetweenTicks:
             if end != now.t or now.muted:
                 _, b, _ = self._look(i, watch, path, end, state, applies=True)
                 # It does not apply there any more: what it would say is known, and is no verdict.
-                b = b._replace(verdict=None)
+                b = replace(b, verdict=None)
             told = self._judge(i, watch, (a, b), state, cut=True)
             if told.exceeded is not None:
                 return told
@@ -358,19 +368,19 @@ class BetweenTicks:
     def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
         """What is left at this tick of a margin that was not asked for; None when that is not enough."""
         path = self._way
-        if path is None or self._ids is None or not np.array_equal(self._ids, state.attachments.ids):
+        if path is None or not self._same:
             return None  # what was picked up has the speed of the hand at once
         if watch.lowest is not None:
-            now = before._replace(t=state.t, speeds=speeds)
+            now = replace(before, t=state.t, speeds=speeds)
             some = before.margin is not None or before.idle
             return now if not some or self._low(watch, path, (before, now), state) >= 0 else None
         if any(state.hearings[person].bones for person in watch.people):
             return None  # how far devices are off now is not known from then
         if before.margin is None:
-            return before._replace(t=state.t, speeds=speeds)
-        fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)
+            return replace(before, t=state.t, speeds=speeds)
+        fall = self._fall(watch, path, (before, replace(before, t=state.t, speeds=speeds)), state)
         margin, off = before.margin
-        end = before._replace(t=state.t, margin=(margin - fall.fall, off), speeds=speeds)
+        end = replace(before, t=state.t, margin=(margin - fall.fall, off), speeds=speeds)
         left = self._left(watch, end)
         assert left is not None
         return end if np.all(left[0] - left[1] >= 0) else None
@@ -382,26 +392,29 @@ class BetweenTicks:
         """
         before, now = ends
         idle = watch.lowest is not None and (before.idle or now.idle)
-        if _EXCEEDED in (before.verdict, now.verdict) or not (before.margin or now.margin or idle):
-            return Told()
+        if before.margin is None and now.margin is None and not idle:
+            return NOTHING
+        if before.verdict is _EXCEEDED or now.verdict is _EXCEEDED:
+            return NOTHING
         assert self._way is not None
         low = self._low(watch, self._way, ends, state)
         if low >= 0:
-            return Told()
+            return NOTHING
         if not (np.isfinite(low) or (before.margin and now.margin) or watch.lowest or cut):
             # Nothing was known at one end, which is said there, and from the other nothing follows.
-            return Told()
+            return NOTHING
         if not np.isfinite(low) and self._way.broken:
             return Told(open=f"{', '.join(self._way.broken)} jumped: its way between two ticks is not known")
         return self._search(i, watch, ends, low, state)
 
     def _span(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Span:
         a, b = ends
-        assert self._ids is not None
-        whole = a.t == path.t[0] and b.t == path.t[-1]
+        whole = a.t == self._begins and b.t == self._ends
         span = self._whole if whole else None
         if span is None:
-            span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
+            assert self._ids is not None
+            ids = np.frombuffer(self._ids, np.int64)
+            span = watch.points.span(path, a.t, b.t, ids, state.model.mj)
             span.between_speeds(a.speeds, b.speeds)
             span.foresee, span.knots = state.foresee, state.knots
             if state.speed_errors:
@@ -412,10 +425,11 @@ class BetweenTicks:
     def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
         assert watch.falls is not None
         span = self._span(watch, path, ends, state)
-        if span is self._whole and isinstance(watch.falls, Approaching | Speeding):
+        if span is self._whole:
             if self._falls is None:
                 self._falls = self._simple.of(span)
-            return self._falls[watch.falls]
+            if (found := self._falls.get(watch.falls)) is not None:
+                return found
         (m, off), *rest = [end.margin for end in ends if end.margin is not None]
         if not rest:
             return watch.falls(span, m - off)
@@ -432,23 +446,27 @@ class BetweenTicks:
             state: The twin at one of them.
         """
         if watch.lowest is not None:
-            if self._ids is None or not np.array_equal(self._ids, state.attachments.ids):
+            if not self._same:
                 return -np.inf
             try:
                 return float(watch.lowest(state, self._span(watch, path, ends, state)))
             except Undecided:
                 return -np.inf
         fall = self._fall(watch, path, ends, state)
-        one, *rest = [m for m in (self._left(watch, end) for end in ends) if m is not None]
-        return _least(one, rest[0] if rest else None, fall)
+        one, other = ends[0].margin, ends[1].margin
+        if watch.follows is not None:
+            one, other = self._left(watch, ends[0]), self._left(watch, ends[1])
+        if one is None:
+            one, other = other, None
+        assert one is not None
+        return _least(one, other, fall)
 
     def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> Told:
         path = self._way
         assert path is not None
         begin, end = (f"{each.t:.4g} s" for each in ends)
-        assert self._ids is not None
         remembers = watch.remembers and watch.follows is None
-        if remembers or not np.array_equal(self._ids, state.attachments.ids):
+        if remembers or not self._same:
             what = "it remembers" if remembers else "something was picked up or let go"
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
@@ -469,7 +487,7 @@ class BetweenTicks:
                 elif _UNDECIDED in (pair[0].verdict, pair[1].verdict):
                     invalid_reason = invalid_reason or result.reason
         if not spans and not invalid_reason:
-            return Told()
+            return NOTHING
         if not spans:
             return Told(open=f"between two ticks: {invalid_reason}")
         _, _, a, b = spans[0]
@@ -487,7 +505,7 @@ class BetweenTicks:
         end = _end(watch.criterion, result, t, shadow.largest_speeds())
         if watch.within is not None:
             with suppress(Undecided):
-                end = end._replace(figure=watch.within.now(shadow).figure)
+                end = replace(end, figure=watch.within.now(shadow).figure)
         return result, end, shadow
 
     def _placed(self, path: Path, t: float, state: State) -> State:
@@ -510,7 +528,7 @@ def _least(one: Margin, other: Margin | None, lost: Fall) -> float:
     if other is None:
         return float(np.min(m - fall - off))
     m_other, also = other
-    if type(m) is type(m_other) is type(fall) is type(bend) is float:
+    if type(fall) is float is type(m) and type(m_other) is float is type(bend):
         return float(max((m + m_other - fall) / 2, min(m, m_other) - bend) - max(off, also))
     low = np.maximum((m + m_other - fall) / 2, np.minimum(m, m_other) - bend)
     return float(np.min(low - np.maximum(off, also)))

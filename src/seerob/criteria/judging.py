@@ -16,8 +16,8 @@ from msgspec.structs import replace
 from seerob.core.errors import SeerobError, Undecided, UnknownName, Unweighed
 from seerob.core.markers import Marker, changed
 from seerob.core.plugin import PluginError, kind_of
-from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
-from seerob.core.verdict import ROUNDING, keeps
+from seerob.core.snapshot import Basis, Finding, Result, Verdict
+from seerob.core.verdict import ROUNDING, admitted, keeps
 from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
@@ -153,7 +153,10 @@ def contradiction(result: Result, criterion: Criterion) -> str:
     if math.isinf(limit):
         return f"it is within, and its limit is {limit}: nothing could exceed that"
     ends = (value,) if result.interval is None else (value, *result.interval)
+    last = admitted(limit, at_most=result.at_most)
     for end in ends:
+        if type(end) is float and (end <= last if result.at_most else end >= last):
+            continue
         # A value that is not a number keeps no limit.
         if not keeps(end, limit, at_most=result.at_most):
             side = "above" if result.at_most else "below"
@@ -181,11 +184,16 @@ def unsaid(result: Result, criterion: Criterion) -> str:
 
 
 def _worse_part(result: Result) -> str:
-    inner: tuple[Result | Row, ...] = (*result.parts, *result.rows)
-    for row in inner:
+    nested = False
+    for part in result.parts:
+        verdict = part.verdict
+        if verdict is _EXCEEDED or verdict is _UNDECIDED:
+            return f"it is within, and its part {part.name} is {verdict}"
+        nested = nested or bool(part.parts or part.rows)
+    for row in result.rows:
         if row.verdict is _EXCEEDED or row.verdict is _UNDECIDED:
             return f"it is within, and its part {row.name} is {row.verdict}"
-    return next(filter(None, map(_worse_part, result.parts)), "")
+    return next(filter(None, map(_worse_part, result.parts)), "") if nested else ""
 
 
 def _unknown(criterion: Criterion, reason: str) -> Result:
@@ -322,6 +330,8 @@ class Judge:
         self._findings = tuple(findings)
         self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
+        self._holds = False
+        """Whether anything is."""
         self._as_heard: AsHeard | None = None
         self._worded: tuple[Finding, ...] = ()
         """What it says now."""
@@ -346,11 +356,10 @@ class Judge:
         if self._held is None:
             model = state.model
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
-            self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
-            self._held_names = held_names(findings, model)
             self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
             self._declared = tuple(_all_declared(bound.criterion, model) for bound in self._bound)
             self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
+            self._hold(model, findings)
             self._as_heard = AsHeard(model)
             known = {finding.holds for finding in findings}
             claims = (claim for one in self._bound for claim in one.criterion.claims(model))
@@ -363,9 +372,8 @@ class Judge:
             self._findings = (*self._findings, *(what for _, what in refuted))
             self._claims = [claim for claim in self._claims if claim not in [one for one, _ in refuted]]
             findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *self._worded)))
-            self._held = tuple(held(bound.criterion, state.model, findings) for bound in self._bound)
-            self._held_names = held_names(findings, state.model)
-        results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
+            self._hold(state.model, findings)
+        results = [self._one(i, bound, state) for i, bound in enumerate(self._bound)]
 
         def ask(i: int) -> Result:
             self._kept.pop(i, None)
@@ -376,6 +384,8 @@ class Judge:
 
         # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
         found = self._between(state, results, Asking(ask, look, undecided))
+        if not any(self._why):
+            return found
         return tuple(
             undecided(result, why) if why and not result.muted else result
             for result, why in zip(found, self._why, strict=True)
@@ -386,13 +396,19 @@ class Judge:
         """How many instants between ticks were looked at so far."""
         return self._between.looks
 
+    def _hold(self, model: Model, findings: Sequence[Finding]) -> None:
+        """Resolve what is held by findings, and by shapes that are missing."""
+        self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
+        self._held_names = held_names(findings, model)
+        self._holds = any(self._held) or bool(self._held_names) or any(self._unmentioned)
+
     def _one(self, i: int, bound: Bound, state: State) -> Result:
-        kept = self._kept.get(i)
         criterion = bound.criterion
+        kept = self._kept.get(i) if self._kept else None
         if kept and self._lasts(kept, criterion, state):
             return kept.result
         result, muted = self._now(i, bound.evaluate, state)
-        self._why[i] = self._reason(i, state)
+        self._why[i] = self._reason(i, state) if self._holds else ""
         if criterion.every is not None:
             result = replace(result, t=state.t)
             due, asked = state.t + criterion.every, tuple(sorted(state.asked))
@@ -439,7 +455,8 @@ class Judge:
         assert self._needs is not None
         bound = self._bound[i]
         names, bodies = self._needs[i]
-        state.require(*names)
+        if names:
+            state.require(*names)
         if bodies:
             state.require_bodies(bodies)
         if bound.own:

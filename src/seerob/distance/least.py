@@ -12,11 +12,11 @@ these values, so a body inside a machine can never read as far from it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.errors import InputError, Problem, SimulationDiverged
@@ -58,8 +58,7 @@ class Per(StrEnum):
     """Whether each pair of bodies is nearer than the cap: far cheaper than how near."""
 
 
-@dataclass(frozen=True, eq=False)
-class Closest:
+class Closest(Struct, frozen=True, eq=False):
     """Where two sets of bodies are nearest."""
 
     distance: float
@@ -76,8 +75,7 @@ class Closest:
     kind: DistanceKind
 
 
-@dataclass(frozen=True, eq=False)
-class Closests:
+class Closests(Struct, frozen=True, eq=False):
     """Many `Closest`, in arrays: shape (g,) for one set of poses, (N, g) for a batch."""
 
     distance: Array

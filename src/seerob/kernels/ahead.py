@@ -16,6 +16,36 @@ _ROW, _ROWS, _PAIR = "f8[::1]", "f8[:,::1]", "f8[:,:,::1]"
 _WINDOW = f"i8[::1], {_ROWS}, {_ROWS}, {_PAIR}, {_PAIR}, {_ROWS}"
 
 
+@njit(f"i8({_ROW}, f8[:], f8, {_ROW}, i8[::1])", cache=True, nogil=True)
+def merged(ticks: Array, knots: Array, slack: float, found: Array, rows: Indices) -> int:
+    """Put ticks, and the knots that are none of them, in one order; writes into the last two arguments.
+
+    Args:
+        ticks: Increasing [s], shape (s,).
+        knots: Not decreasing [s], shape (k,).
+        slack: A knot that is nearer to a tick is that tick [s].
+        found: Shape (s + k,).
+        rows: Where each tick is, shape (s,).
+
+    Returns:
+        How many there are.
+    """
+    count, i = 0, 0
+    for t in knots:
+        while i < len(ticks) and ticks[i] < t:
+            found[count], rows[i] = ticks[i], count
+            count, i = count + 1, i + 1
+        near = i < len(ticks) and abs(t - ticks[i]) <= slack
+        near = near or (i > 0 and abs(t - ticks[i - 1]) <= slack)
+        if not near and (count == 0 or found[count - 1] < t):
+            found[count] = t
+            count += 1
+    while i < len(ticks):
+        found[count], rows[i] = ticks[i], count
+        count, i = count + 1, i + 1
+    return count
+
+
 @njit(f"i8(i8, {_WINDOW}, {_WINDOW}, b1[::1])", cache=True, nogil=True)
 def kept(
     shift: int,

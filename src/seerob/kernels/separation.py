@@ -155,3 +155,41 @@ def largest_factor(c: Array, b: Array, a: Array) -> float:
         elif a[i] != 0:
             least = 0.0
     return least
+
+
+@njit(f"f8({', '.join([_ROW] * 6)}, f8, f8, f8, f8)", cache=True, nogil=True, error_model="numpy")
+def largest_factor_in_time(
+    distance: Array,
+    v_h: Array,
+    S_rest: Array,
+    S_now: Array,
+    v_rest: Array,
+    v_now: Array,
+    T_r: float,
+    T_s: float,
+    K: float,
+    share: float,
+) -> float:
+    """Find the largest factor of all speeds with no part nearer than its S_p, for a stop of known time.
+
+    Args:
+        distance: Of each part [m], shape (n,).
+        v_h: Speed of the person that counts for each part [m/s], shape (n,).
+        S_rest: Ways while the robot reacts that is at rest now [m], shape (n,).
+        S_now: Ways at the present speeds, likewise.
+        v_rest: Speeds at which it begins to brake, at rest now [m/s], shape (n,).
+        v_now: At the present speeds, likewise.
+        T_r: Reaction time [s].
+        T_s: Stopping time [s].
+        K: C + Z_d + Z_r [m].
+        share: Of speed times stopping time that is travelled.
+
+    Returns:
+        As `largest_factor`.
+    """
+    n = len(distance)
+    c, b = np.empty(n), np.empty(n)
+    for i in range(n):
+        c[i] = v_h[i] * (T_r + T_s) + K - distance[i] + S_rest[i] + share * v_rest[i] * T_s
+        b[i] = (S_now[i] - S_rest[i]) + share * (v_now[i] - v_rest[i]) * T_s
+    return largest_factor(c, b, np.zeros(n))

@@ -177,6 +177,38 @@ def joints_at(t: Array, q: Array, v: Array, when: float, position: Array, veloci
         velocity[i] = (c1 + x * (2 * c2 + x * 3 * c3)) / T
 
 
+@njit(f"void({_ROW}, {_ROW}, f8, {', '.join([_ROW] * 5)})", cache=True, nogil=True, error_model="numpy")
+def slowest_and_fastest(
+    before: Array,
+    after: Array,
+    T: float,
+    quick: Array,
+    bend: Array,
+    fast: Array,
+    ends: Array,
+    slow: Array,
+) -> None:
+    """Take into account how fast bodies are at both ends of a span; writes into the last three arguments.
+
+    Args:
+        before: Speed of the fastest point of each body at the begin [m/s], shape (n,).
+        after: Speed at the end [m/s], shape (n,).
+        T: Length of the span [s].
+        quick: Of points, those of bodies first, from `point_bounds` [m/s²], shape (p,).
+        bend: Likewise [m/s].
+        fast: Likewise, from which what is faster than that is taken off [m/s].
+        ends: Larger speed of both ends [m/s], shape (n,).
+        slow: Least speed [m/s], shape (n,).
+    """
+    for i in range(len(before)):
+        ends[i] = np.maximum(before[i], after[i])
+        changes = quick[i] * T
+        # Along the straight line between two velocities no speed is larger than at both ends.
+        most = np.minimum((before[i] + after[i] + changes) / 2, ends[i] + bend[i])
+        fast[i] = np.minimum(fast[i], most)
+        slow[i] = np.maximum((before[i] + after[i] - changes) / 2, 0.0)
+
+
 @njit(f"f8({_ROW}, i8[::1])", cache=True, nogil=True, error_model="numpy")
 def greatest(values: Array, rows: Indices) -> float:
     """Largest of some values that are not negative; 0 of none, NaN where one is not a number."""

@@ -71,6 +71,25 @@ def carried(xmat: Array, xpos: Array, body: int, body_from_frame: Array) -> tupl
     return rotation, position
 
 
+@njit(f"UniTuple(f8, 3)(f8[:,:,::1], {_ROWS}, i8, f8[:])", cache=True, nogil=True)
+def in_body(rotations: Array, positions: Array, index: int, point: Array) -> tuple[float, float, float]:
+    """Where a point of the world is in the frame of a body [m].
+
+    Args:
+        rotations: World from body, shape (n, 3, 3).
+        positions: [m], shape (n, 3).
+        index: Which body.
+        point: In the world [m], shape (3,).
+    """
+    x, y, z = point[0] - positions[index, 0], point[1] - positions[index, 1], point[2] - positions[index, 2]
+    R = rotations[index]
+    return (
+        x * R[0, 0] + y * R[1, 0] + z * R[2, 0],
+        x * R[0, 1] + y * R[1, 1] + z * R[2, 1],
+        x * R[0, 2] + y * R[1, 2] + z * R[2, 2],
+    )
+
+
 @njit(f"void({_ROWS}, {_ROWS}, {_ROWS}, i8[::1], i8[::1], {_ROWS}, {_ROWS})", cache=True, nogil=True)
 def velocities(
     cvel: Array,

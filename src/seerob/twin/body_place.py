@@ -23,6 +23,7 @@ class BodyPlaces:
             person, _, bone = each.name.rpartition("/")
             if each.role == "human" and person in people and bone in BONES:
                 self._bones[index] = person, bone
+        self._words: dict[tuple[int, str | None, bool, str | None], str] = {}
         self._sizes = {name: size(human) for name, human in people.items()}
         self._hands = {name: human.hand for name, human in people.items()}
 
@@ -41,13 +42,12 @@ class BodyPlaces:
 
     def _named(self, state: State, index: int, point: Array) -> str:
         person, bone = self._bones[index]
-        R, x = state.placed((index,), allow_estimated=True, strayed=True)
-        local = (point - x[index]) @ R[index]
-        area = body_area(bone, local, body=self._sizes[person], hand=self._hands[person])
-        return words(
-            self._names[index],
-            body_region(bone, local, body=self._sizes[person]),
-            front=in_front(bone, local, self._sizes[person]),
-            dominant=bone.startswith(f"{self._hands[person]}_"),
-            area=None if area is None else area.name,
-        )
+        body, hand = self._sizes[person], self._hands[person]
+        local = state.in_body(index, point, allow_estimated=True, strayed=True)
+        area = body_area(bone, local, body=body, hand=hand)
+        region, front = body_region(bone, local, body=body), in_front(bone, local, body)
+        key = index, region, front, None if area is None else area.name
+        if key not in self._words:
+            dominant = bone.startswith(f"{hand}_")
+            self._words[key] = words(self._names[index], region, front=front, dominant=dominant, area=key[3])
+        return self._words[key]

@@ -411,11 +411,11 @@ class Engine:
         q, qd, _ = self._references[name].course(t)
         return q, qd, hearing.doubt_ahead(self.state.t, float(t[-1]) if len(t) else self.state.t)
 
-    def _knots_of(self, name: str, begin: float, end: float) -> list[float]:
+    def _knots_of(self, name: str, begin: float, end: float) -> Array:
         """Tell between which instants that is one cubic (`seerob.twin.spans.Knots`)."""
         if name not in self._ahead:
-            return []
-        return [t for t in self._references[name].instants if begin + kernel.SLACK < t < end - kernel.SLACK]
+            return np.zeros(0)
+        return self._references[name].between(begin + kernel.SLACK, end - kernel.SLACK)
 
     # -- time -------------------------------------------------------------------------------
 
@@ -519,11 +519,11 @@ class Engine:
             instants[-1] = t
             q[-1], v[-1] = self._shown.qpos, self._shown.qvel
             return Path(instants, q, v, broken, self._captured() if captured else None)
+        inner = start + kernel.SLACK, t - kernel.SLACK
         inside = {
             instant
             for mechanism in self._mechanisms
-            for instant in self._references[mechanism.name].instants
-            if start + kernel.SLACK < instant < t - kernel.SLACK
+            for instant in self._references[mechanism.name].between(*inner).tolist()
         }
         instants = np.array([start, *sorted(inside), t], float)
         many_q, many_v = np.empty((len(instants), len(q[0]))), np.zeros((len(instants), len(v[0])))

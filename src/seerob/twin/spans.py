@@ -13,7 +13,7 @@ falls at most ``bend`` below the lesser of both ends, is there nowhere below
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,6 +29,7 @@ from seerob.kernels.spans import (
     joint_bounds,
     joints_at,
     point_bounds,
+    slowest_and_fastest,
 )
 from seerob.model.model import Mechanism, Model
 
@@ -37,8 +38,9 @@ Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
 """Asks what a robot does at instants to come [s]: positions and velocities of its joints [rad or m], shape
 (k, n), and why they are not known so; None where nothing is."""
 
-Knots = Callable[[str, float, float], Iterable[float]]
-"""Asks of a robot, and from when to when [s], between which instants what it is known to do is one cubic."""
+Knots = Callable[[str, float, float], Sequence[float] | Array]
+"""Asks of a robot, and from when to when [s], between which instants what it is known to do is one cubic: in
+the order of time [s], shape (k,)."""
 
 
 class Coupling(NamedTuple):
@@ -160,7 +162,8 @@ class Points:
     def __init__(self, model: Model) -> None:
         self.model = model
         self._own: list[tuple[int, Array, float]] = []
-        self._ids: Indices | None = None
+        self._ids = b""
+        """Which of MuJoCo's bodies moved each body when chains were resolved."""
         self._bounds = np.zeros((4, model.mj.nv))
         self._speed, self._change, self._varies, self._away = self._bounds
         self._movers = {name: np.asarray(m.v_address) for name, m in model.mechanisms.items()}
@@ -182,7 +185,7 @@ class Points:
             Its row in what a `Span` says of points.
         """
         self._own.append((body, np.asarray(point, float).reshape(1, 3), radius))
-        self._ids = None
+        self._ids = b""
         return self.count - 1
 
     def span(self, path: Path, begin: float, end: float, ids: Indices, mj: mujoco.MjModel) -> Span:
@@ -195,7 +198,7 @@ class Points:
             ids: MuJoCo's body of each body at the begin, see `seerob.twin.attachments`.
             mj: The `mujoco.MjModel` then.
         """
-        if self._ids is None or not np.array_equal(self._ids, ids):
+        if self._ids != ids.tobytes():
             self._chains(mj, ids)
         n = self.count
         fast, quick, bend = np.empty((3, n))
@@ -237,13 +240,13 @@ class Points:
 
     def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
         """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
-        assert self._ids is not None
+        assert self._ids
         part = slice(int(self._start[point]), int(self._start[point + 1]))
         return self._joints[part], self._turns[part], self._lengths[part]
 
     def chains(self, points: Indices, ids: Indices, mj: mujoco.MjModel) -> Chains:
         """Joints that move some points; ids and model as `span` takes them."""
-        if self._ids is None or not np.array_equal(self._ids, ids):
+        if self._ids != ids.tobytes():
             self._chains(mj, ids)
         every = [self.chain(point) for point in points.tolist()]
         joints, turns, lengths = (
@@ -302,7 +305,7 @@ class Points:
             start.append(len(joints))
         self._start, self._joints = np.array(start, np.int64), np.array(joints, np.int64)
         self._turns, self._lengths = np.array(turns, np.bool_), np.array(lengths, float)
-        self._ids = np.array(ids)
+        self._ids = ids.tobytes()
 
 
 def joints_of(mj: mujoco.MjModel, body: int) -> list[int]:
@@ -353,6 +356,8 @@ class Span:
         self.noise = np.zeros(len(fast))
         """How far speeds of points of bodies may be off that were derived from noisy positions [m/s], shape
         (p,), which is in no other figure here; 0 of points that criteria add."""
+        self.noisy = False
+        """Whether there is any."""
         self.joint_noise = np.zeros(mj.nv)
         """How far speeds of joints may be off by that noise [rad/s or m/s], shape (nv,)."""
         self.qd, self.qdd, _, self.away = joints
@@ -360,15 +365,13 @@ class Span:
 
     def between_speeds(self, before: Array, after: Array) -> None:
         """Take into account how fast bodies are at both ends [m/s], shape (n,) each."""
-        n = len(before)
-        self.ends = np.maximum(before, after)
-        # Along the straight line between two velocities no speed is larger than at both ends.
-        most = np.minimum((before + after + self.quick[:n] * self.T) / 2, self.ends + self.bend[:n])
-        np.minimum(self.fast[:n], most, out=self.fast[:n])
+        self.ends, self.slow = np.empty((2, len(before)))
+        slowest_and_fastest(
+            before, after, self.T, self.quick, self.bend, self.fast, self.ends, self.slow
+        )  # fmt: skip
         if self._captured is not None:
             # How fast the twin is at both ends says nothing of who was captured elsewhere.
             np.maximum(self.fast, self._captured, out=self.fast)
-        self.slow = np.maximum((before + after - self.quick[:n] * self.T) / 2, 0.0)
 
     def derived(self, points: Array, joints: Array) -> None:
         """Take into account how far speeds may be off at one end, of bodies [m/s] (n,) and joints (nv,).
@@ -379,6 +382,7 @@ class Span:
         moved = 2 * float(self.fast[:n].max(initial=0.0)) * self.T
         self.noise[:n][some] = points[some] + float(np.linalg.norm(joints)) * moved
         self.joint_noise = joints
+        self.noisy = bool(some.any())
 
     def way(self, rows: Indices) -> float:
         """Longest way of any of some points within the span [m]."""

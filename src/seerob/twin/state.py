@@ -27,7 +27,7 @@ from seerob.distance.least import Closest, Closests, Per, Query
 from seerob.distance.surveying import Surveyor
 from seerob.kernels.axes import felt, principal_axes, quaternion
 from seerob.kernels.chain import along, at_point
-from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
+from seerob.kernels.speed import carried, fastest, in_body, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.signals import Signals
@@ -328,6 +328,24 @@ class State(Validity):
             R[rows], x[rows] = self._rotations[rows], self._positions[rows]
             self._cache[key] = True
         return R, x
+
+    def in_body(
+        self, index: int, point: Array, *, allow_estimated: bool = False, strayed: bool = False
+    ) -> tuple[float, float, float]:
+        """A point of the world as a body has it in its own frame [m].
+
+        Args:
+            index: Of the body.
+            point: In the world [m], shape (3,).
+            allow_estimated: As in `require_bodies`.
+            strayed: As in `require_bodies`.
+
+        Raises:
+            Undecided: The body may be elsewhere.
+        """
+        self.require_bodies((index,), allow_estimated=allow_estimated, strayed=strayed)
+        found: tuple[float, float, float] = in_body(self._rotations, self._positions, index, point)
+        return found
 
     def _rows_of(self, bodies: tuple[int, ...]) -> Indices:
         if bodies not in self._rows:
@@ -787,6 +805,12 @@ class State(Validity):
         rows = self._rows_of(bodies)
         speed, point, velocity = self._fastest()
         return speed[rows], point[rows], velocity[rows]
+
+    def fastest_speeds(self, bodies: tuple[int, ...], *, allow_estimated: bool = False) -> Array:
+        """Bounds on the speed of any point of bodies [m/s], shape (b,); arguments as of `fastest_points`."""
+        self.require_bodies(bodies, allow_estimated=allow_estimated)
+        self._ask_speeds(bodies)
+        return np.asarray(self._fastest()[0][self._rows_of(bodies)])
 
     def largest_speeds(self) -> Array:
         """Bound on the speed of any point of each body [m/s], shape (n,): for bounds, never for a verdict."""

@@ -252,7 +252,7 @@ class Clamping:
         state.require(*self._carriers)
         if not wanted.any():
             return np.zeros_like(wanted), np.zeros_like(wanted), np.zeros(wanted.shape)
-        v, twists = state.fastest_points(self._moving)[0], state.body_velocities(self._asked)
+        v, twists = state.fastest_speeds(self._moving), state.body_velocities(self._asked)
         clamped, speeds = self._gaps.clamped(*state.placed(self._asked), twists, v, wanted)
         at_joints = self._joints.speeds(state, wanted)
         clamped |= at_joints > 0

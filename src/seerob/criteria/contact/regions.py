@@ -159,9 +159,7 @@ class Person:
         near: NDArray[np.bool_] = close @ self._member
         if speed is not None:
             return near, np.full(len(REGIONS), speed)
-        fast = (
-            state.fastest_points(self.bodies)[0] if span is None else (span.fast + span.noise)[self._people]
-        )
+        fast = state.fastest_speeds(self.bodies) if span is None else (span.fast + span.noise)[self._people]
         v = np.where(self._close, fast, 0.0)
         return near, np.asarray(np.max(v[:, None] * self._member, axis=0))
 

@@ -404,7 +404,7 @@ class Contacts:
             raise Undecided(f"{robot.name} has no moving part with a shape")
         mover = self.behind.mover(state)
         simplified = self.behind.simplified(mover)
-        v_r = state.fastest_points(self.moving)[0]
+        v_r = state.fastest_speeds(self.moving)
         riders = () if mover is not None else self.behind.riding(state)
         # A drive presses as hard however slowly it moves.
         pressing = {body for rider in riders for body in rider.moving}

@@ -236,27 +236,33 @@ class Separation(Criterion, frozen=True, kw_only=True):
             K: C + Z_d + Z_r [m].
             seen: Of one instant, or of each (N, 1).
         """
-        fast = np.asarray(seen, float).reshape(-1)
-        S_r, S_s = (np.ascontiguousarray(each).reshape(len(fast), -1) for each in (course.S_r, course.S_s))
-        time = float(at_least("T_r", self.stop.reaction, unit="s") + at_least("T_s", course.T_s, unit="s"))
+        fast, found = np.array(seen, float).reshape(-1), np.empty_like(course.S_r)
+        rows = len(fast), course.S_r.shape[-1]
+        time = self.stop.reaction + float(at_least("T_s", course.T_s, unit="s"))
         v_h = math.nan if self.human_speed is None else self.human_speed
-        found = np.empty(course.S_r.shape)
-        rows = found.reshape(len(fast), -1)
-        separations(S_r, S_s, time, K, v_h, fast, REACHING, WALKING, iso_13855.ARM_REACH, rows)
+        separations(
+            np.ascontiguousarray(course.S_r).reshape(rows), np.ascontiguousarray(course.S_s).reshape(rows),
+            time, K, v_h, fast, REACHING, WALKING, iso_13855.ARM_REACH, found.reshape(rows),
+        )  # fmt: skip
         return found
 
     @staticmethod
-    def _seen(state: State, gap: Gap) -> tuple[float, float]:
+    def _seen(state: State, gap: Gap, stray: str) -> tuple[float, float]:
         """Speed of the person's fastest point that may be relied on [m/s]; 0 of a twin that is stopped.
+
+        Args:
+            state: The twin.
+            gap: Whose first set the person is.
+            stray: Why the twin is stopped (`State.strays`).
 
         Returns:
             As it is known, and as it may be by the noise of positions that it was derived from.
         """
-        if state.strays(gap.a):
+        if stray:
             return 0.0, 0.0
         lost = state.invalid_bodies(gap.a)
         people = tuple(i for i in gap.a if i not in lost) if lost else gap.a
-        speeds = state.fastest_points(people, allow_estimated=True)[0]
+        speeds = state.fastest_speeds(people, allow_estimated=True)
         seen = float(speeds.max(initial=0.0))
         if not state.speed_errors:
             return seen, seen
@@ -330,13 +336,15 @@ class Separation(Criterion, frozen=True, kw_only=True):
             stray = state.strays(gap.a)
             course = stop.courses(state)
             now = course(1.0)
-            seen = self._seen(state, gap)
+            seen = self._seen(state, gap, stray)
             S_p, most, unbounded_reason = self._required(now, K, *seen)
             if self.mode == "fixed":
                 S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
-            slower = f"{stray}: how fast the person is nobody knows" if stray else ""
-            unknown = "; ".join(filter(None, (unknown_ever, unbounded_reason, slower)))
-            unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
+            unknown = ""
+            if unknown_ever or unbounded_reason or stray:
+                slower = f"{stray}: how fast the person is nobody knows" if stray else ""
+                unknown = "; ".join(filter(None, (unknown_ever, unbounded_reason, slower)))
+                unknown = f"{unknown}; S_p is at least the figure shown"
             near, far = ends_of_distance.of_bodies(state, found.distance)
             span = ends.at(state) if ends.tolerances else None
             # What acceleration and noise may add to S_p, with all inputs at their worst, is less distance.
@@ -346,7 +354,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
             k = judged(
                 found.distance, near, far, S_p, more, low, high, ROUNDING, bool(unknown), between, verdicts
             )
-            open_at_all = span is not None or bool((far > near).any() or (most > S_p).any())
+            open_at_all = span is not None or (far is not near and bool((far > near).any()))
+            open_at_all = open_at_all or (most is not S_p and bool((most > S_p).any()))
             bodies = found.body_a.tolist()
             parts = tuple(
                 Result(
@@ -405,7 +414,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 parts=(
                     *parts,
                     *self._shown(now, k, limit, (C + gap.deviation, Z_d, Z_r), seen[0]),
-                    *self._more(most - S_p, unbounded_reason),
+                    *self._more(S_p, most, unbounded_reason),
                     *self._permissible(stop, state, course, now, found.distance, K, seen, stray),
                 ),
                 markers=drawn(draw),
@@ -414,11 +423,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     @staticmethod
-    def _more(more: Array, unbounded_reason: str) -> tuple[Result, ...]:
+    def _more(S_p: Array, highest: Array, unbounded_reason: str) -> tuple[Result, ...]:
         """By how much S_p of some part may be larger than shown; no value where that has no bound."""
         if unbounded_reason:
             return (Result(name=MORE, unit="m", reason=unbounded_reason),)
-        most = float(more.max())
+        most = 0.0 if highest is S_p else float((highest - S_p).max())
         return (Result(name=MORE, value=most, unit="m"),) if most > 0 else ()
 
     def _shown(
@@ -505,7 +514,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def now(state: State) -> Moment:
             onsets = (each(1.0).v_s for each in stop.reactions(state) if each is not None)
             return Moment(
-                required(state).most, (np.max([*onsets], axis=0), np.array(own._seen(state, gap)[1]))
+                required(state).most,
+                (np.max([*onsets], axis=0), np.array(own._seen(state, gap, state.strays(gap.a))[1])),
             )
 
         def known_ahead(span: Span, at: Moment) -> Array:
@@ -563,10 +573,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def rises(span: Span) -> Array:
             # Speeds that may be off by noise are that at both ends.
             ranges = [(span.fast, span.slow)]
-            if span.noise.any():
+            if span.noisy:
                 ranges.append((span.fast + span.noise, span.slow + span.noise[: len(span.slow)]))
-            sides = [[(v[parts], greatest(v, people)) for v in (most, least)] for most, least in ranges]
-            risen = [S_p(*most) - S_p(*least) for S_p in required for most, least in sides]
+            risen = [
+                S_p(most[parts], greatest(most, people)) - S_p(least[parts], greatest(least, people))
+                for S_p in required
+                for most, least in ranges
+            ]
             return risen[0] if len(risen) == 1 else np.asarray(np.max(risen, axis=0))
 
         return rises
@@ -592,20 +605,24 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def margin(self, result: Result) -> Margin:
         """Tell how far each moving part is from S_p [m], then how far each is away [m], with tolerances."""
-        parts = [part for part in result.parts if part.verdict is not None]
-        away = np.array([part.value or 0.0 for part in parts])
-        least = np.array([part.limit or 0.0 for part in parts])
-        near = np.array([part.interval[0] if part.interval else part.value or 0.0 for part in parts])
+        figures = [
+            (part.value or 0.0, part.limit or 0.0, part.interval[0] if part.interval else part.value or 0.0)
+            for part in result.parts
+            if part.verdict is not None
+        ]
+        away, least, near = np.array(figures, float).reshape(-1, 3).T
         if self.mode == "fixed":
             return away - least, away - near
-        return np.concatenate([away - least, near]), np.concatenate([away - near, np.zeros(len(parts))])
+        room, off = np.zeros((2, 2, len(away)))
+        room[0], room[1], off[0] = away - least, near, away - near
+        return room.ravel(), off.ravel()
 
     def _required(self, now: Course, K: float, seen: float, seen_most: float) -> Required:
         S_p = most = self._distance(now, K, seen)
         if now.most is not None or seen_most > seen:
             most = np.maximum(self._distance(now.most or now, K, seen_most), S_p)
         doubts = (now.unbounded_reason, "" if now.most is None else now.most.unbounded_reason)
-        return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
+        return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))) if any(doubts) else "")
 
     def required(self, model: Model) -> Callable[[State], Required]:
         """S_p of each of `moving`, in that order; to be asked at every tick."""
@@ -615,7 +632,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         K = sum(own._terms()[0]) + gap.deviation
 
         def at(state: State) -> Required:
-            found = own._required(stop.courses(state)(1.0), K, *own._seen(state, gap))
+            found = own._required(stop.courses(state)(1.0), K, *own._seen(state, gap, state.strays(gap.a)))
             if own.mode != "fixed":
                 return found
             S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
@@ -637,7 +654,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
             course = stop.courses(state)
             now = course(1.0)
-            seen, stray = self._seen(state, gap), state.strays(gap.a)
+            stray = state.strays(gap.a)
+            seen = self._seen(state, gap, stray)
             required = self._required(now, K, *seen)
             if required.unbounded_reason:
                 raise Undecided(required.unbounded_reason)

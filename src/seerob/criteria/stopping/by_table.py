@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
-from msgspec.structs import replace as changed
+from msgspec.structs import replace
 
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Input, Origin
@@ -70,7 +69,7 @@ def bind_table(
     said = Origin.MISSING if table.rated_payload is None else Origin.STATED
     source = f"{table.source} ({table.confidence})"
     if rated_payload is not None:
-        table = changed(table, rated_payload=rated_payload)
+        table = replace(table, rated_payload=rated_payload)
         said, source = Origin.GIVEN, "workstation file"
     load = _payload(model, robot)
     inputs = (

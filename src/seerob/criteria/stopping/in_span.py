@@ -147,7 +147,7 @@ def known_in_span(
     b = float(path.t[-1])
     k, end = math.floor(b / period + 1e-6), span.end + T_r + lead
     ticks = np.concatenate([[b], period * np.arange(k + 1, math.ceil(end / period - 1e-6) + 1)])
-    t = with_knots(span.knots, name, ticks)
+    t, _ = with_knots(span.knots, name, ticks)
     foreseen = span.foresee(name, t)
     if foreseen is None or foreseen[2]:
         return None

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from itertools import product
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Input, Origin
@@ -36,6 +36,7 @@ from seerob.criteria.stopping.terms import (
     largest_speed_in_time,
 )
 from seerob.distance.least import Per
+from seerob.kernels.separation import largest_factor_in_time
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.moving_base import first_moving
 from seerob.twin.state import State
@@ -144,8 +145,7 @@ from the onsets at rest and at the present speeds, distances [m] (n,), approach 
 (n,) and K [m]."""
 
 
-@dataclass(frozen=True)
-class StopModel:
+class StopModel(Struct, frozen=True, eq=False):
     """A way to stop, bound to a robot and what it is to keep away from."""
 
     courses: Courses
@@ -172,8 +172,7 @@ class StopModel:
     """When ways are up to those of `Course.most`, in words; empty for the reaction time's."""
 
 
-@dataclass(frozen=True)
-class _Brakes:
+class _Brakes(Struct, frozen=True, eq=False):
     """How a robot brakes, whatever it did before."""
 
     braking: Braking
@@ -321,13 +320,11 @@ def _inverse(stop: Stop) -> Inverse:
             gained = float(faster.max())
             speeds = largest_speed_decelerating(d + gained * T_r - more, v_h, T_r, a, K)
             return max(float(speeds.min()) - gained, 0.0), None
-        S_0, S_1 = rest.S_r, now.S_r - rest.S_r
-        v_0, v_1 = rest.v_s, now.v_s - rest.v_s
         if a is None:
-            factor = largest_factor(
-                v_h * (T_r + T_s) + K - d + S_0 + share * v_0 * T_s, S_1 + share * v_1 * T_s
-            )
+            factor = largest_factor_in_time(d, v_h, rest.S_r, now.S_r, rest.v_s, now.v_s, T_r, T_s, K, share)
         else:
+            S_0, S_1 = rest.S_r, now.S_r - rest.S_r
+            v_0, v_1 = rest.v_s, now.v_s - rest.v_s
             t_0 = float(v_0.max())
             t_1 = float(now.v_s.max()) - t_0
             factor = largest_factor(

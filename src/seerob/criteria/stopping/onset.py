@@ -21,18 +21,19 @@ from __future__ import annotations
 
 import math
 import weakref
-from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob.core.domains import number
 from seerob.core.transforms import Array
-from seerob.kernels.ahead import joint_speeds, kept, part_speeds, until_braking
+from seerob.kernels.ahead import joint_speeds, kept, merged, part_speeds, until_braking
 from seerob.kernels.speed import fastest_of, stacked
 from seerob.model.model import Body, Gap, Mechanism, Model
 from seerob.twin.spans import ROUNDING, Chains, Knots, Points, rows_of
@@ -50,8 +51,7 @@ MOST, ENDS = 0, 1
 Indices = NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class Onset:
+class Onset(Struct, frozen=True, eq=False):
     """From now to the beginning of braking; n parts, j joints of the robot."""
 
     v_r: Array
@@ -120,7 +120,7 @@ def constant(robot: Mechanism, gap: Gap, T_r: float, a: float, unbounded_reason:
     """Every part accelerates by a given figure [m/s²]."""
 
     def at(state: State) -> At:
-        v, qd = state.fastest_points(gap.b)[0], state.qd(robot)
+        v, qd = state.fastest_speeds(gap.b), state.qd(robot)
         if unbounded_reason:
             return lambda scale: held(scale * v, T_r, scale * qd, unbounded_reason)
         return lambda scale: accelerated(scale * v, T_r, a, scale * qd)
@@ -166,28 +166,26 @@ class Foreseen:
 
     def at(self, state: State) -> At | None:
         """None where nobody knows what it will do."""
-        period, T_r = self._period, min(self._T_r, LARGEST_WINDOW)
+        period, T_r, name = self._period, min(self._T_r, LARGEST_WINDOW), self._robot.name
         k, end = math.floor(state.t / period + 1e-6), state.t + T_r + period
-        last = math.ceil(end / period - 1e-6)
         # The same instants whenever they are asked for.
-        ticks = np.asarray(period * np.arange(k, last + 1), float)
+        ticks = np.asarray(period * np.arange(k, math.ceil(end / period - 1e-6) + 1), float)
         ticks[0] = state.t
-        instants = with_knots(state.knots, self._robot.name, ticks)
-        foreseen = state.foresee(self._robot.name, instants)
+        instants, rows = with_knots(state.knots, name, ticks)
+        foreseen = state.foresee(name, instants)
         if foreseen is None:
             return None
         q, qd, unbounded_reason = foreseen
         if self._T_r > LARGEST_WINDOW:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
-        rows = np.searchsorted(instants, ticks)
         known = self._known(state, k, rows, instants, q, qd)
-        v_now, qd_now = state.fastest_points(self._gap.b)[0], np.abs(state.qd(self._robot))
+        v_now, qd_now = state.fastest_speeds(self._gap.b), np.abs(state.qd(self._robot))
         left = np.minimum(instants - state.t, T_r + period)
         # Of a motion that may be another one, or jumps, nothing is known between instants.
         side = ENDS if unbounded_reason else MOST
         # A twin that does not stand exactly where the motion has it may be faster now.
-        S_r, v_s = farthest(left, known.parts[:, side], v_now, self._T_r, period)
-        ways, speeds = farthest(left, known.joints[:, side], qd_now, self._T_r, period)
+        S_r, v_s = _farthest(left, known.parts[:, side], v_now, self._T_r, period)
+        ways, speeds = _farthest(left, known.joints[:, side], qd_now, self._T_r, period)
         # A simulated stop goes by the ticks.
         later = rows[1 : 1 + math.ceil(T_r / period - 1e-6)]
         now = Onset(v_now, S_r, v_s, ways, speeds, q[later], qd[later], unbounded_reason)
@@ -195,8 +193,10 @@ class Foreseen:
         def at(scale: float) -> Onset:
             if scale == 1.0:
                 return now
-            v, far, most, turned, turning = (scale * each for each in (v_now, S_r, v_s, ways, speeds))
-            return Onset(v, far, most, turned, turning, unbounded_reason=unbounded_reason)
+            return Onset(
+                scale * v_now, scale * S_r, scale * v_s, scale * ways, scale * speeds,
+                unbounded_reason=unbounded_reason,
+            )  # fmt: skip
 
         return at
 
@@ -235,20 +235,20 @@ class Foreseen:
             i: Which tick.
             t: All instants of the window [s], shape (m,).
         """
-        a, b = window.rows[i : i + 2].tolist()
-        t, q, qd = (each[a : b + 1] for each in (t, window.q, window.qd))
-        before = window.end(i - 1) if i else window.behind
+        a, b = int(window.rows[i]), int(window.rows[i + 1])
+        t, q, qd = t[a : b + 1], window.q[a : b + 1], window.qd[a : b + 1]
+        joints, now = self._joints, state.data_of(*self._with)
+        joints.follow(self._points, self._parts, self._robot, state)
         speeds = np.empty((len(t), len(self._parts)))
-        first = before is not None and _bits(before.q, before.qd) == _bits(q[0], qd[0])
-        if before is not None and first:
-            speeds[0] = before.speeds
-        now = state.data_of(*self._with)
-        for row in range(int(first), len(t)):
+        before, first = window.end(i - 1) if i else window.behind, 0
+        if before is not None and _bits(before.q, before.qd) == _bits(q[0], qd[0]):
+            speeds[0], first = before.speeds, 1
+        for row in range(first, len(t)):
             self._speeds(state, now, q[row], qd[row], speeds[row])
-        chains = self._joints.of(self._points, self._parts, self._robot, state)
-        all_q, all_v = self._joints.motion(self._robot, now, t, q, qd)
+        chains = joints.chains
+        all_q, all_v = joints.motion(self._robot, now, t, q, qd)
         part_speeds(
-            t, all_q, all_v, speeds, state.model.mj.qpos0[chains.dofs],
+            t, all_q, all_v, speeds, joints.home,
             chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, window.parts[a:b],
         )  # fmt: skip
         joint_speeds(t, q, qd, window.joints[a:b])
@@ -256,16 +256,19 @@ class Foreseen:
 
     def _speeds(self, state: State, now: mujoco.MjData, q: Array, qd: Array, speeds: Array) -> None:
         """Of the parts [m/s], into the last argument (n,), with the robot elsewhere and all others as now."""
-        mj, data, robot = state.model.mj, self._data, self._robot
+        mj, data, robot, joints = state.model.mj, self._data, self._robot, self._joints
         qpos, qvel, xmat, xpos, cvel, com = self._views
-        qpos[:], qvel[:] = now.qpos, now.qvel
-        qpos[robot.q_address] = robot.coupling @ q + robot.offset
-        qvel[robot.v_address] = robot.coupling @ qd
+        if not joints.alone:
+            qpos[:], qvel[:] = now.qpos, now.qvel
+        if joints.direct:
+            qpos[robot.q_address], qvel[robot.v_address] = q, qd
+        else:
+            qpos[robot.q_address] = robot.coupling @ q + robot.offset
+            qvel[robot.v_address] = robot.coupling @ qd
         mujoco.mj_kinematics(mj, data)
         mujoco.mj_comPos(mj, data)
         mujoco.mj_comVel(mj, data)
-        ids, roots = (each[self._parts] for each in (state.attachments.ids, state.attachments.roots))
-        fastest_of(xmat, xpos, cvel, com, ids, roots, *self._corners, self._reach, speeds)
+        fastest_of(xmat, xpos, cvel, com, joints.ids, joints.roots, *self._corners, self._reach, speeds)
 
 
 class _End(NamedTuple):
@@ -320,31 +323,48 @@ class _Window:
 
 
 class _Joints:
-    """All joints that move some parts of a robot, its own and those of whom it rides on."""
+    """All joints that move some parts of a robot, its own and those of whom it rides on.
+
+    Attributes:
+        chains: Of the parts.
+        home: Positions of the joints in the model as compiled, shape (d,).
+        ids: MuJoCo's body of each part, shape (n,).
+        roots: The first body of its tree, likewise.
+        direct: Whether each joint of the robot is commanded itself.
+        alone: Whether nothing but such joints of the robot moves the parts.
+    """
+
+    chains: Chains
+    home: Array
+    ids: Indices
+    roots: Indices
+    direct: bool
+    alone: bool
 
     def __init__(self) -> None:
-        self._ids: Indices | None = None
+        self._attached = b""
 
-    def of(self, points: Points, parts: Indices, robot: Mechanism, state: State) -> Chains:
-        """Their chains now."""
+    def follow(self, points: Points, parts: Indices, robot: Mechanism, state: State) -> None:
+        """Resolve who moves whom now, where that is not as it was."""
         ids = state.attachments.ids
-        if self._ids is None or not np.array_equal(self._ids, ids):
-            self._ids = ids.copy()
-            self._chains = points.chains(parts, ids, state.model.mj)
-            dofs = self._chains.dofs.tolist()
-            own = {dof: column for column, dof in enumerate(robot.v_address.tolist())}
-            others = (m for m in state.model.mechanisms.values() if m is not robot)
-            going = {dof for other in others for dof in other.v_address.tolist()}
-            self._alone = (
-                dofs == robot.v_address.tolist()
-                and np.array_equal(robot.coupling, np.eye(len(dofs)))
-                and not np.any(robot.offset)
-            )
-            """Whether they are the joints of the robot, each commanded itself."""
-            self._own = np.array([i for i, dof in enumerate(dofs) if dof in own], np.int64)
-            self._columns = np.array([own[dof] for dof in dofs if dof in own], np.int64)
-            self._going = np.array([i for i, dof in enumerate(dofs) if dof in going - own.keys()], np.int64)
-        return self._chains
+        attached = ids.tobytes()
+        if self._attached == attached:
+            return
+        self._attached = attached
+        self.ids, self.roots = ids[parts], state.attachments.roots[parts]
+        self.chains = points.chains(parts, ids, state.model.mj)
+        self.home = state.model.mj.qpos0[self.chains.dofs]
+        dofs = self.chains.dofs.tolist()
+        own = {dof: column for column, dof in enumerate(robot.v_address.tolist())}
+        others = (m for m in state.model.mechanisms.values() if m is not robot)
+        going = {dof for other in others for dof in other.v_address.tolist()}
+        self.direct = (
+            np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not np.any(robot.offset)
+        )  # fmt: skip
+        self.alone = self.direct and dofs == robot.v_address.tolist()
+        self._own = np.array([i for i, dof in enumerate(dofs) if dof in own], np.int64)
+        self._columns = np.array([own[dof] for dof in dofs if dof in own], np.int64)
+        self._going = np.array([i for i, dof in enumerate(dofs) if dof in going - own.keys()], np.int64)
 
     def motion(
         self, robot: Mechanism, now: mujoco.MjData, t: Array, q: Array, qd: Array
@@ -358,9 +378,9 @@ class _Joints:
             q: Positions of the robot's there [rad or m], shape (m, j).
             qd: Velocities there, shape (m, j).
         """
-        if self._alone:
+        if self.alone:
             return q, qd
-        dofs = self._chains.dofs
+        dofs = self.chains.dofs
         every_q, every_v = (np.tile(each[dofs], (len(t), 1)) for each in (now.qpos, now.qvel))
         if len(self._going):
             # Who goes on as they do is where that brings them: all of their joints turn or slide.
@@ -374,15 +394,11 @@ def _bits(q: Array, qd: Array) -> bytes:
     return bytes(q.tobytes() + qd.tobytes())
 
 
-def with_knots(knots: Knots, name: str, ticks: Array) -> Array:
-    """Ticks, and the knots between them of what a robot is known to do [s], increasing."""
-    every = ticks.tolist()
-    own: set[float] = set()
-    for t in knots(name, every[0], every[-1]):
-        i = bisect_left(every, t)
-        if min(abs(t - tick) for tick in every[max(i - 1, 0) : i + 1]) > SLACK:
-            own.add(t)
-    return np.array(sorted({*every, *own})) if own else ticks
+def with_knots(knots: Knots, name: str, ticks: Array) -> tuple[Array, Indices]:
+    """Ticks, and the knots between them of what a robot is known to do [s], increasing; where ticks are."""
+    own = np.asarray(knots(name, float(ticks[0]), float(ticks[-1])), float)
+    found, rows = np.empty(len(ticks) + len(own)), np.empty(len(ticks), np.int64)
+    return found[: merged(ticks, own, SLACK, found, rows)], rows
 
 
 def largest_between(t: Array, q: Array, qd: Array) -> Array:
@@ -413,6 +429,10 @@ def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tupl
     """
     number("T_r", T_r, 0.0, unit="s")
     number("lead", lead, 0.0, unit="s")
+    return _farthest(t, most, now, T_r, lead)
+
+
+def _farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tuple[Array, Array]:
     n = len(now)
     speeds, steps, (outside, top) = np.empty((len(t) - 1, n)), np.empty(len(t) - 1), np.empty((2, n))
     until_braking(t, most, now, T_r, lead, SLACK, speeds, steps, outside, top)

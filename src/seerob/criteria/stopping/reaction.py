@@ -81,7 +81,7 @@ def bind_reaction(
         known = foreseen.at(state)
         if known is not None and all(state.foresee(each, now) is not None for each in carriers):
             return with_noise(state, (known, None))
-        v, qd = state.fastest_points(gap.b)[0], state.qd(robot)
+        v, qd = state.fastest_speeds(gap.b), state.qd(robot)
         if robot.role != "robot":
             why = f"nobody says how fast {robot.name} may get faster during the reaction time: {GIVE}"
         elif robot.on:

@@ -175,7 +175,7 @@ class StatedAcceleration:
         if self._confirmed:
             return None
         try:
-            v = state.fastest_points(self._bodies)[0]
+            v = state.fastest_speeds(self._bodies)
         except Undecided:
             self._seen.clear()
             return None

@@ -14,9 +14,9 @@ Speeds count as positive whatever their direction, so that what recedes never sh
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from seerob.core.domains import at_least, number
 from seerob.core.transforms import Array
@@ -28,8 +28,7 @@ BOUND, CONSTANT = 1.0, 0.5
 """Share of v_r T_s that is travelled at full speed until standstill, and at constant deceleration."""
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
+class Course(Struct, frozen=True, eq=False):
     """What each moving part of the robot does from now until it stands; n parts."""
 
     v_r: Array

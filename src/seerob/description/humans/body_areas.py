@@ -9,7 +9,10 @@ written into reasons, and found in them again for tables.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from seerob.core.transforms import Array
 from seerob.description.humans.anthropometry import Body
@@ -81,7 +84,7 @@ def eyes(body: Body) -> float:
     return body.length["head"] - (1 - EYE_HEIGHT) * body.stature
 
 
-def in_front(bone: str, point: Array, body: Body) -> bool:
+def in_front(bone: str, point: Array | Sequence[float], body: Body) -> bool:
     """Whether a point is before its bone; the shoulder girdle runs backward, and its own line divides it.
 
     Args:
@@ -92,10 +95,10 @@ def in_front(bone: str, point: Array, body: Body) -> bool:
     if without_side(bone) != "clavicle":
         return bool(point[0] > 0)
     along = body.offset[bone.replace("clavicle", "upper_arm")]
-    return bool(point[0] > (point @ along) / (along @ along) * along[0])
+    return bool(point[0] > np.dot(point, along) / (along @ along) * along[0])
 
 
-def outer_shoulder(bone: str, point: Array, body: Body) -> bool:
+def outer_shoulder(bone: str, point: Array | Sequence[float], body: Body) -> bool:
     """Whether a point of a clavicle is nearer to the shoulder's joint than to the sternum.
 
     Args:
@@ -104,10 +107,10 @@ def outer_shoulder(bone: str, point: Array, body: Body) -> bool:
         body: The person.
     """
     along = body.offset[bone.replace("clavicle", "upper_arm")]
-    return bool(point @ along > 0.5 * along @ along)
+    return bool(np.dot(point, along) > 0.5 * along @ along)
 
 
-def body_area(bone: str, point: Array, *, body: Body, hand: str) -> SkinArea | None:
+def body_area(bone: str, point: Array | Sequence[float], *, body: Body, hand: str) -> SkinArea | None:
     """Area of a point on the skin; None where the table has none.
 
     Args:
@@ -120,8 +123,8 @@ def body_area(bone: str, point: Array, *, body: Body, hand: str) -> SkinArea | N
     return AREAS[number - 1] if number else None
 
 
-def _number(bone: str, point: Array, body: Body, *, dominant: bool) -> int:
-    x, y, z = (float(value) for value in point)
+def _number(bone: str, point: Array | Sequence[float], body: Body, *, dominant: bool) -> int:
+    x, y, z = map(float, point)
     front, length, plain = in_front(bone, point, body), body.length, without_side(bone)
     outward = -z if bone.startswith("left_") else z
     number = 0

@@ -14,7 +14,7 @@ centimetres and belongs into the uncertainty of every distance.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -49,7 +49,7 @@ Feet are in no region of that table. The face is the front of the head below the
 """
 
 
-def body_region(bone: str, point: Vector, *, body: Body) -> str | None:
+def body_region(bone: str, point: Vector | Sequence[float], *, body: Body) -> str | None:
     """Region of ISO/TS 15066:2016 Table A.3 of a point on the skin; None where the table has none.
 
     Args:

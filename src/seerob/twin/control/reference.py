@@ -15,7 +15,7 @@ where it was until the later one, and the twin is put there instead of being pul
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,8 @@ Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
 
 MAX_KEPT = 4096
 """Samples kept at most: many times what a fast source sends within one tick."""
+ROWS = 64
+"""Samples for which there is room at first."""
 
 
 class Course(NamedTuple):
@@ -55,33 +57,39 @@ class Reference:
         """
         self._largest = largest_speed
         self._coast = coast
-        self._jumps: list[float] = []
         self._landings: list[float] = []
         self._zero = np.zeros(len(home))
         self._times: list[float] = []
-        self._points: list[Array] = [home.astype(float).copy()]
-        self._velocities: list[Array] = [self._zero]
+        """Of the samples that are kept; what else is known of them is in rows from ``_first`` on."""
         self._guessed = [True]
-        self._knots: Knots | None = None
+        self._first, self._end = 0, 1
+        self._room: Knots = self._rows(ROWS)
+        # Before the first sample it waits at home.
+        self._room[0][0], self._room[1][0] = np.inf, home
+
+    def _rows(self, count: int) -> Knots:
+        n = len(self._zero)
+        return np.zeros(count), np.zeros((count, n)), np.zeros((count, n)), np.zeros(count, bool)
 
     @property
     def newest(self) -> Array:
         """Position of the newest sample, or the home position, shape (n,) [rad or m]."""
-        return self._points[-1]
+        return np.array(self._room[1][self._end - 1])
 
     @property
     def leaves_at(self) -> float:
         """Largest speed of a joint at the newest sample [rad/s or m/s]; 0 before the first."""
-        return float(np.abs(self._velocities[-1]).max(initial=0.0))
+        return float(np.abs(self._room[2][self._end - 1]).max(initial=0.0))
 
-    @property
-    def instants(self) -> tuple[float, ...]:
-        """Instants of the samples that are kept, and of its rest after the newest [s], increasing.
+    def between(self, begin: float, end: float) -> Array:
+        """Instants of samples, and of its rest after the newest, between two others [s], shape (k,).
 
-        Between two of them the motion is one cubic.
+        Between two of them, which increase, the motion is one cubic.
         """
-        ends = (self.until + self._coast,) if self._coast and self._times else ()
-        return (*self._times, *ends)
+        inside = slice(bisect_right(self._times, begin), bisect_left(self._times, end))
+        found = self._known()[0][inside] if self._times else np.zeros(0)
+        rests = self.until + self._coast
+        return np.append(found, rests) if self._coast and begin < rests < end else found.copy()
 
     @property
     def waits(self) -> bool:
@@ -103,38 +111,46 @@ class Reference:
             anew: After a silence: nobody knows how it came there, so the twin is put there at once and
                 set in motion when its instant has come.
         """
-        self._knots = None
-        q, qd = np.asarray(q, float), None if qd is None else np.asarray(qd, float)
         if anew and t > self.until:
-            self._times, self._jumps, self._landings = [], [], [-np.inf, t]
+            self._times, self._landings = [], [-np.inf, t]
         if not self._times:
-            self._times, self._points = [t], [q]
-            self._velocities = [self._zero if qd is None else qd]
-            self._guessed = [qd is None]
-            return True
-        if t <= self._times[-1]:
+            self._times, self._guessed = [], []
+            self._first = self._end = 0
+        elif t <= self._times[-1]:
             return False
-        self._times.append(t)
-        self._points.append(q)
-        self._velocities.append(self._zero if qd is None else qd)
-        self._guessed.append(qd is None)
-        self._drop(len(self._times) - MAX_KEPT)
-        self._guess()
+        self._add(t, q, qd)
+        if len(self._times) > 1:
+            self._drop(len(self._times) - MAX_KEPT)
+            self._guess()
         return True
+
+    def _add(self, t: float, q: Array, qd: Array | None) -> None:
+        count = self._end - self._first
+        if self._end == len(self._room[0]):
+            room = self._rows(max(ROWS, 2 * count))
+            for new, old in zip(room, self._known(), strict=True):
+                new[:count] = old
+            self._room, self._first, self._end = room, 0, count
+        times, points, velocities, jumps = self._room
+        times[self._end], points[self._end], jumps[self._end] = t, q, False
+        velocities[self._end] = self._zero if qd is None else qd
+        self._end += 1
+        self._times.append(t)
+        self._guessed.append(qd is None)
 
     def _guess(self) -> None:
         """Velocities of the newest two samples where none were given."""
-        t, q, v = self._times, self._points, self._velocities
+        t, (_, q, v, jumps) = self._times, self._known()
         T = t[-1] - t[-2]
         chord = (q[-1] - q[-2]) / T
         if self._impossible(chord, v[-2], v[-1]):
-            self._jumps.append(t[-1])
+            jumps[-1] = True
             self._landings.append(t[-1])
             if self._guessed[-1] or self._impossible(v[-1]):
-                v[-1] = self._zero
+                v[-1] = 0.0
             return
         before, after = chord, chord
-        if len(t) > 2 and t[-2] not in self._jumps:
+        if len(t) > 2 and not jumps[-2]:
             T0 = t[-2] - t[-3]
             bend = (chord - (q[-2] - q[-3]) / T0) / (T + T0)
             before, after = chord - T * bend, chord + T * bend
@@ -149,7 +165,7 @@ class Reference:
     @property
     def jumped(self) -> bool:
         """Whether a jump led to the newest sample."""
-        return bool(self._jumps) and self._jumps[-1] == self._times[-1]
+        return bool(self._room[3][self._end - 1])
 
     def land(self, t: float) -> None:
         """Let the twin be put there at ``t`` [s]: it is elsewhere, for it was not known before."""
@@ -172,11 +188,8 @@ class Reference:
 
     def _drop(self, count: int) -> None:
         if count > 0:
-            self._knots = None
-            oldest = self._times[count]
-            self._jumps = [jump for jump in self._jumps if jump >= oldest]
-            for kept in (self._times, self._points, self._velocities, self._guessed):
-                del kept[:count]
+            self._first += count
+            del self._times[:count], self._guessed[:count]
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
@@ -209,11 +222,7 @@ class Reference:
         aim(*self._known(), self._coast, t, dt, *places, *own, *of)
 
     def _known(self) -> Knots:
-        if self._knots is None:
-            jumps = np.zeros(max(len(self._times), 1), bool)
-            if self._jumps:
-                jumps[:] = [instant in self._jumps for instant in self._times or [np.inf]]
-            # Before the first sample it waits at home.
-            instants = np.array(self._times or [np.inf], float)
-            self._knots = instants, np.array(self._points), np.array(self._velocities), jumps
-        return self._knots
+        """Instants, positions, velocities and whether nothing but a jump leads there, of samples kept."""
+        t, q, v, jumps = self._room
+        kept = slice(self._first, self._end)
+        return t[kept], q[kept], v[kept], jumps[kept]

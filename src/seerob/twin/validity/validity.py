@@ -88,8 +88,8 @@ class Validity:
         """By question and person, bones that may not be relied on at this tick."""
         self._lost: dict[int, tuple[frozenset[str], tuple[int, ...]]] = {}
         self._relied_on: set[Hashable] = set()
-        self._sound: dict[int, bool] = {}
-        """By whom bodies belong to, whether nothing of any of them is in doubt at this tick."""
+        self._sound: frozenset[str] | None = None
+        """Of whom nothing is in doubt at this tick: what is mostly everybody, and found out once."""
 
     @property
     def model(self) -> Model:
@@ -102,7 +102,7 @@ class Validity:
         self._bones.clear()
         self._lost.clear()
         self._relied_on.clear()
-        self._sound.clear()
+        self._sound = None
 
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 
@@ -134,7 +134,8 @@ class Validity:
     def require(self, *names: str) -> None:
         """Raise `Undecided` unless each robot or human is where the twin shows it."""
         self.asked.update(names)
-        if names in self._relied_on:
+        sound = self._sound
+        if (self._find_sound() if sound is None else sound).issuperset(names) or names in self._relied_on:
             return
         for name in names:
             if reason := self.invalid_reason(name):
@@ -222,6 +223,8 @@ class Validity:
             Undecided: Nothing of it may be relied on.
         """
         self.asked.add(name)
+        if name in (self._sound or self._find_sound()):
+            return self._hearings[name]
         if (reason := self.invalid_place_reason(name)) and not (strayed and reason == self.stray(name)):
             raise Undecided(reason)
         return self._hearings[name]
@@ -242,7 +245,7 @@ class Validity:
 
         Empty when it is not, or when where the person was captured is in doubt itself.
         """
-        return self._once("stray", name, self._stray)
+        return "" if name in (self._sound or self._find_sound()) else self._once("stray", name, self._stray)
 
     def _stray(self, name: str) -> str:
         hearing = self._hearings[name]
@@ -253,7 +256,12 @@ class Validity:
 
     def strays(self, bodies: tuple[int, ...]) -> str:
         """`stray` of any of the people to whom bodies belong."""
-        return next(filter(None, map(self.stray, self._owners(bodies).people)), "")
+        owners = self._owners(bodies)
+        return (
+            ""
+            if owners.everyone <= (self._sound or self._find_sound())
+            else next(filter(None, map(self.stray, owners.people)), "")
+        )
 
     def bones_in_doubt(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be where the twin shows them, when the others are.
@@ -310,7 +318,7 @@ class Validity:
         """
         owners = self._owners(bodies)
         self.asked |= owners.everyone
-        if self._all_sound(owners) and not self.attachments.unknown:
+        if owners.everyone <= (self._sound or self._find_sound()) and not self.attachments.unknown:
             return
         key = owners.key, allow_estimated, strayed
         if key in self._relied_on:
@@ -334,7 +342,7 @@ class Validity:
     def invalid_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Bodies that are bones in doubt, of people whose other bones may be relied on."""
         owners = self._owners(bodies)
-        if self._all_sound(owners):
+        if owners.everyone <= (self._sound or self._find_sound()):
             self.asked |= owners.people.keys()
             return ()
         if owners.key not in self._lost:
@@ -346,12 +354,14 @@ class Validity:
         self.asked |= known
         return which
 
-    def _all_sound(self, owners: _Owners) -> bool:
-        """Whether nothing of any of them is in doubt: what is mostly so, and found out once a tick."""
-        found = self._sound.get(owners.key)
-        if found is None:
-            found = self._sound[owners.key] = all(map(self._is_sound, owners.everyone))
-        return found
+    def _find_sound(self) -> frozenset[str]:
+        """Robots, people and machines of whom nothing is in doubt at this tick."""
+        if self._sound is None:
+            # Nobody asked for them yet.
+            asked, self.asked = self.asked, set()
+            self._sound = frozenset(filter(self._is_sound, self._hearings))
+            self.asked = asked
+        return self._sound
 
     def _is_sound(self, name: str) -> bool:
         if self.invalid_reason(name) or self.invalid_place_reason(name) or self.heard_doubt(name):

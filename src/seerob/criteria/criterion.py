@@ -13,7 +13,7 @@ from msgspec import Meta, Struct
 from seerob.core.errors import UnknownName
 from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
-from seerob.core.verdict import keeps
+from seerob.core.verdict import admitted, keeps
 
 if TYPE_CHECKING:
     from seerob.core.transforms import Array
@@ -258,6 +258,12 @@ def judge_interval(
 ) -> Verdict | None:
     """Verdict when the true value lies in ``interval``: UNDECIDED when the limit lies inside it."""
     low, high = interval
+    if limit is not None and type(low) is float is type(high):
+        if math.isnan(low) or math.isnan(high):
+            return _UNDECIDED
+        last = admitted(limit, at_most=at_most)
+        kept, also = (low <= last, high <= last) if at_most else (low >= last, high >= last)
+        return _UNDECIDED if kept is not also else _WITHIN if kept else _EXCEEDED
     verdict = judge(low, limit, at_most=at_most)
     return verdict if verdict is judge(high, limit, at_most=at_most) else _UNDECIDED
 

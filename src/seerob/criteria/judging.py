@@ -6,7 +6,7 @@ import logging
 import math
 import traceback
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -317,6 +317,37 @@ class _Kept(NamedTuple):
     """Robots, people and variables that it rests on."""
 
 
+@dataclass(slots=True, eq=False)
+class _Question:
+    """A criterion of a run, and what the judge knows of it."""
+
+    bound: Bound
+    criterion: Criterion
+    names: tuple[str, ...]
+    """Robots, people and machines that must be where the twin shows them before it is asked."""
+    bodies: tuple[int, ...]
+    """Bodies, likewise."""
+    declared: frozenset[str]
+    """Whom it says that it rests on, and the variables."""
+    unmentioned: dict[str, str]
+    """By robot that no subject means, what no shape shows of it."""
+    held: str = ""
+    """Why nothing that it says of its subjects is within."""
+    undeclared: set[str] = field(default_factory=set)
+    """Who else it asked for so far."""
+    kept: _Kept | None = None
+    again: tuple[Evaluate | None] | None = None
+    """Another one of it, for what errors of speeds would change; none of one that remembers."""
+    why: str = ""
+    """Why nothing that it said last is within."""
+
+
+def _question(bound: Bound, model: Model) -> _Question:
+    names, bodies = needed(bound.criterion, model)
+    declared = _all_declared(bound.criterion, model)
+    return _Question(bound, bound.criterion, names, bodies, declared, unmentioned(bound.criterion, model))
+
+
 class Judge:
     """Asks every criterion at its period; what it cannot know becomes UNDECIDED.
 
@@ -327,44 +358,31 @@ class Judge:
 
     def __init__(self, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> None:
         self._bound = bound
+        self._questions: list[_Question] = []
+        """Of every criterion, once the model is known."""
         self._findings = tuple(findings)
-        self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
         self._holds = False
-        """Whether anything is."""
+        """Whether anything is held."""
         self._as_heard: AsHeard | None = None
         self._worded: tuple[Finding, ...] = ()
         """What it says now."""
         self._claims: list[Claim] = []
         """That nothing has contradicted yet."""
-        self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
-        self._declared: tuple[frozenset[str], ...] = ()
-        """Of each criterion, whom it says that it rests on, and the variables."""
-        self._undeclared: list[set[str]] = [set() for _ in bound]
-        """Of each criterion, who else it asked for so far."""
-        self._unmentioned: tuple[dict[str, str], ...] = ()
-        self._kept: dict[int, _Kept] = {}
-        self._again: dict[int, Evaluate | None] = {}
-        """Another one of a criterion, for what errors of speeds would change; None of one that remembers."""
-        self._why = [""] * len(bound)
-        """Of each criterion, why nothing that it said last is within."""
         self._between = BetweenTicks([one.watch for one in bound])
         self._warned: set[str] = set()
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
-        if self._held is None:
+        if self._as_heard is None:
             model = state.model
+            self._questions = [_question(one, model) for one in self._bound]
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
-            self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
-            self._declared = tuple(_all_declared(bound.criterion, model) for bound in self._bound)
-            self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
             self._hold(model, findings)
             self._as_heard = AsHeard(model)
             known = {finding.holds for finding in findings}
             claims = (claim for one in self._bound for claim in one.criterion.claims(model))
             self._claims = [claim for claim in claims if claim.holds not in known]
-        assert self._as_heard is not None
         worded = self._as_heard.at(state)
         refuted = [(claim, what) for claim in self._claims if (what := claim(state)) is not None]
         if worded is not None or refuted:
@@ -373,22 +391,22 @@ class Judge:
             self._claims = [claim for claim in self._claims if claim not in [one for one, _ in refuted]]
             findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *self._worded)))
             self._hold(state.model, findings)
-        results = [self._one(i, bound, state) for i, bound in enumerate(self._bound)]
+        results = [self._one(question, state) for question in self._questions]
 
         def ask(i: int) -> Result:
-            self._kept.pop(i, None)
-            return self._one(i, self._bound[i], state)
+            self._questions[i].kept = None
+            return self._one(self._questions[i], state)
 
         def look(i: int, evaluate: Evaluate, shadow: State, applies: bool) -> Result:
-            return self._now(i, evaluate, shadow, applies=applies)[0]
+            return self._now(self._questions[i], evaluate, shadow, applies=applies)
 
         # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
         found = self._between(state, results, Asking(ask, look, undecided))
-        if not any(self._why):
+        if not self._holds:
             return found
         return tuple(
-            undecided(result, why) if why and not result.muted else result
-            for result, why in zip(found, self._why, strict=True)
+            undecided(result, question.why) if question.why and not result.muted else result
+            for result, question in zip(found, self._questions, strict=True)
         )
 
     @property
@@ -398,118 +416,118 @@ class Judge:
 
     def _hold(self, model: Model, findings: Sequence[Finding]) -> None:
         """Resolve what is held by findings, and by shapes that are missing."""
-        self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
         self._held_names = held_names(findings, model)
-        self._holds = any(self._held) or bool(self._held_names) or any(self._unmentioned)
+        self._holds = self._holds or bool(self._held_names)  # and stays so for what was said meanwhile
+        for question in self._questions:
+            question.held = held(question.criterion, model, findings)
+            self._holds = self._holds or bool(question.held or question.unmentioned)
 
-    def _one(self, i: int, bound: Bound, state: State) -> Result:
-        criterion = bound.criterion
-        kept = self._kept.get(i) if self._kept else None
-        if kept and self._lasts(kept, criterion, state):
+    def _one(self, question: _Question, state: State) -> Result:
+        kept = question.kept
+        if kept is not None and self._lasts(kept, question.criterion, state):
             return kept.result
-        result, muted = self._now(i, bound.evaluate, state)
-        self._why[i] = self._reason(i, state) if self._holds else ""
-        if criterion.every is not None:
+        result = self._now(question, question.bound.evaluate, state)
+        if self._holds:
+            question.why = self._reason(question, state)
+        if (every := question.criterion.every) is not None:
             result = replace(result, t=state.t)
-            due, asked = state.t + criterion.every, tuple(sorted(state.asked))
-            self._kept[i] = _Kept(result, state.t, due, muted, asked)
+            asked = tuple(sorted(state.asked))
+            question.kept = _Kept(result, state.t, state.t + every, result.muted, asked)
         return result
 
-    def _at_least(self, i: int, evaluate: Evaluate, state: State, reason: str) -> Result:
+    def _at_least(self, question: _Question, evaluate: Evaluate, state: State, reason: str) -> Result:
         """What the known masses of a robot exceed, when others are not known; else undecided."""
-        criterion = self._bound[i].criterion
+        criterion = question.criterion
         if criterion.heavier_is_worse:
             try:
                 with state.asking(), state.known_masses_alone():
-                    result = self._asked(i, evaluate, state)
+                    result = self._asked(question, evaluate, state)
                 if result.verdict is _EXCEEDED:
                     return undecided(replace(result, reason=f"{result.reason}; at least: {reason}"), reason)
             except Exception as error:
                 _log.debug("%s: %s", criterion.name, error)
         return _unknown(criterion, reason)
 
-    def _now(self, i: int, evaluate: Evaluate, state: State, *, applies: bool = False) -> tuple[Result, bool]:
-        """What a criterion says of a state, and whether it did not apply there; as if it ``applies``."""
-        bound = self._bound[i]
-        muted: Result | None = None
+    def _now(self, question: _Question, evaluate: Evaluate, state: State, *, applies: bool = False) -> Result:
+        """What a criterion says of a state, muted where it does not apply there; as if it ``applies``."""
+        criterion = question.criterion
         try:
             with state.asking():
-                if not applies and bound.criterion.active is not None:
-                    muted = self._muted(bound.criterion, state)
-                result = self._asked(i, evaluate, state) if muted is None else muted
+                if criterion.active is not None and not applies:
+                    muted = self._muted(criterion, state)
+                    if muted is not None:
+                        return muted
+                return self._asked(question, evaluate, state)
         except Unweighed as reason:
-            result = self._at_least(i, evaluate, state, str(reason))
+            return self._at_least(question, evaluate, state, str(reason))
         except Undecided as reason:
-            result = _unknown(bound.criterion, str(reason))
+            return _unknown(criterion, str(reason))
         except Exception as error:
             # One's own criterion that fails must not end a run that others are judged in.
-            result = _unknown(bound.criterion, self._failed(bound, error))
-        return result, muted is not None
+            return _unknown(criterion, self._failed(question.bound, error))
 
-    def _asked(self, i: int, evaluate: Evaluate, state: State) -> Result:
+    def _asked(self, question: _Question, evaluate: Evaluate, state: State) -> Result:
         """What a criterion says, as far as it may be green.
 
         Raises:
             Undecided: What it depends on may not be relied on, or what it says is no result.
         """
-        assert self._needs is not None
-        bound = self._bound[i]
-        names, bodies = self._needs[i]
-        if names:
-            state.require(*names)
-        if bodies:
-            state.require_bodies(bodies)
+        bound, criterion = question.bound, question.criterion
+        if question.names:
+            state.require(*question.names)
+        if question.bodies:
+            state.require_bodies(question.bodies)
         if bound.own:
             with state.set_apart(bound.criterion.name):
                 result = evaluate(state)
         else:
             result = evaluate(state)
-        if self._undeclared[i] or not state.asked <= self._declared[i]:
-            self._rely_on_undeclared(i, state)
+        if question.undeclared or not state.asked <= question.declared:
+            self._rely_on_undeclared(question, state)
         if type(result) is not Result:
             what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
             self._warn(bound, what)
             raise Undecided(what)
-        if result.t is not None or result.muted:
+        if result.muted or result.t is not None:
             # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
             result = replace(result, t=None, muted=False)
-        criterion = bound.criterion
-        reason = contradiction(result, criterion)
-        if not reason and result.verdict is None and (silent := unsaid(result, criterion)):
-            self._warn(bound, f"{_where(bound)}: {silent}")
-            silent = f"{silent}; {result.reason}".removesuffix("; ")
-            return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
-        if reason:
+        if reason := contradiction(result, criterion):
             reason = f"{_where(bound)} contradicts itself: {reason}"
             self._warn(bound, reason)
             if type(result.verdict) is not Verdict:
                 raise Undecided(reason)
-        elif result.value is not None and not math.isfinite(result.value):
-            raise Undecided(f"the value is {result.value}, not a finite number")
-        elif not criterion.by_speed and state.speed_errors:
-            return self._shaken(i, result, state)
-        return undecided(result, reason) if reason else result
+            return undecided(result, reason)
+        value = result.value
+        if result.verdict is None and (silent := unsaid(result, criterion)):
+            self._warn(bound, f"{_where(bound)}: {silent}")
+            silent = f"{silent}; {result.reason}".removesuffix("; ")
+            return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
+        if value is not None and not math.isfinite(value):
+            raise Undecided(f"the value is {value}, not a finite number")
+        if not criterion.by_speed and state.speed_errors:
+            return self._shaken(question, result, state)
+        return result
 
-    def _rely_on_undeclared(self, i: int, state: State) -> None:
+    def _rely_on_undeclared(self, question: _Question, state: State) -> None:
         """Require whom a criterion asked for without having said so, at this instant or before.
 
         Raises:
             Undecided: One of them may not be relied on, whether or not the criterion looked at that.
         """
-        undeclared = self._undeclared[i]
-        undeclared |= state.asked - self._declared[i]
-        whole = self._bound[i].criterion.whole
+        undeclared = question.undeclared
+        undeclared |= state.asked - question.declared
+        whole = question.criterion.whole
         for name in sorted(undeclared):
             doubt = state.invalid_reason if whole or name.startswith(VARIABLE) else state.heard_doubt
             if reason := doubt(name):
                 raise Undecided(f"{reason}; it depends on that and does not declare it (depends, variables)")
 
-    def _shaken(self, i: int, result: Result, state: State) -> Result:
+    def _shaken(self, question: _Question, result: Result, state: State) -> Result:
         """A result with the noise of speeds that it asked for in its interval; undecided across a limit."""
-        criterion = self._bound[i].criterion
-        if i not in self._again:
-            self._again[i] = None if criterion.remembers(state.model) else criterion.bind(state.model)
-        noise = shaken(result, criterion, self._again[i], state)
+        criterion = question.criterion
+        if question.again is None:
+            question.again = (None if criterion.remembers(state.model) else criterion.bind(state.model),)
+        noise = shaken(result, criterion, *question.again, state)
         if noise.off and result.value is not None:
             low, high = result.interval or (result.value, result.value)
             result = replace(result, interval=(low - noise.off, high + noise.off))
@@ -525,13 +543,12 @@ class Judge:
             self._warned.add(bound.criterion.name)
             _log.warning("%s: %s", bound.criterion.name, what)
 
-    def _reason(self, i: int, state: State) -> str:
+    def _reason(self, question: _Question, state: State) -> str:
         """Why nothing that a criterion has just said is within; empty for nothing."""
-        assert self._held is not None
-        reason = self._held[i]
-        if not self._held_names and not self._unmentioned[i]:
+        reason = question.held
+        if not self._held_names and not question.unmentioned:
             return reason
-        every = (*self._held_names.items(), *self._unmentioned[i].items())
+        every = (*self._held_names.items(), *question.unmentioned.items())
         texts = (text for name, text in every if name in state.asked)
         return "; ".join(dict.fromkeys(filter(None, (reason, *(t for t in texts if t not in reason)))))
 

@@ -181,6 +181,8 @@ class Engine:
         self._before = np.zeros(self._mj.nv)
         self._courses: dict[str, tuple[Array, Array, Array]] = {}
         self._divide(self._steps)
+        self._landing: list[Mechanism] = []
+        """Who is still to be put elsewhere."""
         self._broken: set[str] = set()
         """Who was put elsewhere during a tick."""
         q, v = ([m.q_address for m in self._mechanisms], [m.v_address for m in self._mechanisms])
@@ -457,6 +459,8 @@ class Engine:
         self.signals.forget(start)
         self._aim(start, t)
         self._broken.clear()
+        every = self._mechanisms if self.controllers else ()
+        self._landing = [one for one in every if self._references[one.name].landing]
         qpos, qvel = self._qpos, self._qvel
         q_way, v_way = self._way
         q_way[0], v_way[0] = self._shown.qpos, self._shown.qvel
@@ -603,7 +607,7 @@ class Engine:
 
     def _land(self, step: int, t: float) -> None:
         """Put there who jumped there by ``t`` [s], also where that is the instant of the tick itself."""
-        for mechanism in self._mechanisms if self.controllers else ():
+        for mechanism in self._landing:
             reference = self._references[mechanism.name]
             if reference.landing and reference.lands(t):
                 self._broken.add(mechanism.name)

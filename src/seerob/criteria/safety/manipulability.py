@@ -170,7 +170,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
 
         def falls(span: Span, _: Array | float) -> Fall:
             moved = points.column_changes(point, span, coupling)
-            return Fall(float(np.linalg.norm(moved)) * span.T)
+            return Fall(math.sqrt(float(moved @ moved)) * span.T)
 
         return falls
 

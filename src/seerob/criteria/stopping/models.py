@@ -215,8 +215,9 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         found = replace(found, doubts=(*found.doubts, unbounded_reason))
     by_onset, T_r, a = found.by_onset, stop.reaction, stop.acceleration or 0.0
     asked, how, left_out = bind_reaction(
-        model, robot, gap, stop.reaction, stop.acceleration, points=stop.model != "simulated"
-    )
+        model, robot, gap, stop.reaction, stop.acceleration,
+        points=stop.model != "simulated", joints=not found.timed,
+    )  # fmt: skip
 
     def reactions(state: State) -> tuple[OnsetAt, OnsetAt | None]:
         found: tuple[OnsetAt, OnsetAt | None] = state.once(("onset", asked), lambda: asked(state))

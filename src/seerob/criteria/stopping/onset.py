@@ -141,7 +141,7 @@ class Foreseen:
     tick is kept as long as the motion there stays what it was.
     """
 
-    def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float) -> None:
+    def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float, *, joints: bool) -> None:
         """Bind.
 
         Args:
@@ -149,9 +149,10 @@ class Foreseen:
             robot: Who moves.
             gap: Its second set are the moving parts.
             T_r: Reaction time [s].
+            joints: Whether what the joints do is asked for, too.
         """
         number("T_r", T_r, 0.0, unit="s")
-        self._robot, self._gap, self._T_r = robot, gap, T_r
+        self._robot, self._gap, self._T_r, self._joints_asked = robot, gap, T_r, joints
         self._period = model.workstation.engine.tick
         self._with = (robot.name, *robot.riders, *model.carriers_of(robot.name))
         self._data = data = mujoco.MjData(model.mj)
@@ -179,12 +180,20 @@ class Foreseen:
         if self._T_r > LARGEST_WINDOW:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
         known = self._known(state, k, rows, instants, q, qd)
-        v_now, qd_now = state.fastest_speeds(self._gap.b), np.abs(state.qd(self._robot))
+        v_now = state.fastest_speeds(self._gap.b)
         left = np.minimum(instants - state.t, T_r + period)
         # Of a motion that may be another one, or jumps, nothing is known between instants.
         side = ENDS if unbounded_reason else MOST
         # A twin that does not stand exactly where the motion has it may be faster now.
         S_r, v_s = _farthest(left, known.parts[:, side], v_now, self._T_r, period)
+        if not self._joints_asked:
+            points = Onset(v_now, S_r, v_s, None, None, unbounded_reason=unbounded_reason)
+            return lambda scale: (
+                points
+                if scale == 1.0
+                else replace(points, v_r=scale * v_now, S_r=scale * S_r, v_s=scale * v_s)
+            )
+        qd_now = np.abs(state.qd(self._robot))
         ways, speeds = _farthest(left, known.joints[:, side], qd_now, self._T_r, period)
         # A simulated stop goes by the ticks.
         later = rows[1 : 1 + math.ceil(T_r / period - 1e-6)]
@@ -251,7 +260,8 @@ class Foreseen:
             t, all_q, all_v, speeds, joints.home,
             chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, window.parts[a:b],
         )  # fmt: skip
-        joint_speeds(t, q, qd, window.joints[a:b])
+        if self._joints_asked:
+            joint_speeds(t, q, qd, window.joints[a:b])
         window.last[i] = speeds[-1]
 
     def _speeds(self, state: State, now: mujoco.MjData, q: Array, qd: Array, speeds: Array) -> None:

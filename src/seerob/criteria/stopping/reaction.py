@@ -32,7 +32,7 @@ GIVE = "give stop.acceleration"
 
 
 def bind_reaction(
-    model: Model, robot: Mechanism, gap: Gap, T_r: float, a: float | None, *, points: bool
+    model: Model, robot: Mechanism, gap: Gap, T_r: float, a: float | None, *, points: bool, joints: bool
 ) -> tuple[Reactions, Input, tuple[str, ...]]:
     """Resolve what a robot does until it brakes.
 
@@ -43,6 +43,7 @@ def bind_reaction(
         T_r: Reaction time [s].
         a: Acceleration of its points that was given [m/s²].
         points: Whether how it brakes can begin with an acceleration of points, or of joints.
+        joints: Whether how it brakes asks for its joints.
 
     Returns:
         How to ask, where it is from, and what is left out.
@@ -69,7 +70,7 @@ def bind_reaction(
         given = constant(robot, gap, T_r, a, unsaid)
         what = Input(name=NAME, value=a, unit="m/s²", origin=Origin.GIVEN, source="workstation file")
         return lambda state: with_noise(state, (given(state), None)), what, ()
-    foreseen = Foreseen(model, robot, gap, T_r)
+    foreseen = Foreseen(model, robot, gap, T_r, joints=joints)
     limits = _acceleration_limits(model, robot)
     levers = Levers(model, robot, gap)
     largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
@@ -98,17 +99,17 @@ def bind_reaction(
             return with_noise(state, (lambda scale: held(scale * v, T_r, scale * qd, why), None))
         chains = levers.at(state)
 
-        def joints(v: Array, qd: Array) -> Onset:
+        def with_joints(v: Array, qd: Array) -> Onset:
             return by_joints(v, T_r, qd, limits, largest, robot.coupling, chains, lead)
 
         def most(scale: float) -> Onset:
-            return joints(scale * v, scale * qd)
+            return with_joints(scale * v, scale * qd)
 
         off = noise(state)
         top = most
         if off is not None:
             # How quickly points get faster depends on how fast joints are.
-            top = lambda scale: joints(scale * v + off[0], np.abs(scale * qd) + off[1])  # noqa: E731
+            top = lambda scale: with_joints(scale * v + off[0], np.abs(scale * qd) + off[1])  # noqa: E731
         if limits is not None:
             return most, None if off is None else top
         return (lambda scale: held(scale * v, T_r, scale * qd)), top

@@ -179,12 +179,13 @@ class Hearing:
 
     def doubt_ahead(self, t: float, until: float) -> str:
         """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""
-        for before, (b, reason, *_) in pairwise(self.heard):
-            a = before.t
-            if t + SLACK < b and a < until - SLACK:
-                if reason:
-                    return reason
-                if b - a > self.timeout + SLACK:
+        begin, end, longest = t + SLACK, until - SLACK, self.timeout + SLACK
+        for before, said in pairwise(self.heard):
+            a, b = before.t, said.t
+            if begin < b and a < end:
+                if said.reason:
+                    return said.reason
+                if b - a > longest:
                     return f"nothing is heard from {a:.3f} s to {b:.3f} s"
         last = self.heard[-1].t if self.heard else -np.inf
         if last < until - SLACK and self.leaves_at > STANDS:

@@ -82,6 +82,8 @@ class Validity:
             m.name: limits.get(m.role, engine.tracking_limit) for m in model.mechanisms.values()
         }
         self._owners_of: dict[tuple[int, ...], _Owners] = {}
+        self._owners_last: dict[int, tuple[tuple[int, ...], _Owners]] = {}
+        """By the identity of bodies that were asked for, them and whom they belong to."""
         self._reasons: dict[tuple[str, str], str] = {}
         """By question and name, why something may not be relied on at this tick."""
         self._bones: dict[tuple[str, str], tuple[str, ...]] = {}
@@ -369,15 +371,22 @@ class Validity:
         return not self._hearings[name].bones_heard or not self._bones_in_doubt(name)
 
     def _owners(self, bodies: tuple[int, ...]) -> _Owners:
+        last = self._owners_last.get(id(bodies))
+        if last is not None and last[0] is bodies:  # to look up a set of many takes its hash
+            return last[1]
         found = self._owners_of.get(bodies)
         if found is None:
             if len(self._owners_of) == MOST:
                 self._owners_of.clear()
+                self._owners_last.clear()
                 self.heard()
             others, people = bones_of(self._model, bodies)
             everyone = frozenset((*others, *people))
             found = _Owners(len(self._owners_of), others, people, everyone, frozenset(bodies))
             self._owners_of[bodies] = found
+        if len(self._owners_last) == MOST:
+            self._owners_last.clear()
+        self._owners_last[id(bodies)] = bodies, found
         return found
 
     # -- what follows from it -------------------------------------------------------------------

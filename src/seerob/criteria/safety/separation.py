@@ -236,7 +236,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             K: C + Z_d + Z_r [m].
             seen: Of one instant, or of each (N, 1).
         """
-        fast, found = np.array(seen, float).reshape(-1), np.empty_like(course.S_r)
+        fast, found = np.array(seen, float).reshape(-1), np.empty(np.shape(course.S_r))
         rows = len(fast), course.S_r.shape[-1]
         time = self.stop.reaction + float(at_least("T_s", course.T_s, unit="s"))
         v_h = math.nan if self.human_speed is None else self.human_speed

@@ -215,3 +215,17 @@ def test_one_without_a_workstation_file_is_no_traceback(tmp_path, recorded):
     recording.files = {"a.csv": b""}
     with pytest.raises(InputError, match=r"workstation\.toml: is not in it"):
         share(recording, tmp_path / "out.mcap")
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "TMP/x", "a/../../x", "..\\x", "c:x", "", ".", "a\0b", "x" * 300, "arm.urdf/x"]
+)
+def test_no_name_of_a_file_leads_out_of_where_it_is_unpacked(tmp_path, recorded, name):
+    recording = sr.Recording.open(recorded)
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    recording.files = {**recording.files, name.replace("TMP", str(tmp_path)): b"PLANTED"}
+    for unpacks in (lambda: share(recording, tmp_path / "out.mcap"), lambda: recording.extract(folder)):
+        with pytest.raises(InputError, match="do not trust this recording"):
+            unpacks()
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.read_bytes() == b"PLANTED"]

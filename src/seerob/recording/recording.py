@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from hashlib import sha256
 from itertools import repeat
@@ -53,10 +53,36 @@ _CACHED_CHUNKS = 8
 _TICK = {SAMPLES, SNAPSHOT}
 _TICK_VIEWS = {SAMPLES, SNAPSHOT, *VIEWS}
 _REMEDY = "give a recording (.mcap) made by seerob"
+_DISTRUST = "do not trust this recording"
 
 _decode_scene = msgspec.msgpack.Decoder(Scene).decode
 _decode_snapshot = msgspec.msgpack.Decoder(Snapshot).decode
 _decode_tick = msgspec.msgpack.Decoder(Tick).decode
+
+
+def unpack(files: Mapping[str, bytes], folder: Path, recording: Path) -> None:
+    """Write files of a recording below a folder.
+
+    Args:
+        files: Content by the name that the recording has for it.
+        folder: Where to.
+        recording: The file, for messages.
+
+    Raises:
+        InputError: A name leads out of the folder, in which case nothing is written, or is none of a file.
+    """
+    for name in files:
+        parts = PurePosixPath(name.replace("\\", "/")).parts
+        if not parts or ".." in parts or parts[0] == "/" or ":" in parts[0]:
+            raise InputError.at(recording, FILE_PREFIX + name, "leads out of the folder", _DISTRUST)
+    for name, data in files.items():
+        target = folder / PurePosixPath(name.replace("\\", "/"))
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+        except (OSError, ValueError) as error:
+            what = f"cannot be unpacked: {error.args[-1]}"
+            raise InputError.at(recording, FILE_PREFIX + name[:200], what, _DISTRUST) from error
 
 
 class Recording:
@@ -191,20 +217,8 @@ class Recording:
         return self._attachments(FILE_PREFIX)
 
     def extract(self, folder: Path) -> None:
-        """Write `files` below ``folder``.
-
-        Raises:
-            InputError: A name leads out of the folder; nothing is written then.
-        """
-        for name in self.files:
-            parts = PurePosixPath(name.replace("\\", "/")).parts
-            if not parts or ".." in parts or parts[0] == "/" or ":" in parts[0]:
-                what = "leads out of the folder"
-                raise InputError.at(self.path, FILE_PREFIX + name, what, "do not trust this recording")
-        for name, data in self.files.items():
-            target = folder / PurePosixPath(name.replace("\\", "/"))
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(data)
+        """Write `files` below ``folder``; raises as `unpack` does."""
+        unpack(self.files, folder, self.path)
 
     # -- what happened --------------------------------------------------------------------------
 

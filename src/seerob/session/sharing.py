@@ -29,7 +29,7 @@ from seerob.core.snapshot import Finding
 from seerob.files.tables.mapping import toml_value
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.filing import OUTSIDE, SOURCES
-from seerob.recording.recording import Recording
+from seerob.recording.recording import Recording, unpack
 from seerob.recording.result_log import log_of
 from seerob.session.reading import read
 from seerob.session.scene import scene_of
@@ -121,10 +121,7 @@ def share(
     _learn(words, table, recording)
     kept, new = _written(table, recording, words, dropped)
     with TemporaryDirectory(prefix="seerob-") as folder:
-        for name, content in {**kept, FILE_NAME: new}.items():
-            target = Path(folder) / PurePosixPath(name)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
+        unpack({**kept, FILE_NAME: new}, Path(folder), recording.path)
         try:
             station = Station(read(folder, Allowed(allow_plugins, replayed=True)), cache=cache)
             _run(station, recording, words, Path(folder) / "out")

@@ -210,3 +210,29 @@ def test_what_is_taken_back_is_taken_back_whole():
     assert (figure.verdict, figure.reason) == (None, "")
     nobody = undecided(Result(name="d", reason="nobody is near"), "nobody knows")
     assert (nobody.verdict, nobody.reason) == ("undecided", "nobody knows; nobody is near")
+
+
+@pytest.mark.parametrize(
+    ("source", "fast"),
+    [("", "undecided"), ('[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n', "within")],
+)
+def test_how_fast_a_robot_is_that_nothing_moves_is_not_within(tmp_path, source, fast):
+    """Whose source was forgotten stands where the file puts it: that is a place, and no speed."""
+    still = "t [s],j1 [rad],j2 [rad]\n0,0,0\n0.1,0,0\n"
+    two = TWO_ARMS.replace('"arm"\n', '"arm"\nq = [0, 0]\n', 1).replace(
+        '"other"\n', '"other"\nq = [0, 0]\nbase = { position = [9, 0, 0] }\n'
+    )
+    text = (
+        two
+        + ENERGY
+        + BETWEEN
+        + 'limit = 1\n[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\nlimit = 1\n'
+    )
+    found = made(tmp_path, text + source, {"arm.urdf": two_r(), "m.csv": still}).run().results
+    assert {name: str(series.verdict) for name, series in found.items()} == {
+        "E": fast,
+        "d": "within",
+        "v": fast,
+    }
+    if fast == "undecided":
+        assert "arm: no source says how it moves" in found["E"].worst().reason

@@ -252,6 +252,12 @@ def _open(part: Result, reason: str) -> Result:
     return part if part.verdict is None and part.value is None else undecided(part, reason)
 
 
+def unmoved(state: State) -> str:
+    """Robots whose speeds were asked for, when nothing ever moves any of them; empty when something does."""
+    robots = [name for name in state.speeds_asked if state.model.mechanisms[name].role == "robot"]
+    return "" if any(map(state.moved, robots)) else ", ".join(sorted(robots))
+
+
 def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:
     """Why nothing that a criterion says of its subjects is within; empty for nothing.
 
@@ -504,6 +510,8 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if value is not None and not math.isfinite(value):
             raise Undecided(f"the value is {value}, not a finite number")
+        if result.verdict is _WITHIN and state.speeds_asked and (still := unmoved(state)):
+            return undecided(result, f"{still}: no source says how it moves, and how fast it is was asked")
         if not criterion.by_speed and state.speed_errors:
             return self._shaken(question, result, state)
         return result

@@ -106,6 +106,11 @@ class Validity:
         self._relied_on.clear()
         self._sound = None
 
+    def moved(self, name: str) -> bool:
+        """Whether anything moves a robot: a source of its own, or of what carries it."""
+        names = (name, *self._model.carriers_of(name))
+        return any(self._hearings[each].driven or self._hearings[each].heard for each in names)
+
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 
     def asking(self) -> _Asking:

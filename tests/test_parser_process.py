@@ -20,6 +20,7 @@ from seerob.core.files.toml_file import read_toml
 
 
 def test_a_process_answers_for_one_file_after_the_other_and_is_not_this_one():
+    parser_process._end_all()
     assert parsed(operator.add, [1, b"\0"], ["é", None], file="a") == [1, b"\0", "é", None]
     first = parsed(os.getpid, file="a")
     assert first == parsed(os.getpid, file="b") != os.getpid()
@@ -100,6 +101,7 @@ def test_items_come_as_they_are_asked_for_and_the_process_is_used_again():
 
 
 def test_one_that_ended_while_it_waited_is_not_held_against_the_next_file():
+    parser_process._end_all()
     ended = parsed(os.getpid, file="a")
     (child,) = (c for c in parser_process._idle if c.process.pid == ended)
     child.process.kill()

@@ -99,6 +99,7 @@ def test_a_number_that_nothing_has_is_taken_or_told_with_its_place(tmp_path, ste
 
 
 def test_one_process_reads_what_parsers_of_others_read_one_file_after_the_other(tmp_path):
+    parser_process._end_all()
     processes = set()
     for kind in (
         "xacro",

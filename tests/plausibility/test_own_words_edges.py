@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from seerob.core.transforms import transform
 from seerob.twin.own_words import (
     LiveWords,
     SaidTool,
+    _bias,
     _differ,
     _Ways,
     bound,
@@ -211,3 +213,22 @@ def test_live_torques_are_judged_from_five_on_where_masses_are_known(
         for k in range(6):
             right.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=torques))
         assert right.torque_doubt == ""
+
+
+def test_a_speed_that_is_a_third_low_shows_over_half_a_second_only(tmp_path) -> None:
+    """At 125 Hz, of a tip at 2 m/s: less than a fifth, 10 mm and 30 ms of the way it seems until then."""
+    words = LiveWords(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
+    told = [
+        words.invalid_reason(heard("arm", k / 125, (0.0, 0.0), (1.0, 0.0), tcp_speed=1.3)) for k in range(63)
+    ]
+    assert told[20] == ""
+    assert "its own tool centre point went" in told[-1]
+
+
+def test_torques_of_a_joint_that_follows_another_with_an_offset(tmp_path) -> None:
+    """Both at once: 1 kg at the ends of both links, whose second is turned by 0.3 + 0.5 rad more."""
+    urdf = two_r(mimic='<mimic joint="j1" multiplier="1" offset="0.5"/>')
+    model = made(tmp_path, DOWN + TWO_R, {"arm.urdf": urdf}).model
+    found = _bias(model, mujoco.MjData(model.mj), model.mechanisms["arm"], np.array([0.3]), None)
+    expected = 9.81 * (2 * np.cos(0.3) + np.cos(1.1) + np.cos(1.1))
+    np.testing.assert_allclose(found, [expected], rtol=1e-9)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import getpass
+import io
 import socket
+import zipfile
 from pathlib import Path
 
+import openpyxl
 import pytest
 from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -229,3 +232,20 @@ def test_no_name_of_a_file_leads_out_of_where_it_is_unpacked(tmp_path, recorded,
         with pytest.raises(InputError, match="do not trust this recording"):
             unpacks()
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.read_bytes() == b"PLANTED"]
+
+
+def test_a_workbook_that_is_kept_has_no_author_and_no_bomb(monkeypatch):
+    from seerob.session import sharing
+
+    book, made = openpyxl.Workbook(), io.BytesIO()
+    book.properties.creator = "plantedname"
+    book.active.append(["limit", 3])
+    book.save(made)
+    cleaned = sharing._workbook("a.xlsx", made.getvalue())
+    with zipfile.ZipFile(io.BytesIO(cleaned)) as archive:
+        assert not [name for name in archive.namelist() if b"plantedname" in archive.read(name)]
+    assert openpyxl.load_workbook(io.BytesIO(cleaned)).active["B1"].value == 3
+    monkeypatch.setattr(sharing, "MAX_WORKBOOK", 100)
+    for content in (made.getvalue(), b"no archive"):
+        with pytest.raises(InputError, match=r"a\.xlsx: cannot be read"):
+            sharing._workbook("a.xlsx", content)

@@ -12,16 +12,18 @@ import io
 import re
 import shutil
 import socket
-import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
+from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.files.toml_file import parsed_toml
 from seerob.core.files.whole_file import whole_file
 from seerob.core.samples import BodySample, Sample, SignalSample
@@ -40,6 +42,8 @@ from seerob.workstation.workstation import FILE_NAME, file_among
 NOWHERE = "192.0.2.1"
 """Instead of hosts: an address for documentation, which nobody has (RFC 5737)."""
 _UNNAMED = "…"
+MAX_WORKBOOK = 256 << 20
+"""Most that a workbook which is kept unpacks to [byte]."""
 
 _HOSTS = ("host", "sender", "bind", "server")
 _OF_ACCESS = ("user", "ca", "certificate", "key", "server_certificate", "security")
@@ -50,7 +54,7 @@ _PATH = re.compile(rf"""(?:file://|(?<![\w.:/])/{_ROOTS}/|~[\w.-]*/|\b[A-Za-z]:[
 _ANY_PATH = re.compile(r"""(?<![\w.:/…])/[\w.-]+/[^\s"'<>|;,]*""")
 _OWNER = re.compile(r"(?:/home/|/Users/|[A-Za-z]:[\\/]Users[\\/])([^\s/\\\"'<>|;,]+)")
 _URL = re.compile(r"\b(?!package:|model:|library:|file:)(\w+://)[^/\s\"']+[^\s\"']*")
-_MAIL = re.compile(r"[\w.+-]+@[\w-]+\.[\w.]+")
+_MAIL = re.compile(r"(?<![\w.+-])[\w.+-]++@[\w-]++\.[\w.]+")
 _IP = re.compile(r"(?<![\w.])(?!127\.|0\.0\.0\.0|192\.0\.2\.1\b)\d{1,3}(?:\.\d{1,3}){3}(?![\w.])")
 _IP6 = re.compile(r"(?<![\w:])(?:[0-9a-fA-F]{0,4}:){3,7}[0-9a-fA-F]{0,4}(?![\w:])")
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
@@ -309,7 +313,7 @@ def _cleaned(name: str, content: bytes, words: _Words) -> bytes:
     ):
         return bytes(80) + content[80:]
     if ending in (".xlsx", ".xlsm"):
-        return _workbook(content)
+        return _workbook(name, content)
     with suppress(UnicodeDecodeError):
         text = content.decode()
         if ending in (".obj", ".mtl"):
@@ -319,13 +323,22 @@ def _cleaned(name: str, content: bytes, words: _Words) -> bytes:
     return content
 
 
-def _workbook(content: bytes) -> bytes:
-    """A workbook without its properties, which name whoever wrote it."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as new:
-        for member in old.infolist():
-            if not member.filename.startswith(("docProps/", "customXml/")):
-                new.writestr(zipfile.ZipInfo(member.filename), old.read(member))
+def _workbook(name: str, content: bytes) -> bytes:
+    """A workbook without its properties, which name whoever wrote it.
+
+    Raises:
+        InputError: It is none, or unpacks to too much.
+    """
+    made, left = io.BytesIO(), MAX_WORKBOOK
+    try:
+        with ZipFile(io.BytesIO(content)) as old, ZipFile(made, "w", ZIP_DEFLATED) as new:
+            for member in old.infolist():
+                if not member.filename.startswith(("docProps/", "customXml/")):
+                    data = unpacked(old, member, left)
+                    left -= len(data)
+                    new.writestr(ZipInfo(member.filename), data)
+    except (BadZipFile, TooLarge, OSError, ValueError, NotImplementedError, zlib.error) as error:
+        raise InputError.at(name, "", f"cannot be read: {error}", "do not trust this recording") from error
     return made.getvalue()
 
 

@@ -89,3 +89,9 @@ def test_a_flooded_page_is_measured_in_one_run(smoke):
         "pings",
         "requests",
     }
+
+
+def test_the_price_of_checks_against_strangers_is_a_share_of_a_tick_and_of_a_start(smoke):
+    said = smoke("price_of_checks")
+    assert "a tick of" in said
+    assert "a start of" in said

@@ -5,11 +5,14 @@ import multiprocessing
 import socket
 import threading
 import time
+from contextlib import ExitStack
 
 import httpx
 import msgspec
 import pytest
+from websockets.exceptions import InvalidStatus
 
+from seerob.app.server import door
 from seerob.app.server.access import Role, Tokens
 from seerob.app.server.allowance import Allowance, Allowances
 from seerob.app.server.door import STRANGERS
@@ -139,6 +142,35 @@ def test_strangers_who_ask_without_end_are_slowed_down_and_visitors_are_not():
         begun = time.monotonic()
         assert set(asyncio.run(ask(120, headers=cookie))) <= {404, 503}
         assert time.monotonic() - begun < took
+
+
+def test_who_begins_sockets_without_end_waits_or_is_turned_away_and_owes_nothing_for_that(monkeypatch):
+    monkeypatch.setattr(door, "SOCKETS", (5.0, 4.0))
+    monkeypatch.setattr(door, "LONGEST_WAIT", 0.5)
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0) as server, ExitStack() as held:
+        for _ in range(4):
+            held.enter_context(Visitor(server))
+        codes = []
+
+        def come():
+            try:
+                held.enter_context(Visitor(server))
+                codes.append(101)
+            except InvalidStatus as refused:
+                codes.append(refused.response.status_code)
+
+        many = [threading.Thread(target=come) for _ in range(40)]
+        for one in many:
+            one.start()
+        begun = time.monotonic()
+        held.enter_context(Visitor(server, source_address=("127.0.0.9", 0)))  # another address
+        assert time.monotonic() - begun < PATIENCE / 2
+        for one in many:
+            one.join()
+        assert set(codes) == {101, 429}
+        assert codes.count(429) > codes.count(101)
+        time.sleep(1.0)
+        held.enter_context(Visitor(server))  # 40 that were turned away would be 7 s
 
 
 def test_an_allowance_gives_its_rate_and_never_more():

@@ -11,6 +11,7 @@ import msgspec
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from seerob.app.server import door
 from seerob.app.server.player import Player
 from seerob.app.server.serving import LARGEST_MESSAGE, Server
 from seerob.core.snapshot import PROTOCOL, Snapshot
@@ -20,8 +21,10 @@ from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, sna
 @pytest.fixture(scope="module")
 def server():
     feed = Player(Remembered([snapshot(0), snapshot(1)]))
-    with Server(scene=scene(), meshes=MESHES, feed=feed, port=0) as server:
-        yield server
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(door, "SOCKETS", (1e3, 1e3))  # a thousand come one after the other
+        with Server(scene=scene(), meshes=MESHES, feed=feed, port=0) as server:
+            yield server
 
 
 def frame(opcode, payload, *, fin=True, length=None, masked=True, reserved=0):

@@ -41,6 +41,9 @@ _HOST = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9.-]+))(?::\d{1,5})?")
 STRANGERS, VISITORS = (10.0, 40.0), (60.0, 200.0)
 """Requests per second of one address, and at once: of who has no token, and of others. A page has 10 to 100
 files and meshes."""
+SOCKETS = (10.0, 64.0)
+"""WebSockets that one address may begin per second, and at once: as many as there are pages served. Each is told
+the past, which costs more than a file."""
 LONGEST_WAIT = 5.0
 """After which a request that came too fast is turned away [s]."""
 _ROLES = {role: frozenset({Role.VIEW, role}) for role in Role}
@@ -74,6 +77,7 @@ class Door:
         self._cookies = [] if tokens is None else [tokens.cookie(role) for role in Role]
         self._guesses = Guesses()
         self._strangers, self._visitors = Allowances(*STRANGERS), Allowances(*VISITORS)
+        self._sockets = Allowances(*SOCKETS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request or WebSocket."""
@@ -94,9 +98,14 @@ class Door:
         known = answer is None or answer.status_code < 400
         if answer is not None and not known:
             self._visits.turn_away(address, bytes(answer.body).decode().strip())
-        allowances = self._visitors if known else self._strangers
-        wait = allowances.of(neighbourhood(address)).take()
+        asked = [self._visitors if known else self._strangers]
+        if known and scope["type"] == "websocket":
+            asked.append(self._sockets)
+        owed = [allowances.of(neighbourhood(address)) for allowances in asked]
+        wait = max(allowance.take() for allowance in owed)
         if wait > LONGEST_WAIT:
+            for allowance in owed:
+                allowance.take(-1.0)  # whoever is turned away owes nothing for it
             answer = _later("too many requests", wait)
             self._visits.turn_away(address, "too many requests")
         elif wait:

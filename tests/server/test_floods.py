@@ -5,7 +5,7 @@ import multiprocessing
 import socket
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import httpx
 import msgspec
@@ -193,3 +193,24 @@ def test_allowances_are_of_those_who_asked_last():
         allowances.of(str(k))
     assert allowances.of("a") is not first
     assert len(allowances._of) <= 1025
+
+
+def test_refusals_and_those_who_wait_when_the_server_stops_are_no_errors_in_the_log(monkeypatch, caplog):
+    monkeypatch.setattr(door, "SOCKETS", (0.5, 1.0))
+    tokens = Tokens.made()
+    with ExitStack() as held:
+        asking = held.enter_context(Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, tokens=tokens))
+        with pytest.raises(InvalidStatus, match="401"):
+            Visitor(asking)
+        held.enter_context(Visitor(asking, path=f"/ws?token={tokens.view}"))
+
+        def come():
+            with suppress(Exception):
+                Visitor(asking, path=f"/ws?token={tokens.view}")
+
+        waiting = threading.Thread(target=come, daemon=True)
+        waiting.start()
+        time.sleep(0.5)  # it is made to wait for 2 s
+        asking.stop()
+        waiting.join(PATIENCE)
+    assert [r for r in caplog.records if r.exc_info or "handshake" in r.getMessage()] == []

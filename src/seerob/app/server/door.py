@@ -16,6 +16,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.utils import ClientDisconnected
 
 from seerob.app.server.access import EVERYTHING, Guesses, Role, Tokens, matching, neighbourhood
 from seerob.app.server.allowance import Allowances
@@ -42,7 +43,7 @@ STRANGERS, VISITORS = (10.0, 40.0), (60.0, 200.0)
 """Requests per second of one address, and at once: of who has no token, and of others. A page has 10 to 100
 files and meshes."""
 SOCKETS = (10.0, 64.0)
-"""WebSockets that one address may begin per second, and at once: as many as there are pages served. Each is told
+"""WebSockets that one address may begin per second, and at once: as many as pages are served. Each is told
 the past, which costs more than a file."""
 LONGEST_WAIT = 5.0
 """After which a request that came too fast is turned away [s]."""
@@ -109,7 +110,10 @@ class Door:
             answer = _later("too many requests", wait)
             self._visits.turn_away(address, "too many requests")
         elif wait:
-            await asyncio.sleep(wait)
+            try:
+                await asyncio.sleep(wait)
+            except asyncio.CancelledError:  # the server stops: no mistake that belongs in the log
+                raise ClientDisconnected from None
         await (answer or self._app)(scope, receive, send_with_headers)
 
     def _refuse(self, scope: Scope) -> Response | None:

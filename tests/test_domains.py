@@ -235,7 +235,6 @@ CALLS = {
     "criteria.contact.clamping.clamps": {
         "gaps": HALF,
         "speed": HALF,
-        "period": 0.01,
         "thickness": HALF[None],
     },
     "criteria.contact.collision.robot_mass": {"M": 10.0, "m_L": 1.0},
@@ -248,6 +247,7 @@ CALLS = {
     "criteria.contact.collision.energy_limit": {"F": 100.0, "k": 25e3, "printed": 1.0},
     "criteria.contact.collision.permissible_speed": {"v_F": 1.0, "v_P": 1.0, "v_E": 1.0},
     "criteria.contact.measured.peaks": {"t": TWO - 1, "force": TWO},
+    "criteria.contact.measured.risen": {"force": TWO},
     "criteria.contact.tolerances.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
     "criteria.contact.shape.round_shape": {"radius": 0.01},
     "description.norms.iso_13855.speed_at": {"distance": TWO},
@@ -264,7 +264,6 @@ STRICT = {
     "criteria.stopping.terms.largest_factor a": "is 0, no speed",
     "criteria.contact.clamping.clamps gaps": "clamps",
     "criteria.contact.clamping.clamps speed": "clamps",
-    "criteria.contact.clamping.clamps period": "clamps",
     "criteria.contact.clamping.clamps thickness": "clamps",
     "criteria.contact.collision.energy_limit printed": "was not printed: that of force and stiffness",
     "criteria.contact.collision.permissible_speed v_P": "of an unknown area: the upper bound of the others",

@@ -8,6 +8,7 @@ import inspect
 import math
 import pkgutil
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -319,6 +320,8 @@ def called(name, arguments):
 def figures(told):
     if dataclasses.is_dataclass(told):
         told = [getattr(told, each.name) for each in dataclasses.fields(told)]
+    if isinstance(told, msgspec.Struct):
+        told = msgspec.structs.astuple(told)
     if isinstance(told, tuple | list):
         return [x for each in told for x in figures(each)]
     return [] if told is None or isinstance(told, str) else np.ravel(np.asarray(told, float)).tolist()

@@ -21,9 +21,13 @@ from seerob.core.files.toml_file import read_toml
 
 def test_a_process_answers_for_one_file_after_the_other_and_is_not_this_one():
     parser_process._end_all()
+    taken = bytearray(b"x") * (
+        parser_process.TIRED + (64 << 20)
+    )  # what this process has is not what that one has
     assert parsed(operator.add, [1, b"\0"], ["é", None], file="a") == [1, b"\0", "é", None]
     first = parsed(os.getpid, file="a")
     assert first == parsed(os.getpid, file="b") != os.getpid()
+    assert taken
 
 
 def test_one_that_was_begun_ahead_has_imported_what_it_will_need_and_is_asked_first():

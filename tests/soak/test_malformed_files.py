@@ -51,6 +51,7 @@ FOUND = [
     ("mjcf", b'fromto="0 0 0 0 0 0.3"', b'fromto="0 0 0 0 0 1e308"'),
     ("ply text", b"vertex 8", b"vertex " + b"1" * 5000),
     ("obj", b"f ", b"v inf 0 0\nf "),
+    ("obj", b"f ", b"v inf 0 0\nv 0 inf 0\nf -1 -2 1 2\nf "),
     ("motion csv", b"\n0.01,", b"\n5e-324,"),
     ("motion csv", b"\n0.01,", b"\n-1e308,"),
     ("waypoints xlsx", b'<row r="2">', b'<row r="999999999">'),

@@ -412,13 +412,12 @@ def _held() -> int:
 
 
 def _peak() -> int:
-    """Most memory that this process had [byte]."""
-    if os.name != "posix":
+    """Most memory that this process had [byte]; that of `resource` counts the one that started it, too."""
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+    except OSError:  # of Linux alone
         return 0
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak << 10
+    return next((int(line.split()[1]) << 10 for line in lines if line.startswith("VmHWM:")), 0)
 
 
 if __name__ == "__main__":

@@ -41,9 +41,10 @@ def _equal_polygons(vertices: Array, table: Indices) -> Indices:
     first = np.repeat(table[:, :1], size - 2, axis=1)
     fans = np.stack([first, table[:, 1:-1], table[:, 2:]], axis=2)
     a, b, c = np.moveaxis(vertices[fans], 2, 0)
-    cross = np.cross(b - a, c - a)
-    normal = cross.sum(axis=1)
-    backward = (np.einsum("ksi,ki->ks", cross, normal) < 0).any(axis=1)
+    with np.errstate(all="ignore"):  # corners that are no numbers, or too large, are refused later
+        cross = np.cross(b - a, c - a)
+        normal = cross.sum(axis=1)
+        backward = (np.einsum("ksi,ki->ks", cross, normal) < 0).any(axis=1)
     for i in np.flatnonzero(backward):
         cut = _concave(vertices[table[i]], normal[i])
         if cut is not None and len(cut) == size - 2:

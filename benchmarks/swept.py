@@ -36,7 +36,7 @@ def cell(folder: Path) -> Model:
         f'[[robots]]\nname = "ur10"\nmodel = "{ROBOTS}/ur_description/urdf/ur10_robot.urdf"\n'
         f'base = {{ position = [0, 0, 0.72] }}\npackages = {{ "example-robot-data" = "{ROBOTS.parent}" }}\n'
     )
-    return load(folder).model
+    return load(folder, allow_outside=True).model
 
 
 def motion(poses: int) -> Array:

@@ -113,9 +113,13 @@ def test_never_heard_is_undecided(arm):
 
 def test_no_source_and_no_position_is_undecided_and_a_given_one_is_not(arm, tmp_path):
     assert results_without_source(arm)[0].verdict == "undecided"
-    given = made(tmp_path, FLOATING + TWO_R + "q = [0.3, 0.4]\n" + ENERGY, {"arm.urdf": two_r()})
-    result = results_without_source(given)[0]
-    assert (result.verdict, result.value) == ("within", pytest.approx(0.0, abs=1e-12))
+    post = '[[parts]]\nname = "post"\nshape = { sphere = 0.1 }\nat = { position = [9, 0, 0] }\n'
+    far = '[[safety]]\nkind = "minimum_distance"\nname = "far"\nbetween = ["arm", "post"]\nlimit = 1\n'
+    text = FLOATING + TWO_R + "q = [0.3, 0.4]\n" + post + ENERGY + far
+    energy, distance = results_without_source(made(tmp_path, text, {"arm.urdf": two_r()}))
+    assert distance.verdict == "within"
+    # A place is no speed: nobody says that it stands.
+    assert (energy.verdict, energy.value) == ("undecided", pytest.approx(0.0, abs=1e-12))
 
 
 def results_without_source(station):

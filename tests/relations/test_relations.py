@@ -39,7 +39,7 @@ CELLS = 300
 """Random cells."""
 EACH = 1
 """Relations that are asked of a cell, by chance; of one that somebody names, all are."""
-DEPTH = 0.01
+DEPTH = 0.03
 """How far depths in an area may differ, which are searched for within an interval [m]."""
 BESIDE = 0.05
 """Share of a limit by which a figure may fall beside a gap: of given speeds and slopes the larger counts, and

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.devices.motion_files.pose_frame import PoseFrame
 from seerob.devices.sources.bag import Bag
-from seerob.files.motion_capture.ros_bag import TimeBase
+from seerob.files.motion_capture.ros_bag import TimeBase, topics_of
 from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform
 from seerob.protocols.ros.ros_serialised import Edition, encode, store
 from seerob.workstation.source import Target
@@ -156,3 +157,9 @@ def test_mistakes_are_named(tmp_path):
     (tmp_path / "no.bag").write_bytes(b"nonsense")
     with pytest.raises(InputError, match="not a ROS bag that can be read"):
         opened(tmp_path / "no.bag")
+
+
+def test_a_pipe_is_no_bag_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "motion.bag")
+    with pytest.raises(InputError, match=r"motion\.bag: cannot be read: is a pipe or a device"):
+        topics_of(tmp_path / "motion.bag", "motion.bag")

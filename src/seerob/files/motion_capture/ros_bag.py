@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seerob.core.errors import InputError
+from seerob.core.files.bounded import regular
 from seerob.files.motion_capture.kinect_bag import connections, raw_messages
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros.ros_messages import Content, Said, same_type
@@ -47,8 +48,13 @@ def topics_of(path: Path, file: str) -> dict[str, str]:
     Raises:
         InputError: It is missing or no bag.
     """
-    if not path.exists():
-        raise InputError.at(file, "", "no such file", "give the path from the workstation's folder")
+    try:
+        regular(path)
+    except FileNotFoundError:
+        raise InputError.at(file, "", "no such file", "give the path from the workstation's folder") from None
+    except OSError as error:
+        what = f"cannot be read: {error.strerror}"
+        raise InputError.at(file, "", what, "give a bag that may be read") from error
     return dict(connections(path, file))
 
 

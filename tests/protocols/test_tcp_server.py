@@ -64,3 +64,20 @@ def test_a_cancelled_server_leaves_nothing_open(turns):
         loop_is_free.close()
 
     assert not left_open(work())
+
+
+def test_what_is_written_is_sent_at_once():
+    said = []
+
+    async def hear(_, writer):
+        said.append(writer.get_extra_info("socket").getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+        writer.transport.abort()
+
+    async def work():
+        async with tcp_server(hear, "127.0.0.1", 0) as server:
+            reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+            await reader.read()
+            writer.close()
+
+    assert not left_open(work())
+    assert said == [1]

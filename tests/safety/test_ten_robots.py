@@ -110,7 +110,7 @@ def test_mass_jacobian_energy_and_effective_mass_are_pinocchios(tmp_path, name):
         path = tmp_path / name if name.endswith(".urdf") else installed(content)
     reference = name if path is None else name if name.endswith(".urdf") else str(path)
     text = f'{FLOATING}[[robots]]\nname = "arm"\nmodel = "{reference}"\n{LOAD.format(tip=tip)}'
-    station = made(tmp_path, text, {name: content} if name.endswith(".urdf") else {})
+    station = made(tmp_path, text, {name: content} if name.endswith(".urdf") else {}, allow_outside=True)
     robot = station.model.robot("arm")
     assert (robot.units.count("rad"), robot.units.count("m")) == (turning, sliding)
     model, columns = theirs(path, robot.description)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import os
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,6 +62,9 @@ def run(options: argparse.Namespace) -> int:
     try:
         with whole_folder(options.output) as working:
             (working / FILE_NAME).write_text(text, encoding="utf-8")
+            recording = Path(options.file)
+            copied = shutil.copytree if recording.is_dir() else shutil.copyfile
+            copied(recording, working / recording.name)
     except OSError as error:
         what = f"cannot be made: {error.strerror}"
         raise InputError.at(options.output, "", what, "give a folder that may be written") from error
@@ -82,7 +85,7 @@ def _workstation(options: argparse.Namespace, recording: Path) -> str:
     from seerob.session.reading import convert_workstation
 
     table = _person(options, recording)
-    given = {"kind": options.kind, "human": options.name, "file": _path(recording, options.output)}
+    given = {"kind": options.kind, "human": options.name, "file": recording.name}
     given |= {"subject": options.subject} if options.subject else {}
     given |= options_of(options.set, COMMAND)
     source = [f"{key} = {toml_value(value)}" for key, value in given.items()]
@@ -138,10 +141,3 @@ def _marker_stature(source: CaptureFile, recording: Path, options: argparse.Name
         return person, observer(source, captured.layout, person, file=recording.name)[0]
 
     return marker_stature(captured, bound, name=options.name)
-
-
-def _path(recording: Path, folder: Path) -> str:
-    try:
-        return os.path.relpath(recording, folder).replace(os.sep, "/")
-    except ValueError:  # another drive
-        return str(recording.resolve())

@@ -50,7 +50,8 @@ class Doorstep(socket.socket):
         """Take over a socket that listens."""
         self._open: WeakSet[socket.socket] = WeakSet()
         self._allowances = Allowances(*CONNECTIONS)
-        super().__init__(listening.family, listening.type, listening.proto, listening.detach())
+        # With its protocol: asyncio sends at once (TCP_NODELAY) only where it is named.
+        super().__init__(listening.family, listening.type, socket.IPPROTO_TCP, listening.detach())
 
     def accept(self) -> tuple[socket.socket, Any]:
         """Accept somebody.

@@ -8,6 +8,7 @@ made for a server that is closed by then, and fails, or is cancelled with the lo
 from __future__ import annotations
 
 import asyncio
+import os
 import socket
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -32,13 +33,18 @@ async def tcp_server(welcome: Welcome, bind: str, port: int) -> AsyncGenerator[a
     """
     loop = asyncio.get_running_loop()
     found = await loop.getaddrinfo(bind, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    listening = socket.create_server(found[0][4][:2], family=found[0][0])
-    server = await asyncio.start_server(welcome, sock=listening, start_serving=False)
-    try:
-        await server.start_serving()
-        yield server
-    finally:
-        await close_server(server)
+    family, kind, protocol, _, address = found[0]
+    # With its protocol: asyncio sends at once (TCP_NODELAY) only where it is named.
+    with socket.socket(family, kind, protocol) as listening:
+        if os.name == "posix":  # elsewhere it lets others take the port
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        server = await asyncio.start_server(welcome, sock=listening, start_serving=False)
+        try:
+            await server.start_serving()
+            yield server
+        finally:
+            await close_server(server)
 
 
 async def close_server(server: asyncio.Server) -> None:

@@ -35,7 +35,7 @@ from seerob.core.snapshot import Verdict
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
 
-CELLS = 300
+CELLS = 100
 """Random cells."""
 EACH = 1
 """Relations that are asked of a cell, by chance; of one that somebody names, all are."""

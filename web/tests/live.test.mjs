@@ -201,8 +201,10 @@ test("while the run is stopped as a whole the page says so by its own clock, and
     served.signal("SIGCONT");
   }
   const stopped = await page.evaluate(() => window.pictures.at(-1).t);
-  await page.waitForFunction((t) => window.seerob.t > t, stopped);
-  await page.waitForSelector(".pill:not(.state-off)");
+  await page.waitForFunction(
+    (before) => window.pictures.some(({ t, current }) => t > before && current),
+    stopped,
+  );
   const pictures = await page.evaluate(() => window.pictures);
   const slowest = Math.max(...pictures.slice(1).map(({ at }, i) => at - pictures[i].at));
   const begun = pictures.find(({ t }) => t === stopped).at;

@@ -17,6 +17,18 @@ before(async () => {
 
 after(() => opened?.close());
 
+/** A busy machine sends nothing for a third of a second now and then, and the page says so: it is looked at again. */
+async function eventually(check) {
+  for (let again = 0; ; again++) {
+    try {
+      return await check();
+    } catch (error) {
+      if (again === 20) throw error;
+      await page.waitForTimeout(200);
+    }
+  }
+}
+
 test("nothing comes from elsewhere, nothing complains, memory is shared", async () => {
   assert.equal(await page.evaluate(() => globalThis.crossOriginIsolated), true);
   assert.deepEqual(browser.outside, []);
@@ -31,24 +43,26 @@ test("names from files are shown as text, and only as text", async () => {
 });
 
 test("the table says values, units, limits and words; UNDECIDED gives its reason and its own look", async () => {
-  const speed = await page.locator('tr[data-criterion="tcp speed"]').innerText();
-  assert.match(speed, /0\.\d{3}\sm\/s[\s\S]*≤\s0\.7\sm\/s[\s\S]*(within|exceeded)/);
-  const mass = page.locator('tr[data-criterion="effective mass"]');
-  assert.match(await mass.innerText(), /–\skg[\s\S]*undecided/);
-  assert.equal(await mass.locator(".badge-icon").innerText(), "?");
-  const reason = await page.locator("tr.explanation", { hasText: "given by nobody" }).innerText();
-  assert.match(reason, /mass of ur10\/shoulder_link was given by nobody/);
-  const looks = await page.evaluate(() => {
-    const look = (name) => {
-      const row = document.querySelector(`tr[data-criterion="${name}"]`);
-      const style = getComputedStyle(row.querySelector("td"));
-      const icon = getComputedStyle(row.querySelector(".badge-icon"));
-      return [style.backgroundImage, icon.borderStyle, getComputedStyle(row.querySelector(".badge")).color];
-    };
-    return { undecided: look("effective mass"), within: look("work area") };
+  await eventually(async () => {
+    const speed = await page.locator('tr[data-criterion="tcp speed"]').innerText();
+    assert.match(speed, /0\.\d{3}\sm\/s[\s\S]*≤\s0\.7\sm\/s[\s\S]*(within|exceeded)/);
+    const mass = page.locator('tr[data-criterion="effective mass"]');
+    assert.match(await mass.innerText(), /–\skg[\s\S]*undecided/);
+    assert.equal(await mass.locator(".badge-icon").innerText(), "?");
+    const reason = await page.locator("tr.explanation", { hasText: "given by nobody" }).innerText();
+    assert.match(reason, /mass of ur10\/shoulder_link was given by nobody/);
+    const looks = await page.evaluate(() => {
+      const look = (name) => {
+        const row = document.querySelector(`tr[data-criterion="${name}"]`);
+        const style = getComputedStyle(row.querySelector("td"));
+        const icon = getComputedStyle(row.querySelector(".badge-icon"));
+        return [style.backgroundImage, icon.borderStyle, getComputedStyle(row.querySelector(".badge")).color];
+      };
+      return { undecided: look("effective mass"), within: look("work area") };
+    });
+    assert.match(looks.undecided[0], /gradient/);
+    for (const [i, style] of looks.undecided.entries()) assert.notEqual(style, looks.within[i]);
   });
-  assert.match(looks.undecided[0], /gradient/);
-  for (const [i, style] of looks.undecided.entries()) assert.notEqual(style, looks.within[i]);
 });
 
 test("the worst comes first and the pill names it", async () => {
@@ -59,7 +73,9 @@ test("the worst comes first and the pill names it", async () => {
     const ranks = badges.map((badge) => rank.findIndex((word) => badge.textContent.trim().endsWith(word)));
     return !ranks.includes(-1) && ranks[0] === Math.min(...ranks);
   });
-  assert.match(await page.locator("output.pill").innerText(), /LIMIT EXCEEDED|UNDECIDED/);
+  await eventually(async () => {
+    assert.match(await page.locator("output.pill").innerText(), /LIMIT EXCEEDED|UNDECIDED/);
+  });
 });
 
 test("a row opens to its basis: formula, source, inputs with origin, what is not modelled", async () => {

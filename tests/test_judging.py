@@ -105,6 +105,17 @@ def test_a_criterion_with_a_period_is_asked_at_once_when_it_is_switched(tmp_path
     assert (found.verdict, found.max()) == ("exceeded", pytest.approx(10.0, rel=1e-3))
 
 
+def test_an_answer_that_is_kept_is_held_by_what_is_found_out_since(asked, monkeypatch):
+    judge, state = asked(ENERGY + "every = 10\n")
+    assert judge(state)[0].verdict == "within"
+    found = Finding(level="warning", subject="arm", text="another tool", holds=("arm",))
+    monkeypatch.setattr(judge._as_heard, "at", lambda state: (found,))
+    state.refresh(0.01)
+    (result,) = judge(state)
+    assert (result.verdict, result.t) == ("undecided", 0.0)
+    assert "another tool" in result.reason
+
+
 def test_an_answer_of_later_says_nothing_when_time_is_set_back(asked):
     judge, state = asked(ENERGY + "every = 10\n")
     state.refresh(5.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -253,9 +253,9 @@ def _open(part: Result, reason: str) -> Result:
 
 
 def unmoved(state: State) -> str:
-    """Robots whose speeds were asked for, when nothing ever moves any of them; empty when something does."""
-    robots = [name for name in state.speeds_asked if state.model.mechanisms[name].role == "robot"]
-    return "" if any(map(state.moved, robots)) else ", ".join(sorted(robots))
+    """Robots whose speeds were asked for and that nothing ever moves; empty when there is none."""
+    robots = (name for name in state.speeds_asked if state.model.mechanisms[name].role == "robot")
+    return ", ".join(sorted(name for name in robots if not state.moved(name)))
 
 
 def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:
@@ -431,10 +431,12 @@ class Judge:
     def _one(self, question: _Question, state: State) -> Result:
         kept = question.kept
         if kept is not None and self._lasts(kept, question.criterion, state):
+            if self._holds:  # also what was found out since it was asked
+                question.why = self._reason(question, kept.asked)
             return kept.result
         result = self._now(question, question.bound.evaluate, state)
         if self._holds:
-            question.why = self._reason(question, state)
+            question.why = self._reason(question, state.asked)
         if (every := question.criterion.every) is not None:
             result = replace(result, t=state.t)
             asked = tuple(sorted(state.asked))
@@ -551,13 +553,13 @@ class Judge:
             self._warned.add(bound.criterion.name)
             _log.warning("%s: %s", bound.criterion.name, what)
 
-    def _reason(self, question: _Question, state: State) -> str:
-        """Why nothing that a criterion has just said is within; empty for nothing."""
+    def _reason(self, question: _Question, asked: Collection[str]) -> str:
+        """Why nothing is within that a criterion said when it asked for these; empty for nothing."""
         reason = question.held
         if not self._held_names and not question.unmentioned:
             return reason
         every = (*self._held_names.items(), *question.unmentioned.items())
-        texts = (text for name, text in every if name in state.asked)
+        texts = (text for name, text in every if name in asked)
         return "; ".join(dict.fromkeys(filter(None, (reason, *(t for t in texts if t not in reason)))))
 
     @staticmethod

@@ -24,7 +24,7 @@ from seerob.core.printable import printable
 from seerob.description.capture.mapping import read_conventions
 from seerob.description.loader import load_robot
 from seerob.description.mesh import load_meshes
-from seerob.description.mesh_files import apart
+from seerob.description.mesh_files import source as mesh_source
 from seerob.description.norms import body_limits
 from seerob.description.robots.calibration import read_calibration
 from seerob.files.motion_capture import kinect_bag
@@ -282,11 +282,11 @@ def test_a_collada_file_that_takes_too_much_ends_its_parser_with_a_message_and_t
     # What runs out of memory first decides: this package, a parser in C, or the process.
     refused = r"large.dae: (takes more than 32 MiB|.*more memory than|ends the process|.*unknown error)"
     with monkeypatch.context() as limited:
-        limited.setattr(apart, "parsed", partial(parsed, memory=32 << 20))
+        limited.setattr(mesh_source, "parsed", partial(parsed, memory=32 << 20))
         with pytest.raises(InputError, match=refused):
             load_meshes(tmp_path / "large.dae")
     assert len(load_meshes(tmp_path / "good.dae").meshes) == 1
-    monkeypatch.setattr(apart, "parsed", partial(parsed, seconds=1e-3))
+    monkeypatch.setattr(mesh_source, "parsed", partial(parsed, seconds=1e-3))
     with pytest.raises(InputError, match=r"large.dae: takes more than 0.001 s to read; export it"):
         load_meshes(tmp_path / "large.dae")
 

@@ -16,8 +16,7 @@ from seerob.core.shapes.geometry import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.core.units import LENGTHS
-from seerob.description.mesh_files.apart import apart
-from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh, apart
 from seerob.description.meshes import collada, gltf, obj, off, ply, stl, threemf
 from seerob.description.shapes.mesh_sides import sided
 from seerob.description.shapes.tidy import tidied

@@ -1,6 +1,7 @@
 """A page that offers what a headset sees, over the connection it has anyway."""
 
 import time
+from contextlib import contextmanager
 
 import msgspec
 import numpy as np
@@ -13,8 +14,9 @@ from seerob.app.server.serving import Server
 from seerob.core.snapshot import Tracked, Tracking
 from seerob.description.capture.estimated import estimated
 from seerob.description.capture.mapping import conventions
-from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, OFFERS, SHORTEST
+from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, SHORTEST
 from seerob.devices.live.listening import Listener
+from seerob.devices.live.receivers import Receivers
 from seerob.devices.sources.headset import Headset
 from server.frames import MESHES, PATIENCE, Visitor, scene
 
@@ -46,18 +48,26 @@ def a_server():
         yield server
 
 
-@pytest.fixture(name="samples")
-def a_source():
+@contextmanager
+def heard(server):
+    """What a run that shows these pages hears of the headset."""
     samples = []
-    listener = Listener(Headset(human="anna", name="headset", timeout=1.0), None, samples.append)
+    source = Headset(human="anna", name="headset", timeout=1.0).taking(server.offers)
+    listener = Listener(source, None, samples.append)
     listener.start()
     end = time.monotonic() + PATIENCE
-    while "anna" not in OFFERS._waiting and time.monotonic() < end:
+    while "anna" not in server.offers._waiting and time.monotonic() < end:
         time.sleep(0.005)
     yield samples
     listener.ask_to_stop()
     assert listener.join(PATIENCE)
-    assert "anna" not in OFFERS._waiting
+    assert "anna" not in server.offers._waiting
+
+
+@pytest.fixture(name="samples")
+def a_source(server):
+    with heard(server) as samples:
+        yield samples
 
 
 def seen(page, samples, enough=1, **more):
@@ -107,6 +117,24 @@ def test_nobody_waits_for_it(server):
         answer = page.answer()
     assert not answer.accepted
     assert "nothing in this run waits for a headset of 'berta'" in answer.reason
+
+
+def test_a_page_of_another_run_of_the_process_is_nobodys_headset(server, samples):
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0) as other, Page(other) as page:
+        page.see()
+        assert "nothing in this run waits" in page.answer().reason
+    assert samples == []
+
+
+def test_a_run_hands_its_pages_offers_to_its_headset(server):
+    headset = Headset(human="anna", name="headset", timeout=1.0)
+    with Receivers([(headset, None)], server.offers) as receivers, Page(server) as page:
+        samples, end = (), time.monotonic() + PATIENCE
+        while not samples and time.monotonic() < end:
+            page.see(int(1e3 * time.monotonic()))
+            samples = receivers.take()
+            time.sleep(0.01)
+    assert samples[0].target == "anna"
 
 
 def test_one_page_per_person_until_it_leaves(server, samples):
@@ -159,8 +187,11 @@ def test_without_the_token_nobody_offers():
 
 
 @pytest.mark.parametrize("role", ["view", "control"])
-def test_who_may_only_look_is_nobodys_headset(samples, role):
-    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, tokens=TOKENS) as server:
+def test_who_may_only_look_is_nobodys_headset(role):
+    with (
+        Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, tokens=TOKENS) as server,
+        heard(server) as samples,
+    ):
         with Page(server, path=f"/ws?token={getattr(TOKENS, role)}") as looker:
             for k in range(50):
                 looker.see(k)

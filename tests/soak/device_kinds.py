@@ -14,7 +14,7 @@ from free_ports import free_port
 from seerob.app.emulation.background import Emulator
 from seerob.app.emulation.motions import swing
 from seerob.core.page_messages import Tracking
-from seerob.devices.live.headset_offers import OFFERS, read
+from seerob.devices.live.headset_offers import Offers, read
 from seerob.devices.live.listening import LiveSource
 from seerob.workstation.source import Target
 from seerob.workstation.variables.dictionary import Variable
@@ -255,7 +255,7 @@ class Page(Emulator):
 
     def __init__(self, worn):
         super().__init__()
-        self._worn = worn
+        self._worn, self.offers = worn, Offers()
 
     def begin(self):
         """Offer."""
@@ -269,8 +269,8 @@ class Page(Emulator):
             places = self._worn(now - begun).positions[:3]
             poses = np.hstack([places, np.tile([1, 0, 0, 0], (3, 1))]).astype("<f4").tobytes()
             said = Tracking(human="anna", t=0.0, names=names, poses=poses)
-            OFFERS.offer("anna", self, read(msgspec.structs.replace(said, t=now), now))
-        OFFERS.gone(self)
+            self.offers.offer("anna", self, read(msgspec.structs.replace(said, t=now), now))
+        self.offers.gone(self)
 
 
 def headset(patch):
@@ -278,7 +278,8 @@ def headset(patch):
 
     patch.setattr("seerob.devices.sources.headset.SILENCE", SILENCE)
     patch.setattr("seerob.devices.sources.headset.GATHER", 0.02)
-    return Made(Page(person()).start(), Headset(human="anna", timeout=1.0))
+    page = Page(person()).start()
+    return Made(page, Headset(human="anna", timeout=1.0).taking(page.offers))
 
 
 FOREIGN = (opcua, opcua_robot, mqtt, foxglove)

@@ -19,6 +19,7 @@ from seerob.core.snapshot import Finding, Scene
 from seerob.criteria.contact.measured import curves
 from seerob.criteria.criterion import Criterion
 from seerob.devices.live.contact import Contact
+from seerob.devices.live.headset_offers import HasOffers
 from seerob.devices.live.listening import LiveSource, name_of
 from seerob.devices.live.real_time import Clock, hear, require_recorded
 from seerob.devices.live.receivers import Receivers
@@ -275,7 +276,8 @@ class Station:
         with ExitStack() as until_the_end:
             if clock and heard:
                 targets = [(source, source_target(self.model, source)) for source in heard]
-                listening = until_the_end.enter_context(Receivers(targets))
+                offers = next((w.offers for w in writers if isinstance(w, HasOffers)), None)
+                listening = until_the_end.enter_context(Receivers(targets, offers))
                 road.warm_up(self.model)  # while they begin
                 feed = hear(feed, listening, clock)
             bound = self.bound  # refused, if so, before anything is open

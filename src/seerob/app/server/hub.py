@@ -33,7 +33,7 @@ from seerob.core.snapshot import (
     Transport,
 )
 from seerob.devices.live import headset_offers
-from seerob.devices.live.headset_offers import OFFERS
+from seerob.devices.live.headset_offers import Offers
 
 MOST_CLIENTS = 64
 PATIENCE = 10.0
@@ -81,9 +81,15 @@ class Hub:
     """
 
     def __init__(
-        self, *, scene: Scene, feed: Feed, visits: Visits | None = None, patience: float = PATIENCE
+        self,
+        *,
+        scene: Scene,
+        feed: Feed,
+        offers: Offers,
+        visits: Visits | None = None,
+        patience: float = PATIENCE,
     ) -> None:
-        self._feed, self._patience = feed, patience
+        self._feed, self._patience, self._offers = feed, patience, offers
         self._visits = Visits() if visits is None else visits
         self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
         self._scene = _encode(scene)
@@ -154,7 +160,7 @@ class Hub:
             closing = await client.over
         finally:
             self.clients.discard(client)
-            OFFERS.gone(client)
+            self._offers.gone(client)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -178,7 +184,7 @@ class Hub:
                     visit.refuse(f"more than {RATES[kind][0]:g} per second: {kind}")
                     await asyncio.sleep(wait)
                 if isinstance(message, Tracking):
-                    told = _offer(client, message, told, visit, may=Role.TRACK in roles)
+                    told = self._offer(client, message, told, visit, may=Role.TRACK in roles)
                 elif kind == "ack":
                     client.acknowledge(int(message.value or 0))
                 else:
@@ -193,24 +199,25 @@ class Hub:
         except (WebSocketDisconnect, RuntimeError):
             client.end(Closing(1006, "gone"))
 
+    def _offer(
+        self, client: Client, tracking: Tracking, told: Tracked | None, visit: Visit, *, may: bool
+    ) -> Tracked:
+        """Pass on what a headset sees; the page is told what became of it when that changes.
 
-def _offer(client: Client, tracking: Tracking, told: Tracked | None, visit: Visit, *, may: bool) -> Tracked:
-    """Pass on what a headset sees; the page is told what became of it when that changes.
-
-    Raises:
-        ValueError: It contradicts itself.
-    """
-    offer = headset_offers.read(tracking, headset_offers.now())
-    if may:
-        refusal = OFFERS.offer(tracking.human, client, offer)
-    else:
-        refusal = "this page may not: open the address for tracking that seerob printed"
-    answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
-    if refusal:
-        visit.refuse(f"tracking: {refusal}")
-    if answer != told:
-        client.offer("Tracked", _encode(answer))
-    return answer
+        Raises:
+            ValueError: It contradicts itself.
+        """
+        offer = headset_offers.read(tracking, headset_offers.now())
+        if may:
+            refusal = self._offers.offer(tracking.human, client, offer)
+        else:
+            refusal = "this page may not: open the address for tracking that seerob printed"
+        answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
+        if refusal:
+            visit.refuse(f"tracking: {refusal}")
+        if answer != told:
+            client.offer("Tracked", _encode(answer))
+        return answer
 
 
 def _name() -> str:

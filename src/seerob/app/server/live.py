@@ -272,6 +272,8 @@ class LiveView(Closing):
             tls=tls,
             clear_text=clear_text,
         )
+        self.offers = self.server.offers
+        """What headsets that show a page see: `Station.run` hands it to the sources that take it."""
         self.url = self.server.start()
         """What to open in a browser."""
 

@@ -38,6 +38,7 @@ from seerob.app.server.visits import Visits
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
+from seerob.devices.live.headset_offers import Offers
 from seerob.protocols.links.tcp_server import stop_accepting
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
@@ -127,7 +128,9 @@ class Server:
         self._feed = feed
         self.visits = Visits()
         """Who is, and was, connected."""
-        self.hub = Hub(scene=scene, feed=feed, visits=self.visits, patience=patience)
+        self.offers = Offers()
+        """What headsets that show a page see: the sources of the same run take it."""
+        self.hub = Hub(scene=scene, feed=feed, offers=self.offers, visits=self.visits, patience=patience)
         app = build(hub=self.hub, meshes=meshes, folder=page, lifespan=self._lifespan)
         known = (*hosts, *(() if tls is None else tls.names))
         names = {name.lower() for name in known} | ({host.lower()} if not is_address(host) else set())

@@ -1,7 +1,7 @@
 """Where pages that offer what a headset sees, and sources that wait for it, find each other.
 
-The server's thread offers, a source's thread takes; both are of one process and know each other only by the
-person's name. One page per person: whoever offers first, until it falls silent or leaves.
+The server's thread offers, a source's thread takes; the run that has both hands the server's `Offers` to its
+sources. One page per person: whoever offers first, until it falls silent or leaves.
 """
 
 from __future__ import annotations
@@ -10,12 +10,15 @@ import math
 import time
 from collections.abc import Callable
 from threading import Lock
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from seerob.core.snapshot import Tracking
 from seerob.core.transforms import Array
+
+if TYPE_CHECKING:
+    from seerob.devices.live.listening import LiveSource
 
 HELD = 2.0
 """A page that offers nothing for so long loses its place [s]."""
@@ -120,8 +123,19 @@ class Offers:
             self._held = {human: held for human, held in self._held.items() if held.visitor is not visitor}
 
 
-OFFERS = Offers()
-"""Of this process: the workstation's sources and the server that shows it know nothing of each other."""
+@runtime_checkable
+class HasOffers(Protocol):
+    """A writer of a run whose pages may offer what a headset sees."""
+
+    offers: Offers
+
+
+@runtime_checkable
+class TakesOffers(Protocol):
+    """A source that hears what such pages offer."""
+
+    def taking(self, offers: Offers) -> LiveSource:
+        """This source, which takes what is offered there."""
 
 
 def now() -> float:

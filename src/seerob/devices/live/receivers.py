@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import Self
 
 from seerob.core.samples import Mailbox, Sample, SignalSample, key
+from seerob.devices.live.headset_offers import Offers, TakesOffers
 from seerob.devices.live.listening import Listener, LiveSource, delay_of, name_of, stop
 from seerob.devices.live.source_process import SourceProcess, pickled_source
 from seerob.workstation.source import Target
@@ -29,12 +30,15 @@ class Receivers:
 
     Args:
         sources: With what each drives.
+        offers: What pages of this run offer; nothing when None.
 
     Attributes:
         delay: How far the run is behind the world [s].
     """
 
-    def __init__(self, sources: Sequence[tuple[LiveSource, Target | None]]) -> None:
+    def __init__(
+        self, sources: Sequence[tuple[LiveSource, Target | None]], offers: Offers | None = None
+    ) -> None:
         self.delay = delay_of(source for source, _ in sources)
         self._awaited = {name_of(source) for source, _ in sources if source.target()}
         self._box = Mailbox()
@@ -43,6 +47,8 @@ class Receivers:
         for source, target in sources:
             pair = pickled_source(source, target)
             if pair is None:
+                if offers is not None and isinstance(source, TakesOffers):
+                    source = source.taking(offers)  # noqa: PLW2901
                 self._here.append(Listener(source, target, self._box.post))
             else:
                 self._apart.append(SourceProcess(name_of(source), pair))

@@ -23,8 +23,8 @@ from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.description.capture.mapping import conventions, plain
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.contact import Contact
-from seerob.devices.live.headset_offers import OFFERS, Offer
-from seerob.devices.live.listening import say_once
+from seerob.devices.live.headset_offers import Offer, Offers
+from seerob.devices.live.listening import LiveSource, say_once
 from seerob.protocols.tracking.xr_axes import world_positions, world_turns
 
 _log = logging.getLogger(__name__)
@@ -63,17 +63,24 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
         )
         return (Finding(level="assumed", subject=self.human, text=f"headset: {text}"),)
 
-    async def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
-        """What the page offers.
+    def taking(self, offers: Offers) -> LiveSource:
+        """This source, which takes what pages of a run offer."""
+        return _Taking(offers=offers, **{name: getattr(self, name) for name in self.__struct_fields__})
+
+    def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
+        """What the page offers; nothing without a run that has one.
 
         Raises:
             TimeoutError: No page offers anything.
         """
+        return self._frames(Offers())
+
+    async def _frames(self, place: Offers) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
         layout: Layout | None = None
         known: set[str] = set()
         begun: float | None = None
         last = -1.0
-        async with aclosing(self._offers()) as offers:
+        async with aclosing(self._offers(place)) as offers:
             async for offer in offers:
                 begun = offer.arrived if begun is None else begun
                 fresh = set(offer.names) - known
@@ -93,7 +100,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
             text = "head and hands only: legs, pelvis and spine are estimated, not measured"
             say_once(_log, logging.WARNING, f"{self.name or f'headset {self.human}'}: {text}")
 
-    async def _offers(self) -> AsyncGenerator[Offer, None]:
+    async def _offers(self, place: Offers) -> AsyncGenerator[Offer, None]:
         loop = asyncio.get_running_loop()
         waiting: deque[Offer] = deque(maxlen=64)
         arrived = asyncio.Event()
@@ -104,7 +111,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
             with contextlib.suppress(RuntimeError):  # the loop ended meanwhile
                 loop.call_soon_threadsafe(arrived.set)
 
-        OFFERS.wait(self.human, key, take)
+        place.wait(self.human, key, take)
         try:
             while True:
                 try:
@@ -117,7 +124,16 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
                 while waiting:
                     yield waiting.popleft()
         finally:
-            OFFERS.leave(self.human, key)
+            place.leave(self.human, key)
+
+
+class _Taking(Headset, frozen=True, kw_only=True):
+    """A headset of a run that shows pages."""
+
+    offers: Offers
+
+    def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
+        return self._frames(self.offers)
 
 
 def layout_of(names: Iterable[str]) -> Layout:

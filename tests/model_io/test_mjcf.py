@@ -12,6 +12,7 @@ import trimesh
 from oracles import numpy_dynamics
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin
+from seerob.description.formats import mjcf_compiled
 from seerob.description.loader import load_robot
 
 ARM = """
@@ -200,3 +201,77 @@ def test_meshes_outside_the_folder_are_refused(tmp_path):
 def test_a_urdf_named_xml_is_a_urdf(tmp_path):
     (tmp_path / "r.xml").write_text('<robot name="r"><link name="only"/></robot>')
     assert [link.name for link in load_robot("r.xml", folder=Path(tmp_path)).links] == ["only"]
+
+
+def one_body(inside="", beside=""):
+    return f'<mujoco><worldbody><body name="a"><geom size=".1"/>{inside}</body></worldbody>{beside}</mujoco>'
+
+
+BOMBS = {
+    "a model that attaches itself": (
+        one_body(beside='<asset><model name="m" file="m.xml"/></asset>'),
+        r"ends the process that reads it \(SIGSEGV\)",
+    ),
+    "more than any memory": (
+        one_body(beside='<size nuser_body="2000000000"/>'),
+        "takes more than 2048 MiB of memory",
+    ),
+}
+
+
+@pytest.mark.parametrize("bomb", BOMBS)
+def test_a_model_that_crashes_its_parser_or_is_a_bomb_is_refused_by_name(tmp_path, bomb):
+    text, said = BOMBS[bomb]
+    with pytest.raises(InputError, match=rf"m\.xml.*{said}"):
+        read(tmp_path, text)
+    assert read(tmp_path, one_body()).links[0].name == "a"
+
+
+def test_what_one_line_multiplies_is_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr(mjcf_compiled, "MAX_ELEMENTS", 20)
+    (tmp_path / "m.xml").write_text(one_body('<replicate count="20" sep="a"><site/></replicate>'))
+    with pytest.raises(InputError, match=r"has 23 bodies, joints, geoms, sites and meshes"):
+        mjcf_compiled._compile(tmp_path / "m.xml", "m.xml")
+
+
+def test_a_model_without_end_is_refused_in_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(mjcf_compiled, "SECONDS", 1.0)
+    text = one_body('<replicate count="2000000000"><site/></replicate>')
+    with pytest.raises(InputError, match=r"takes more than (1 s|2048 MiB of memory) to read"):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        '<compiler meshdir="in"/><compiler meshdir="{out}"/>',
+        '<compiler assetdir="{out}"/>',
+        '<compiler meshdir="in/../../out"/>',
+    ],
+)
+def test_a_file_that_mujoco_may_take_from_outside_is_refused_though_one_inside_has_its_name(tmp_path, way):
+    for folder in ("cell/in", "out"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "m.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
+    mesh = '<asset><mesh file="m.stl"/></asset>'
+    with pytest.raises(InputError, match="outside the model's folder"):
+        read(tmp_path / "cell", one_body(beside=way.format(out=tmp_path / "out") + mesh))
+
+
+def test_what_an_attached_model_names_is_looked_at_too(tmp_path):
+    (tmp_path / "secret.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "cell" / "hand.xml").write_text(
+        one_body(beside='<asset><mesh name="s" file="../secret.stl"/></asset>')
+    )
+    with pytest.raises(InputError, match="outside the model's folder"):
+        read(tmp_path / "cell", one_body(beside='<asset><model name="m" file="hand.xml"/></asset>'))
+    (tmp_path / "cell" / "hand.xml").write_text(one_body())
+    made = read(
+        tmp_path / "cell",
+        one_body(
+            '<attach model="h" body="a" prefix="h_"/>', '<asset><model name="h" file="hand.xml"/></asset>'
+        ),
+    )
+    assert set(made.files) == {"m.xml", "hand.xml"}
+    assert "h_a" in {link.name for link in made.links}

@@ -1,5 +1,7 @@
 """Sheets about motion, and posture against safety: the arrays of the run, thinned without a loss."""
 
+import tracemalloc
+
 import made_person_run as run
 import numpy as np
 import openpyxl
@@ -136,6 +138,32 @@ def test_a_thinned_table_is_even_and_at_least_half_full(most):
         assert 1 <= len(kept) <= most
         assert k < most or len(kept) >= most // 2
         assert kept == list(range(0, k + 1, int(kept[1]) if len(kept) > 1 else k + 1))
+
+
+@pytest.mark.parametrize("most", [2, 5, 64])
+def test_texts_and_new_columns_of_a_thinned_table_stay_with_their_rows(most):
+    table, offered = ThinnedTable(most, ["k"]), []
+    for k in range(300):
+        cells = {"k": k} | ({"text": f"row {k}"} if k % 3 else {}) | ({"late": k / 2} if k > 70 else {})
+        offered.append(cells)
+        if table.wants():
+            table.keep(cells)
+    for row in table.rows():
+        told = {title: cell for title, cell in zip(table.titles, row, strict=True) if cell == cell}
+        assert told == offered[int(row[0])]
+
+
+def test_a_row_of_numbers_takes_what_its_numbers_do():
+    table = ThinnedTable(20_000, [f"c{k}" for k in range(8)])
+    tracemalloc.start()
+    try:
+        for k in range(20_000):
+            if table.wants():
+                table.keep_numbers([float(k)] * 8)
+        taken, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert taken < 1.3 * 20_000 * 8 * 8
 
 
 def test_rows_of_a_growing_table_are_equally_wide(tmp_path):

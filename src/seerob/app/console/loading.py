@@ -209,6 +209,8 @@ def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources:
     found = readable(path, allowed)
     if sources and any(_is_workbook(source) for source in found.entries["sources"].values()):
         begin("seerob.files.tables.workbook", "openpyxl")
+    if any(_is_mjcf(robot) for robot in found.entries["robots"].values()):
+        begin("seerob.description.formats.mjcf_compiled", "mujoco")
     from seerob.session.station import Station
 
     problems = list(found.problems)
@@ -239,6 +241,10 @@ def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources:
 
 def _is_workbook(source: object) -> bool:
     return str(getattr(source, "file", "")).lower().endswith((".xlsx", ".xlsm"))
+
+
+def _is_mjcf(robot: object) -> bool:
+    return str(getattr(robot, "model", "")).lower().endswith(".xml")
 
 
 def _unprepared(station: Station, *, sources: bool) -> list[Problem]:

@@ -1,4 +1,4 @@
-"""MJCF in: MuJoCo reads and compiles the file, this turns the result into a description.
+"""MJCF in: MuJoCo reads and compiles the file (`mjcf_compiled`), this turns the result into a description.
 
 The files that a model names are checked before MuJoCo opens any of them. A geom whose contype and conaffinity
 are both 0 never touches anything: it is for the screen. The others are for contacts and distances; they are
@@ -7,14 +7,11 @@ also drawn where a body has nothing else.
 
 from __future__ import annotations
 
-import logging
 import math
-import re
-import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -27,6 +24,7 @@ from seerob.core.transforms import Array, rotation_from_wxyz, transform
 from seerob.description import lint
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
 from seerob.description.formats.mimic import flattened
+from seerob.description.formats.mjcf_compiled import Compiled, compiled
 from seerob.description.formats.resolve import Resolver
 from seerob.description.formats.urdf_geometry import moved
 from seerob.description.mesh import MAX_BYTES as MAX_MESH_BYTES
@@ -36,18 +34,15 @@ from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.split_surfaces import with_insides
 from seerob.description.xml_values import FARTHEST, HEAVIEST, MAX_BYTES, SMALLEST, Reader, parse_xml
 
-if TYPE_CHECKING:
-    import mujoco
-
 
 def shapes_of_body(
-    reader: Reader, model: mujoco.MjModel, body: int, name: str
+    reader: Reader, model: Compiled, body: int, name: str
 ) -> tuple[tuple[Mesh, ...], tuple[Solid, ...]]:
     """Display meshes and solids of one body, in its frame.
 
     Args:
         reader: Collects findings.
-        model: A `mujoco.MjModel`.
+        model: Of the file.
         body: Index of the body.
         name: Its name, for messages.
     """
@@ -71,12 +66,12 @@ def shapes_of_body(
     return tuple(drawn) or tuple(mesh for _, mesh in touched), with_insides(solids)
 
 
-def _geom(reader: Reader, model: mujoco.MjModel, geom: int, body: str) -> tuple[Solid, Mesh] | None:
+def _geom(reader: Reader, model: Compiled, geom: int, body: str) -> tuple[Solid, Mesh] | None:
     import mujoco
 
     kinds = mujoco.mjtGeom
     kind = kinds(int(model.geom_type[geom]))
-    name = model.geom(geom).name
+    name = model.names["geom"][geom]
     body_from_geom = transform(rotation_from_wxyz(model.geom_quat[geom]), model.geom_pos[geom])
     material = int(model.geom_matid[geom])
     default = np.allclose(model.geom_rgba[geom], 0.5 * np.array([1, 1, 1, 2]))
@@ -87,7 +82,7 @@ def _geom(reader: Reader, model: mujoco.MjModel, geom: int, body: str) -> tuple[
     if kind == kinds.mjGEOM_MESH:
         shown = _mesh(model, int(model.geom_dataid[geom]))
         solid = Solid(mesh=physics_mesh(shown))
-        name = name or model.mesh(int(model.geom_dataid[geom])).name
+        name = name or model.names["mesh"][int(model.geom_dataid[geom])]
     elif kind == kinds.mjGEOM_BOX:
         shown = shapes.box_mesh(-size, size)
         solid = Solid(mesh=shown)
@@ -110,7 +105,7 @@ def _geom(reader: Reader, model: mujoco.MjModel, geom: int, body: str) -> tuple[
     return replace(placed, name=name), replace(shown.moved(body_from_geom), color=(r, g, b, a))
 
 
-def _mesh(model: mujoco.MjModel, mesh: int) -> Mesh:
+def _mesh(model: Compiled, mesh: int) -> Mesh:
     v, n = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     f, m = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return Mesh(model.mesh_vert[v : v + n].astype(float), model.mesh_face[f : f + m].astype(np.int32))
@@ -138,13 +133,16 @@ FILE_ATTRIBUTES = ("file", "fileright", "fileleft", "fileup", "filedown", "filef
 def checked_files(path: Path) -> dict[str, bytes]:
     """The model and every file it names, by path relative to its folder.
 
+    A name may be meant from several folders, and which of them MuJoCo takes it from is its own affair: all
+    are looked at.
+
     Raises:
         InputError: A file is missing, too large, or outside the folder of the model; all of them at once.
     """
     problems: list[Problem] = []
     folder = path.parent.resolve()
     files: dict[str, bytes] = {}
-    elements: list[Element] = []
+    naming: list[tuple[Element, Path]] = []
     waiting = [path.resolve()]
     while waiting:
         current = waiting.pop()
@@ -155,57 +153,58 @@ def checked_files(path: Path) -> dict[str, bytes]:
             files[name] = content(current, MAX_BYTES)
         except (TooLarge, OSError) as error:
             raise InputError.at(path, name, str(error), f"at most {MAX_BYTES} are read") from None
-        root = parse_xml(files[name], str(current))
-        elements += root.iter()
-        for include in root.iter("include"):
-            # Relative to the main file, or to the file that includes.
-            near = [folder / include.get("file", ""), current.parent / include.get("file", "")]
-            found = _inside(path, folder, include, near, problems)
-            waiting += [found] if found else []
-    compilers = [e for e in elements if e.tag == "compiler"]
-    for element in elements:
+        for element in parse_xml(files[name], str(current)).iter():
+            naming.append((element, current.parent))
+            # Included, or attached with assets of its own.
+            if element.tag in {"include", "model"} and element.get("file") is not None:
+                near = [folder / element.attrib["file"], current.parent / element.attrib["file"]]
+                waiting += _inside(path, folder, element, near, problems)
+    compilers = [element for element, _ in naming if element.tag == "compiler"]
+    for element, parent in naming:
         for attribute in FILE_ATTRIBUTES:
-            if element.tag == "include" or element.get(attribute) is None:
+            if element.tag in {"include", "model"} or element.get(attribute) is None:
                 continue
-            roots = _roots(folder, compilers, str(element.tag))
-            near = [root / element.attrib[attribute] for root in roots]
-            found = _inside(path, folder, element, near, problems)
-            if found is None:
-                continue
-            try:
-                files[found.relative_to(folder).as_posix()] = content(found, MAX_MESH_BYTES)
-            except (TooLarge, OSError) as error:
-                problems.append(Problem(str(path), found.name, str(error), f"at most {MAX_MESH_BYTES}"))
+            roots = _roots(dict.fromkeys((folder, parent)), compilers, str(element.tag))
+            # The last part alone: the compiler's ``strippath``.
+            named = dict.fromkeys((element.attrib[attribute], Path(element.attrib[attribute]).name))
+            near = [root / name for name in named for root in roots]
+            for found in _inside(path, folder, element, near, problems):
+                try:
+                    files[found.relative_to(folder).as_posix()] = content(found, MAX_MESH_BYTES)
+                except (TooLarge, OSError) as error:
+                    problems.append(Problem(str(path), found.name, str(error), f"at most {MAX_MESH_BYTES}"))
     if problems:
         raise InputError(problems)
     return files
 
 
-def _roots(folder: Path, compilers: list[Element], tag: str) -> list[Path]:
+def _roots(folders: Iterable[Path], compilers: list[Element], tag: str) -> list[Path]:
     said = [c.get(name) for c in compilers for name in (DIRECTORIES.get(tag, ""), "assetdir") if name]
-    named = [folder / directory for directory in said if directory]
-    return [*named, folder]
+    return [folder / directory for folder in folders for directory in (*filter(None, said), "")]
 
 
 def _inside(
     path: Path, folder: Path, element: Element, near: list[Path], problems: list[Problem]
-) -> Path | None:
-    """The first candidate that exists; a problem when it lies outside the folder or there is none."""
+) -> list[Path]:
+    """The candidates that exist; a problem when one of them lies outside the folder, or there is none."""
     key = f"<{element.tag} {element.get('name', '')}".strip() + ">"
+    found: dict[Path, None] = {}
     for candidate in near:
-        resolved = candidate.resolve()
+        try:
+            resolved = candidate.resolve()
+            there = resolved.exists()
+        except (OSError, ValueError):  # no name of a file
+            continue
+        if there and not resolved.is_relative_to(folder):
+            what = f"{candidate} is outside the model's folder"
+            problems.append(Problem(str(path), key, what, "keep its files together"))
+            return []
         if resolved.is_file():
-            if resolved.is_relative_to(folder):
-                return resolved
-            problems.append(
-                Problem(
-                    str(path), key, f"{candidate} is outside the model's folder", "keep its files together"
-                )
-            )
-            return None
-    searched = ", ".join(dict.fromkeys(str(c) for c in near))
-    problems.append(Problem(str(path), key, "no such file", f"searched {searched}"))
-    return None
+            found[resolved] = None
+    if not found:
+        searched = ", ".join(dict.fromkeys(str(c) for c in near))
+        problems.append(Problem(str(path), key, "no such file", f"searched {searched}"))
+    return list(found)
 
 
 DEFAULT_DENSITY = 1000.0
@@ -223,31 +222,15 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
     Raises:
         InputError: What MuJoCo refuses, files outside the folder, ball and free joints.
     """
-    import mujoco
-
-    # Its own way is the terminal, and a file in the folder where the user happens to be.
-    mujoco.set_mju_user_warning(logging.getLogger("mujoco").debug)
     files = checked_files(path)
     reader = Reader(resolver.file, name)
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        # Names of fixed bodies and shapes for the screen are kept, whatever the file says.
-        spec.compiler.fusestatic = False
-        spec.compiler.discardvisual = False
-        with warnings.catch_warnings(record=True) as said_of_it:
-            warnings.simplefilter("always")
-            model = spec.compile()
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        named = re.search(r"Element name '([^']+)'", said)
-        key = f"element {named[1]!r}" if named else ""
-        raise InputError.at(resolver.file, key, f"MuJoCo cannot read it: {said}", _remedy(said)) from None
-    for warning in said_of_it:
-        reader.finding("warning", "", f"MuJoCo says: {warning.message}")
+    model = compiled(path, resolver.file)
+    for said in model.warned:
+        reader.finding("warning", "", f"MuJoCo says: {said}")
     _check_figures(reader, model)
-    _remarks(reader, spec, model)
+    _remarks(reader, model)
     names = _body_names(reader, model)
-    links = [_link(reader, spec, model, body, names) for body in range(model.nbody)]
+    links = [_link(reader, model, body, names) for body in range(model.nbody)]
     links = _without_empty_world(links)
     links += _sites(model, names, {link.name for link in links})
     reader.raise_problems()
@@ -267,48 +250,40 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
     return lint.checked(description, reader)
 
 
-def _check_figures(reader: Reader, model: mujoco.MjModel) -> None:
+def _check_figures(reader: Reader, model: Compiled) -> None:
     """Raise `InputError` where a place or a size is no number, or none that a robot has."""
     far, heavy = f"must be within {FARTHEST:g} m", f"must be within {HEAVIEST:g} kg or kg·m²"
     turned = "must be a finite rotation"
+    names = model.names
     for figures, most, named, key, remedy in (
-        (model.body_pos, FARTHEST, model.body, "body[{}].pos", far),
-        (model.body_ipos, FARTHEST, model.body, "body[{}].inertial.pos", far),
-        (model.body_mass[:, None], HEAVIEST, model.body, "body[{}].inertial.mass", heavy),
-        (model.body_inertia, HEAVIEST, model.body, "body[{}].inertial", heavy),
-        (model.body_quat, 2, model.body, "body[{}]", turned),
-        (model.body_iquat, 2, model.body, "body[{}].inertial", turned),
-        (model.jnt_pos, FARTHEST, model.joint, "joint[{}].pos", far),
-        (model.qpos0[:, None], FARTHEST, model.joint, "joint[{}].ref", "must be a position"),
-        (model.geom_pos, FARTHEST, model.geom, "geom[{}].pos", far),
-        (model.geom_quat, 2, model.geom, "geom[{}]", turned),
-        (model.site_pos, FARTHEST, model.site, "site[{}].pos", far),
-        (model.site_quat, 2, model.site, "site[{}]", turned),
+        (model.body_pos, FARTHEST, names["body"], "body[{}].pos", far),
+        (model.body_ipos, FARTHEST, names["body"], "body[{}].inertial.pos", far),
+        (model.body_mass[:, None], HEAVIEST, names["body"], "body[{}].inertial.mass", heavy),
+        (model.body_inertia, HEAVIEST, names["body"], "body[{}].inertial", heavy),
+        (model.body_quat, 2, names["body"], "body[{}]", turned),
+        (model.body_iquat, 2, names["body"], "body[{}].inertial", turned),
+        (model.jnt_pos, FARTHEST, names["joint"], "joint[{}].pos", far),
+        (model.qpos0[:, None], FARTHEST, names["joint"], "joint[{}].ref", "must be a position"),
+        (model.geom_pos, FARTHEST, names["geom"], "geom[{}].pos", far),
+        (model.geom_quat, 2, names["geom"], "geom[{}]", turned),
+        (model.site_pos, FARTHEST, names["site"], "site[{}].pos", far),
+        (model.site_quat, 2, names["site"], "site[{}]", turned),
     ):
         for i in np.flatnonzero(~(np.abs(figures) <= most).all(axis=1)).tolist():
-            name = named(i).name if key[:5] != "joint" or i < len(model.jnt_pos) else ""
+            name = named[i] if i < len(named) else ""
             reader.problem(key.format(name or i), f"is {figures[i].tolist()}", remedy)
     for i in np.flatnonzero(~(np.abs(np.linalg.norm(model.jnt_axis, axis=1) - 1) <= 1e-6)).tolist():
-        key = f"joint[{model.joint(i).name or i}].axis"
+        key = f"joint[{model.names['joint'][i] or i}].axis"
         reader.problem(key, f"is {model.jnt_axis[i].tolist()}", "must be a direction")
     sizes = model.geom_size
     fit = (sizes == 0) | ((sizes >= SMALLEST) & (sizes <= FARTHEST))
     for i in np.flatnonzero(~fit.all(axis=1)).tolist():
         remedy = f"must be from {SMALLEST:g} m to {FARTHEST:g} m"
-        reader.problem(f"geom[{model.geom(i).name or i}].size", f"is {sizes[i].tolist()}", remedy)
+        reader.problem(f"geom[{model.names['geom'][i] or i}].size", f"is {sizes[i].tolist()}", remedy)
     reader.raise_problems()
 
 
-def _remedy(said: str) -> str:
-    """What would be right, where MuJoCo only says what is wrong."""
-    if "mass" in said:
-        return "give every moving body a mass greater than 0, and inertia: <inertial>, or mass of its geoms"
-    if "inertia" in said:
-        return "give principal moments greater than 0, none of them larger than the sum of the others"
-    return "correct that element"
-
-
-def _remarks(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+def _remarks(reader: Reader, model: Compiled) -> None:
     left_out = {
         "tendons": model.ntendon,
         "flexes": model.nflex,
@@ -318,12 +293,8 @@ def _remarks(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None
     for what, count in left_out.items():
         if count:
             reader.finding("warning" if what == "tendons" else "note", "", f"{count} {what} left out")
-    compiler = spec.compiler
-    for option, on in (
-        ("balanceinertia", compiler.balanceinertia),
-        ("settotalmass", compiler.settotalmass > 0),
-    ):
-        if on:
+    for option in ("balanceinertia", "settotalmass"):
+        if model.compiler[option]:
             reader.finding("warning", "", f"the file asks MuJoCo to change masses ({option}): as changed")
     if model.nu:
         reader.finding(
@@ -333,10 +304,10 @@ def _remarks(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None
         reader.finding("note", "", "springs in joints are left out")
 
 
-def _body_names(reader: Reader, model: mujoco.MjModel) -> list[str]:
+def _body_names(reader: Reader, model: Compiled) -> list[str]:
     names = []
     for body in range(model.nbody):
-        name = model.body(body).name
+        name = model.names["body"][body]
         if not name:
             name = f"body_{body}"
             reader.finding("note", name, "a body without a name was given this one")
@@ -344,14 +315,14 @@ def _body_names(reader: Reader, model: mujoco.MjModel) -> list[str]:
     return names
 
 
-def _link(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel, body: int, names: list[str]) -> Link:
+def _link(reader: Reader, model: Compiled, body: int, names: list[str]) -> Link:
     name = names[body]
     parent_from_link = transform(rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])
     adr, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     joints = [_joint(reader, model, joint) for joint in range(adr, adr + count)]
     made = tuple(joint for joint in joints if joint)
     visual, solids = shapes_of_body(reader, model, body, name)
-    inertial, refused = _inertial(reader, spec, model, body, name, shown=bool(made or visual or solids))
+    inertial, refused = _inertial(reader, model, body, name, shown=bool(made or visual or solids))
     return Link(
         name=name,
         parent=names[int(model.body_parentid[body])] if body else None,
@@ -364,10 +335,10 @@ def _link(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel, body: int,
     )
 
 
-def _joint(reader: Reader, model: mujoco.MjModel, joint: int) -> Joint | None:
+def _joint(reader: Reader, model: Compiled, joint: int) -> Joint | None:
     import mujoco
 
-    name = model.joint(joint).name or f"joint_{joint}"
+    name = model.names["joint"][joint] or f"joint_{joint}"
     kind = mujoco.mjtJoint(int(model.jnt_type[joint]))
     kinds = {
         mujoco.mjtJoint.mjJNT_HINGE: JointKind.REVOLUTE,
@@ -400,7 +371,7 @@ def _joint(reader: Reader, model: mujoco.MjModel, joint: int) -> Joint | None:
     )
 
 
-def _force_limits(model: mujoco.MjModel, joint: int) -> Iterator[float]:
+def _force_limits(model: Compiled, joint: int) -> Iterator[float]:
     """Every bound on the force of a joint: its own, and those of motors that drive it alone."""
     import mujoco
 
@@ -424,7 +395,7 @@ def _force_limits(model: mujoco.MjModel, joint: int) -> Iterator[float]:
 
 
 def _at_zero(
-    reader: Reader, model: mujoco.MjModel, adr: int, joints: tuple[Joint, ...], parent_from_link: Array
+    reader: Reader, model: Compiled, adr: int, joints: tuple[Joint, ...], parent_from_link: Array
 ) -> Array:
     """MuJoCo's bodies are given with every joint at its ``ref``; descriptions are with every joint at 0."""
     references = [float(model.qpos0[model.jnt_qposadr[adr + i]]) for i in range(len(joints))]
@@ -438,7 +409,7 @@ def _at_zero(
 
 
 def _inertial(
-    reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel, body: int, name: str, *, shown: bool
+    reader: Reader, model: Compiled, body: int, name: str, *, shown: bool
 ) -> tuple[Inertial | None, str]:
     """Mass properties that can be used, and why they cannot."""
     mass = float(model.body_mass[body])
@@ -447,15 +418,15 @@ def _inertial(
     rotation = rotation_from_wxyz(model.body_iquat[body])
     inertia = rotation @ np.diag(model.body_inertia[body].astype(float)) @ rotation.T
     origin, source = Origin.STATED, f"{reader.file}: body {name}"
-    given = spec.bodies[body]
-    low, high = spec.compiler.inertiagrouprange
-    if not given.explicitinertial or int(spec.compiler.inertiafromgeom) == 1:
-        left_out = [geom.mass for geom in given.geoms if not low <= geom.group <= high and geom.mass > 0]
+    own, geoms = model.written[body]
+    low, high = model.compiler["inertiagrouprange"]
+    if not own or model.compiler["inertiafromgeom"] == 1:
+        left_out = [geom.mass for geom in geoms if not low <= geom.group <= high and geom.mass > 0]
         if left_out:
             text = f"{sum(left_out):.4g} kg of its shapes are outside inertiagrouprange and count nowhere"
             reader.finding("warning", name, f"{text}: mass and inertia unknown")
             return None, text
-        weighed = [geom for geom in given.geoms if np.isnan(geom.mass)]
+        weighed = [geom for geom in geoms if np.isnan(geom.mass)]
         if any(geom.density == DEFAULT_DENSITY for geom in weighed):
             origin, source = Origin.ASSUMED, f"{source}: shapes at MuJoCo's default of 1000 kg/m³"
             reader.finding(
@@ -492,11 +463,11 @@ def _without_empty_world(links: list[Link]) -> list[Link]:
     return [replace(root, parent=None), *(link for link in links[1:] if link is not root)]
 
 
-def _sites(model: mujoco.MjModel, names: list[str], taken: set[str]) -> list[Link]:
+def _sites(model: Compiled, names: list[str], taken: set[str]) -> list[Link]:
     """Sites are frames without mass: a tool may be mounted on one."""
     sites = []
     for site in range(model.nsite):
-        name = model.site(site).name
+        name = model.names["site"][site]
         parent = names[int(model.site_bodyid[site])]
         if not name or parent not in taken:
             continue
@@ -509,7 +480,7 @@ def _sites(model: mujoco.MjModel, names: list[str], taken: set[str]) -> list[Lin
     return sites
 
 
-def _mimicking(model: mujoco.MjModel, links: list[Link], left_out: list[str]) -> Iterator[Link]:
+def _mimicking(model: Compiled, links: list[Link], left_out: list[str]) -> Iterator[Link]:
     """Joint equalities as mimic joints; what other equalities there are is appended to ``left_out``."""
     import mujoco
 
@@ -525,7 +496,7 @@ def _mimicking(model: mujoco.MjModel, links: list[Link], left_out: list[str]) ->
             left_out.append(f"an equality of kind {kind}")
             continue
         y0, x0 = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (first, second))
-        driven, driver = (model.joint(j).name or f"joint_{j}" for j in (first, second))
+        driven, driver = (model.names["joint"][j] or f"joint_{j}" for j in (first, second))
         mimics[driven] = Mimic(driver, float(a1), float(y0 + a0 - a1 * x0))
     for link in links:
         joints = tuple(replace(joint, mimic=mimics.get(joint.name)) for joint in link.joints)

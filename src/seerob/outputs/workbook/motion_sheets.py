@@ -9,8 +9,11 @@ import math
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from seerob.core.samples import BodySample, Sample
 from seerob.core.snapshot import Scene, Snapshot
+from seerob.core.transforms import Array
 from seerob.outputs.tables import sample_cells as _sample_cells
 from seerob.outputs.tables.growing_table import Pace
 from seerob.outputs.tables.people import people
@@ -31,7 +34,11 @@ class ThinnedTable:
         self.offered = 0
         self._most, self._stride = most, 1
         self._places = {title: k for k, title in enumerate(self.titles)}
-        self._rows: list[tuple[array[float], dict[int, str]]] = []
+        # Rows one after the other: a row of its own each would take four times as much.
+        self._numbers = array("d")
+        self._texts: dict[int, dict[int, str]] = {}
+        """Row → column → text."""
+        self._count = 0
 
     @property
     def thinned(self) -> bool:
@@ -42,36 +49,47 @@ class ThinnedTable:
         """Offer a row: whether it is to be kept, and `keep` to be called."""
         wanted = self.offered % self._stride == 0
         self.offered += 1
-        if wanted and len(self._rows) >= self._most:
-            del self._rows[1::2]
+        if wanted and self._count >= self._most:
+            self._numbers = array("d", self._table()[::2].tobytes())
+            self._texts = {row // 2: texts for row, texts in self._texts.items() if row % 2 == 0}
+            self._count = (self._count + 1) // 2
             self._stride *= 2
             wanted = (self.offered - 1) % self._stride == 0
         return wanted
 
     def keep(self, cells: Mapping[str, str | float | bool | None]) -> None:
         """Keep a row; a column that is new goes to the end."""
-        for title in cells:
-            if title not in self._places:
-                self._places[title] = len(self.titles)
-                self.titles.append(title)
-        numbers, texts = array("d", [math.nan]) * len(self.titles), {}
+        if new := [title for title in cells if title not in self._places]:
+            table = np.pad(self._table(), ((0, 0), (0, len(new))), constant_values=math.nan)
+            self._numbers = array("d", table.tobytes())
+            self.titles += new
+            self._places = {title: k for k, title in enumerate(self.titles)}
+        numbers, texts = [math.nan] * len(self.titles), {}
         for title, value in cells.items():
             if isinstance(value, str):
                 texts[self._places[title]] = value
             elif value is not None:
                 numbers[self._places[title]] = float(value)
-        self._rows.append((numbers, texts))
+        if texts:
+            self._texts[self._count] = texts
+        self._numbers.extend(numbers)
+        self._count += 1
 
     def keep_numbers(self, values: Sequence[float | None]) -> None:
-        """Keep a row of numbers, one per column."""
-        self._rows.append((array("d", [math.nan if v is None else v for v in values]), {}))
+        """Keep a row of numbers, one per column; columns that have none are NaN."""
+        self._numbers.extend(math.nan if v is None else v for v in values)
+        self._numbers.extend([math.nan] * (len(self.titles) - len(values)))
+        self._count += 1
+
+    def _table(self) -> Array:
+        return np.array(self._numbers).reshape(self._count, len(self.titles))
 
     def rows(self) -> Iterator[list[Cell]]:
         """All rows, equally wide; NaN where there is nothing."""
         width = len(self.titles)
-        for numbers, texts in self._rows:
-            row: list[Cell] = [*numbers, *([math.nan] * (width - len(numbers)))]
-            for place, text in texts.items():
+        for k in range(self._count):
+            row: list[Cell] = list(self._numbers[k * width : (k + 1) * width])
+            for place, text in self._texts.get(k, {}).items():
                 row[place] = text
             yield row
 

@@ -1,6 +1,7 @@
 """What files, recordings and devices call things reaches neither the terminal nor the page as a command."""
 
 import logging
+import math
 import re
 import sys
 import tomllib
@@ -14,9 +15,14 @@ from made_cells import make_cell, seerob
 import seerob as sr
 from seerob.app.console.printable import PrintableLines
 from seerob.core.errors import InputError
-from seerob.core.printable import obeyed, printable
+from seerob.core.markers import Label
+from seerob.core.printable import obeyed, printable, printable_record
+from seerob.core.samples import BodyPoint, BodySample, JointSample, Quality, SignalSample
+from seerob.core.snapshot import Result, Row, Snapshot
 from seerob.description.loader import load_robot
 from seerob.description.mesh import load_meshes
+from seerob.outputs.sink import Closing
+from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 
 OBEYED = "\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202egnirts\u2066"
@@ -112,3 +118,76 @@ def test_names_in_files_of_robots_and_parts_that_turn_the_reading_are_refused_or
     (tmp_path / "a.obj").write_text("o b\u202e\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     (mesh,) = load_meshes(tmp_path / "a.obj", units="m", up="z").meshes
     assert mesh.name == "b\\u202e"
+
+
+SPOKEN = (
+    BodySample(
+        source="suit",
+        target="op",
+        seq=0,
+        t=0.0,
+        subject=OBEYED,
+        points=(BodyPoint(name=OBEYED, bone="pelvis", position=(0.0, 0.0, 1.0)),),
+    ),
+    SignalSample(
+        source="plc",
+        seq=0,
+        t=0.0,
+        values={OBEYED: OBEYED, "on": True},
+        doubts={"on": OBEYED},
+        ages={OBEYED: 1.0},
+    ),
+    JointSample(source="r", target="ur5e", seq=0, t=0.0, q=(0,) * 6, reason=OBEYED, quality=Quality.DEGRADED),
+)
+
+
+def test_what_devices_say_is_printable_from_the_first_tick_on(tmp_path):
+    """In every result, on the page's wire and in the recording."""
+    cell = make_cell(tmp_path / "cell")
+    person = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+    with (cell / "workstation.toml").open("a") as file:
+        file.write(person)
+    station = sr.load(cell)
+    sent = []
+
+    class Page(Closing):
+        def write(self, snapshot, samples):
+            sent.append(msgspec.json.encode((snapshot, samples), enc_hook=list).decode())
+
+        def close(self):
+            pass
+
+    station.run(
+        feed=iter([SPOKEN, (), ()]), folder=tmp_path, sinks=[Recorder(lossless=True)], writers=[Page()]
+    )
+    assert not any(f"\\u00{ord(c):02x}" in said for said in sent for c in "\x1b\x07\x00")
+    assert not any(obeyed(said) for said in sent)
+    heard = next(iter(Recording.open(tmp_path / "run.mcap").ticks())).samples
+    assert heard[0].subject == heard[0].points[0].name == heard[2].reason == printable(OBEYED)
+    assert heard[1].values == {printable(OBEYED): printable(OBEYED), "on": True}
+
+
+@pytest.mark.parametrize("where", ["reason", "label", "row", "part", "joints"])
+def test_what_a_recorded_picture_says_is_printable_when_it_is_shown(where):
+    text = Label(position=(0.0, 0.0, 0.0), text=OBEYED if where == "label" else "a")
+    shown = Snapshot(
+        seq=1,
+        t=0.5,
+        poses=bytes(range(28)),
+        joints={OBEYED if where == "joints" else "r": (0.0, math.nan)},
+        results=(
+            Result(
+                name="d",
+                value=math.nan,
+                reason=OBEYED if where == "reason" else "né",
+                markers=(text,),
+                rows=(Row(name=OBEYED if where == "row" else "palm"),),
+                parts=(Result(name=OBEYED if where == "part" else "l"),),
+            ),
+        ),
+    )
+    made = printable_record(shown)
+    assert OBEYED not in msgspec.json.decode(msgspec.json.encode(repr(msgspec.to_builtins(made))))
+    encode = msgspec.msgpack.encode
+    assert encode(made) == encode(shown).replace(encode(OBEYED), encode(printable(OBEYED)))
+    assert printable_record(made) is made

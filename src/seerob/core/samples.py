@@ -10,6 +10,8 @@ from threading import Lock
 
 from msgspec import Struct, field
 
+from seerob.core.printable import printable_record
+
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 
@@ -163,6 +165,20 @@ class SignalSample(SampleBase, frozen=True, kw_only=True, tag="signal"):
 
 
 Sample = JointSample | PoseSample | BodySample | SignalSample
+
+
+def printable_sample(sample: Sample) -> Sample:
+    """A sample whose texts neither a terminal nor a page obeys: devices name people, points and values."""
+    texts = [sample.source, sample.reason]
+    if isinstance(sample, SignalSample):
+        texts += [*sample.values, *sample.doubts.values()]
+        texts += [value for value in sample.values.values() if isinstance(value, str)]
+    else:
+        texts.append(sample.target)
+    if isinstance(sample, BodySample):
+        texts.append(sample.subject)
+        texts += [point.name for point in sample.points]
+    return sample if "".join(texts).isprintable() else printable_record(sample)
 
 
 def key(sample: Sample) -> tuple[str, ...]:

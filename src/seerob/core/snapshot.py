@@ -144,8 +144,9 @@ class Finding(Struct, frozen=True, kw_only=True):
     criterion is WITHIN as long as it stands."""
 
     def __post_init__(self) -> None:
-        if not self.text.isprintable():  # it may quote a file or a device
+        if not (self.text.isprintable() and self.subject.isprintable()):  # they may quote a file or a device
             msgspec.structs.force_setattr(self, "text", printable(self.text))
+            msgspec.structs.force_setattr(self, "subject", printable(self.subject))
 
 
 # -- results ------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ import msgspec
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError
+from seerob.core.printable import printable_record
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.recording.format import (
@@ -303,7 +304,7 @@ class Recording:
         for chunk in self._index.chunks[:4]:
             for message in self._messages(chunk, SCENE):
                 scene: Scene = self._decode(_decode_scene, message, SCENE)
-                return scene
+                return printable_record(scene)
         if self._index.finished:
             raise InputError.at(self.path, "", f"has no readable {SCENE}", _REMEDY)
         raise InputError.at(self.path, "", "was cut off before anything was recorded", "record again")

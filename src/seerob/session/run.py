@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 
 from seerob.core.errors import InputError, Problem, SeerobError
-from seerob.core.samples import Sample
+from seerob.core.samples import Sample, printable_sample
 from seerob.core.snapshot import Result, Scene, Snapshot, Verdict
 from seerob.criteria.between_ticks import watched
 from seerob.criteria.judging import Bound as Bound  # noqa: PLC0414
@@ -211,7 +211,8 @@ def ticks(
     """The road: for each tick what goes out, and the samples it was made from; ``end`` of `Engine` [s]."""
     engine.end = end
     looks, lateness = Looks(engine.model), Lateness(engine.model)
-    for seq, samples in enumerate(feed):
+    for seq, heard in enumerate(feed):
+        samples = tuple(map(printable_sample, heard))
         engine.take(samples)
         late = lateness.take(samples)
         state = engine.tick() if seq else engine.start()

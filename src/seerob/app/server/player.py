@@ -11,6 +11,7 @@ from time import monotonic
 from typing import Protocol
 
 from seerob.app.server.feed import Audience
+from seerob.core.printable import printable_record
 from seerob.core.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
 from seerob.recording.result_log import ResultLog
 
@@ -66,8 +67,8 @@ class Player:
         self._shown: float | None = None
         self._wake = asyncio.Event()
         self._log = ResultLog(recording.scene.criteria)
-        self._history = self._log.history(POINTS)
-        self._so_far = self._log.so_far(whole=False)
+        self._history = printable_record(self._log.history(POINTS))
+        self._so_far = printable_record(self._log.so_far(whole=False))
         self.reading = True
         """Whether the recording is still read through; then `so_far` is ``whole``, or reading failed."""
 
@@ -153,7 +154,7 @@ class Player:
             audience.tell(self.transport())
         if snapshot.t != self._shown:
             self._shown = snapshot.t
-            audience.show(snapshot)
+            audience.show(printable_record(snapshot))
 
     def _stepped(self, snapshot: Snapshot, steps: int) -> Snapshot:
         if steps > 0:
@@ -194,6 +195,6 @@ class Player:
             if monotonic() > until:
                 more = True
                 break
-        self._history = self._log.history(POINTS)
-        self._so_far = self._log.so_far(whole=not more)
+        self._history = printable_record(self._log.history(POINTS))
+        self._so_far = printable_record(self._log.so_far(whole=not more))
         return more

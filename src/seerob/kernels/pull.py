@@ -133,6 +133,119 @@ def aim(
 
 
 @njit(
+    f"void({_ROW}, {_ROWS}, {_ROWS}, b1[::1], f8, f8, i8[::1], i8[::1], {', '.join([_ROW] * 3)})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def follow(
+    instants: Array,
+    points: Array,
+    speeds: Array,
+    jumps: Flags,
+    coast: float,
+    t: float,
+    q_places: Indices,
+    v_places: Indices,
+    qpos: Array,
+    qvel: Array,
+    before: Array,
+) -> None:
+    """Put one robot or human on its motion at an instant; writes into the last three.
+
+    Args:
+        instants: As of `along`, likewise the next four.
+        points: Shape (k, n).
+        speeds: Shape (k, n).
+        jumps: Shape (k,).
+        coast: [s]
+        t: When [s].
+        q_places: Where its positions are among all, shape (n,).
+        v_places: Where its velocities are, shape (n,).
+        qpos: Positions of everybody, shape (nq,).
+        qvel: Velocities of everybody, shape (nv,).
+        before: Velocities of everybody a step earlier, shape (nv,).
+    """
+    n = points.shape[1]
+    found = np.empty((3, 1, n))
+    along(instants, points, speeds, jumps, coast, np.full(1, t), found[0], found[1], found[2])
+    for i in range(n):
+        # A negative zero is as good, and would be written differently.
+        qpos[q_places[i]] = found[0, 0, i] + 0.0
+        qvel[v_places[i]] = found[1, 0, i] + 0.0
+        before[v_places[i]] = qvel[v_places[i]]
+
+
+@njit(f"b1({_ROW}, {_ROWS}, {_ROWS}, b1[::1], b1, b1, {_ROW})", cache=True, nogil=True, error_model="numpy")
+def join(
+    instants: Array,
+    points: Array,
+    speeds: Array,
+    jumps: Flags,
+    derives_before: bool,
+    derives_last: bool,
+    largest: Array,
+) -> bool:
+    """Join the newest sample to the one before it; whether only a jump does.
+
+    Writes the velocities of these two that nobody said, and that it is a jump.
+
+    Args:
+        instants: As of `along`, likewise the next three; k >= 2.
+        points: Shape (k, n).
+        speeds: Shape (k, n).
+        jumps: Shape (k,).
+        derives_before: Whether nobody said the velocities of the last but one.
+        derives_last: Whether nobody said those of the newest.
+        largest: Above it a motion is a jump [rad/s or m/s], shape (n,).
+    """
+    last, n = len(instants) - 1, points.shape[1]
+    T = instants[last] - instants[last - 1]
+    chord = np.empty(n)
+    jump = beyond = False
+    for i in range(n):
+        chord[i] = (points[last, i] - points[last - 1, i]) / T
+        beyond = beyond or abs(speeds[last, i]) > largest[i]
+        jump = jump or abs(chord[i]) > largest[i] or abs(speeds[last - 1, i]) > largest[i]
+    if jump or beyond:
+        jumps[last] = True
+        if derives_last or beyond:
+            speeds[last] = 0.0
+        return True
+    bends = last > 1 and not jumps[last - 1]
+    for i in range(n):
+        before = after = chord[i]
+        if bends:
+            T0 = instants[last - 1] - instants[last - 2]
+            bend = (chord[i] - (points[last - 1, i] - points[last - 2, i]) / T0) / (T + T0)
+            before, after = chord[i] - T * bend, chord[i] + T * bend
+        if derives_before:
+            speeds[last - 1, i] = before
+        if derives_last:
+            speeds[last, i] = after
+    return False
+
+
+@njit(f"void({_ROW}, {_ROW}, {_ROW}, b1, i8, {_ROWS}, {_ROWS})", cache=True, nogil=True)
+def note(q: Array, v: Array, before: Array, centred: bool, row: int, q_way: Array, v_way: Array) -> None:
+    """Note where a step of the physics led to; writes a row of the last two.
+
+    Args:
+        q: Positions, shape (nq,).
+        v: Velocities, shape (nv,).
+        before: Those before the step, shape (nv,).
+        centred: Whether velocities belong half a step earlier than positions.
+        row: Which.
+        q_way: Positions at all steps, shape (s, nq).
+        v_way: Velocities at all steps, shape (s, nv).
+    """
+    for i in range(len(q)):
+        q_way[row, i] = q[i]
+    for i in range(len(v)):
+        v_way[row, i] = v[i] + 0.5 * (v[i] - before[i]) if centred else v[i]
+
+
+@njit(
     f"void({', '.join([_ROWS] * 5)}, {', '.join([_ROW] * 4)}, f8, i8[::1], {_ROWS})",
     cache=True,
     nogil=True,
@@ -226,6 +339,16 @@ def errors(
         for k in range(v_start[r], v_start[r + 1]):
             if effort[v_places[k]] >= almost[v_places[k]]:
                 saturated[r] = True
+
+
+@njit(f"f8({_ROW})", cache=True, nogil=True)
+def greatest(v: Array) -> float:
+    """Largest absolute value, 0 of none; not a number where one is not."""
+    most = 0.0
+    for one in v:
+        if not abs(one) <= most and not np.isnan(most):
+            most = abs(one)
+    return most
 
 
 @njit(f"b1({_ROW}, f8)", cache=True, nogil=True)

@@ -475,9 +475,7 @@ class Engine:
             mujoco.mj_step(self._mj, self._data)
             if self.controllers and not kernel.tame(qvel, WILD):
                 self._put_back(step + 1, start + (step + 1) * self._dt)
-            q_way[step + 1], v_way[step + 1] = qpos, qvel
-            if self._centred:
-                v_way[step + 1] += 0.5 * (qvel - self._before)
+            kernel.note(qpos, qvel, self._before, self._centred, step + 1, q_way, v_way)
         self._tick += 1
         self._now = t
         if self.physics:
@@ -526,8 +524,8 @@ class Engine:
         inner = start + kernel.SLACK, t - kernel.SLACK
         inside = {
             instant
-            for mechanism in self._mechanisms
-            for instant in self._references[mechanism.name].between(*inner).tolist()
+            for reference in self._references.values()
+            for instant in reference.between(*inner).tolist()
         }
         instants = np.array([start, *sorted(inside), t], float)
         many_q, many_v = np.empty((len(instants), len(q[0]))), np.zeros((len(instants), len(v[0])))
@@ -548,8 +546,13 @@ class Engine:
             reference = self._references[mechanism.name]
             if reference.landing and reference.lands(t):
                 self._broken.add(mechanism.name)
-            if not reference.waits:
+            if reference.waits:
+                continue
+            if mechanism.name in self._coupled:
                 self._put(mechanism, *reference.at(t))
+                continue
+            places = mechanism.q_address, mechanism.v_address
+            reference.put(t, places, self._qpos, self._qvel, self._before)
 
     def _aim(self, start: float, end: float) -> None:
         """Where every joint is to be at each step of the tick that begins, and at its end [s]."""

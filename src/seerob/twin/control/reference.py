@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.pull import SLACK, aim, along
+from seerob.kernels.pull import SLACK, aim, along, follow, greatest, join
 
 Indices = NDArray[np.int64]
 Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
@@ -55,7 +55,7 @@ class Reference:
             coast: How long it goes on at its speed after the newest sample [s]: the next one of a live
                 source may be late, and a robot in motion does not stop for that.
         """
-        self._largest = largest_speed
+        self._largest = np.broadcast_to(np.asarray(largest_speed, float), len(home)).copy()
         self._coast = coast
         self._landings: list[float] = []
         self._zero = np.zeros(len(home))
@@ -79,15 +79,17 @@ class Reference:
     @property
     def leaves_at(self) -> float:
         """Largest speed of a joint at the newest sample [rad/s or m/s]; 0 before the first."""
-        return float(np.abs(self._room[2][self._end - 1]).max(initial=0.0))
+        return float(greatest(self._room[2][self._end - 1]))
 
     def between(self, begin: float, end: float) -> Array:
         """Instants of samples, and of its rest after the newest, between two others [s], shape (k,).
 
         Between two of them, which increase, the motion is one cubic.
         """
-        inside = slice(bisect_right(self._times, begin), bisect_left(self._times, end))
-        found = self._known()[0][inside] if self._times else np.zeros(0)
+        first, last = bisect_right(self._times, begin), bisect_left(self._times, end)
+        if first >= last and not self._coast:
+            return np.zeros(0)
+        found = self._known()[0][first:last] if self._times else np.zeros(0)
         rests = self.until + self._coast
         return np.append(found, rests) if self._coast and begin < rests < end else found.copy()
 
@@ -121,7 +123,7 @@ class Reference:
         self._add(t, q, qd)
         if len(self._times) > 1:
             self._drop(len(self._times) - MAX_KEPT)
-            self._guess()
+            self._join()
         return True
 
     def _add(self, t: float, q: Array, qd: Array | None) -> None:
@@ -138,29 +140,11 @@ class Reference:
         self._times.append(t)
         self._guessed.append(qd is None)
 
-    def _guess(self) -> None:
-        """Velocities of the newest two samples where none were given."""
-        t, (_, q, v, jumps) = self._times, self._known()
-        T = t[-1] - t[-2]
-        chord = (q[-1] - q[-2]) / T
-        if self._impossible(chord, v[-2], v[-1]):
-            jumps[-1] = True
-            self._landings.append(t[-1])
-            if self._guessed[-1] or self._impossible(v[-1]):
-                v[-1] = 0.0
-            return
-        before, after = chord, chord
-        if len(t) > 2 and not jumps[-2]:
-            T0 = t[-2] - t[-3]
-            bend = (chord - (q[-2] - q[-3]) / T0) / (T + T0)
-            before, after = chord - T * bend, chord + T * bend
-        if self._guessed[-2]:
-            v[-2] = before
-        if self._guessed[-1]:
-            v[-1] = after
-
-    def _impossible(self, *speeds: Array) -> bool:
-        return any(bool((np.abs(speed) > self._largest).any()) for speed in speeds)
+    def _join(self) -> None:
+        """Velocities of the newest two samples where none were given, unless only a jump joins them."""
+        before, last = self._guessed[-2:]
+        if join(*self._known(), before, last, self._largest):
+            self._landings.append(self._times[-1])
 
     @property
     def jumped(self) -> bool:
@@ -195,6 +179,18 @@ class Reference:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
         q, v, a = self.course(np.array([t]))
         return q[0], v[0], a[0]
+
+    def put(self, t: float, places: tuple[Indices, Indices], qpos: Array, qvel: Array, before: Array) -> None:
+        """Put it on its motion at an instant, among everybody.
+
+        Args:
+            t: [s]
+            places: Of its positions and of its velocities among all, shape (n,) each.
+            qpos: Positions of everybody [rad or m], written, shape (nq,).
+            qvel: Velocities, written, shape (nv,).
+            before: Velocities a step earlier, written, shape (nv,).
+        """
+        follow(*self._known(), self._coast, t, *places, qpos, qvel, before)
 
     def course(self, t: Array) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at many instants [s] (m,), each of shape (m, n)."""

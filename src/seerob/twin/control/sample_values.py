@@ -28,7 +28,10 @@ def is_possible(sample: JointSample | PoseSample) -> bool:
     said = (
         (*sample.q, *(sample.qd or ())) if isinstance(sample, JointSample) else sample.position + sample.wxyz
     )
-    return math.isfinite(sample.t) and all(-LARGEST <= value <= LARGEST for value in said)
+    if not math.isfinite(sample.t):
+        return False
+    # What is not a number may hide from both ends, and not from the sum.
+    return not said or (min(said) >= -LARGEST and max(said) <= LARGEST and math.isfinite(sum(said)))
 
 
 def beyond_limits(sample: JointSample, mechanism: Mechanism) -> str:

@@ -13,6 +13,7 @@ from seerob.twin.own_words import (
     SaidTool,
     _bias,
     _differ,
+    _past,
     _Ways,
     bound,
     fixed_offset,
@@ -161,14 +162,16 @@ def test_ways_of_one_motion(said: float, twins: tuple[float, float], told: str) 
     before, ways = np.array([0.3, 0.4, 0.5]), np.array([said, *twins])
     speeds = np.full(3, 2.0)
     then, now = _Ways(4.0, speeds, before), _Ways(4.5, speeds, before + ways)
-    why = _differ(then, now)
+    why = _differ(_past([then]), now)
     assert told in why if told else why == ""
     slow = np.zeros(3)
     then, now = _Ways(4.0, slow, before), _Ways(4.5, slow, before + ways)
-    assert bool(_differ(then, now)) is (min(abs(w - said) - 0.2 * max(w, said) for w in twins) > 0.01)
+    assert bool(_differ(_past([then]), now)) is (
+        min(abs(w - said) - 0.2 * max(w, said) for w in twins) > 0.01
+    )
     # What either of both speeds was at one end may lag, not at both.
     for a, b in ((speeds, slow), (slow, speeds)):
-        assert bool(_differ(_Ways(4.0, a, before), _Ways(4.5, b, before + ways))) is bool(told)
+        assert bool(_differ(_past([_Ways(4.0, a, before)]), _Ways(4.5, b, before + ways))) is bool(told)
 
 
 def test_ways_begin_anew_after_half_a_second_and_of_one_instant_nothing_follows(tmp_path) -> None:

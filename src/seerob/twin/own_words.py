@@ -16,6 +16,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import mujoco
@@ -29,6 +30,7 @@ from seerob.description.description import Description
 from seerob.description.robots import library
 from seerob.files.trajectories.trajectory import TrajectorySamples
 from seerob.files.waypoints.arm import Arm, Posture
+from seerob.kernels.arm import nearest_point, other_way, point_speeds
 from seerob.model.model import Mechanism, Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.workstation.workstation import Robot
@@ -60,6 +62,8 @@ LAG = 0.03
 """By which one of two speeds may be filtered more than the other [s], likewise."""
 ANCHORS = 10
 """Instants of a span that the newest is compared with."""
+LIMITS = np.array([SPAN, SPEED_FLOOR * SPAN, SPEED_SHARE, LAG])
+"""Of two ways, as `seerob.kernels.arm.other_way` takes them."""
 EVERY, FEWEST = 0.1, 5
 """Live torques are looked at so often [s], and judged from so many on."""
 PAYLOAD_FLOOR, PAYLOAD_SHARE = 0.15, 0.1
@@ -193,15 +197,11 @@ class SaidTool:
             posture: The arm at N joint positions.
             said: Of the TCP, as the source has it [m], shape (N, 3).
         """
-        best: tuple[Array, str, int] | None = None
-        for k, base in enumerate(self.bases):
-            there = said @ base[:3, :3].T + base[:3, 3]
-            for name, tip in self.tips.items():
-                e = np.linalg.norm(posture.rotation @ tip + posture.position - there, axis=-1)
-                if best is None or e.max() < best[0].max():
-                    best = e, name, k
-        assert best is not None
-        return best
+        error = np.empty(len(said))
+        point, base = nearest_point(
+            posture.rotation, posture.position, self._points, self.bases, np.ascontiguousarray(said), error
+        )
+        return error, tuple(self.tips)[point], base
 
     def speeds(self, posture: Posture, qd: Array) -> Array:
         """Speed of each point where the TCP may be [m/s], shape (tips, N).
@@ -210,10 +210,16 @@ class SaidTool:
             posture: The arm at N joint positions.
             qd: [rad/s or m/s], shape (N, n).
         """
-        twist = np.einsum("...ij,...j->...i", posture.jacobian(), qd)
-        v, w = twist[..., :3], twist[..., 3:]
-        tips = (posture.rotation @ tip for tip in self.tips.values())
-        return np.array([np.linalg.norm(v + np.cross(w, arm), axis=-1) for arm in tips])
+        return np.asarray(
+            point_speeds(
+                posture.rotation, posture.position, posture.anchors, posture.axes, posture.slides,
+                np.ascontiguousarray(qd), self._points,
+            )
+        )  # fmt: skip
+
+    @cached_property
+    def _points(self) -> Array:
+        return np.array(list(self.tips.values()), float)
 
 
 class _Ways(NamedTuple):
@@ -236,6 +242,7 @@ class LiveWords:
         self._model, self._name = model, name
         self._robot = bound(model, name)
         self._ways: deque[_Ways] = deque(maxlen=ANCHORS)
+        self._past = _past(())
         self._newest: _Ways | None = None
         self._torques: deque[tuple[Array, Array]] = deque(maxlen=ROWS)
         self._looked = -math.inf
@@ -288,22 +295,26 @@ class LiveWords:
             self._newest = None
             return ""
         twin = self._robot.speeds(posture, np.array([sample.qd]))[:, 0]
-        speeds = np.array([sample.tcp_speed, *twin])
+        speeds = np.array([sample.tcp_speed, *twin.tolist()])
         last, t = self._newest, sample.t
-        if not np.isfinite(speeds).all():
+        if not math.isfinite(speeds.sum()) and not np.isfinite(speeds).all():
             self._newest = None
             return "the speed of its own tool centre point is no number"
         if last is None or not 0 < t - last.t < SPAN:
             self._ways.clear()
             self._newest = _Ways(t, speeds, np.zeros(len(speeds)))
-            self._ways.append(self._newest)
+            self._remember(self._newest)
             return ""
         ways = last.ways + 0.5 * (t - last.t) * (last.speeds + speeds)
         now = self._newest = _Ways(t, speeds, ways)
-        found = next((text for then in self._ways if t - then.t <= SPAN and (text := _differ(then, now))), "")
+        found = _differ(self._past, now)
         if t - self._ways[-1].t >= SPAN / ANCHORS:
-            self._ways.append(now)
+            self._remember(now)
         return found
+
+    def _remember(self, now: _Ways) -> None:
+        self._ways.append(now)
+        self._past = _past(self._ways)
 
     def _hear_torques(self, sample: JointSample) -> None:
         model, mechanism = self._model, self._model.mechanisms[self._name]
@@ -318,19 +329,23 @@ class LiveWords:
             self.torque_doubt = sign_or_unit(measured, needed)
 
 
-def _differ(then: _Ways, now: _Ways) -> str:
-    """Why the ways from one instant to another are of no one motion."""
-    went = now.ways - then.ways
-    said, twin = went[0], went[1:]
-    span = now.t - then.t
-    most = np.maximum(said, twin)
-    lag = LAG * np.maximum(np.maximum(now.speeds[0], then.speeds[0]), np.maximum(now.speeds, then.speeds)[1:])
-    if (np.abs(twin - said) <= SPEED_FLOOR * SPAN + SPEED_SHARE * most + lag).any():
+def _past(every: Sequence[_Ways]) -> tuple[Array, Array, Array]:
+    """Instants (k,), speeds and ways (k, 1 + tips) of several."""
+    t, speeds, ways = zip(*every, strict=True) if every else ((), (), ())
+    return np.array(t, float), np.array(speeds, float, ndmin=2), np.array(ways, float, ndmin=2)
+
+
+def _differ(past: tuple[Array, Array, Array], now: _Ways) -> str:
+    """Why the ways from one of some instants until now are of no one motion; empty when all may be."""
+    k = other_way(*past, now.t, now.speeds, now.ways, LIMITS)
+    if k < 0:
         return ""
-    k = int(np.abs(twin - said).argmin())
+    went = now.ways - past[2][k]
+    said, twin = went[0], went[1:]
+    nearest = int(np.abs(twin - said).argmin())
     return (
-        f"its own tool centre point went {1e3 * said:.0f} mm in {span:.2g} s, "
-        f"the twin's {1e3 * twin[k]:.0f} mm: the speeds that its source says are of no one motion"
+        f"its own tool centre point went {1e3 * said:.0f} mm in {now.t - past[0][k]:.2g} s, "
+        f"the twin's {1e3 * twin[nearest]:.0f} mm: the speeds that its source says are of no one motion"
     )
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.transforms import Array, inverse
 from seerob.description.description import Description, Joint, JointKind, Link
+from seerob.kernels.arm import postures
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Posture:
     """A point on each joint's axis [m], shape (..., n, 3)."""
     axes: Array
     """Unit axis of each joint, shape (..., n, 3); 0 of a joint that does not move the tool."""
-    slides: Array
+    slides: NDArray[np.bool_]
     """Which joints are prismatic, shape (n,)."""
 
     def jacobian(self) -> Array:
@@ -65,14 +65,25 @@ class Arm:
         self.lower = np.array([-np.inf if j.lower is None else j.lower for j in commanded])
         self.upper = np.array([np.inf if j.upper is None else j.upper for j in commanded])
         index = {joint.name: i for i, joint in enumerate(commanded)}
-        self._steps: list[tuple[Array, Sequence[tuple[int, Joint]]]] = []
+        links, order, start = [], [], [0]
         for part in _way(description, link or description.tip):
             for joint in part.joints:
                 if joint.mimic is not None:
                     what = f"joint {joint.name!r} follows another one, and moves the tool"
                     raise InputError.at(description.name, "waypoints", what, "give joint positions")
-            self._steps.append((part.parent_from_link, [(index[j.name], j) for j in part.joints]))
-        self._tcp = np.eye(4) if link_from_tcp is None else np.asarray(link_from_tcp, float)
+            links.append(part.parent_from_link)
+            order += [index[joint.name] for joint in part.joints]
+            start.append(len(order))
+        links.append(np.eye(4) if link_from_tcp is None else np.asarray(link_from_tcp, float))
+        self._chain = (
+            np.array(links, float),
+            np.array([*start, len(order)], np.int64),
+            np.array(order, np.int64),
+            np.array([joint.anchor for joint in commanded], float).reshape(-1, 3),
+            np.array([joint.axis for joint in commanded], float).reshape(-1, 3),
+            self.slides,
+        )
+        """Links and the joints between them, as `seerob.kernels.arm.postures` has them."""
         self.base_from_root: Array = np.eye(4)
         if base is not None:
             root_from_base: Array = np.eye(4)
@@ -91,17 +102,18 @@ class Arm:
             q: Joint positions [rad or m], shape (..., n).
         """
         q = np.asarray(q, float)
-        lead = q.shape[:-1]
-        T: Array = np.broadcast_to(self.base_from_root, (*lead, 4, 4))
-        anchors, axes = np.zeros((*lead, self.n, 3)), np.zeros((*lead, self.n, 3))
-        for parent_from_link, joints in self._steps:
-            T = T @ parent_from_link
-            for i, joint in joints:
-                anchors[..., i, :] = T[..., :3, :3] @ joint.anchor + T[..., :3, 3]
-                axes[..., i, :] = T[..., :3, :3] @ joint.axis
-                T = T @ _moved(joint, q[..., i])
-        T = T @ self._tcp
-        return Posture(T[..., :3, :3], T[..., :3, 3], anchors, axes, self.slides)
+        lead, rows = q.shape[:-1], np.ascontiguousarray(q).reshape(-1, self.n)
+        rotations, positions = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
+        anchors, axes = np.zeros((2, len(rows), self.n, 3))
+        base = np.ascontiguousarray(self.base_from_root)
+        postures(rows, base, *self._chain, rotations, positions, anchors, axes)
+        return Posture(
+            rotations.reshape(*lead, 3, 3),
+            positions.reshape(*lead, 3),
+            anchors.reshape(*lead, self.n, 3),
+            axes.reshape(*lead, self.n, 3),
+            self.slides,
+        )
 
 
 def _way(description: Description, name: str) -> list[Link]:
@@ -113,20 +125,3 @@ def _way(description: Description, name: str) -> list[Link]:
     while (parent := way[-1].parent) is not None:
         way.append(links[parent])
     return way[::-1]
-
-
-def _moved(joint: Joint, q: Array) -> Array:
-    """Frame of a joint from the frame that it leaves, shape (..., 4, 4)."""
-    T = np.zeros((*q.shape, 4, 4))
-    T[..., 3, 3] = 1.0
-    if joint.kind is JointKind.PRISMATIC:
-        T[..., :3, :3] = np.eye(3)
-        T[..., :3, 3] = q[..., None] * joint.axis
-        return T
-    x, y, z = joint.axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    s, c = np.sin(q)[..., None, None], np.cos(q)[..., None, None]
-    R = np.eye(3) + s * K + (1 - c) * (K @ K)
-    T[..., :3, :3] = R
-    T[..., :3, 3] = joint.anchor - R @ joint.anchor
-    return T

@@ -251,7 +251,6 @@ CALLS = {
     "criteria.contact.measured.risen": {"force": TWO},
     "criteria.contact.tolerances.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
     "criteria.contact.shape.round_shape": {"radius": 0.01},
-    "description.norms.iso_13855.speed_at": {"distance": TWO},
 }
 ELSEWHERE = {
     "criteria.contact.clamping.thickest": "of a table of sizes that ships",
@@ -268,7 +267,6 @@ STRICT = {
     "criteria.contact.clamping.clamps thickness": "clamps",
     "criteria.contact.collision.energy_limit printed": "was not printed: that of force and stiffness",
     "criteria.contact.collision.permissible_speed v_P": "of an unknown area: the upper bound of the others",
-    "description.norms.iso_13855.speed_at distance": "is the larger speed",
 }
 """What is strictest, or right, where an argument is not a number."""
 BELOW = {

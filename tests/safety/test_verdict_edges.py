@@ -26,7 +26,8 @@ from seerob.criteria.safety.manipulability import Manipulability, singular_value
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation
 from seerob.description.norms.body_limits import SHIPPED, parse, shipped
-from seerob.description.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
+from seerob.description.norms.iso_13855 import ARM_REACH, Approach, Edition, intrusion, minimum_distance
+from seerob.kernels.separation import approach_speeds
 from seerob.recording.answers import judge_many
 from seerob.recording.series import CODES
 from seerob.twin import joint_torques
@@ -367,7 +368,9 @@ def test_a_time_that_is_none_is_refused(T):
 
 
 def test_people_walk_from_half_a_metre_on():
-    assert speed_at(np.array([0.0, np.nextafter(0.5, 0), 0.5, 9.0])).tolist() == [2.0, 2.0, 1.6, 1.6]
+    found = np.empty(4)
+    approach_speeds(np.array([0.0, np.nextafter(0.5, 0), 0.5, 9.0]), np.nan, 0.0, 2.0, 1.6, ARM_REACH, found)
+    assert found.tolist() == [2.0, 2.0, 1.6, 1.6]
 
 
 @pytest.mark.parametrize("mode", ["dynamic", "fixed"])

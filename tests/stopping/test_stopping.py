@@ -22,13 +22,16 @@ from seerob.criteria.stopping.terms import (
     worst_case,
 )
 from seerob.description.norms.iso_13855 import (
+    ARM_REACH,
+    REACHING,
+    WALKING,
     Approach,
     Edition,
     intrusion,
     least_distance,
     minimum_distance,
-    speed_at,
 )
+from seerob.kernels.separation import approach_speeds
 
 positive = st.floats(0.01, 5)
 
@@ -274,6 +277,12 @@ def test_what_is_from_memory_says_so():
         assert fine.endswith("(2S)" if edition is Edition.E2010 else "(1S)")
 
 
+def approach_speed(distance):
+    found = np.empty(1)
+    approach_speeds(np.array([distance]), np.nan, 0.0, REACHING, WALKING, ARM_REACH, found)
+    return float(found[0])
+
+
 @given(v=st.floats(0, 3), T=st.floats(0.01, 0.5), d=st.floats(0, 2))
 def test_approach_speed_at_a_distance_decides_as_the_distance_itself(v, T, d):
     """So an inverse may use one speed: d ≥ S_p as switched if and only if d ≥ S_p at that speed."""
@@ -282,5 +291,5 @@ def test_approach_speed_at_a_distance_decides_as_the_distance_itself(v, T, d):
         return np.array(v_h * T + v * T)
 
     if abs(d - least_distance(S)) > 1e-9:
-        assert (d >= least_distance(S)) == (d >= S(float(speed_at(np.array(d)))))
+        assert (d >= least_distance(S)) == (d >= S(approach_speed(d)))
     assert least_distance(S) >= S(1.6)

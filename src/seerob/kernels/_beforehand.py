@@ -25,7 +25,7 @@ LOOPS = {
     "chain at_point": "",
     "spans joint_bounds": "",
     "separation separations": "",
-    "ahead until_braking": "",
+    "ahead farthest": "",
     "speed fastest": "",
     "speed carried": "(f8[:,::1], f8[:,::1], i8, f8[:,::1])",
     "pull along": "",

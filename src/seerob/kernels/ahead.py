@@ -16,12 +16,16 @@ _ROW, _ROWS, _PAIR = "f8[::1]", "f8[:,::1]", "f8[:,:,::1]"
 _WINDOW = f"i8[::1], {_ROWS}, {_ROWS}, {_PAIR}, {_PAIR}, {_ROWS}"
 
 
-@njit(f"i8({_ROW}, f8[:], f8, {_ROW}, i8[::1])", cache=True, nogil=True)
-def merged(ticks: Array, knots: Array, slack: float, found: Array, rows: Indices) -> int:
+@njit(f"i8(f8, i8, f8, f8[:], f8, {_ROW}, i8[::1])", cache=True, nogil=True)
+def instants(
+    begin: float, first: int, period: float, knots: Array, slack: float, found: Array, rows: Indices
+) -> int:
     """Put ticks, and the knots that are none of them, in one order; writes into the last two arguments.
 
     Args:
-        ticks: Increasing [s], shape (s,).
+        begin: The first tick, between two of the clock [s].
+        first: Number of the clock's tick before it.
+        period: Of the clock [s].
         knots: Not decreasing [s], shape (k,).
         slack: A knot that is nearer to a tick is that tick [s].
         found: Shape (s + k,).
@@ -30,19 +34,18 @@ def merged(ticks: Array, knots: Array, slack: float, found: Array, rows: Indices
     Returns:
         How many there are.
     """
-    count, i = 0, 0
+    count, i, tick, before = 0, 0, begin, -np.inf
     for t in knots:
-        while i < len(ticks) and ticks[i] < t:
-            found[count], rows[i] = ticks[i], count
-            count, i = count + 1, i + 1
-        near = i < len(ticks) and abs(t - ticks[i]) <= slack
-        near = near or (i > 0 and abs(t - ticks[i - 1]) <= slack)
+        while i < len(rows) and tick < t:
+            found[count], rows[i], before = tick, count, tick
+            count, i, tick = count + 1, i + 1, period * (first + i + 1)
+        near = (i < len(rows) and abs(t - tick) <= slack) or (i > 0 and abs(t - before) <= slack)
         if not near and (count == 0 or found[count - 1] < t):
             found[count] = t
             count += 1
-    while i < len(ticks):
-        found[count], rows[i] = ticks[i], count
-        count, i = count + 1, i + 1
+    while i < len(rows):
+        found[count], rows[i] = tick, count
+        count, i, tick = count + 1, i + 1, period * (first + i + 1)
     return count
 
 
@@ -186,45 +189,48 @@ def joint_speeds(t: Array, q: Array, qd: Array, bounds: Array) -> None:
 
 
 @njit(
-    f"void({_ROW}, f8[:,:], {_ROW}, f8, f8, f8, {_ROWS}, {_ROW}, {_ROW}, {_ROW})",
+    f"void({_ROW}, f8, f8, f8[:,:], {_ROW}, f8, f8, f8, {_ROW}, {_ROW})",
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def until_braking(
+def farthest(
     t: Array,
+    begin: float,
+    end: float,
     most: Array,
     now: Array,
     T_r: float,
     lead: float,
     slack: float,
-    speeds: Array,
-    steps: Array,
-    outside: Array,
+    way: Array,
     top: Array,
 ) -> None:
-    """Find how fast parts or joints get from instant to instant; writes into the last four arguments.
+    """Bound how far and fast parts or joints get until they brake; writes into the last two arguments.
 
     Args:
-        t: Instants from now to ``T_r + lead`` [s], shape (k,).
+        t: Instants, increasing [s], shape (k,).
+        begin: Now [s].
+        end: After which nothing counts [s], ``T_r + lead`` from now at most.
         most: Largest speeds from instant to instant, shape (k - 1, n).
         now: Speeds now, which may be larger, shape (n,).
         T_r: Reaction time [s].
         lead: A reaction begins until then [s].
         slack: Instants nearer than this are one [s].
-        speeds: As ``most``, with ``now``, shape (k - 1, n).
-        steps: From instant to instant [s], shape (k - 1,).
-        outside: Least of the speeds that may lie before a reaction or after it, shape (n,).
-        top: Largest of all, shape (n,).
+        way: In any stretch of T_r that begins within ``lead`` [m or rad], shape (n,).
+        top: Largest speed until then, shape (n,).
     """
-    outside[:] = np.inf
-    top[:] = 0.0
-    for i in range(len(steps)):
-        steps[i] = t[i + 1] - t[i]
-        apart = t[i] < lead - slack or t[i + 1] > T_r + slack
-        for c in range(len(now)):
+    for c in range(len(now)):
+        outside, far, fastest = np.inf, 0.0, 0.0
+        a = np.minimum(t[0] - begin, end)
+        for i in range(len(t) - 1):
+            b = np.minimum(t[i + 1] - begin, end)
             fast = most[i, c] if i else np.maximum(most[i, c], now[c])
-            speeds[i, c] = fast
-            top[c] = np.maximum(top[c], fast)
-            if apart:
-                outside[c] = np.minimum(outside[c], fast)
+            far += (b - a) * fast
+            fastest = np.maximum(fastest, fast)
+            if a < lead - slack or b > T_r + slack:
+                outside = np.minimum(outside, fast)
+            a = b
+        # What lies outside of the stretch is at its ends.
+        way[c] = np.maximum(np.maximum(far - lead * outside, 0.0), now[c] * T_r)
+        top[c] = fastest

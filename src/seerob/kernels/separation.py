@@ -19,6 +19,59 @@ _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
 
 
 @njit(
+    f"void({_ROW}, {_ROW}, f8, f8, f8, f8, f8, f8, f8, {_ROW})", cache=True, nogil=True, error_model="numpy"
+)
+def separation(
+    S_r: Array,
+    S_s: Array,
+    time: float,
+    K: float,
+    v_h: float,
+    seen: float,
+    reaching: float,
+    walking: float,
+    arm: float,
+    found: Array,
+) -> None:
+    """Find S_p of each part at one instant, shape (n,); arguments as of `separations`."""
+    given = not math.isnan(v_h)
+    own = np.maximum(np.maximum(v_h, seen), 0.0) * time
+    near, far = np.maximum(reaching, 0.0) * time, np.maximum(walking, 0.0) * time
+    faster = np.maximum(seen, 0.0) * time
+    for i in range(len(S_r)):
+        if given:
+            found[i] = own + S_r[i] + S_s[i] + K
+            continue
+        least = near + S_r[i] + S_s[i] + K
+        if not least <= arm:
+            least = np.maximum(far + S_r[i] + S_s[i] + K, arm)
+        # A speed that is not a number is none that may be left out.
+        if not seen <= walking:
+            least = np.maximum(least, faster + S_r[i] + S_s[i] + K)
+        found[i] = least
+
+
+@njit(f"void({_ROW}, f8, f8, f8, f8, f8, {_ROW})", cache=True, nogil=True, error_model="numpy")
+def approach_speeds(
+    distance: Array, v_h: float, seen: float, reaching: float, walking: float, arm: float, found: Array
+) -> None:
+    """Find the speed of the person that counts for each part at its distance; writes the last argument.
+
+    Args:
+        distance: Of each part [m], shape (n,).
+        v_h: As of `separations`, with the next four.
+        seen: Likewise, of one instant.
+        reaching: Likewise.
+        walking: Likewise.
+        arm: Likewise.
+        found: [m/s], shape (n,).
+    """
+    for i in range(len(distance)):
+        assumed = v_h if not math.isnan(v_h) else walking if distance[i] >= arm else reaching
+        found[i] = np.maximum(assumed, seen)
+
+
+@njit(
     f"void({_ROWS}, {_ROWS}, f8, f8, f8, {_ROW}, f8, f8, f8, {_ROWS})",
     cache=True,
     nogil=True,
@@ -52,22 +105,8 @@ def separations(
         arm: Distance up to which the former counts, and below which the latter leads to none [m].
         found: S_p [m], shape (N, n).
     """
-    given = not math.isnan(v_h)
     for k in range(S_r.shape[0]):
-        own = np.maximum(np.maximum(v_h, seen[k]), 0.0) * time
-        near, far = np.maximum(reaching, 0.0) * time, np.maximum(walking, 0.0) * time
-        faster = np.maximum(seen[k], 0.0) * time
-        for i in range(S_r.shape[1]):
-            if given:
-                found[k, i] = own + S_r[k, i] + S_s[k, i] + K
-                continue
-            least = near + S_r[k, i] + S_s[k, i] + K
-            if not least <= arm:
-                least = np.maximum(far + S_r[k, i] + S_s[k, i] + K, arm)
-            # A speed that is not a number is none that may be left out.
-            if not seen[k] <= walking:
-                least = np.maximum(least, faster + S_r[k, i] + S_s[k, i] + K)
-            found[k, i] = least
+        separation(S_r[k], S_s[k], time, K, v_h, seen[k], reaching, walking, arm, found[k])
 
 
 @njit(

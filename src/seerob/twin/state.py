@@ -27,6 +27,7 @@ from seerob.distance.least import Closest, Closests, Per, Query
 from seerob.distance.surveying import Surveyor
 from seerob.kernels.axes import felt, principal_axes, quaternion
 from seerob.kernels.chain import along, at_point
+from seerob.kernels.spans import greatest
 from seerob.kernels.speed import carried, fastest, in_body, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.joint_columns import Columns, moving_dofs
@@ -114,7 +115,6 @@ class State(Validity):
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
         self._cvel, self._qpos = data.cvel, data.qpos
-        self._rows: dict[tuple[int, ...], Indices] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
@@ -348,9 +348,7 @@ class State(Validity):
         return found
 
     def _rows_of(self, bodies: tuple[int, ...]) -> Indices:
-        if bodies not in self._rows:
-            self._rows[bodies] = np.array(bodies, np.int64)
-        return self._rows[bodies]
+        return self._owners(bodies).rows
 
     def data_of(self, *names: str) -> Any:
         """MuJoCo's data, of which only what these robots, people and machines decide may be used.
@@ -811,6 +809,13 @@ class State(Validity):
         self.require_bodies(bodies, allow_estimated=allow_estimated)
         self._ask_speeds(bodies)
         return np.asarray(self._fastest()[0][self._rows_of(bodies)])
+
+    def fastest_speed(self, bodies: tuple[int, ...], *, allow_estimated: bool = False) -> float:
+        """Bound on the speed of the fastest point of bodies [m/s], 0 of none; arguments likewise."""
+        self.require_bodies(bodies, allow_estimated=allow_estimated)
+        owners = self._owners(bodies)
+        self.speeds_asked |= owners.everyone
+        return float(greatest(self._fastest()[0], owners.rows))
 
     def largest_speeds(self) -> Array:
         """Bound on the speed of any point of each body [m/s], shape (n,): for bounds, never for a verdict."""

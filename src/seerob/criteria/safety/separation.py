@@ -41,7 +41,15 @@ from seerob.criteria.stopping.terms import At, Course, separation_distance, way_
 from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shifted, tolerances
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import REACHING, WALKING
-from seerob.kernels.separation import EXCEEDED, UNDECIDED, WITHIN, judged, separations
+from seerob.kernels.separation import (
+    EXCEEDED,
+    UNDECIDED,
+    WITHIN,
+    approach_speeds,
+    judged,
+    separation,
+    separations,
+)
 from seerob.kernels.spans import greatest
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
@@ -228,21 +236,34 @@ class Separation(Criterion, frozen=True, kw_only=True):
         reasons = [f"not given: {', '.join(missing)}"] if missing else []
         return "; ".join([*reasons, *stop.doubts])
 
-    def _distance(self, course: Course, K: float, seen: Array | float) -> Array:
-        """S_p of each part [m], of a person who is seen to be as fast as ``seen`` [m/s].
+    @property
+    def _approach(self) -> float:
+        """The speed of the person that is given [m/s]; NaN for that of ISO 13855."""
+        return math.nan if self.human_speed is None else self.human_speed
+
+    def _distance(self, course: Course, K: float, seen: float) -> Array:
+        """S_p of each part [m], shape (n,), of a person who is seen to be as fast as ``seen`` [m/s].
 
         Args:
-            course: Of the robot, at one instant (n,) or at N of them (N, n).
+            course: Of the robot.
             K: C + Z_d + Z_r [m].
-            seen: Of one instant, or of each (N, 1).
+            seen: [m/s].
         """
-        fast, found = np.array(seen, float).reshape(-1), np.empty(np.shape(course.S_r))
-        rows = len(fast), course.S_r.shape[-1]
+        found = np.empty(len(course.S_r))
         time = self.stop.reaction + float(at_least("T_s", course.T_s, unit="s"))
-        v_h = math.nan if self.human_speed is None else self.human_speed
+        separation(
+            course.S_r, course.S_s, time, K, self._approach, seen, REACHING, WALKING, iso_13855.ARM_REACH,
+            found,
+        )  # fmt: skip
+        return found
+
+    def _distances(self, course: Course, K: float, seen: Array) -> Array:
+        """S_p at N instants [m], shape (N, n); ``seen`` of each (N,)."""
+        found = np.empty(course.S_r.shape)
+        time = self.stop.reaction + float(at_least("T_s", course.T_s, unit="s"))
         separations(
-            np.ascontiguousarray(course.S_r).reshape(rows), np.ascontiguousarray(course.S_s).reshape(rows),
-            time, K, v_h, fast, REACHING, WALKING, iso_13855.ARM_REACH, found.reshape(rows),
+            np.ascontiguousarray(course.S_r), np.ascontiguousarray(course.S_s), time, K, self._approach,
+            seen, REACHING, WALKING, iso_13855.ARM_REACH, found,
         )  # fmt: skip
         return found
 
@@ -262,10 +283,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return 0.0, 0.0
         lost = state.invalid_bodies(gap.a)
         people = tuple(i for i in gap.a if i not in lost) if lost else gap.a
-        speeds = state.fastest_speeds(people, allow_estimated=True)
-        seen = float(speeds.max(initial=0.0))
+        seen = state.fastest_speed(people, allow_estimated=True)
         if not state.speed_errors:
             return seen, seen
+        speeds = state.fastest_speeds(people, allow_estimated=True)
         return seen, float((speeds + state.speed_noise(people)).max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
@@ -449,7 +470,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if self.mode == "fixed" or own._tolerances():
             return None
         incomplete = bool(self.unknown(model))
-        return at_instants(own.stop, gap, own._distance, K, incomplete=incomplete)
+        return at_instants(own.stop, gap, own._distances, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
@@ -605,17 +626,14 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def margin(self, result: Result) -> Margin:
         """Tell how far each moving part is from S_p [m], then how far each is away [m], with tolerances."""
-        figures = [
-            (part.value or 0.0, part.limit or 0.0, part.interval[0] if part.interval else part.value or 0.0)
-            for part in result.parts
-            if part.verdict is not None
-        ]
-        away, least, near = np.array(figures, float).reshape(-1, 3).T
+        parts = [part for part in result.parts if part.verdict is not None]
+        away = [part.value or 0.0 for part in parts]
+        room = [far - (part.limit or 0.0) for far, part in zip(away, parts, strict=True)]
+        near = [part.interval[0] if part.interval else far for far, part in zip(away, parts, strict=True)]
+        off = [far - least for far, least in zip(away, near, strict=True)]
         if self.mode == "fixed":
-            return away - least, away - near
-        room, off = np.zeros((2, 2, len(away)))
-        room[0], room[1], off[0] = away - least, near, away - near
-        return room.ravel(), off.ravel()
+            return np.array(room), np.array(off)
+        return np.array([*room, *near]), np.array([*off, *[0.0] * len(off)])
 
     def _required(self, now: Course, K: float, seen: float, seen_most: float) -> Required:
         S_p = most = self._distance(now, K, seen)
@@ -688,9 +706,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if stray or now.unbounded_reason or (now.most is not None and now.most.unbounded_reason):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None and onset(1.0).linear:
-            given = self.human_speed
-            assumed = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
-            v_h = np.maximum(assumed, seen[1])
+            v_h = np.empty(len(distance))
+            approach_speeds(distance, self._approach, seen[1], REACHING, WALKING, iso_13855.ARM_REACH, v_h)
             speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
         elif now.v_r.max() > MOVING:
             factor = factor_by_search(S_p, distance, stop.costly)

@@ -146,8 +146,7 @@ def known_in_span(
     path, lead = span.path, period
     b = float(path.t[-1])
     k, end = math.floor(b / period + 1e-6), span.end + T_r + lead
-    ticks = np.concatenate([[b], period * np.arange(k + 1, math.ceil(end / period - 1e-6) + 1)])
-    t, _ = with_knots(span.knots, name, ticks)
+    t, _ = with_knots(span.knots, name, b, k, math.ceil(end / period - 1e-6), period)
     foreseen = span.foresee(name, t)
     if foreseen is None or foreseen[2]:
         return None

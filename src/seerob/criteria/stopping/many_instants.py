@@ -24,7 +24,7 @@ def separations(
     Args:
         stop: How the robot stops.
         gap: From whom to its moving parts.
-        S_p: Of a course, K and the speed that a person is seen to have [m/s] (N, 1), shape (N, b) [m].
+        S_p: Of a course, K and the speed that a person is seen to have [m/s] (N,), shape (N, b) [m].
         K: C + Z_d + Z_r [m].
         incomplete: Whether S_p may be larger than what is computed.
     """
@@ -39,7 +39,7 @@ def separations(
     def evaluate(states: States) -> Answers:
         distance = states.closest_per_body(gap).distance
         v_r, _, _ = states.fastest_points(gap.b)
-        seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)[:, None]
+        seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)
         least = S_p(braking(accelerated(v_r, stop.reaction, a, np.zeros(0)), T_s, share), K, seen)
         k = (distance - least).argmin(axis=1)[:, None]
         value, limit = (np.take_along_axis(found, k, axis=1)[:, 0] for found in (distance, least))

@@ -33,7 +33,8 @@ from numpy.typing import NDArray
 
 from seerob.core.domains import number
 from seerob.core.transforms import Array
-from seerob.kernels.ahead import joint_speeds, kept, merged, part_speeds, until_braking
+from seerob.kernels import ahead as kernel
+from seerob.kernels.ahead import joint_speeds, kept, part_speeds
 from seerob.kernels.speed import fastest_of, stacked
 from seerob.model.model import Body, Gap, Mechanism, Model
 from seerob.twin.spans import ROUNDING, Chains, Knots, Points, rows_of
@@ -167,12 +168,11 @@ class Foreseen:
 
     def at(self, state: State) -> At | None:
         """None where nobody knows what it will do."""
-        period, T_r, name = self._period, min(self._T_r, LARGEST_WINDOW), self._robot.name
-        k, end = math.floor(state.t / period + 1e-6), state.t + T_r + period
+        period, T_r, name, t = self._period, min(self._T_r, LARGEST_WINDOW), self._robot.name, state.t
+        k = math.floor(t / period + 1e-6)
         # The same instants whenever they are asked for.
-        ticks = np.asarray(period * np.arange(k, math.ceil(end / period - 1e-6) + 1), float)
-        ticks[0] = state.t
-        instants, rows = with_knots(state.knots, name, ticks)
+        last = math.ceil((t + T_r + period) / period - 1e-6)
+        instants, rows = with_knots(state.knots, name, t, k, last, period)
         foreseen = state.foresee(name, instants)
         if foreseen is None:
             return None
@@ -181,11 +181,11 @@ class Foreseen:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
         known = self._known(state, k, rows, instants, q, qd)
         v_now = state.fastest_speeds(self._gap.b)
-        left = np.minimum(instants - state.t, T_r + period)
         # Of a motion that may be another one, or jumps, nothing is known between instants.
         side = ENDS if unbounded_reason else MOST
         # A twin that does not stand exactly where the motion has it may be faster now.
-        S_r, v_s = _farthest(left, known.parts[:, side], v_now, self._T_r, period)
+        stretch = t, T_r + period
+        S_r, v_s = _farthest(instants, stretch, known.parts[:, side], v_now, self._T_r, period)
         if not self._joints_asked:
             points = Onset(v_now, S_r, v_s, None, None, unbounded_reason=unbounded_reason)
             return lambda scale: (
@@ -194,7 +194,7 @@ class Foreseen:
                 else replace(points, v_r=scale * v_now, S_r=scale * S_r, v_s=scale * v_s)
             )
         qd_now = np.abs(state.qd(self._robot))
-        ways, speeds = _farthest(left, known.joints[:, side], qd_now, self._T_r, period)
+        ways, speeds = _farthest(instants, stretch, known.joints[:, side], qd_now, self._T_r, period)
         # A simulated stop goes by the ticks.
         later = rows[1 : 1 + math.ceil(T_r / period - 1e-6)]
         now = Onset(v_now, S_r, v_s, ways, speeds, q[later], qd[later], unbounded_reason)
@@ -229,32 +229,36 @@ class Foreseen:
             now.behind = before.end(shift - 1) if shift else before.behind
             same = np.empty(len(now.last), bool)
             found = kept(shift, *before.arrays, *now.arrays, same) == 0
-            missing = [] if found else np.flatnonzero(~same).tolist()
-        for i in missing:
-            self._find(state, now, i, t)
-        self._run, self._window = weakref.ref(state), now
+            missing = [] if found else [i for i, known in enumerate(same.tolist()) if not known]
+        if missing:
+            data = state.data_of(*self._with)
+            self._joints.follow(self._points, self._parts, self._robot, state)
+            for i in missing:
+                self._find(state, data, now, i, t)
+        if self._run() is not state:
+            self._run = weakref.ref(state)
+        self._window = now
         return now
 
-    def _find(self, state: State, window: _Window, i: int, t: Array) -> None:
+    def _find(self, state: State, now: mujoco.MjData, window: _Window, i: int, t: Array) -> None:
         """Bound the speeds from a tick to the next, with all others as they are or go on.
 
         Args:
             state: The twin.
+            now: Where all are.
             window: All that comes before is known.
             i: Which tick.
             t: All instants of the window [s], shape (m,).
         """
         a, b = int(window.rows[i]), int(window.rows[i + 1])
         t, q, qd = t[a : b + 1], window.q[a : b + 1], window.qd[a : b + 1]
-        joints, now = self._joints, state.data_of(*self._with)
-        joints.follow(self._points, self._parts, self._robot, state)
+        joints, chains = self._joints, self._joints.chains
         speeds = np.empty((len(t), len(self._parts)))
         before, first = window.end(i - 1) if i else window.behind, 0
         if before is not None and _bits(before.q, before.qd) == _bits(q[0], qd[0]):
             speeds[0], first = before.speeds, 1
         for row in range(first, len(t)):
             self._speeds(state, now, q[row], qd[row], speeds[row])
-        chains = joints.chains
         all_q, all_v = joints.motion(self._robot, now, t, q, qd)
         part_speeds(
             t, all_q, all_v, speeds, joints.home,
@@ -404,11 +408,23 @@ def _bits(q: Array, qd: Array) -> bytes:
     return bytes(q.tobytes() + qd.tobytes())
 
 
-def with_knots(knots: Knots, name: str, ticks: Array) -> tuple[Array, Indices]:
-    """Ticks, and the knots between them of what a robot is known to do [s], increasing; where ticks are."""
-    own = np.asarray(knots(name, float(ticks[0]), float(ticks[-1])), float)
-    found, rows = np.empty(len(ticks) + len(own)), np.empty(len(ticks), np.int64)
-    return found[: merged(ticks, own, SLACK, found, rows)], rows
+def with_knots(
+    knots: Knots, name: str, begin: float, k: int, last: int, period: float
+) -> tuple[Array, Indices]:
+    """Ticks, and the knots between them of what a robot is known to do [s], increasing; where ticks are.
+
+    Args:
+        knots: Tells them.
+        name: Of the robot.
+        begin: The first tick [s].
+        k: Number of the clock's tick that this is, or that is before it.
+        last: Number of the last one.
+        period: Of the clock [s].
+    """
+    own = np.asarray(knots(name, begin, float(period * last)), float)
+    rows = np.empty(1 + last - k, np.int64)
+    found = np.empty(len(rows) + len(own))
+    return found[: kernel.instants(begin, k, period, own, SLACK, found, rows)], rows
 
 
 def largest_between(t: Array, q: Array, qd: Array) -> Array:
@@ -439,16 +455,16 @@ def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tupl
     """
     number("T_r", T_r, 0.0, unit="s")
     number("lead", lead, 0.0, unit="s")
-    return _farthest(t, most, now, T_r, lead)
+    return _farthest(np.asarray(t, float), (0.0, np.inf), most, now, T_r, lead)
 
 
-def _farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tuple[Array, Array]:
-    n = len(now)
-    speeds, steps, (outside, top) = np.empty((len(t) - 1, n)), np.empty(len(t) - 1), np.empty((2, n))
-    until_braking(t, most, now, T_r, lead, SLACK, speeds, steps, outside, top)
-    # What lies outside of the stretch is at its ends.
-    way = np.maximum(steps @ speeds - lead * outside, 0.0)
-    return np.maximum(way, now * T_r), top
+def _farthest(
+    t: Array, stretch: tuple[float, float], most: Array, now: Array, T_r: float, lead: float
+) -> tuple[Array, Array]:
+    """As `farthest`, of instants of which the stretch says since when they count, and for how long [s]."""
+    way, top = np.empty((2, len(now)))
+    kernel.farthest(t, *stretch, most, now, T_r, lead, SLACK, way, top)
+    return way, top
 
 
 # -- accelerations of the joints ----------------------------------------------------------------

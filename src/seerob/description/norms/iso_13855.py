@@ -194,11 +194,6 @@ def least_distance(at_speed: Callable[[float], Array]) -> Array:
     return np.where(near <= ARM_REACH, near, np.maximum(at_speed(WALKING), ARM_REACH))
 
 
-def speed_at(distance: Array) -> Array:
-    """Approach speed that decides whether a distance [m] is at least `least_distance`, same shape [m/s]."""
-    return np.where(np.asarray(distance) >= ARM_REACH, WALKING, REACHING)
-
-
 def _across(edition: Edition, capability: float | None) -> Intrusion:
     if capability is None:
         return Intrusion(

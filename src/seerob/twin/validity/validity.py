@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from seerob.core.errors import NotAsked, Undecided
 from seerob.model.model import Model
 from seerob.twin.attachments import Attachments
@@ -31,6 +34,8 @@ class _Owners(NamedTuple):
     """Person → which bones."""
     everyone: frozenset[str]
     bodies: frozenset[int]
+    rows: NDArray[np.int64]
+    """The bodies, in the order in which they were asked for."""
 
 
 class _Asking:
@@ -387,7 +392,9 @@ class Validity:
                 self.heard()
             others, people = bones_of(self._model, bodies)
             everyone = frozenset((*others, *people))
-            found = _Owners(len(self._owners_of), others, people, everyone, frozenset(bodies))
+            found = _Owners(
+                len(self._owners_of), others, people, everyone, frozenset(bodies), np.array(bodies, np.int64)
+            )
             self._owners_of[bodies] = found
         if len(self._owners_last) == MOST:
             self._owners_last.clear()

@@ -68,6 +68,8 @@ LONG_WAY = {"rad": 1.0, "m": 0.3}
 """Of a joint, from which on that share is told [rad or m]; what was four times as long ago counts half."""
 TOLD_BY = {"rad": 0.01, "m": 2e-3}
 """Way between two anchors that tells of it [rad or m]: twice `NOISE`."""
+CLOSE = 0.99
+"""Share of a bound up to which rounding can hide nothing: what is nearer is not compared one by one."""
 SILENCE = 0.5
 """After it what was before says nothing of now [s]."""
 
@@ -130,13 +132,18 @@ class _Standing:
 
     def _move(self, t: float, q: float) -> None:
         step, interval = q - self._q, t - self._since
-        if not math.isnan(step):
-            for size in (abs(step), abs(abs(step) - abs(self._step))):
-                if size > 1e-9:
-                    self._finest = min(self._finest, size)
         self._speed = self._step / self._interval
         self._longest = max(interval, self._interval)
-        self._step, self._interval = (0.0, math.inf) if math.isnan(step) else (step, interval)
+        if math.isnan(step):
+            self._step, self._interval = 0.0, math.inf
+        else:
+            size = abs(step)
+            turned = abs(size - abs(self._step))
+            if 1e-9 < size < self._finest:
+                self._finest = size
+            if 1e-9 < turned < self._finest:
+                self._finest = turned
+            self._step, self._interval = step, interval
         self._q, self._since, self._window = q, t, t
         self._way = self._fastest = 0.0
         self._looked, self._dead = False, ""
@@ -197,17 +204,29 @@ class Contradictions:
         self._live = live
         units = () if target is None else target.units
         limits = () if target is None else target.velocity
-        self._units = units
+        self._units = [*units]
         self._fastest = [
             min(FASTEST[unit], FASTEST[unit] if limit is None else TIMES_LIMIT * limit)
             for unit, limit in zip(units, limits, strict=False)
         ]
+        self._noise = [NOISE[unit] for unit in units]
         stated = () if target is None else target.acceleration
         self._quickest = stated * len(units) if len(stated) == 1 else stated
+        self._gains = [
+            CLOSE * ((1 + SHARE) * limit * SPAN / ANCHORS + SPEED_NOISE[unit])
+            for limit, unit in zip(self._quickest, units, strict=False)
+        ]
+        """Of a joint's speed, which no anchor contradicts that was slower by less [rad/s or m/s]."""
         self._before: Sample | None = None
         self._at = -math.inf
         self._told: deque[_Told] = deque(maxlen=ANCHORS)
         self._newest: _Told | None = None
+        self._bounds: list[tuple[float, float]] = []
+        """Of each joint, between which its positions less the integral of its velocity lie at the anchors."""
+        self._slowest: list[float] = []
+        """Of each joint, least speed at an anchor [rad/s or m/s]."""
+        self._off = ""
+        """Whose velocities are off by a factor, as is known since the last anchor."""
         self._places: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=ANCHORS + 1)
         """Instants [s] and positions of a device that gives no velocities."""
         self._standing: list[_Standing] = []
@@ -229,6 +248,7 @@ class Contradictions:
             self._standing = []
             before = None
         if isinstance(sample, JointSample):
+            self._resolve(len(sample.q))
             jump = self._leap(before, sample, step) if isinstance(before, JointSample) else ""
             # Each is told every sample: what it looks for may begin while another one has found something.
             differs, hangs = self._compare(sample, t), self._hangs(sample, t)
@@ -237,11 +257,17 @@ class Contradictions:
             return _moved(before, sample, step) if isinstance(before, PoseSample) else ""
         return _flew(before, sample, step) if isinstance(before, BodySample) else ""
 
+    def _resolve(self, joints: int) -> None:
+        """Bounds of joints that the robot does not have: as those of one that turns, as fast as any."""
+        self._units += ["rad"] * (joints - len(self._units))
+        self._fastest += [FASTEST["rad"]] * (joints - len(self._fastest))
+        self._noise += [NOISE["rad"]] * (joints - len(self._noise))
+
     def _leap(self, before: JointSample, sample: JointSample, step: float) -> str:
-        for k, (a, b) in enumerate(zip(before.q, sample.q, strict=False)):
-            fastest = self._fastest[k] if k < len(self._fastest) else FASTEST["rad"]
-            unit = self._units[k] if k < len(self._units) else "rad"
-            if abs(b - a) > fastest * step + NOISE[unit]:
+        bounds = zip(before.q, sample.q, self._fastest, self._noise, strict=False)
+        for k, (a, b, fastest, noise) in enumerate(bounds):
+            if abs(b - a) > fastest * step + noise:
+                unit = self._units[k]
                 return f"joint {k + 1} went {abs(b - a):.3g} {unit} within {1e3 * step:.0f} ms"
         return ""
 
@@ -256,36 +282,52 @@ class Contradictions:
             zeros = (0.0,) * len(q)
             self._told.clear()
             self._newest = _Told(t, q, qd, zeros, zeros)
-            self._told.append(self._newest)
+            self._anchor(self._newest)
             return ""
-        half = 0.5 * (t - last.t)
-        way = tuple([w + half * (a + b) for w, a, b in zip(last.way, last.qd, qd, strict=True)])
-        length = tuple(
-            [w + half * (abs(a) + abs(b)) for w, a, b in zip(last.length, last.qd, qd, strict=True)]
-        )
-        now = self._newest = _Told(t, q, qd, way, length)
+        half, near = 0.5 * (t - last.t), True
+        way, length = [], []
+        rows = zip(q, qd, last.qd, last.way, last.length, self._bounds, self._noise, strict=False)
+        for x, b, a, went, far, (low, high), noise in rows:
+            way.append(went := went + half * (a + b))
+            length.append(far + half * (abs(a) + abs(b)))
+            near = near and x - went - low < CLOSE * noise and high - (x - went) < CLOSE * noise
+        if self._gains and near:
+            speeds = zip(qd, self._slowest, self._gains, strict=False)
+            near = all(abs(b) - slowest <= gain for b, slowest, gain in speeds)
+        now = self._newest = _Told(t, q, qd, tuple(way), tuple(length))
         found = ""
-        for then in self._told:
+        for then in () if near else self._told:
             if t - then.t <= SPAN and (found := self._differ(then, now) or self._hurries(then, now)):
                 break
         if t - self._told[-1].t >= SPAN / ANCHORS:
             self._scale(self._told[-1], now)
-            self._told.append(now)
-        offs = ((k, scale.off()) for k, scale in enumerate(self._scales))
-        return found or next((f"the velocity of joint {k + 1} {off}" for k, off in offs if off), "")
+            self._anchor(now)
+        return found or self._off
+
+    def _anchor(self, now: _Told) -> None:
+        """Compare what comes with this instant, too."""
+        self._told.append(now)
+        lags = zip(
+            *[[a - went for a, went in zip(then.q, then.way, strict=True)] for then in self._told],
+            strict=True,
+        )
+        self._bounds = [(min(lag), max(lag)) for lag in lags]
+        self._slowest = [
+            min(map(abs, rates)) for rates in zip(*[then.qd for then in self._told], strict=True)
+        ]
 
     def _scale(self, then: _Told, now: _Told) -> None:
         if len(self._scales) != len(now.q):
-            units = [*self._units, *["rad"] * len(now.q)]
-            self._scales = [_Scale(unit) for unit in units[: len(now.q)]]
+            self._scales = [_Scale(unit) for unit in self._units[: len(now.q)]]
         for k, scale in enumerate(self._scales):
             scale.add(now.q[k] - then.q[k], now.way[k] - then.way[k])
+        offs = ((k, scale.off()) for k, scale in enumerate(self._scales))
+        self._off = next((f"the velocity of joint {k + 1} {off}" for k, off in offs if off), "")
 
     def _hangs(self, sample: JointSample, t: float) -> str:
         """Whether a joint that moved stands to the last bit, as nothing that brakes does."""
         if len(self._standing) != len(sample.q):
-            units = [*self._units, *["rad"] * len(sample.q)]
-            self._standing = [_Standing(unit) for unit in units[: len(sample.q)]]
+            self._standing = [_Standing(unit) for unit in self._units[: len(sample.q)]]
         if sample.qd is not None and len(sample.qd) != len(sample.q):
             return ""
         rates: Sequence[float | None] = sample.qd or ()
@@ -347,7 +389,7 @@ class Contradictions:
         for k, (a, b) in enumerate(zip(then.q, now.q, strict=True)):
             went, said = b - a, now.way[k] - then.way[k]
             off = abs(went - said)
-            unit = self._units[k] if k < len(self._units) else "rad"
+            unit = self._units[k]
             if off < NOISE[unit]:
                 continue
             path = max(now.length[k] - then.length[k], abs(went))

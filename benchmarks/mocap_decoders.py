@@ -31,7 +31,7 @@ from seerob.app.emulators.mvn import datagrams
 from seerob.devices.sources import bvh, mvnx
 from seerob.devices.sources.mvn import Frames
 from seerob.protocols.tracking.mvn import Kind, decode
-from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
+from seerob.protocols.tracking.mvn_pose import JOINTS, PARENTS, SEGMENTS
 
 GOAL = 100_000
 ITEM = struct.Struct(">i7f")

@@ -27,8 +27,8 @@ from seerob.description.mesh import load_meshes
 from seerob.description.mesh_files import source as mesh_source
 from seerob.description.norms import body_limits
 from seerob.description.robots.calibration import read_calibration
-from seerob.files.motion_capture import kinect_bag
-from seerob.files.tables.workbook import MAX_LEFT_OUT, sheets
+from seerob.files.motion_capture import ros_bag
+from seerob.files.tables.table_files import MAX_LEFT_OUT, sheets
 from seerob.outputs.html import text
 from soak import made_cells
 
@@ -106,7 +106,8 @@ def test_a_workbook_that_unpacks_to_a_thousand_times_its_size_is_refused(tmp_pat
                 file.write(bytes(1 << 20))
     assert path.stat().st_size < 2 << 20
     said, grown = asked(
-        "seerob.files.tables.workbook", f"seerob.files.tables.workbook.sheets(Path({str(path)!r}), 'a.xlsx')"
+        "seerob.files.tables.table_files",
+        f"seerob.files.tables.table_files.sheets(Path({str(path)!r}), 'a.xlsx')",
     )
     assert "a.xlsx: unpacks to more than" in said
     assert grown < 200
@@ -263,9 +264,9 @@ def test_a_chunk_of_a_bag_that_unpacks_to_more_than_there_is_ends_the_parser_alo
         topic = writer.add_connection("/a", kind, typestore=get_typestore(Stores.ROS1_NOETIC))
         writer.write(topic, 1, bytes(400 << 20))
     assert path.stat().st_size < 4 << 20
-    monkeypatch.setattr(kinect_bag, "MEMORY", 300 << 20)
+    monkeypatch.setattr(ros_bag, "MEMORY", 300 << 20)
     with pytest.raises(InputError, match=r"a.bag: takes more than 300 MiB of memory to read; repair it"):
-        list(kinect_bag.raw_messages(path, "a.bag", ("/a",), 1 << 20))
+        list(ros_bag.raw_messages(path, "a.bag", ("/a",), 1 << 20))
 
 
 def test_a_collada_file_that_takes_too_much_ends_its_parser_with_a_message_and_the_next_is_read(

@@ -23,8 +23,8 @@ from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.rosbridge import Rosbridge
 from seerob.devices.sources.siemens_web import SiemensWeb
 from seerob.devices.sources.web import Web
-from seerob.files.motion_capture.kinect_bag import connections
-from seerob.protocols.ros.ros_serialised import Edition, store
+from seerob.files.motion_capture.ros_bag import connections
+from seerob.protocols.ros.ros_messages import Edition, store
 from seerob.workstation.source import Target
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]

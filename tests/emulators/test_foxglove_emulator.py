@@ -11,7 +11,7 @@ from seerob.app.emulation.ros_robot import EPOCH
 from seerob.app.emulators.foxglove import FoxgloveBridge
 from seerob.devices.sources.foxglove import Foxglove
 from seerob.protocols.ros import foxglove
-from seerob.protocols.ros.ros_serialised import Edition
+from seerob.protocols.ros.ros_messages import Edition
 from sources.listening import heard
 
 NAMES = ("a", "b")

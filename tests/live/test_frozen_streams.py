@@ -14,7 +14,7 @@ from seerob.core.samples import BodyPoint, BodySample
 from seerob.description.capture.frozen import STEPS
 from seerob.devices.live.listening import STILL, Listener
 from seerob.devices.sources.kinect import Kinect
-from seerob.protocols.tracking.mvn_segments import SEGMENTS
+from seerob.protocols.tracking.mvn_pose import SEGMENTS
 from soak import device_kinds
 
 KINDS = ("natnet", "vrpn", "mvn", "rokoko", "vive", "kinect", "headset")

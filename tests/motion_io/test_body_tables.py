@@ -5,7 +5,7 @@ import pytest
 
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Seen
-from seerob.files.motion_capture import body_csv
+from seerob.files.motion_capture import body_table
 from seerob.files.motion_capture.body_table import Column, column
 from seerob.files.motion_capture.markers import MarkerReading
 
@@ -56,7 +56,7 @@ def text(delimiter=",", *, time="time [s]", unit=" [m]", person=None):
 def read(tmp_path, content, reading=READING, **more):
     path = tmp_path / "r.csv"
     path.write_text(content)
-    return body_csv.read(path, reading, seen=Seen.JOINTS, **more)
+    return body_table.read_person(path, reading, seen=Seen.JOINTS, **more)
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])

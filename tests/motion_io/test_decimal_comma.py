@@ -6,8 +6,8 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Seen
 from seerob.description.humans.skeleton import JOINTS
-from seerob.files.motion_capture import body_csv, joint_angles
-from seerob.files.motion_capture.decimal_comma import Commas
+from seerob.files.motion_capture import body_table, joint_angles
+from seerob.files.motion_capture.body_table import Commas
 from seerob.files.motion_capture.markers import MarkerReading
 
 KNEE = JOINTS.index("right_knee_extension")
@@ -30,7 +30,7 @@ def test_points(tmp_path):
     head = ";".join(["time [s]", *(f"{name} {axis} [m]" for name in names for axis in "xyz")])
     path = tmp_path / "r.csv"
     path.write_text("\n".join([head, *rows]), encoding="utf-8")
-    captured = body_csv.read(path, MarkerReading(file="r.csv"), seen=Seen.JOINTS, time_unit="")
+    captured = body_table.read_person(path, MarkerReading(file="r.csv"), seen=Seen.JOINTS, time_unit="")
     places = np.stack([frame.positions for frame in captured.frames])
     np.testing.assert_allclose(places[:, 0, 0], np.arange(4) / 8)
     np.testing.assert_allclose(places[:, 1], np.tile([0.1, 0.2, 1.6], (4, 1)))

@@ -8,7 +8,7 @@ import pytest
 
 from seerob.app.emulators.kinect import CAMERA
 from seerob.core.errors import InputError
-from seerob.files.motion_capture import kinect_bag, kinect_recording
+from seerob.files.motion_capture import kinect_recording, ros_bag
 from seerob.files.motion_capture.kinect_recording import Reading
 from seerob.protocols.tracking.kinect import JOINTS, body_object
 
@@ -33,7 +33,7 @@ def write(path, pictures, kind):
         return path, kinect_recording.read_json
     if kind in ("ros1", "ros2"):
         path = path / ("r.bag" if kind == "ros1" else "r")
-        return made_pictures.bag(path, pictures, ros2=kind == "ros2"), kinect_bag.read
+        return made_pictures.bag(path, pictures, ros2=kind == "ros2"), ros_bag.read
     path = path / "r.csv"
     path.write_text(wide(pictures) if kind == "wide" else long(pictures))
     return path, kinect_recording.read_text
@@ -133,7 +133,7 @@ def test_a_table_without_a_unit_is_asked_about(tmp_path, pictures):
 def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path, pictures):
     path = made_pictures.bag(tmp_path / "r.bag", pictures[:3])
     with pytest.raises(InputError, match="/body_tracking_data"):
-        kinect_bag.read(path, KNOWN, topic="/other")
+        ros_bag.read(path, KNOWN, topic="/other")
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(InputError, match="not a ROS bag that can be read"):
-        kinect_bag.read(path, KNOWN)
+        ros_bag.read(path, KNOWN)

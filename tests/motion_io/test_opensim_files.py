@@ -7,7 +7,7 @@ from seerob.core.errors import InputError
 from seerob.description.humans import manikin
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 from seerob.files.motion_capture import joint_angles, storage, trc
-from seerob.files.motion_capture import opensim_coordinates as opensim
+from seerob.files.motion_capture import joint_angles as opensim
 from seerob.files.motion_capture.markers import MarkerReading
 
 NAMES = ("LFHD", "C 7", "LASI", "LANK")

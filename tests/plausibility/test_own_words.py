@@ -20,7 +20,7 @@ from seerob.devices.sources.modbus_robot import joint_sample as modbus_sample
 from seerob.devices.sources.modbus_robot import standing
 from seerob.devices.sources.rtde import joint_sample as rtde_sample
 from seerob.files.trajectories.trajectory import position_noise
-from seerob.protocols.plc.modbus_map import load as load_map
+from seerob.protocols.plc.modbus import load as load_map
 from seerob.protocols.robots.fri import Edition, Monitoring, decode_monitoring, encode_monitoring
 from seerob.session.run import Judge, bind, engine_of
 from seerob.session.station import Station, load

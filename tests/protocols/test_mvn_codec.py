@@ -32,8 +32,18 @@ from seerob.protocols.tracking.mvn import (
     pack_scale,
     pack_tags,
 )
-from seerob.protocols.tracking.mvn_pose import Up, looks_y_up, pose, unit_of
-from seerob.protocols.tracking.mvn_segments import FINGERS, JOINTS, PARENTS, SEGMENTS, UNITY, names
+from seerob.protocols.tracking.mvn_pose import (
+    FINGERS,
+    JOINTS,
+    PARENTS,
+    SEGMENTS,
+    UNITY,
+    Up,
+    looks_y_up,
+    names,
+    pose,
+    unit_of,
+)
 
 RNG = np.random.default_rng(0)
 STEPS = np.array([[0, 0, 0.1]] * 23) + RNG.uniform(-0.03, 0.03, (23, 3))

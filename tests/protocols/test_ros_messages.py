@@ -10,8 +10,18 @@ import pytest
 from seerob.app.emulators.rosbridge import document
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros import rosbridge
-from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform, read, same_type
-from seerob.protocols.ros.ros_serialised import Edition, decode, encode
+from seerob.protocols.ros.ros_messages import (
+    Content,
+    Edition,
+    Joints,
+    Plan,
+    Point,
+    Transform,
+    decode,
+    encode,
+    read,
+    same_type,
+)
 from seerob.protocols.ros.rosbridge import Published, Reader
 
 SAID = {

@@ -6,7 +6,7 @@ import ssl
 import certifi
 import pytest
 
-from seerob.protocols.links.trusted_certificates import trusting
+from seerob.protocols.links.credentials import trusting
 
 END = "-----END CERTIFICATE-----\n"
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import InputError
 from seerob.description.humans.skeleton import BONES, JOINTS
-from seerob.files.motion_capture import joint_angles, opensim_coordinates, trc
+from seerob.files.motion_capture import joint_angles, trc
 from seerob.outputs.sinks import opensim
 from seerob.outputs.sinks.opensim import EstimatedCoordinates, OpenSim
 from seerob.outputs.tables.people import people
@@ -93,7 +93,7 @@ def test_coordinates_that_nobody_measured_are_named_in_the_header(tmp_path):
     for k in range(4):
         told.add(person.joints_measured(replace(run.snapshot(k), bones={"op": seen} if k else {})))
     text = "".join(told.lines())
-    named = {name for name in opensim_coordinates.coordinates() if f"{name} (75 % of the rows)" in text}
+    named = {name for name in joint_angles.coordinates() if f"{name} (75 % of the rows)" in text}
     assert named == {"knee_angle_r", "ankle_angle_r", "subtalar_angle_r", "mtp_angle_r"}
     assert "in 1 of 4 rows" in text
     told = EstimatedCoordinates()

@@ -77,7 +77,7 @@ def drfl(patch):
 def modbus_robot(_):
     from seerob.app.emulators.modbus import ModbusServer, program
     from seerob.devices.sources.modbus_robot import ModbusRobot
-    from seerob.protocols.plc.modbus_map import load
+    from seerob.protocols.plc.modbus import load
 
     played = program(load("doosan", Path()), swing(SIX), {"robot_state": "moving", "servo_on": True})
     server = ModbusServer(played).start()

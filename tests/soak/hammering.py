@@ -16,8 +16,8 @@ from unittest.mock import patch
 
 from seerob.core.errors import InputError, SeerobError
 from seerob.description.mesh_files import source as mesh_source
-from seerob.files.motion_capture import kinect_bag
-from seerob.files.tables import workbook
+from seerob.files.motion_capture import ros_bag
+from seerob.files.tables import table_files
 from soak.corpus import corpus
 from soak.made_cells import KINDS
 
@@ -77,7 +77,7 @@ def in_this_process():
             raise InputError.at(file, "", "takes too much memory to read") from None
 
     with ExitStack() as stack:
-        for module in (mesh_source, workbook, kinect_bag):
+        for module in (mesh_source, table_files, ros_bag):
             for name, instead in (("parsed", parsed), ("parsed_one_by_one", parsed_one_by_one)):
                 stack.enter_context(patch.object(module, name, instead, create=True))
         yield

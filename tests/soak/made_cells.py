@@ -266,8 +266,7 @@ def _limits(path):
 def _bag(path):
     from rosbags.rosbag1 import Writer
 
-    from seerob.protocols.ros.ros_messages import Content, Joints
-    from seerob.protocols.ros.ros_serialised import Edition, encode, store
+    from seerob.protocols.ros.ros_messages import Content, Edition, Joints, encode, store
 
     path.unlink(missing_ok=True)
     with Writer(path) as writer:

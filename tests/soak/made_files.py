@@ -19,11 +19,11 @@ from seerob.description.capture.mapping import read_conventions
 from seerob.description.humans import keyframes
 from seerob.devices.sources import bvh, mvnx
 from seerob.files.motion_capture import (
-    body_csv,
+    body_table,
     c3d,
     joint_angles,
-    kinect_bag,
     kinect_recording,
+    ros_bag,
     storage,
     tracker_file,
     trc,
@@ -285,7 +285,7 @@ FILES = {
         lambda path: joint_angles.from_table(path, file="f"),
     ),
     "marker table": Malformed(
-        "csv", _marker_table, lambda path: sound(body_csv.read(path, MARKERS, seen=Seen.MARKERS))
+        "csv", _marker_table, lambda path: sound(body_table.read_person(path, MARKERS, seen=Seen.MARKERS))
     ),
     "kinect json": Malformed(
         "json",
@@ -298,7 +298,7 @@ FILES = {
     "kinect bag": Malformed(
         "bag",
         lambda path: made_pictures.bag(path, made_pictures.pictures(2)),
-        lambda path: sound(kinect_bag.read(path, Reading("f"))),
+        lambda path: sound(ros_bag.read(path, Reading("f"))),
         mutated,
     ),
     "trackers jsonl": Malformed("jsonl", _write_trackers, _trackers),

@@ -9,8 +9,7 @@ from seerob.app.emulators.rosbridge import _typed, document
 from seerob.protocols.links.protobuf_wire import double, message, whole
 from seerob.protocols.ros import foxglove, ros_tcp, rosbridge
 from seerob.protocols.ros.foxglove import ServerChannel
-from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform
-from seerob.protocols.ros.ros_serialised import Edition, decode, encode
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Plan, Point, Transform, decode, encode
 from soak.mutations import refusals
 
 COUNTS = [pytest.param(1500, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]

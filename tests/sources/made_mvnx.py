@@ -9,8 +9,8 @@ from seerob.app.emulation.mvn_person import segments
 from seerob.description.humans import manikin
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
-from seerob.protocols.tracking.mvn_segments import JOINTS as MVN_JOINTS
-from seerob.protocols.tracking.mvn_segments import SEGMENTS
+from seerob.protocols.tracking.mvn_pose import JOINTS as MVN_JOINTS
+from seerob.protocols.tracking.mvn_pose import SEGMENTS
 
 PERSON = manikin.build(name="op", stature=1.8, mass=80, sex="male")
 BONE = dict(zip(("Pelvis", "L3", "T8", "Neck", "Head"), BONES[:5], strict=True)) | {

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError
-from seerob.devices.motion_files.pose_frame import PoseFrame
+from seerob.devices.motion_files import PoseFrame
 from seerob.devices.sources.bag import Bag
 from seerob.files.motion_capture.ros_bag import TimeBase, topics_of
-from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform
-from seerob.protocols.ros.ros_serialised import Edition, encode, store
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Plan, Point, Transform, encode, store
 from seerob.workstation.source import Target
 
 NAMES = ("j1", "j2")

@@ -15,7 +15,7 @@ from seerob.devices.sources.body_csv import BodyCsv
 from seerob.devices.sources.joint_angles import JointAngleFile
 from seerob.devices.sources.kinect_recording import KinectRecording
 from seerob.devices.sources.trc import Trc
-from seerob.files.motion_capture import opensim_coordinates as opensim
+from seerob.files.motion_capture import joint_angles as opensim
 from seerob.files.motion_capture import storage, trc
 from seerob.protocols.tracking.kinect import JOINTS as KINECT
 from seerob.protocols.tracking.kinect import body_object

@@ -28,8 +28,7 @@ from seerob.app.emulators.rosbridge import document
 from seerob.core.samples import JointSample, PoseSample
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.foxglove import Foxglove
-from seerob.protocols.ros.ros_messages import Content, Joints
-from seerob.protocols.ros.ros_serialised import Edition, encode
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, encode
 
 NAMES = ("a", "b")
 TURN = 0.3

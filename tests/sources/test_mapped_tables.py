@@ -245,12 +245,12 @@ def test_more_rows_than_are_taken_are_refused(tmp_path, monkeypatch):
 
 def test_larger_files_and_longer_lines_than_are_taken_are_refused(tmp_path, monkeypatch):
     write_csv(tmp_path / "a.csv", HEADER, rows(20))
-    monkeypatch.setattr("seerob.files.tables.text.MAX_LINE", 50)
+    monkeypatch.setattr("seerob.files.tables.table_files.MAX_LINE", 50)
     assert "longer than 50 characters" in refused(Csv, tmp_path, file="a.csv")
     write_sheet(tmp_path / "a.xlsx", [HEADER, *rows(20)])
-    monkeypatch.setattr("seerob.files.tables.workbook.MAX_UNPACKED", 1000)
+    monkeypatch.setattr("seerob.files.tables.table_files.MAX_UNPACKED", 1000)
     assert "more than is taken" in refused(Excel, tmp_path, file="a.xlsx")
-    monkeypatch.setattr("seerob.files.tables.workbook.MAX_BYTES", 1000)
+    monkeypatch.setattr("seerob.files.tables.table_files.LARGEST_WORKBOOK", 1000)
     assert "bytes, more than 1000" in refused(Excel, tmp_path, file="a.xlsx")
 
 

@@ -27,8 +27,19 @@ from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.sources.modbus import Modbus
 from seerob.devices.sources.modbus_robot import ModbusRobot
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.protocols.plc.modbus import MOST, Block, Place, Table, Type, Words, blocks, decode, encode
-from seerob.protocols.plc.modbus_map import load, names
+from seerob.protocols.plc.modbus import (
+    MOST,
+    Block,
+    Place,
+    Table,
+    Type,
+    Words,
+    blocks,
+    decode,
+    encode,
+    load,
+    names,
+)
 from seerob.recording.recording import Recording
 from seerob.workstation.source import Target
 from seerob.workstation.variables.dictionary import Kind, Variable

@@ -24,7 +24,7 @@ from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.mvn import BETTER_GONE, MOST_CHARACTERS, Frames, Mvn, Transport, Unit
 from seerob.protocols.tracking.mvn import Header, Items, Kind, decode, encode, pack_items
-from seerob.protocols.tracking.mvn_segments import SEGMENTS, names
+from seerob.protocols.tracking.mvn_pose import SEGMENTS, names
 from seerob.workstation.source import Target
 
 PATIENCE = 120.0

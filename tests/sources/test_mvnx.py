@@ -15,7 +15,7 @@ from seerob.devices.capture.xsens import anatomical, differences, joint_angles, 
 from seerob.devices.sources import mvnx
 from seerob.devices.sources import mvnx as _mvnx_stream
 from seerob.devices.sources.mvnx import lengths, read
-from seerob.protocols.tracking.mvn_segments import JOINTS, SEGMENTS
+from seerob.protocols.tracking.mvn_pose import JOINTS, SEGMENTS
 
 CLEAR = np.abs(angles(Q)[..., 0]) < 85
 """Away from the singular pose, where two of three angles are anything, shape (40, 22)."""

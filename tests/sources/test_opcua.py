@@ -25,10 +25,9 @@ from seerob.devices.live.listening import Listener
 from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.opcua_robot import OpcuaRobot
 from seerob.devices.variables.live_source import Change, Picture
-from seerob.protocols.plc.opcua_address import Address, address, browse_name, node_name, written
+from seerob.protocols.plc.opcua_address import Address, address, browse_name, node_name, number, unit, written
 from seerob.protocols.plc.opcua_client import Security
 from seerob.protocols.plc.opcua_robotics import natural
-from seerob.protocols.plc.opcua_units import number, unit
 from seerob.workstation.source import Target
 from seerob.workstation.variables.dictionary import Kind, Variable
 from seerob.workstation.variables.units import UNITS

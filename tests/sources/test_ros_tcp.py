@@ -22,8 +22,7 @@ from seerob.devices.live.listening import Listener
 from seerob.devices.sources.ros_tcp import RosTcp, Side
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros import ros_tcp
-from seerob.protocols.ros.ros_messages import Content, Joints, Transform
-from seerob.protocols.ros.ros_serialised import Edition, decode, encode
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Transform, decode, encode
 from seerob.protocols.ros.ros_tcp import Frame, Splitter
 
 NAMES = ("a", "b", "c")

@@ -20,8 +20,7 @@ from seerob.core.samples import JointSample, PoseSample, Quality
 from seerob.devices.live.listening import Listener
 from seerob.devices.ros import live_source as _ros
 from seerob.devices.sources.rosbridge import Rosbridge
-from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform
-from seerob.protocols.ros.ros_serialised import Edition
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Plan, Point, Transform
 from seerob.protocols.ros.rosbridge import Compression
 
 UR10 = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")

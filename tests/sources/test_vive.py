@@ -23,7 +23,7 @@ from seerob.devices.sources.vive import Link, Vive
 from seerob.devices.sources.vive_recording import ViveRecording
 from seerob.files.motion_capture import tracker_file
 from seerob.protocols import ProtocolError
-from seerob.protocols.tracking import mvn_segments
+from seerob.protocols.tracking import mvn_pose
 from seerob.protocols.tracking.openvr_devices import OpenVr
 from seerob.protocols.tracking.vive import Device, Devices, decode, encode, missing, plain_role
 from seerob.workstation.source import Target
@@ -105,7 +105,7 @@ def test_a_recording_is_read_back(tmp_path, suffix):
     opened = ViveRecording(human="anna", file=path.name).open(tmp_path, target())
     samples = list(opened.samples)
     assert len(samples) == 15
-    row = mvn_segments.SEGMENTS.index(WORN["left_hand"])
+    row = mvn_pose.SEGMENTS.index(WORN["left_hand"])
     np.testing.assert_allclose(
         by_name(samples[3])["left_hand"].position, PERSON(0.1).positions[row], atol=1e-6
     )

@@ -15,7 +15,7 @@ from seerob.core.samples import Quality
 from seerob.devices.sources.vrpn import Vrpn, names_of
 from seerob.files.motion_capture.upright import Up
 from seerob.protocols import ProtocolError
-from seerob.protocols.tracking import mvn_segments, vrpn
+from seerob.protocols.tracking import mvn_pose, vrpn
 from sources.listening import by_name, heard
 
 PERSON = animated("library:reach")
@@ -51,7 +51,7 @@ def test_a_stream_in_any_pieces_is_the_same_stream():
     poses = [pose for message in whole if (pose := reader.take(message)) is not None]
     assert [pose.tracker for pose in poses] == [*FIVE, *FIVE]
     assert poses[-1].t == pytest.approx(0.75)
-    row = mvn_segments.SEGMENTS.index(WORN["right_hand"])
+    row = mvn_pose.SEGMENTS.index(WORN["right_hand"])
     np.testing.assert_array_equal(poses[-1].position, PERSON(0.75).positions[row])
 
 
@@ -81,7 +81,7 @@ def test_trackers_are_where_they_were_sent_from(units):
     assert set(points) == set(FIVE)
     sent = PERSON(samples[-1].t_device)
     for role, point in points.items():
-        row = mvn_segments.SEGMENTS.index(WORN[role])
+        row = mvn_pose.SEGMENTS.index(WORN[role])
         np.testing.assert_allclose(point.position, sent.positions[row], atol=1e-9)
     assert samples[-1].quality is Quality.GOOD
     assert "waist" in findings[0].text

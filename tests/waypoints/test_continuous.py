@@ -10,8 +10,7 @@ from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.continuous import Wish, continuous
 from seerob.files.waypoints.inverse import parse, rotation_vectors, solutions
-from seerob.files.waypoints.joint_limits import JointLimits
-from seerob.files.waypoints.timing import Limits, needed, profile, reachable
+from seerob.files.waypoints.timing import JointLimits, Limits, needed, profile, reachable
 from seerob.files.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
 HOME = (0.0, -1.2, 1.4, -1.7, -1.57, 0.0)

@@ -7,7 +7,7 @@ from seerob.core.transforms import rotation_from_rpy, wxyz_from_rotation
 from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.continuous import Wish, continuous
-from seerob.files.waypoints.joint_limits import JointLimits
+from seerob.files.waypoints.timing import JointLimits
 from seerob.files.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
 HOME = np.array([0.0, -1.2, 1.4, -1.7, -1.57, 0.0])

@@ -208,7 +208,7 @@ def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources:
 
     found = readable(path, allowed)
     if sources and any(_is_workbook(source) for source in found.entries["sources"].values()):
-        begin("seerob.files.tables.workbook", "openpyxl")
+        begin("seerob.files.tables.table_files", "openpyxl")
     if any(_is_mjcf(robot) for robot in found.entries["robots"].values()):
         begin("seerob.description.formats.mjcf_compiled", "mujoco")
     from seerob.session.station import Station

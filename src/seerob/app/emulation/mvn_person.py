@@ -17,7 +17,7 @@ from seerob.description.humans import keyframes, manikin, motion
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.sources import bvh, mvnx
-from seerob.protocols.tracking.mvn_segments import SEGMENTS
+from seerob.protocols.tracking.mvn_pose import SEGMENTS
 from seerob.workstation.source import Target
 
 WORN = {

@@ -242,7 +242,7 @@ def read(path: Path, target: Target) -> Motion:
     """
     from seerob.devices.sources.csv import Csv
     from seerob.devices.sources.excel import Excel
-    from seerob.files.tables.candidates import WORKBOOKS
+    from seerob.files.tables.table_files import WORKBOOKS
 
     kind = Excel if path.suffix.lower() in WORKBOOKS else Csv
     return _played(kind(robot=target.name, file=path.name).open(path.parent, target))

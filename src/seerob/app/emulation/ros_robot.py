@@ -9,8 +9,7 @@ from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Rate, Ready, RobotOptions, option, port
 from seerob.core.extras import need
-from seerob.protocols.ros.ros_messages import Content, Joints, Said
-from seerob.protocols.ros.ros_serialised import Edition
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Said
 
 JOINT_STATES = "/joint_states"
 EPOCH = 1_700_000_000.0

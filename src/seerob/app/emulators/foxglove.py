@@ -15,7 +15,7 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.links.tcp_server import stop_accepting
 from seerob.protocols.ros import foxglove
 from seerob.protocols.ros.foxglove import ServerChannel
-from seerob.protocols.ros.ros_serialised import Edition, encode, store
+from seerob.protocols.ros.ros_messages import Edition, encode, store
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection

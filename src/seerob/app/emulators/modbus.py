@@ -18,8 +18,18 @@ from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
 from seerob.core.extras import need
-from seerob.protocols.plc.modbus import Place, Table, Type, Words, blocks, encode
-from seerob.protocols.plc.modbus_map import Joints, RegisterMap, SignalEntry, load
+from seerob.protocols.plc.modbus import (
+    Joints,
+    Place,
+    RegisterMap,
+    SignalEntry,
+    Table,
+    Type,
+    Words,
+    blocks,
+    encode,
+    load,
+)
 
 Program = Mapping[Place, Callable[[float], float | bool]]
 """Place → the raw value in it at a time since it was made [s]."""

@@ -17,7 +17,7 @@ from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.devices.capture.xsens import anatomical, joint_angles
 from seerob.protocols.tracking import mvn
 from seerob.protocols.tracking.mvn import Header, Kind, ScalePoint, encode, pack_items, pack_scale, pack_tags
-from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS, UNITY
+from seerob.protocols.tracking.mvn_pose import JOINTS, PARENTS, SEGMENTS, UNITY
 
 IDS = np.arange(1, len(SEGMENTS) + 1)
 HEAD_OVER_NECK = 2.0

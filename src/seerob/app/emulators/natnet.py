@@ -16,7 +16,7 @@ from seerob.app.emulation.mvn_person import Person
 from seerob.app.emulation.options import PersonOptions, Ready, option, port
 from seerob.core.transforms import turned
 from seerob.files.motion_capture.upright import world_from_file
-from seerob.protocols.tracking import mvn_segments, natnet
+from seerob.protocols.tracking import mvn_pose, natnet
 from seerob.protocols.tracking.natnet import (
     RIGID_BODY,
     SKELETON,
@@ -147,7 +147,7 @@ def _bones() -> tuple[tuple[str, str, int], ...]:
 
 
 BONES = _bones()
-_ROWS = [mvn_segments.SEGMENTS.index(segment) for _, segment, _ in BONES]
+_ROWS = [mvn_pose.SEGMENTS.index(segment) for _, segment, _ in BONES]
 _WORLD = world_from_file("y")
 
 
@@ -223,7 +223,7 @@ class NatnetServer(Emulator):
             skeletons.append(Skeleton(number, bones))
         bodies: list[Body] = []
         for index, (person, segment) in enumerate(self.worn.values()):
-            pose, row = person(t), mvn_segments.SEGMENTS.index(segment)
+            pose, row = person(t), mvn_pose.SEGMENTS.index(segment)
             bodies += _as_bodies(pose.positions[row, None], pose.wxyz[row, None], 100 + index)
         return Frame(k, t, tuple(bodies), tuple(skeletons), models_changed=False, recording=False)
 

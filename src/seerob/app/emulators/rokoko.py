@@ -9,7 +9,7 @@ import numpy as np
 from seerob.app.emulation.message_sender import MessageSender, Way
 from seerob.app.emulation.mvn_person import Person
 from seerob.app.emulation.options import PersonOptions, Ready, To, option, port
-from seerob.protocols.tracking import mvn_segments
+from seerob.protocols.tracking import mvn_pose
 from seerob.protocols.tracking.rokoko import PORT, SEGMENTS, Actor, Scene, encode
 
 _SPINE = {"hip": "Pelvis", "spine": "L5", "chest": "T12", "neck": "Neck", "head": "Head"}
@@ -20,8 +20,8 @@ def _row(segment: str) -> int:
     for side in ("left", "right"):
         part = segment.removeprefix(side)
         if part != segment:
-            return mvn_segments.SEGMENTS.index(side.capitalize() + _LIMBS.get(part, part))
-    return mvn_segments.SEGMENTS.index(_SPINE[segment])
+            return mvn_pose.SEGMENTS.index(side.capitalize() + _LIMBS.get(part, part))
+    return mvn_pose.SEGMENTS.index(_SPINE[segment])
 
 
 _ROWS = [_row(segment) for segment in SEGMENTS]

@@ -17,8 +17,7 @@ from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.ros import ros_tcp
-from seerob.protocols.ros.ros_messages import ros1_name, same_type
-from seerob.protocols.ros.ros_serialised import Edition, encode, store
+from seerob.protocols.ros.ros_messages import Edition, encode, ros1_name, same_type, store
 from seerob.protocols.ros.ros_tcp import Frame, Splitter
 
 PAUSE = 0.02

@@ -20,8 +20,7 @@ from seerob.app.emulation.options import Ready, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.core.extras import need
 from seerob.protocols.links.tcp_server import stop_accepting
-from seerob.protocols.ros.ros_messages import Joints, Plan, Said, Transform, ros1_name
-from seerob.protocols.ros.ros_serialised import Edition, encode
+from seerob.protocols.ros.ros_messages import Edition, Joints, Plan, Said, Transform, encode, ros1_name
 from seerob.protocols.ros.rosbridge import MAX_MESSAGE, Compression
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from seerob.app.emulation.message_sender import MessageSender, Way
 from seerob.app.emulation.mvn_person import FIVE, WORN, Person
 from seerob.app.emulation.options import PersonOptions, Ready, option, port
 from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
-from seerob.protocols.tracking import mvn_segments
+from seerob.protocols.tracking import mvn_pose
 from seerob.protocols.tracking.vive import PORT, Device, Devices, encode
 
 STRAP = rotation_from_rpy((0.4, -0.7, 1.1))
@@ -28,7 +28,7 @@ def worn(person: Person, roles: Sequence[str] = FIVE) -> Trackers:
         person: Who wears them.
         roles: Of `WORN`.
     """
-    rows = [mvn_segments.SEGMENTS.index(WORN[role]) for role in roles]
+    rows = [mvn_pose.SEGMENTS.index(WORN[role]) for role in roles]
 
     def at(t: float) -> Devices:
         pose = person(t)

@@ -12,7 +12,7 @@ from typing import Annotated
 from seerob.app.emulation.background import Emulator
 from seerob.app.emulation.mvn_person import FIVE, WORN, Person
 from seerob.app.emulation.options import PersonOptions, Ready, option, port
-from seerob.protocols.tracking import mvn_segments, vrpn
+from seerob.protocols.tracking import mvn_pose, vrpn
 
 OTHERS = 7
 """Number of the pose's type here: each server chooses its own."""
@@ -68,7 +68,7 @@ class VrpnServer(Emulator):
         pose = self.person(t)
         found = []
         for k, segment in enumerate(self.worn.values()):
-            row = mvn_segments.SEGMENTS.index(segment)
+            row = mvn_pose.SEGMENTS.index(segment)
             payload = vrpn.encode_pose(0, self.units * pose.positions[row], pose.wxyz[row][[1, 2, 3, 0]])
             found.append(vrpn.encode(t, k, OTHERS, payload))
         return b"".join(found)

@@ -39,7 +39,7 @@ from seerob.core.verdict import keeps
 from seerob.criteria.contact.limits import RegionArrays
 from seerob.criteria.criterion import worst
 from seerob.files.tables.grid import read_numbers
-from seerob.files.tables.text import TextGrid, check_file, encoding_of, head
+from seerob.files.tables.table_files import TextGrid, check_file, encoding_of, head
 from seerob.model.model import Mechanism, Model
 from seerob.workstation.plausibility.ranges import Quantity, implausible, row_of, sentence
 

@@ -13,7 +13,7 @@ from seerob.core.snapshot import Basis, Label, Marker, Polyline, Result, Sphere,
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.files.waypoints.continuous import Programmed
-from seerob.files.waypoints.joint_limits import JointLimits
+from seerob.files.waypoints.timing import JointLimits
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State

@@ -24,9 +24,9 @@ from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.repetition import GAP, WINDOW
 from seerob.criteria.scoring.spans import ROUNDING
 from seerob.description.humans.angles import NEEDS, SIDED, Angles
-from seerob.files.tables.candidates import candidates
 from seerob.files.tables.grid import Cell, Grid, blank, number, place
 from seerob.files.tables.mapping import Mapping as TableMapping
+from seerob.files.tables.table_files import candidates
 from seerob.workstation.conversion import convert, tables
 from seerob.workstation.tables.task_phase import Period, Seconds
 

@@ -1,10 +1,14 @@
-"""Base of the sources that read captured motion of a person from a file."""
+"""Base of the sources that read captured motion of a person from a file.
+
+What files of markers are told alike: unit and vertical, where the file does not say them.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import ClassVar
 
@@ -32,7 +36,19 @@ from seerob.devices.capture.options import (
     person,
     placed_only,
 )
+from seerob.files.motion_capture.markers import MarkerReading
+from seerob.files.motion_capture.upright import Up
 from seerob.workstation.source import Opened, Source, Target
+
+
+class Length(StrEnum):
+    """Unit of coordinates."""
+
+    M = "m"
+    CM = "cm"
+    MM = "mm"
+    INCH = "inch"
+
 
 MOST_FRAMES = 5_000_000
 """Of one recording: over five hours at 240 frames per second."""
@@ -134,6 +150,25 @@ class CaptureFile(Source, frozen=True, kw_only=True):
                 return
             if since >= 0:
                 yield frame
+
+
+class MarkerFile(CaptureFile, frozen=True, kw_only=True):
+    """Base of the files of points whose unit or vertical may be open."""
+
+    up: Up | None = None
+    """Axis of the file that points up; what the file says, or told by heads being above feet."""
+    unit: Length | None = None
+    """Unit of the coordinates; what the file says when not given."""
+
+    def reading(self) -> MarkerReading:
+        """How the file is to be read."""
+        return MarkerReading(
+            file=self.file,
+            subject=self.subject,
+            up=self.up,
+            unit=self.unit or "",
+            convention=self.convention,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import numpy as np
 
 from seerob.core.orientation import product
 from seerob.core.transforms import Array, rotation_from_wxyz
-from seerob.protocols.tracking.mvn_segments import JOINTS, SEGMENTS
+from seerob.protocols.tracking.mvn_pose import JOINTS, SEGMENTS
 
 ISB_AXES: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Columns: the ISB's X, Y, Z in axes with x forward, y left, z up."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, suggestion
 from seerob.core.transforms import Array, rotation_from_wxyz, transform
-from seerob.devices.motion_files.pose_frame import PoseFrame, fixed_links
+from seerob.devices.motion_files import PoseFrame, fixed_links
 from seerob.protocols.ros.ros_messages import Transform
 from seerob.workstation.source import Target
 

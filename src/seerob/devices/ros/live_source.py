@@ -18,13 +18,13 @@ from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.devices.live.listening import LiveSource
-from seerob.devices.motion_files.pose_frame import PoseFrame
+from seerob.devices.motion_files import PoseFrame
 from seerob.devices.ros.frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.devices.ros.joints import JointGather, PlayedPlan
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Said
-from seerob.protocols.ros.rosbridge_client import SILENCE, Heard
+from seerob.protocols.ros.rosbridge import SILENCE, Heard
 from seerob.workstation.source import Opened, Target
 
 ASKED = 1.2

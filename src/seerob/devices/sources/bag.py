@@ -14,8 +14,7 @@ from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
-from seerob.devices.motion_files.pose_frame import PoseFrame
-from seerob.devices.motion_files.trajectory_file import TrajectoryFile
+from seerob.devices.motion_files import PoseFrame, TrajectoryFile
 from seerob.devices.ros.frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.devices.ros.joints import JointGather
 from seerob.files.motion_capture import ros_bag

@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from seerob.description.capture.captured import Captured, Seen
-from seerob.devices.capture.marker_file import MarkerFile
-from seerob.files.motion_capture import body_csv
+from seerob.devices.capture.file_source import MarkerFile
+from seerob.files.motion_capture import body_table
 from seerob.files.motion_capture.frame_arrays import about
 from seerob.files.tables.mapping import TimeUnit
 
@@ -26,5 +26,7 @@ class BodyCsv(MarkerFile, frozen=True, kw_only=True):
         Raises:
             InputError: It is no such table, or the unit, the vertical or the person is not clear.
         """
-        captured = body_csv.read(path, self.reading(), seen=self.seen, time_unit=self.time_unit or "")
+        captured = body_table.read_person(
+            path, self.reading(), seen=self.seen, time_unit=self.time_unit or ""
+        )
         return replace(captured, findings=about(captured.findings, self.human))

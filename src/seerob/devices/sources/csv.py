@@ -6,8 +6,8 @@ from pathlib import Path
 
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding
-from seerob.devices.motion_files.mapped_table import MappedTable
-from seerob.files.tables.candidates import WORKBOOKS
+from seerob.devices.motion_files import MappedTable
+from seerob.files.tables.table_files import WORKBOOKS
 from seerob.files.trajectories.trajectory import Trajectory
 from seerob.workstation.source import Target
 

@@ -17,7 +17,7 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.links.websocket_link import Link, linked
 from seerob.protocols.ros import foxglove
 from seerob.protocols.ros.foxglove import Operation, ServerChannel
-from seerob.protocols.ros.rosbridge_client import NONSENSE, Heard
+from seerob.protocols.ros.rosbridge import NONSENSE, Heard
 
 _log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Captured
 from seerob.devices.capture.file_source import CaptureFile
-from seerob.files.motion_capture import kinect_bag, kinect_recording
+from seerob.files.motion_capture import kinect_recording, ros_bag
 from seerob.files.motion_capture.frame_arrays import about
 from seerob.files.motion_capture.kinect_recording import Reading
 from seerob.files.tables.mapping import LengthUnit, TimeUnit
@@ -37,7 +37,7 @@ class KinectRecording(CaptureFile, frozen=True, kw_only=True):
         reading = Reading(self.file, self.subject, level=self.at != Pose())
         suffix = path.suffix.lower()
         if suffix in BAGS or path.is_dir():
-            captured = kinect_bag.read(path, reading, topic=self.topic)
+            captured = ros_bag.read(path, reading, topic=self.topic)
         elif suffix == ".json":
             captured = kinect_recording.read_json(path, reading)
         elif suffix in TEXTS:

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding
-from seerob.devices.motion_files.log_columns import Joints, Log, missing, open_log
-from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
+from seerob.devices.motion_files import Joints, Log, TrajectoryFile, missing, notes, open_log
 from seerob.files.tables.mapping import AngleUnit
 from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.workstation.source import Target

@@ -24,9 +24,8 @@ from seerob.devices.live.listening import LiveSource
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc import modbus
-from seerob.protocols.plc.modbus import Block, blocks
+from seerob.protocols.plc.modbus import SUFFIX, Block, Joints, RegisterMap, blocks, load
 from seerob.protocols.plc.modbus_client import Device, Refused, connect, take
-from seerob.protocols.plc.modbus_map import SUFFIX, Joints, RegisterMap, load
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables.dictionary import BadValue
 

@@ -20,9 +20,8 @@ from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.files.tables.mapping import toml_value
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.credentials import Server, secret
+from seerob.protocols.links.credentials import Server, secret, trusting
 from seerob.protocols.links.json_pointer import document, parts
-from seerob.protocols.links.trusted_certificates import trusting
 from seerob.protocols.plc import sparkplug
 from seerob.protocols.plc.broker_pulse import Pulse, known_end
 from seerob.workstation.source import Opened, Target

@@ -33,8 +33,17 @@ from seerob.protocols.links.datagrams import listening
 from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.tracking import mvn
 from seerob.protocols.tracking.mvn import Assembly, Items, Kind, Scale, Tags, decode
-from seerob.protocols.tracking.mvn_pose import METRES, POSES, Up, looks_y_up, pose, unit_of
-from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
+from seerob.protocols.tracking.mvn_pose import (
+    JOINTS,
+    METRES,
+    PARENTS,
+    POSES,
+    SEGMENTS,
+    Up,
+    looks_y_up,
+    pose,
+    unit_of,
+)
 
 _log = logging.getLogger(__name__)
 

@@ -30,8 +30,7 @@ from seerob.core.transforms import Array
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.devices.capture.file_source import CaptureFile
 from seerob.devices.capture.xsens import anatomical, correction, differences
-from seerob.protocols.tracking.mvn_pose import METRES, unit_of
-from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
+from seerob.protocols.tracking.mvn_pose import JOINTS, METRES, PARENTS, SEGMENTS, unit_of
 
 CHUNK = 1 << 16
 LONGEST = 1 << 20

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from seerob.core.errors import InputError, Problem
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
+from seerob.devices.motion_files import TrajectoryFile, notes
 from seerob.files.tables.grid import Numbers, blank, number, read_numbers
-from seerob.files.tables.text import BLANKS, TextGrid, encoding_of
+from seerob.files.tables.table_files import BLANKS, TextGrid, encoding_of
 from seerob.files.trajectories.trajectory import Trajectory
 from seerob.workstation.source import Target
 

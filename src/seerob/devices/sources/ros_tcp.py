@@ -24,10 +24,9 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.links.connection import Connection, connected
 from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.ros import ros_tcp
-from seerob.protocols.ros.ros_messages import ros1_name, same_type
-from seerob.protocols.ros.ros_serialised import Edition, decode, store
+from seerob.protocols.ros.ros_messages import Edition, decode, ros1_name, same_type, store
 from seerob.protocols.ros.ros_tcp import Frame, Splitter
-from seerob.protocols.ros.rosbridge_client import NONSENSE, Heard
+from seerob.protocols.ros.rosbridge import NONSENSE, Heard
 from seerob.workstation.source import Opened, Target
 
 _log = logging.getLogger(__name__)

@@ -14,10 +14,8 @@ from msgspec import Meta
 from seerob.devices.ros.live_source import RosSource
 from seerob.protocols.links.websocket_link import linked
 from seerob.protocols.ros import rosbridge
-from seerob.protocols.ros.ros_messages import ros1_name
-from seerob.protocols.ros.ros_serialised import Edition
-from seerob.protocols.ros.rosbridge import Compression
-from seerob.protocols.ros.rosbridge_client import Heard, hear
+from seerob.protocols.ros.ros_messages import Edition, ros1_name
+from seerob.protocols.ros.rosbridge import Compression, Heard, hear
 
 
 class Rosbridge(RosSource, frozen=True, kw_only=True):

@@ -22,9 +22,8 @@ from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.credentials import Server, secret, server_of
+from seerob.protocols.links.credentials import Server, secret, server_of, trusting
 from seerob.protocols.links.http_answer import answer
-from seerob.protocols.links.trusted_certificates import trusting
 from seerob.protocols.plc import s7_web
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables.dictionary import Variable

@@ -13,7 +13,7 @@ import numpy as np
 from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.devices.motion_files.pose_frame import PoseFrame, fixed_links
+from seerob.devices.motion_files import PoseFrame, fixed_links
 from seerob.files.tables.mapping import Mapping
 from seerob.files.tables.motion import read_tool_motion
 from seerob.files.trajectories.checks import sampling_findings

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from seerob.description.capture.captured import Captured
-from seerob.devices.capture.marker_file import MarkerFile
+from seerob.devices.capture.file_source import MarkerFile
 from seerob.files.motion_capture import trc
 from seerob.files.motion_capture.frame_arrays import about
 

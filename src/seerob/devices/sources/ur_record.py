@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding
-from seerob.devices.motion_files.log_columns import Joints, Log, LogValues, open_log
-from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
+from seerob.devices.motion_files import Joints, Log, LogValues, TrajectoryFile, notes, open_log
 from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.workstation.source import Target
 

@@ -18,14 +18,14 @@ from seerob.core.quantities import Pose, Radians, unit
 from seerob.core.same_names import by_name
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
-from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
+from seerob.devices.motion_files import TrajectoryFile, notes
 from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.continuous import Continuous, Wish, continuous
 from seerob.files.waypoints.inverse import parse
-from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.reading import Point, read_program
 from seerob.files.waypoints.reduction import reduced
+from seerob.files.waypoints.timing import JointLimits
 from seerob.files.waypoints.waypoint import Program
 from seerob.workstation.source import Target
 

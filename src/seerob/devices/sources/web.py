@@ -23,10 +23,9 @@ from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.credentials import Server, secret, server_of
+from seerob.protocols.links.credentials import Server, secret, server_of, trusting
 from seerob.protocols.links.http_answer import LARGEST, answer
 from seerob.protocols.links.json_pointer import document, parts
-from seerob.protocols.links.trusted_certificates import trusting
 from seerob.protocols.links.websocket_link import linked_to
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables.dictionary import Variable

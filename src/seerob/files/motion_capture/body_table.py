@@ -3,6 +3,10 @@
 Delimited text. Headers say which point, which coordinate, in which unit: ``PELVIS_X [mm]``, ``LeftHand
 position y (m)``, ``head qw``, ``wrist confidence``; with a row per point ``time [s], joint, x [mm], y, z, qw
 …``. A cell that is empty or ``NaN`` was not seen.
+
+Numbers with a decimal comma, as spreadsheets of many countries write them.
+
+A table of captured motion as the recording of one person.
 """
 
 from __future__ import annotations
@@ -19,12 +23,107 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.transforms import Array
-from seerob.files.motion_capture.decimal_comma import Commas
+from seerob.description.capture.captured import Captured, Seen
 from seerob.files.motion_capture.frame_arrays import MAX_VALUES, check_size
-from seerob.files.tables.candidates import candidates
+from seerob.files.motion_capture.markers import MarkerReading, Points, recording
 from seerob.files.tables.grid import MAX_COLUMNS, MAX_PROBLEMS, Grid
 from seerob.files.tables.headers import Role, understand
 from seerob.files.tables.mapping import Mapping
+from seerob.files.tables.table_files import candidates
+
+_WITH_COMMA = re.compile(r"[+-]?(\d+),(\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_GROUP = 3
+"""Digits between the separators of thousands."""
+
+
+class Commas:
+    """Reads the cells of one file and finds out whether its commas can be taken for decimal ones.
+
+    Args:
+        file: For messages.
+    """
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+        self._seen = ""
+        self._sure = False
+
+    def number(self, text: str) -> float:
+        """The number in a cell.
+
+        Raises:
+            ValueError: It is none.
+        """
+        if "," not in text:
+            return float(text)
+        match = _WITH_COMMA.fullmatch(text)
+        if match is None:
+            raise ValueError(f"{text[:40]!r} is no number")
+        whole, after = match.groups()
+        self._seen = self._seen or text
+        # Thousands come in groups of three and do not begin with 0.
+        self._sure = self._sure or len(after) != _GROUP or len(whole) > _GROUP or whole[0] == "0"
+        return float(text.replace(",", "."))
+
+    def check(self) -> None:
+        """Refuse a file whose commas may as well separate thousands.
+
+        Raises:
+            InputError: Every comma in it is followed by three digits.
+        """
+        if self._seen and not self._sure:
+            what = (
+                f"every comma is followed by three digits, as in {self._seen[:40]!r}: decimals or thousands?"
+            )
+            raise InputError.at(self._file, "", what, "write numbers with a decimal point")
+
+
+def read_person(path: Path, reading: MarkerReading, *, seen: Seen, time_unit: str = "") -> Captured:
+    """The points of one person.
+
+    Args:
+        path: Delimited text.
+        reading: What the user says of it; ``subject`` is a value of the column ``person``.
+        seen: What the points are.
+        time_unit: Of the time, when its header does not say it.
+
+    Raises:
+        InputError: It is no such table, or the unit, the vertical or the person is not clear.
+    """
+    from dataclasses import replace
+
+    table = read(path, file=reading.file, time_unit=time_unit)
+    persons = sorted(set(table.persons))
+    rows = np.ones(len(table.t), bool)
+    if len(persons) > 1:
+        chosen = _chosen_person(table.persons, reading)
+        rows = np.array([p == chosen for p in table.persons])
+        reading = replace(reading, subject="")
+    order = np.flatnonzero(rows)
+    confidence = table.values[order, :, 7] if "confidence" in table.has else None
+    if confidence is not None:
+        confidence = np.clip(confidence, 0.0, 1.0)
+    points = Points(
+        names=table.names,
+        t=table.t[order],
+        values=table.values[order, :, :3],
+        unit=table.unit,
+        wxyz=table.values[order, :, 3:7] if "orientation" in table.has else None,
+        confidence=confidence,
+    )
+    return recording(points, reading, seen=seen)
+
+
+def _chosen_person(persons: tuple[str, ...], reading: MarkerReading) -> str:
+    counts = {name: persons.count(name) for name in sorted(set(persons)) if name}
+    if reading.subject in counts:
+        return reading.subject
+    if not reading.subject and len(counts) == 1:
+        return next(iter(counts))
+    shown = ", ".join(f"{name} ({n} rows)" for name, n in list(counts.items())[:12])
+    what = f"no person {reading.subject!r}" if reading.subject else "several persons"
+    raise InputError.at(reading.file, "subject", what, f"name one of: {shown}")
+
 
 MAX_HEADER = 200
 _BRACKET = re.compile(r"\s*[\[(]\s*([^\])]{0,20}?)\s*[\])]\s*")

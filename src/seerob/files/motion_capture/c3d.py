@@ -21,7 +21,7 @@ from seerob.core.transforms import Array
 from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture.frame_arrays import check_size
 from seerob.files.motion_capture.markers import MarkerReading, Points, recording
-from seerob.files.tables.text import check_file
+from seerob.files.tables.table_files import check_file
 
 BLOCK = 512
 MAGIC = 0x50

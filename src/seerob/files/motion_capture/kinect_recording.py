@@ -2,7 +2,7 @@
 
 Azure Kinect body tracking as ``offline_processor`` writes it is one JSON object with a list of frames, of any
 size: its elements are read one after the other, without holding the file. As text it is a table as in
-`body_table`, in the frame of the depth camera. Bags are read in `kinect_bag`.
+`body_table`, in the frame of the depth camera. Bags are read in `ros_bag`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from seerob.files.motion_capture import body_table, persons
 from seerob.files.motion_capture.body_table import BodyTable
 from seerob.files.motion_capture.frame_arrays import FrameArrays, check_size, checked
 from seerob.files.motion_capture.upright import camera_upright
-from seerob.files.tables.text import check_file
+from seerob.files.tables.table_files import check_file
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.kinect import JOINTS, LAYOUT, Body, Picture, camera_body, decode_frame
 

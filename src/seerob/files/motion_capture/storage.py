@@ -15,7 +15,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.files.motion_capture.frame_arrays import MAX_VALUES
 from seerob.files.tables.grid import MAX_PROBLEMS
-from seerob.files.tables.text import encoding_of, lines
+from seerob.files.tables.table_files import encoding_of, lines
 
 MAX_HEADER = 200
 """Lines before ``endheader``."""

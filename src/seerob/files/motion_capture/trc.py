@@ -24,7 +24,7 @@ from seerob.files.motion_capture.frame_arrays import MAX_VALUES
 from seerob.files.motion_capture.markers import MarkerReading, Points, recording
 from seerob.files.motion_capture.upright import world_from_file
 from seerob.files.tables.grid import MAX_PROBLEMS
-from seerob.files.tables.text import encoding_of, lines
+from seerob.files.tables.table_files import encoding_of, lines
 
 HEAD = (
     "DataRate",

@@ -18,11 +18,11 @@ from msgspec import convert, structs
 from seerob.core.errors import InputError, Problem
 from seerob.core.orientation import CONVENTIONS, columns_of, is_convention
 from seerob.core.transforms import Array
-from seerob.files.tables.candidates import candidates
 from seerob.files.tables.grid import blank, number
 from seerob.files.tables.headers import ROTATION_VECTOR, UR_POSE, Role
 from seerob.files.tables.layout import Layout, find_layout
 from seerob.files.tables.mapping import Mapping, Motion
+from seerob.files.tables.table_files import candidates
 from seerob.workstation.source import Target
 
 ORIENTATIONS: dict[tuple[str, ...], str] = {

@@ -16,9 +16,8 @@ import numpy as np
 
 from seerob.core.transforms import Array
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.pieces import Piece, Rounding, rounding
-from seerob.files.waypoints.timing import Limits, reachable
+from seerob.files.waypoints.timing import JointLimits, Limits, reachable
 from seerob.files.waypoints.waypoint import Program
 
 SLOPES = (1.2, 1.4, 1.6, 1.8, 2.0, 2.2)

@@ -18,9 +18,8 @@ from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.blending import Leg, meet, rounded
 from seerob.files.waypoints.inverse import Branch, branch, is_classic, solutions, why_not
-from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.pieces import SINGULAR, Piece, joint_line, tool_way
-from seerob.files.waypoints.timing import Limits, Profile, profile
+from seerob.files.waypoints.timing import JointLimits, Limits, Profile, profile
 from seerob.files.waypoints.waypoint import Program, Waypoint
 from seerob.workstation.source import Target
 

@@ -28,11 +28,17 @@ from seerob.core.printable import printable_table
 from seerob.core.quantities import Metres3, Pose, Radians, Table, unit
 from seerob.core.samples import Vec4
 from seerob.core.transforms import rotation_from_rpy, wxyz_from_rotation
-from seerob.files.tables.candidates import DELIMITERS, WORKBOOKS
 from seerob.files.tables.grid import Grid, blank, number, place
 from seerob.files.tables.mapping import SI
-from seerob.files.tables.text import TextGrid, check_file, encoding_of
-from seerob.files.tables.workbook import SheetGrid, sheets
+from seerob.files.tables.table_files import (
+    DELIMITERS,
+    WORKBOOKS,
+    SheetGrid,
+    TextGrid,
+    check_file,
+    encoding_of,
+    sheets,
+)
 from seerob.files.waypoints.urp import read_urp
 from seerob.files.waypoints.urscript import read_urscript
 from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Move, Program, ToolPose, Waypoint

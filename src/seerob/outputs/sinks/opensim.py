@@ -20,7 +20,7 @@ from seerob.core.samples import BodySample, Sample
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.core.transforms import Array
 from seerob.description.humans.skeleton import JOINTS
-from seerob.files.motion_capture import opensim_coordinates, storage, trc
+from seerob.files.motion_capture import joint_angles, storage, trc
 from seerob.outputs.sentences import percent
 from seerob.outputs.sink import Sink
 from seerob.outputs.tables.growing_table import GrowingTable
@@ -51,7 +51,7 @@ class EstimatedCoordinates:
         self._told += 1
         lost: list[bool] = np.any(_follows()[:, [not v for v in joints]], axis=1).tolist()
         self._estimated.update(
-            name for name, is_lost in zip(opensim_coordinates.coordinates(), lost, strict=True) if is_lost
+            name for name, is_lost in zip(joint_angles.coordinates(), lost, strict=True) if is_lost
         )
 
     def lines(self) -> list[str]:
@@ -71,7 +71,7 @@ def _follows() -> Array:
     """Whether a coordinate follows a joint of ours, shape (37, 53); the pelvis' place follows its joints."""
     rest = 0.1 * np.cos(np.arange(len(JOINTS)))  # no angle is 0, where some would hide
     moved = np.vstack([rest, rest + STEP * np.eye(len(JOINTS))])
-    found = opensim_coordinates.from_joints(moved, moved[:, :3])
+    found = joint_angles.from_joints(moved, moved[:, :3])
     return np.asarray((np.abs(found[1:] - found[0]) > STEP**2).T)
 
 
@@ -156,7 +156,7 @@ class OpenSimWriter(WholeFolder):
         table = self._table(name, ".trc", lambda table, rate: list(_trc_head(table, rate)))
         if self._later(name, t):
             # In the same axes as the coordinates: OpenSim takes both files of one motion.
-            cells = next(trc.cells(opensim_coordinates.in_its_world(places)[None]))
+            cells = next(trc.cells(joint_angles.in_its_world(places)[None]))
             titles = [f"{axis}\t{marker}" for marker in names for axis in "XYZ"]
             row = {"frame": str(table.rows + 1), "time": f"{t:.6f}"}
             table.add(row | dict(zip(titles, cells, strict=True)))
@@ -165,9 +165,9 @@ class OpenSimWriter(WholeFolder):
         waiting = self._waiting.pop(name, [])
         if not waiting:
             return
-        names = opensim_coordinates.coordinates()
-        lengths = np.array([opensim_coordinates.is_length(label) for label in names])
-        found = opensim_coordinates.from_joints(
+        names = joint_angles.coordinates()
+        lengths = np.array([joint_angles.is_length(label) for label in names])
+        found = joint_angles.from_joints(
             np.array([q for _, q, _ in waiting]), np.array([place for _, _, place in waiting])
         )
         values = np.where(lengths, found, np.degrees(found)).tolist()

@@ -8,13 +8,17 @@ looked for in ``credentials.toml`` in the user's configuration folder, which nob
     secret = "…"
     host = "192.168.0.7:8883"
     clear_text = false
+
+Who is believed to be who they say over TLS, read once and again when the file changes.
 """
 
 from __future__ import annotations
 
 import os
+import ssl
 import stat
 import tomllib
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -24,6 +28,34 @@ import msgspec
 from seerob.core.errors import InputError
 from seerob.core.files.toml_file import read_toml
 from seerob.core.host_name import is_loopback
+
+MOST = 32
+"""Servers whose certificates stay read."""
+
+
+def trusting(ca: Path | None, *, server: str) -> ssl.SSLContext:
+    """What a client needs to check a server's certificate.
+
+    A system trusts more than a hundred signers: to read them at each of many attempts to reach a machine
+    that is switched off takes more time than the attempts, and memory that is given back late.
+
+    Args:
+        ca: Certificates that are trusted instead of the system's (PEM).
+        server: Its URL or name: what a library sets for one server is not set for another.
+
+    Raises:
+        OSError: The file cannot be read, or is no certificate (`ssl.SSLError` is one).
+    """
+    if ca is None:
+        return _read(None, server, 0, 0)
+    about = ca.stat()
+    return _read(ca, server, about.st_mtime_ns, about.st_size)
+
+
+@lru_cache(MOST)
+def _read(ca: Path | None, server: str, changed: int, size: int) -> ssl.SSLContext:
+    return ssl.create_default_context(cafile=ca)
+
 
 PREFIX, HOST, CLEAR = "SEEROB_", "_HOST", "_CLEAR_TEXT"
 PORTS = {"http": 80, "ws": 80, "https": 443, "wss": 443, "opc.tcp": 4840}

@@ -1,14 +1,28 @@
-"""Modbus registers: where a value is, what its bits mean, and which are asked for together."""
+"""Modbus registers: where a value is, what its bits mean, and which are asked for together.
+
+Register maps of robots: data files that say where a controller has its joints and states.
+
+One file per maker, here or beside a workstation; every entry says where its address comes from.
+"""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
+from importlib import resources
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta
+
+from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.files.toml_file import read_toml
+from seerob.core.quantities import Seconds
+from seerob.workstation.conversion import convert
+from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables.units import unit
 
 PORT = 502
 MOST = 120
@@ -157,3 +171,189 @@ def blocks(places: Iterable[Place]) -> tuple[Block, ...]:
                 continue
         found.append(Block(place.table, place.at, place.type.size))
     return tuple(found)
+
+
+MOST_SIGNALS = 200
+MOST_JOINTS = 12
+SUFFIX = ".toml"
+
+Scale = Annotated[float, Meta(gt=0)]
+Text = Annotated[str, Meta(min_length=1, max_length=1000)]
+
+
+class Joints(msgspec.Struct, frozen=True, kw_only=True):
+    """One value per joint, one after the other."""
+
+    at: Annotated[int, Meta(ge=0, le=65535)]
+    """Of the first joint."""
+    type: Type
+    unit: str
+    scale: Scale
+    """The raw number times this is in ``unit``."""
+    source: Text
+    table: Table = Table.HOLDING
+    words: Words | None = None
+
+    def __post_init__(self) -> None:
+        if self.type is Type.BIT:
+            raise ValueError("a joint is no bit")
+        if unit(self.unit) is None:
+            raise ValueError(f"unknown unit {self.unit!r}")
+
+    @property
+    def factor(self) -> float:
+        """From the raw number to SI."""
+        known = unit(self.unit)
+        return self.scale * (known.factor if known is not None else float("nan"))
+
+    def places(self, count: int) -> tuple[Place, ...]:
+        """Where each joint is."""
+        size = self.type.size
+        return tuple(
+            Place(table=self.table, at=self.at + size * k, type=self.type, words=self.words)
+            for k in range(count)
+        )
+
+
+class SignalEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """One state or figure of the controller."""
+
+    name: Annotated[
+        str,
+        Meta(pattern=r"^[A-Za-z_][\w.]{0,99}$", description="a letter or _, then letters, digits, _ and ."),
+    ]
+    at: Annotated[int, Meta(ge=0, le=65535)]
+    type: Type
+    source: Text
+    table: Table = Table.HOLDING
+    words: Words | None = None
+    bit: Annotated[int, Meta(ge=0, le=15)] | None = None
+    unit: str | None = None
+    scale: float = 1.0
+    choices: dict[str, str] = {}
+
+    @property
+    def place(self) -> Place:
+        """Where it is."""
+        return Place(table=self.table, at=self.at, type=self.type, words=self.words, bit=self.bit)
+
+    @property
+    def variable(self) -> Variable:
+        """What it means."""
+        kind = Kind.CHOICE if self.choices else Kind.BOOL if self.type is Type.BIT else Kind.NUMBER
+        return Variable(
+            name=self.name.replace(".", "/"),
+            source="",
+            address=None,
+            type=kind,
+            unit=self.unit,
+            scale=self.scale,
+            choices=self.choices,
+        )
+
+
+class Together(msgspec.Struct, frozen=True, kw_only=True):
+    """Registers that are asked in one question, with what lies between those that are used."""
+
+    first: Annotated[int, Meta(ge=0, le=65535)]
+    count: Annotated[int, Meta(ge=1, le=MOST)]
+    table: Table = Table.HOLDING
+
+
+class States(msgspec.Struct, frozen=True, kw_only=True):
+    """What the controller's state says of its joints."""
+
+    signal: str
+    """Name of the one of ``signals`` that has it."""
+    unsure: tuple[str, ...] = ()
+    """States in which it does not know its joints."""
+    doubtful: tuple[str, ...] = ()
+    """States in which they may be shown, not judged."""
+
+
+class RegisterMap(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a robot's controller has what."""
+
+    title: Text
+    source: Text
+    """Document that it is from."""
+    joints: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    refresh: Seconds
+    """Interval at which the controller renews its values [s]."""
+    position: Joints
+    velocity: Joints | None = None
+    torque: Joints | None = None
+    tool: Joints | None = None
+    """x, y and z of the tool centre point in the base frame of the controller."""
+    state: States | None = None
+    blocks: Annotated[tuple[Together, ...], Meta(max_length=20)] = ()
+    signals: Annotated[tuple[SignalEntry, ...], Meta(max_length=MOST_SIGNALS)] = ()
+
+    def __post_init__(self) -> None:
+        for key, joints, si in (
+            ("position", self.position, ("rad", "m")),
+            ("velocity", self.velocity, ("rad/s", "m/s")),
+            ("torque", self.torque, ("N·m", "N")),
+            ("tool", self.tool, ("m",)),
+        ):
+            known = None if joints is None else unit(joints.unit)
+            if joints is not None and (known is None or known.si not in si):
+                raise ValueError(f"{key}.unit = {joints.unit!r} is not one of {' or '.join(si)}")
+            if joints is not None:
+                joints.places(self.joints)
+        variables = {s.name: s.variable for s in self.signals}
+        if len(variables) < len(self.signals):
+            raise ValueError("a name in signals is there twice")
+        for signal in self.signals:
+            _ = signal.place
+        if self.state is not None:
+            words = variables[self.state.signal].choices.values() if self.state.signal in variables else ()
+            unknown = {*self.state.unsure, *self.state.doubtful} - set(words)
+            if not words or unknown:
+                what = ", ".join(sorted(unknown)) or self.state.signal
+                raise ValueError(f"state: no signal with choices has {what}")
+
+    def places(self) -> dict[str, Place]:
+        """Everything that it has: ``q0`` …, ``qd0`` …, ``tau0`` …, ``tcp0`` … and ``signal <name>``."""
+        found: dict[str, Place] = {}
+        groups = (("q", self.position), ("qd", self.velocity), ("tau", self.torque), ("tcp", self.tool))
+        for key, joints in groups:
+            count = 3 if joints is self.tool else self.joints
+            for k, place in enumerate(() if joints is None else joints.places(count)):
+                found[f"{key}{k}"] = place
+        return found | {f"signal {s.name}": s.place for s in self.signals}
+
+    def questions(self) -> tuple[Block, ...]:
+        """What is asked for, the question with the first joint first."""
+        stated = [Block(b.table, b.first, b.count) for b in self.blocks]
+        alone = [p for p in self.places().values() if not any(b.covers(p) for b in stated)]
+        first = self.position.places(self.joints)[0]
+        return tuple(sorted((*stated, *blocks(alone)), key=lambda b: not b.covers(first)))
+
+
+def names() -> tuple[str, ...]:
+    """Names of the maps that ship."""
+    files = (resources.files(__package__) / "modbus_maps").iterdir()
+    return tuple(sorted(f.name.removesuffix(SUFFIX) for f in files if f.name.endswith(SUFFIX)))
+
+
+def load(name: str, folder: Path) -> RegisterMap:
+    """A map that ships, by its name, or one beside the workstation, by its file name.
+
+    Raises:
+        UnknownName: There is no such map.
+        InputError: With every mistake in the file.
+    """
+    if name.endswith(SUFFIX):
+        path = folder / name
+    elif name in names():
+        with resources.as_file(resources.files(__package__) / "modbus_maps" / f"{name}{SUFFIX}") as shipped:
+            path = shipped
+    else:
+        raise UnknownName("register map", name, names())
+    table, _ = read_toml(path)
+    problems: list[Problem] = []
+    found = convert(table, RegisterMap, file=str(path), key="", problems=problems)
+    if found is None:
+        raise InputError(problems)
+    return found

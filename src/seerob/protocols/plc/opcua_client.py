@@ -25,8 +25,7 @@ from seerob.core.errors import SeerobError
 from seerob.core.extras import need
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.credentials import Server, secret, server_of
-from seerob.protocols.plc.opcua_address import Address, browse_name, node_name
-from seerob.protocols.plc.opcua_units import unit
+from seerob.protocols.plc.opcua_address import Address, browse_name, node_name, unit
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client

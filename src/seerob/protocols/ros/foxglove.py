@@ -21,14 +21,14 @@ from seerob.protocols.ros.ros_messages import (
     MOST_TRANSFORMS,
     NANO,
     Content,
+    Edition,
     Joints,
     Said,
     Transform,
     read,
     same_type,
 )
-from seerob.protocols.ros.ros_serialised import Edition
-from seerob.protocols.ros.ros_serialised import decode as deserialise
+from seerob.protocols.ros.ros_messages import decode as deserialise
 
 PORT = 8765
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")

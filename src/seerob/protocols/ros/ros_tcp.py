@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.json_pointer import document
-from seerob.protocols.ros.ros_serialised import Edition
+from seerob.protocols.ros.ros_messages import Edition
 
 PORT = 10000
 VERSION = "v0.7.0"

@@ -24,14 +24,13 @@ from seerob.core.samples import PoseSample, Quality, Sample
 from seerob.core.snapshot import Snapshot
 from seerob.core.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.devices.live.listening import because
-from seerob.devices.motion_files.pose_frame import fixed_links
+from seerob.devices.motion_files import fixed_links
 from seerob.model.model import Model
 from seerob.outputs.sink import Closing
 from seerob.protocols.links.connection import Connection, connected
 from seerob.protocols.links.websocket_link import Link, linked
 from seerob.protocols.ros import ros_tcp, rosbridge
-from seerob.protocols.ros.ros_messages import ros1_name
-from seerob.protocols.ros.ros_serialised import Edition, store
+from seerob.protocols.ros.ros_messages import Edition, ros1_name, store
 from seerob.protocols.ros.rosbridge import Status
 from seerob.session.opening import target
 from seerob.workstation.tables.writing import CartesianTarget, TargetMessage, TargetWire

@@ -1,1 +1,0 @@
-"""What sources of trajectory files share."""

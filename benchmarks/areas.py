@@ -24,11 +24,11 @@ import mujoco
 import numpy as np
 import trimesh
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.description.shapes.shapes import box_mesh
 from seerob.distance.depth import Depths
 from seerob.distance.least import Shapes
-from seerob.distance.rays import Rays
+from seerob.distance.scan import Rays
 from seerob.kernels.crossings import encloses
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains

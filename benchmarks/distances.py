@@ -24,7 +24,7 @@ import pinocchio as pin
 import trimesh
 from defusedxml import ElementTree
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.transforms import Array, rotation_from_rpy
 from seerob.distance.least import DistanceKind, Per, Query, Shapes
 

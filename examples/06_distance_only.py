@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.description.shapes.shapes import box_mesh
 from seerob.distance.least import DistanceKind, Query, Shapes
 

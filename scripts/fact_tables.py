@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from seerob.description.humans import anthropometry
+from seerob.description.humans.anthropometry import table
 from seerob.description.humans.skeleton import AXES
-from seerob.description.humans.tables import table
 from seerob.description.robots import library
 from seerob.workstation.plausibility.ranges import data
 

@@ -5,7 +5,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.core.shapes import Mesh, Solid, capsule, dilated_rectangle
 from seerob.distance.least import Shapes
 
 IDENTITY = np.eye(3)

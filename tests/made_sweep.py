@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains
 from seerob.model.volumes.moving import posed

@@ -21,10 +21,10 @@ from seerob.core.files import bounded, parser_process
 from seerob.core.files.parser_process import parsed
 from seerob.core.files.toml_file import read_toml
 from seerob.core.printable import printable
+from seerob.description import mesh_files as mesh_source
 from seerob.description.capture.mapping import read_conventions
 from seerob.description.loader import load_robot
 from seerob.description.mesh import load_meshes
-from seerob.description.mesh_files import source as mesh_source
 from seerob.description.norms import body_limits
 from seerob.description.robots.calibration import read_calibration
 from seerob.files.motion_capture import ros_bag

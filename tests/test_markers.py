@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from seerob import criteria
 from seerob.core.markers import Marker, changed, drawn, plain
-from seerob.core.shapes.floor_polygon import cut_ears
+from seerob.core.shapes import cut_ears
 from seerob.core.snapshot import Highlight, Label, Polyline, Prism, Rays, Result, Verdict
 from seerob.core.transforms import Array
 

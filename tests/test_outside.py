@@ -13,7 +13,7 @@ from made_cell import FLOATING, TWO_R, two_r
 from seerob.app.cli import main
 from seerob.core.errors import InputError
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.workstation.outside import named_outside
+from seerob.workstation.allowed import named_outside
 
 ROWS = "".join(f"{k / 20:g},{10 * k},0,PLANTED\n" for k in range(5))
 MOTION = f"t [s],j1 [deg],j2 [deg],Worker\n{ROWS}"

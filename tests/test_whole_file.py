@@ -12,7 +12,7 @@ from interrupted_anywhere import interrupted_anywhere
 from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_file
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.description.shapes.glb import stl_bytes, write_mesh
 from seerob.outputs.sinks.dossier import write_whole
 from seerob.outputs.tables.growing_table import GrowingTable

@@ -13,7 +13,7 @@ import pytest
 from made_cells import make_cell, seerob
 
 import seerob as sr
-from seerob.app.console.printable import PrintableLines
+from seerob.app.console.terminal import PrintableLines
 from seerob.core.errors import InputError
 from seerob.core.markers import Label
 from seerob.core.printable import obeyed, printable, printable_record

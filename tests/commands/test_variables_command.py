@@ -14,7 +14,7 @@ from seerob.app.console.terminal import Exit
 from seerob.app.emulators.siemens_web import SiemensWeb
 from seerob.core.errors import InputError
 from seerob.devices.variables.live_source import Node
-from seerob.workstation.variables.dictionary import read
+from seerob.workstation.variables import read
 
 STATION = """
 variables = "variables.toml"

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from made_cell import UR10, made
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.criteria.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs, thickest
 from seerob.distance.least import Shapes
 

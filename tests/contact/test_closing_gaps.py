@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.criteria.contact.clamped_regions import ClosingGaps
 from seerob.criteria.contact.clamping import clamps, pinch_pairs
 from seerob.distance.least import Shapes

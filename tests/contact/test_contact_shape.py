@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.criteria.contact.limits import RegionArrays
 from seerob.criteria.contact.shape import (
     ContactShape,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.criteria.contact.shape import (
     ContactShape,
     body_shape,

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.core.shapes.floor_polygon import prism_mesh
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid, prism_mesh
 from seerob.core.transforms import Array
 from seerob.criteria.contact.shape import ContactShape, body_shape, mesh_shape, solid_shape
 

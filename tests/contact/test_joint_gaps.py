@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, Q0, UR10, made, results_at, state_at, two_r
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact import joint_gaps
 from seerob.criteria.contact.clamped_regions import Clamping

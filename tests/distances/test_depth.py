@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from concave import bumpy_ball
-from seerob.core.shapes.floor_polygon import prism_mesh
-from seerob.core.shapes.geometry import Solid, capsule
+from seerob.core.shapes import Solid, capsule, prism_mesh
 from seerob.description.shapes.shapes import box_mesh
 from seerob.distance.depth import Depths
 from seerob.distance.least import Shapes

@@ -7,7 +7,7 @@ import trimesh
 
 from concave import IDENTITY, SLOT, SOLIDS, bumpy_ball, poses
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.distance.least import DistanceKind, Query, Shapes
 
 

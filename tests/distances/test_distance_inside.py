@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from concave import IDENTITY, SLOT, SOLIDS, U_BOXES, boxes, bumpy_ball, poses
-from seerob.core.shapes.geometry import Solid, capsule
+from seerob.core.shapes import Solid, capsule
 from seerob.distance.least import DistanceKind, Query, Shapes
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from concave import SOLIDS, bumpy_ball, poses
-from seerob.core.shapes.geometry import Solid, capsule
+from seerob.core.shapes import Solid, capsule
 from seerob.distance.least import Query, Shapes
-from seerob.distance.rays import Rays
+from seerob.distance.scan import Rays
 
 I3, ORIGIN = np.eye(3)[None], np.zeros((1, 3))
 

@@ -11,7 +11,7 @@ from seerob.app.console.terminal import Exit
 from seerob.app.emulation.options import EmulatorOptions
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.plugin import kinds, load
-from seerob.workstation.expectations import described, unit_of
+from seerob.workstation.conversion import described, unit_of
 
 KINDS = kinds(PACKAGE)
 

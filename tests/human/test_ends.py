@@ -8,7 +8,7 @@ from made_capture import PERSON, captured, frames_of, source, walking, workstati
 
 from seerob.core.samples import BodyPoint
 from seerob.criteria.postures.rule import bind_posture
-from seerob.description.capture.ends import ENDS, aimed, bare, swing, turned, untold
+from seerob.description.capture.estimated import ENDS, aimed, bare, swing, turned, untold
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import AXES, BONES, bone_poses
 from seerob.session import run as road

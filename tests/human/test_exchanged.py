@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, source, walking
 
-from seerob.description.capture.exchanged import Exchanges
+from seerob.description.capture.captured import Exchanges
 from seerob.description.humans.skeleton import BONES
 from seerob.workstation.source import Target
 

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.snapshot import Origin
 from seerob.description.description import Description, JointKind
 from seerob.description.humans import anthropometry, manikin, skin
+from seerob.description.humans.anthropometry import table
 from seerob.description.humans.skeleton import AXES, BONES, bone_poses
-from seerob.description.humans.tables import table
 
 SEXES, LENGTHS = ("male", "female"), ("drillis", "deleva")
 PEOPLE = st.tuples(st.floats(1.2, 2.3), st.floats(30, 250), st.sampled_from(SEXES), st.sampled_from(LENGTHS))

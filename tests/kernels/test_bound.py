@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from seerob.core.shapes.geometry import Solid, capsule
+from seerob.core.shapes import Solid, capsule
 from seerob.distance.least import Per, Query, Shapes
 from seerob.kernels.bound import Layout
 

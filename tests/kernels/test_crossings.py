@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from concave import bumpy_ball
-from seerob.core.shapes.floor_polygon import prism_mesh
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh, prism_mesh
 from seerob.description.shapes.shapes import box_mesh
 from seerob.kernels.crossings import UX, UY, UZ, crossings, encloses
 from seerob.kernels.tree_file import tree_of

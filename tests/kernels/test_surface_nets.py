@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from made_sweep import inside
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.distance.voxels import VoxelGrid
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from seerob.core.shapes.track import Track
+from seerob.core.shapes import Track
 from seerob.twin.machines.following import follow
 from seerob.workstation.tables.machines import Fingers, Route
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.description.shapes.decomposition import convex_parts
 
 

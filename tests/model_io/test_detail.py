@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from surface_distance import hausdorff
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.description.shapes.detail import display_mesh, physics_mesh
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from seerob.description.description import groups
 from seerob.description.loader import load_robot
-from seerob.description.pose import groups
 from seerob.description.robots import library
 from seerob.description.robots.maker_geometry import with_geometry_of
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.core.shapes import Mesh, Solid, capsule, dilated_rectangle
 from seerob.description.shapes.glb import glb_bytes, mesh_hash, shaded, shown, solid_mesh
 from seerob.description.shapes.moments import of_closed_mesh, of_solid
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Origin
 from seerob.description.shapes.mass_properties import from_shape
 

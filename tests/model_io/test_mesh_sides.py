@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from made_cell import made, results_at
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.description.shapes.mesh_bodies import winding_number
-from seerob.description.shapes.mesh_sides import sided
+from seerob.description.shapes.mesh_mending import sided
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 BOX = trimesh.creation.box([6, 6, 6])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.core.shapes.geometry import Mesh, capsule, dilated_rectangle
+from seerob.core.shapes import Mesh, capsule, dilated_rectangle
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import rotation_from_rpy
 from seerob.description.shapes.moments import (

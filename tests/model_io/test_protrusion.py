@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.core.shapes import Mesh, Solid, capsule, dilated_rectangle
 from seerob.description.description import Description, Link
 from seerob.description.robots.maker_geometry import outside_distances, with_protrusions
 from seerob.description.shapes import shapes

@@ -8,10 +8,10 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import capsule
+from seerob.core.shapes import capsule
 from seerob.core.transforms import rotation_from_rpy
 from seerob.model.mounting.specification import extreme_points
-from seerob.recording.filing import filed
+from seerob.recording.format import filed
 
 GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = { box = [0.2, 0.1, 0.1] }\nmass = 0.5\n'
 PART = '[[workpieces]]\nname = "part"\non = "grip"\nshape = { sphere = 0.05 }\ndensity = 1000\n'
@@ -178,7 +178,7 @@ def test_massless_frame_between_joints_changes_nothing(tmp_path):
 
 
 def test_extreme_points_bound_every_point_of_the_solids():
-    from seerob.core.shapes.geometry import Solid
+    from seerob.core.shapes import Solid
     from seerob.description.shapes.shapes import box_mesh
 
     solids = [

@@ -8,7 +8,7 @@ import pytest
 
 from seerob.core.errors import InputError
 from seerob.description.humans.skeleton import BONES, bone_poses
-from seerob.model.mounting.people import SLIPS, describe, size
+from seerob.model.mounting.overrides import SLIPS, describe, size
 from seerob.workstation.workstation import Human
 
 CHAIN = ("ankle_height", "shank", "thigh", "pelvis", "lumbar", "thorax", "neck", "head")

@@ -24,17 +24,17 @@ from seerob.devices.live.listening import LiveSource
 from seerob.model.mounting.in_place import implausible
 from seerob.session.reading import BASES, read
 from seerob.session.station import Station, load
-from seerob.workstation.expectations import is_struct, members, unit_of
-from seerob.workstation.plausibility.of_file import (
+from seerob.workstation.conversion import is_struct, members, unit_of
+from seerob.workstation.plausibility.ranges import (
     FOLLOWS,
     LISTS,
     PLUGINS,
+    data,
     entries_of,
     findings,
     listed,
     unknown,
 )
-from seerob.workstation.plausibility.ranges import data
 from seerob.workstation.workstation import TABLES, Confirmed, Engine, Workstation
 
 ROOT = Path(__file__).parents[2]

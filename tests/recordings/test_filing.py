@@ -6,8 +6,7 @@ import pytest
 
 import seerob as sr
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.recording import filing
-from seerob.recording.filing import SOURCES, source_files
+from seerob.recording.format import SOURCES, source_files
 
 
 @pytest.fixture
@@ -26,7 +25,7 @@ def line(name, content):
 
 
 def test_a_large_file_and_a_folder_are_kept_as_the_hashes_that_sha256sum_prints(folder, monkeypatch):
-    monkeypatch.setattr(filing, "LARGEST", 100)
+    monkeypatch.setattr("seerob.recording.format.LARGEST", 100)
     named = ("small.csv", "large.bag", "walk", "../beside.csv", "none.csv", "library:walk")
     parts = [line(f"walk/{name}", name.encode()) for name in ("metadata.yaml", "walk_0.db3")]
     kept = {
@@ -40,7 +39,7 @@ def test_a_large_file_and_a_folder_are_kept_as_the_hashes_that_sha256sum_prints(
 
 
 def test_a_run_from_a_large_file_is_computed_again_without_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(filing, "LARGEST", 100)
+    monkeypatch.setattr("seerob.recording.format.LARGEST", 100)
     rows = "".join(f"{k / 10},{k},-90,90,-90,-90,0\n" for k in range(5))
     header = "time [s]," + ",".join(f"J{i} [deg]" for i in range(1, 7))
     (tmp_path / "motion.csv").write_text(f"{header}\n{rows}")

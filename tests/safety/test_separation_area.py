@@ -10,7 +10,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, person, results_at, state_at, two_r
 from seerob.core.errors import InputError, UnknownName
 from seerob.criteria.judging import Judge
-from seerob.distance.offset_shell import offset_shell
+from seerob.distance.voxels import offset_shell
 from seerob.twin.engine import Engine
 
 CELL = (

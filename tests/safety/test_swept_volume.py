@@ -6,7 +6,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, heard, made, two_r
 from made_sweep import inside
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Verdict
 from seerob.model.volumes.swept import swept_volume
 from seerob.session.run import Judge

@@ -6,7 +6,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.transforms import rotation_from_axis_angle, rotation_from_wxyz
 from seerob.description.shapes.glb import glb_bytes
 from seerob.outputs.sinks.recorder import Recorder

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.snapshot import (
     Arrow,
     Box,
@@ -25,11 +25,9 @@ from seerob.core.snapshot import (
 from seerob.description.shapes.glb import glb_bytes
 from seerob.kernels.paint import raster
 from seerob.outputs.palette import FILL
-from seerob.outputs.picture.camera import look_along
-from seerob.outputs.picture.canvas import in_front
-from seerob.outputs.picture.glb_reader import read_glb
+from seerob.outputs.picture.canvas import in_front, look_along
 from seerob.outputs.picture.picture import Stage
-from seerob.outputs.picture.stage_bodies import creases, tone
+from seerob.outputs.picture.stage_bodies import creases, read_glb, tone
 
 RED, GREEN = (0.8, 0.1, 0.1, 1), (0.1, 0.7, 0.1, 1)
 SIZE = (200, 150)

@@ -17,7 +17,7 @@ from seerob.core.page_messages import Tracking
 from seerob.devices.live.headset_offers import Offers, read
 from seerob.devices.live.listening import LiveSource
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 from soak.elsewhere import Elsewhere
 
 SILENCE = 0.2

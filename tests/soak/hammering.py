@@ -15,7 +15,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from seerob.core.errors import InputError, SeerobError
-from seerob.description.mesh_files import source as mesh_source
+from seerob.description import mesh_files as mesh_source
 from seerob.files.motion_capture import ros_bag
 from seerob.files.tables import table_files
 from soak.corpus import corpus

@@ -28,9 +28,9 @@ from seerob.devices.sources.tool_path import ToolPath
 from seerob.devices.sources.ur_record import UrRecord
 from seerob.files.trajectories import path_map
 from seerob.session import reading
+from seerob.workstation import variables
 from seerob.workstation.source import Target
 from seerob.workstation.tables.controller_zones import zones_of
-from seerob.workstation.variables import dictionary
 from soak.made_files import FILES, Malformed, _lines, _said, _workbook
 from soak.mutations import mutated, mutated_text, mutated_zip
 
@@ -227,8 +227,8 @@ def _tool_path(path):
 
 def _signals(path):
     known = (
-        dictionary.Variable(name="belt/speed", source="plc", address="v", unit="mm/s", range=(0, 1000)),
-        dictionary.Variable(name="clear", source="plc", address="c", type=dictionary.Kind.BOOL),
+        variables.Variable(name="belt/speed", source="plc", address="v", unit="mm/s", range=(0, 1000)),
+        variables.Variable(name="clear", source="plc", address="c", type=variables.Kind.BOOL),
     )
     source = SignalsCsv(name="plc", file=path.name, time="t", time_unit="ms")
     _heard(source.open(path.parent, Target(variables=known)))
@@ -312,7 +312,7 @@ CELLS = {
         "csv", _map, lambda path: path_map.read_map(path.read_bytes(), name="m", units=("rad", "rad"))
     ),
     "workstation": Malformed("toml", _said(STATION), _station),
-    "variables": Malformed("toml", _said(DICTIONARY), lambda path: dictionary.read(path)),
+    "variables": Malformed("toml", _said(DICTIONARY), lambda path: variables.read(path)),
     "zones of a controller": Malformed("toml", _said(ZONES), _zones),
     "measured contacts": Malformed("toml", _said(MEASURED), lambda path: measured.read(path)),
     "measured curve": Malformed(

@@ -9,7 +9,7 @@ import pytest
 
 from seerob.devices.variables.live_source import Change, Picture, VariablesSource
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 SPEED = Variable(name="speed", source="plc", address=1, unit="mm/s", range=(0, 2000), timeout=0.5)
 DOOR = Variable(name="door", source="plc", address=2, type=Kind.BOOL)

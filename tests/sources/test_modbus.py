@@ -42,7 +42,7 @@ from seerob.protocols.plc.modbus import (
 )
 from seerob.recording.recording import Recording
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.4, 0.2, 0.3, 0.2, 0.4, 0.3])
 DOOSAN = load("doosan", Path())

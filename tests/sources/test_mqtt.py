@@ -21,7 +21,7 @@ from seerob.core.errors import InputError
 from seerob.devices.sources.mqtt import Mqtt, Plain, address, plain_change
 from seerob.protocols.plc.sparkplug import Metric, Payload, encode
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 pytest.importorskip("aiomqtt")
 

@@ -29,8 +29,7 @@ from seerob.protocols.plc.opcua_address import Address, address, browse_name, no
 from seerob.protocols.plc.opcua_client import Security
 from seerob.protocols.plc.opcua_robotics import natural
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
-from seerob.workstation.variables.units import UNITS
+from seerob.workstation.variables import UNITS, Kind, Variable
 
 pytestmark = pytest.mark.xdist_group("opcua")
 """One server for all: starting one takes seconds."""

@@ -24,7 +24,7 @@ from seerob.devices.sources.siemens_web import SiemensWeb
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc.s7_web import PATH, reading, result, results
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address='"Belt".speed', unit="mm/s", timeout=1)
 RUNS = Variable(name="belt/runs", source="plc", address='"Belt".runs', type=Kind.BOOL, timeout=1)

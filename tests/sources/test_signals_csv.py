@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from seerob.core.errors import InputError
 from seerob.devices.sources.signals_csv import SignalsCsv
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address="v", unit="mm/s", range=(0, 1000))
 CLEAR = Variable(name="clear", source="plc", address="c", type=Kind.BOOL, inverted=True)

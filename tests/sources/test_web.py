@@ -16,7 +16,7 @@ from seerob.app.emulators.web import Web as WebOptions
 from seerob.core.errors import InputError
 from seerob.devices.sources.web import Web, leaves
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 SPEED = Variable(name="speed", source="plc", address="/belt/speed", unit="mm/s", timeout=5)
 RUNS = Variable(name="runs", source="plc", address="/belt/runs", type=Kind.BOOL, timeout=5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.core.orientation import is_convention, wxyz_from
+from seerob.core.transforms import is_convention, wxyz_from
 
 ANGLES = np.random.default_rng(0).uniform(-3, 3, (50, 3))
 SEQUENCES = ["".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] != s[2]]

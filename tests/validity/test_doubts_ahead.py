@@ -3,7 +3,7 @@
 from seerob.core.samples import Quality, SignalSample
 from seerob.twin.signals import Signals
 from seerob.twin.validity.hearing import Heard, Hearing
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 AFTER = 1e-6
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from seerob.twin.validity.seen_bones import unobserved_reason
+from seerob.twin.validity.hearing import unobserved_reason
 
 BONES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot", "left_thigh")
 

@@ -8,7 +8,7 @@ import msgspec
 from seerob.app.commands.variables import skeleton
 from seerob.devices.sources.mqtt import Metric, Plain, _nodes, address
 from seerob.protocols.plc import sparkplug
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 
 def test_what_is_browsed_is_an_address_whatever_its_name():

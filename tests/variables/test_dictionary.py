@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError
-from seerob.workstation.variables.dictionary import BadValue, Kind, Variable, read
-from seerob.workstation.variables.units import UNITS, unit
+from seerob.workstation.variables import UNITS, BadValue, Kind, Variable, read, unit
 
 
 def variable(**more):

@@ -16,7 +16,7 @@ from seerob.devices.sources.web import Web
 from seerob.session.run import engine_of
 from seerob.twin.signals import Signals
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address=1, unit="m/s", timeout=0.5)
 

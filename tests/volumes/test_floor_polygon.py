@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.core.shapes.floor_polygon import (
+from seerob.core.shapes import (
     check_polygon,
     contains,
     prism_mesh,

@@ -8,7 +8,7 @@ import pytest
 from made_cell import TWO_R, made, two_r
 from seerob.app.commands import swept
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.description.shapes.glb import write_mesh
 
 

@@ -8,12 +8,12 @@ import pytest
 from made_cell import made
 from made_sweep import inside
 from seerob.app.cli import main
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.transforms import rotation_from_wxyz
 from seerob.criteria.stopping.simulated import StopSimulation
 from seerob.model.volumes.moving import posed
 from seerob.model.volumes.swept import swept_volume
-from seerob.twin.machines.held import Held, before
+from seerob.twin.machines.gripping import Held, before
 
 HIGH = 0.25
 """Where the bar is taken: so far below its middle [m]; the file has its middle in the hand."""

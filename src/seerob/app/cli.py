@@ -11,8 +11,7 @@ from importlib import import_module
 from importlib.metadata import version
 
 from seerob.app.console.interruption import Interrupts
-from seerob.app.console.printable import PrintableLines
-from seerob.app.console.terminal import Exit, Parser
+from seerob.app.console.terminal import Exit, Parser, PrintableLines
 from seerob.core.errors import SeerobError
 from seerob.core.interrupted import stopped
 from seerob.core.printable import printable

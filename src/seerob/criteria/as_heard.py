@@ -17,8 +17,7 @@ from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
 from seerob.model.mounting.in_place import placed
 from seerob.twin.state import State
-from seerob.workstation.plausibility.of_file import findings
-from seerob.workstation.plausibility.ranges import Quantity, canonical, scaled
+from seerob.workstation.plausibility.ranges import Quantity, canonical, findings, scaled
 
 AGAIN = 1.0
 """Period at which what is implausible is asked again [s] of run time."""

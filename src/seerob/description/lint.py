@@ -13,12 +13,11 @@ from itertools import pairwise
 import numpy as np
 
 from seerob.core.errors import Problem
-from seerob.core.shapes.geometry import Solid
+from seerob.core.quantities import LENGTHS
+from seerob.core.shapes import Solid
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
-from seerob.core.units import LENGTHS
-from seerob.description.description import Description, Inertial, Joint, JointKind, Link
-from seerob.description.pose import groups
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, groups
 from seerob.description.shapes import moments
 from seerob.description.shapes.mesh_bodies import is_closed
 from seerob.description.xml_values import Reader

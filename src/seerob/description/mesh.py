@@ -12,13 +12,13 @@ import numpy as np
 from seerob.core.errors import InputError, suggestion
 from seerob.core.files.bounded import TooLarge, content
 from seerob.core.printable import printable
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.quantities import LENGTHS
+from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.core.units import LENGTHS
-from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh, apart
+from seerob.description.mesh_files import MeshSource, RawFile, RawMesh, apart
 from seerob.description.meshes import collada, gltf, obj, off, ply, stl, threemf
-from seerob.description.shapes.mesh_sides import sided
+from seerob.description.shapes.mesh_mending import sided
 from seerob.description.shapes.tidy import tidied
 
 MAX_BYTES = 512 * 2**20
@@ -98,8 +98,8 @@ def load_meshes(
 
     Args:
         path: The file; its name's ending decides the format.
-        units: Unit of the file's lengths, a key of `seerob.core.units.LENGTHS`. Required for STL, OBJ, PLY
-            and OFF, which do not say; overrules what the other formats say.
+        units: Unit of the file's lengths, a key of `seerob.core.quantities.LENGTHS`. Required for STL, OBJ,
+            PLY and OFF, which do not say; overrules what the other formats say.
         up: ``x``, ``y`` or ``z``: the file's axis that points up. Overrules what the file says; formats
             that do not say are taken as z up, with a finding.
         scale: Factors along x, y, z of the result; negative ones mirror.

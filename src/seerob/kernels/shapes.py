@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem, UnknownName
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.transforms import Array
 from seerob.kernels.lanes import WIDTH
 from seerob.kernels.pairs import COLUMNS, Solids

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem, UnknownName
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.snapshot import Finding, LinkMass, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Description, Joint, Quantity
 from seerob.distance.least import Query, Shapes
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 from seerob.workstation.workstation import Workstation
 
 Indices = NDArray[np.int64]

@@ -11,7 +11,7 @@ from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.files.bounded import content
 from seerob.core.files.toml_file import MAX_FILE_SIZE
 from seerob.core.snapshot import Finding
-from seerob.workstation.variables.dictionary import Kind, Variable, read
+from seerob.workstation.variables import Kind, Variable, read
 from seerob.workstation.workstation import Workstation
 
 MOST_NAMED = 20

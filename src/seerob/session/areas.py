@@ -14,7 +14,7 @@ import numpy as np
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.files.whole_file import whole_file
 from seerob.core.samples import Sample
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding, Origin, Result, Snapshot
 from seerob.core.transforms import Array
 from seerob.criteria.safety.separation import MORE
@@ -27,7 +27,7 @@ from seerob.model.volumes.reachable import reachable_volume
 from seerob.model.volumes.swept import BATCH, Sweep, Swept
 from seerob.outputs.sink import Closing, Writer
 from seerob.session.run import Bound
-from seerob.twin.machines.held import before
+from seerob.twin.machines.gripping import before
 from seerob.workstation.workstation import Area, SweptArea, Workstation, content_hash
 
 VERSION = "seerob swept area 3"

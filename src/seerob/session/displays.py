@@ -5,7 +5,7 @@ from __future__ import annotations
 from seerob.model.model import Model
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import nobody_says
-from seerob.workstation.variables.dictionary import Value, WhenStale
+from seerob.workstation.variables import Value, WhenStale
 
 UNKNOWN = (0.55, 0.55, 0.6)
 """Of a lamp of which nobody knows whether it is lit: red, green, blue."""

@@ -27,7 +27,7 @@ from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.in_place import implausible_motion
 from seerob.twin.own_words import compared, said_by
 from seerob.twin.states import motion_of
-from seerob.workstation.plausibility.of_file import findings as implausible
+from seerob.workstation.plausibility.ranges import findings as implausible
 from seerob.workstation.source import Matrix4, Opened, Source, Target, delayed
 
 FIRST, LOOKS = 2000, 8

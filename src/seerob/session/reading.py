@@ -13,15 +13,14 @@ from msgspec import Struct
 
 from seerob.core import plugin
 from seerob.core.errors import InputError, Problem, SeerobError
-from seerob.core.files.outside import leads_outside
+from seerob.core.files.bounded import leads_outside
 from seerob.core.files.toml_file import read_toml
 from seerob.criteria.criterion import Criterion
 from seerob.outputs.sink import Sink
 from seerob.workstation import naming
-from seerob.workstation.allowed import NOTHING, Allowed
+from seerob.workstation.allowed import NOTHING, Allowed, Named, named_outside
 from seerob.workstation.conversion import convert, tables
-from seerob.workstation.outside import Named, named_outside
-from seerob.workstation.plausibility.of_file import unknown
+from seerob.workstation.plausibility.ranges import unknown
 from seerob.workstation.source import Source
 from seerob.workstation.tables.controller_zones import zones_of
 from seerob.workstation.workstation import PLUGINS, TABLES, Robot, Workstation, locate

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.samples import Sample
-from seerob.recording.filing import SOURCES
+from seerob.recording.format import SOURCES
 from seerob.recording.recording import Recording
 from seerob.session.reading import read
 from seerob.session.station import Station

@@ -30,7 +30,7 @@ from seerob.core.samples import BodySample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.files.tables.mapping import toml_value
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.recording.filing import OUTSIDE, SOURCES
+from seerob.recording.format import OUTSIDE, SOURCES
 from seerob.recording.recording import Recording, unpack
 from seerob.recording.result_log import log_of
 from seerob.session.reading import read

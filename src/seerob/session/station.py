@@ -30,7 +30,7 @@ from seerob.model.mounting.things import MadeArea
 from seerob.outputs.notebook import criteria_html
 from seerob.outputs.sentences import counted
 from seerob.outputs.sink import Sink, Writer
-from seerob.recording.filing import source_files
+from seerob.recording.format import source_files
 from seerob.recording.recording import Recording
 from seerob.session import run as road
 from seerob.session.opening import open_sources, reached, source_target

@@ -41,7 +41,7 @@ from seerob.twin.engine import Engine
 from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import BonesHeard
 from seerob.workstation.source import Opened, Source
-from seerob.workstation.variables.dictionary import Kind, Value, Variable
+from seerob.workstation.variables import Kind, Value, Variable
 
 TICKS = 18
 TIMEOUT = 4

@@ -7,7 +7,7 @@ from seerob.description.humans.body_areas import body_area, in_front, words
 from seerob.description.humans.skeleton import BONES
 from seerob.description.humans.skin import body_region
 from seerob.model.model import Model
-from seerob.model.mounting.people import size
+from seerob.model.mounting.overrides import size
 from seerob.twin.state import State
 
 

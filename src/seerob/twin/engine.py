@@ -32,11 +32,10 @@ from seerob.kernels import pull as kernel
 from seerob.model.model import Mechanism, Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.twin import own_words
-from seerob.twin.control.actuation import set_gains, set_torque_limits
+from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
 from seerob.twin.control.reference import Course, Reference
 from seerob.twin.control.sample_values import beyond_limits, is_possible, largest_speed, torques_of
-from seerob.twin.control.task_space import TaskPull
 from seerob.twin.machines.following import HOLD, Machines, Moved
 from seerob.twin.machines.gripping import Grips, own_masses
 from seerob.twin.moving_base import moved_by_poses

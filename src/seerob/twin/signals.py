@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import Undecided
 from seerob.core.samples import REPEATED, Quality, SignalSample
-from seerob.workstation.variables.dictionary import Value, Variable
+from seerob.workstation.variables import Value, Variable
 
 DEFAULT_TIMEOUT = 1.0
 """Time-out [s] of what is heard without a source that states one."""

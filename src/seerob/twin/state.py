@@ -37,8 +37,8 @@ from seerob.twin.speed_noise import SpeedNoise
 from seerob.twin.validity.hearing import SLACK
 from seerob.twin.validity.hearing import Hearing as Hearing  # noqa: PLC0414
 from seerob.twin.validity.validity import Validity
-from seerob.workstation.variables.dictionary import VARIABLE as VARIABLE  # noqa: PLC0414
-from seerob.workstation.variables.dictionary import Value
+from seerob.workstation.variables import VARIABLE as VARIABLE  # noqa: PLC0414
+from seerob.workstation.variables import Value
 
 Indices = NDArray[np.int64]
 Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]

@@ -1,18 +1,100 @@
-"""From a table of a file to a typed struct, collecting every mistake on the way."""
+"""From a table of a file to a typed struct, collecting every mistake on the way.
+
+What a field of a table expects, in words that an engineer reads: the remedy of a wrong value.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+import types
 from collections.abc import Collection, Mapping
-from typing import Any, TypeVar, get_args, get_origin
+from enum import Enum
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
 
-from seerob.core import units
+from seerob.core import quantities
 from seerob.core.errors import Problem, suggestion
-from seerob.workstation.expectations import expected, is_struct, members, unit_of
+
+_NOUNS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "text in quotes",
+    "bool": "true or false",
+    "array": "a list [...]",
+    "object": "a table {...}",
+    "null": "nothing",
+}
+
+
+def members(wanted: Any) -> tuple[Any, ...]:
+    """The types that a union is made of, without None; a type that is none, alone."""
+    while hasattr(wanted, "__metadata__"):
+        wanted = wanted.__origin__
+    if get_origin(wanted) in (Union, types.UnionType):
+        return tuple(m for item in get_args(wanted) if item is not type(None) for m in members(item))
+    return (wanted,)
+
+
+def is_struct(wanted: Any) -> bool:
+    """Whether a type is a table."""
+    return isinstance(wanted, type) and issubclass(wanted, Struct)
+
+
+def unit_of(wanted: Any) -> str | None:
+    """Unit in the metadata of a type, also inside ``X | None`` and ``dict[str, X]``."""
+    for meta in getattr(wanted, "__metadata__", ()):
+        if isinstance(meta, msgspec.Meta) and meta.extra and "unit" in meta.extra:
+            return str(meta.extra["unit"])
+    is_union = get_origin(wanted) in (Union, types.UnionType)
+    if is_union or get_origin(wanted) is dict:
+        return next((found for item in get_args(wanted) if (found := unit_of(item))), None)
+    return None
+
+
+def choices(wanted: Any) -> tuple[str, ...]:
+    """What a closed set allows; empty when the type is not one."""
+    found: list[str] = []
+    for member in members(wanted):
+        if get_origin(member) is Literal:
+            found += map(str, get_args(member))
+        elif isinstance(member, type) and issubclass(member, Enum):
+            found += [str(item.value) for item in member]
+    return tuple(found)
+
+
+def described(wanted: Any) -> str | None:
+    """What the metadata of a type say in words, also inside ``X | Y``."""
+    for meta in getattr(wanted, "__metadata__", ()):
+        if isinstance(meta, msgspec.Meta) and meta.description:
+            return str(meta.description)
+    if get_origin(wanted) in (Union, types.UnionType):
+        return next((found for item in get_args(wanted) if (found := described(item))), None)
+    return None
+
+
+def expected(wanted: Any, complaint: str) -> str:
+    """What would be right, from the type and the complaint of `msgspec`.
+
+    Args:
+        wanted: The field's type.
+        complaint: Message of a `msgspec.ValidationError` without its place.
+    """
+    allowed = choices(wanted)
+    if allowed and ("enum" in complaint or "Expected `str`" in complaint):
+        return "one of: " + ", ".join(allowed)
+    if "matching regex" in complaint:
+        return "expected " + (described(wanted) or complaint[complaint.index("matching") :])
+    found = re.match(r"Expected `([^`]+)`(.*?)(?:, got .*)?$", complaint)
+    if not found:
+        return complaint[:1].lower() + complaint[1:]
+    nouns = [_NOUNS.get(name, name) for name in found.group(1).split(" | ") if name != "null"]
+    unit = unit_of(wanted)
+    rest = re.sub(r"\.0$", "", found.group(2))
+    return f"expected {' or '.join(nouns)}{rest}" + (f" [{unit}]" if unit else "")
+
 
 T = TypeVar("T", bound=Struct)
 
@@ -112,7 +194,7 @@ def _field(name: str, fields: Mapping[str, Any]) -> tuple[str | None, float | No
     """Field and factor that a key means: itself, or a field with a unit suffix."""
     if name in fields:
         return name, None
-    for stem, unit, factor in units.splits(name):
+    for stem, unit, factor in quantities.splits(name):
         if stem in fields and unit_of(fields[stem].type) == unit:
             return stem, factor
     return None, None
@@ -120,12 +202,12 @@ def _field(name: str, fields: Mapping[str, Any]) -> tuple[str | None, float | No
 
 def _wrong_unit(name: str, fields: Mapping[str, Any]) -> str:
     """What to say of ``mass_mm``: the field exists, but not in that unit."""
-    for stem, _, _ in units.splits(name):
+    for stem, _, _ in quantities.splits(name):
         if stem in fields:
             unit = unit_of(fields[stem].type)
             if unit is None:
                 return f"{stem!r} is no quantity with a unit that could be converted"
-            suffixes = [f"{stem}_{suffix}" for suffix, (si, _) in units.SUFFIXES.items() if si == unit]
+            suffixes = [f"{stem}_{suffix}" for suffix, (si, _) in quantities.SUFFIXES.items() if si == unit]
             return f"{stem!r} is in {unit}: write " + " or ".join([stem, *suffixes])
     return ""
 

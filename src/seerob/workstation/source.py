@@ -20,7 +20,7 @@ from seerob.core.quantities import NotBefore, Seconds
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
 from seerob.description.description import Description
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 Row4 = tuple[float, float, float, float]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]

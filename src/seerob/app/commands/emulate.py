@@ -46,7 +46,7 @@ def parser_of(kind: str) -> Parser:
     import msgspec
 
     from seerob.app.emulation.options import COMMAND, EmulatorOptions
-    from seerob.workstation.expectations import choices, described, members, unit_of
+    from seerob.workstation.conversion import choices, described, members, unit_of
 
     wanted = load(PACKAGE, kind, EmulatorOptions)
     title = (wanted.__doc__ or "").strip().split("\n")[0].rstrip(".")
@@ -111,7 +111,7 @@ def _option(name: str) -> str:
 
 def _value(text: Any, wanted: Any) -> Any:
     """The number that a word is, where the option takes one; what is none is left for the type to refuse."""
-    from seerob.workstation.expectations import members
+    from seerob.workstation.conversion import members
 
     for member in members(wanted):
         said = get_args(member) if get_origin(member) is Literal else ()

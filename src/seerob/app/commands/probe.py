@@ -20,7 +20,7 @@ from seerob.app.console.terminal import OUT, Exit, add_allowed, allowed, line, p
 from seerob.core.errors import InputError, SeerobError
 from seerob.devices.live.arrivals import Arrivals
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
-from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables import Kind, Variable
 
 if TYPE_CHECKING:
     from seerob.core.samples import Sample

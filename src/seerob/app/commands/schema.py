@@ -11,8 +11,8 @@ from typing import Any, get_args
 import msgspec
 
 from seerob.app.console.terminal import OUT, Exit, line
-from seerob.core import units
-from seerob.workstation.expectations import is_struct, members, unit_of
+from seerob.core import quantities
+from seerob.workstation.conversion import is_struct, members, unit_of
 from seerob.workstation.workstation import PLUGINS, TABLES, Workstation
 
 HELP = "write the JSON schema of the workstation file, for editors"
@@ -98,7 +98,7 @@ def _add_suffixes(definition: dict[str, Any], kind: type[msgspec.Struct]) -> Non
     either, replaced = [], set()
     for field in msgspec.structs.fields(kind):
         unit = unit_of(field.type)
-        suffixes = [suffix for suffix, (si, _) in units.SUFFIXES.items() if si == unit]
+        suffixes = [suffix for suffix, (si, _) in quantities.SUFFIXES.items() if si == unit]
         for suffix in suffixes:
             shape = _without_limits(properties[field.name])
             shape["description"] = f"{field.name} in {suffix.replace('_', '/')}"

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     from seerob.model.volumes.moving import posed, reach_box
     from seerob.model.volumes.reachable import reachable_volume
     from seerob.model.volumes.swept import swept_volume
-    from seerob.twin.machines.held import before
+    from seerob.twin.machines.gripping import before
 
     model = station.model
     bodies = model.select(_subject(station, options.of))

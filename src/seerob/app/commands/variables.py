@@ -18,14 +18,14 @@ from seerob.app.console.terminal import OUT, Exit, add_workstation, allowed, lin
 from seerob.core.errors import InputError, SeerobError
 from seerob.devices.variables.live_source import Node
 from seerob.files.tables.mapping import toml_value
-from seerob.workstation.variables.units import unit
+from seerob.workstation.variables import unit
 
 if TYPE_CHECKING:
     from seerob.core.samples import Sample
     from seerob.devices.variables.live_source import Node, VariablesSource
     from seerob.session.station import Station
     from seerob.workstation.allowed import Allowed
-    from seerob.workstation.variables.dictionary import Variable
+    from seerob.workstation.variables import Variable
 
 
 BOOLS = ("bool", "boolean")
@@ -199,7 +199,7 @@ async def nodes_of(source: VariablesSource) -> list[Node]:
     """What a device says it has; raises as `VariablesSource.browse` does."""
     from contextlib import aclosing
 
-    from seerob.workstation.variables.dictionary import MOST_VARIABLES
+    from seerob.workstation.variables import MOST_VARIABLES
 
     nodes: list[Node] = []
     async with aclosing(source.browse()) as found:

@@ -1,9 +1,13 @@
-"""The commands of the command line, one file each, and the words they share."""
+"""The commands of the command line, one file each, and the words they share.
+
+What is logged, as a terminal may have it.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
+import logging
 import math
 import re
 import sys
@@ -25,6 +29,14 @@ if TYPE_CHECKING:
     from seerob.recording.result_log import Series
     from seerob.session.run import Summary
     from seerob.session.station import Station
+
+
+class PrintableLines(logging.Formatter):
+    """What is logged, which may quote a device, `printable`."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line, and the traceback where there is one."""
+        return printable(super().format(record))
 
 
 class Console(RichConsole):

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from seerob.app.emulation import plc_cell
+from seerob.app.emulation import motions
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
@@ -222,10 +222,10 @@ class Modbus(RobotOptions, frozen=True, kw_only=True):
         known = {s.name for s in found.signals}
         played = {
             **program(found, motion, {name: state for name, state in states.items() if name in known}),
-            Place(table=Table.HOLDING, at=BELT, type=Type.I16): plc_cell.speed,
-            Place(table=Table.HOLDING, at=BELT + 1, type=Type.BIT, bit=0): plc_cell.running,
-            Place(table=Table.HOLDING, at=BELT + 1, type=Type.BIT, bit=1): plc_cell.clear,
-            Place(table=Table.HOLDING, at=BELT + 2, type=Type.F32, words=Words.HIGH_FIRST): plc_cell.position,
+            Place(table=Table.HOLDING, at=BELT, type=Type.I16): motions.speed,
+            Place(table=Table.HOLDING, at=BELT + 1, type=Type.BIT, bit=0): motions.running,
+            Place(table=Table.HOLDING, at=BELT + 1, type=Type.BIT, bit=1): motions.clear,
+            Place(table=Table.HOLDING, at=BELT + 2, type=Type.F32, words=Words.HIGH_FIRST): motions.position,
         }
         server = ModbusServer(played, host=self.host, port=self.port, refresh=found.refresh)
         belt = f"a belt in the holding registers {BELT} (i16, mm/s) to {BELT + 3}"

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
-from seerob.app.emulation import plc_cell
+from seerob.app.emulation import motions
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion, swing
 from seerob.app.emulation.options import EmulatorOptions, Ready, port
@@ -323,11 +323,11 @@ class Opcua(EmulatorOptions, frozen=True, kw_only=True):
         """The server."""
         need("asyncua")
         variables = {
-            "Belt/running": Emulated(plc_cell.running),
-            "Belt/speed": Emulated(plc_cell.speed, "mm/s"),
-            "Belt/position": Emulated(plc_cell.position, "mm"),
-            "Curtain/clear": Emulated(plc_cell.clear),
-            "Door/open": Emulated(plc_cell.door_open),
+            "Belt/running": Emulated(motions.running),
+            "Belt/speed": Emulated(motions.speed, "mm/s"),
+            "Belt/position": Emulated(motions.position, "mm"),
+            "Curtain/clear": Emulated(motions.clear),
+            "Door/open": Emulated(motions.door_open),
         }
         server = OpcuaServer(
             variables, {"Robot": swing(HOME)}, host=self.host, port=self.port, outputs=(OUTPUT,)

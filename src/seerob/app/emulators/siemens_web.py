@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from seerob.app.emulation import plc_cell
+from seerob.app.emulation import motions
 from seerob.app.emulation.http import HttpEmulator
 from seerob.app.emulation.options import EmulatorOptions, Ready, option, port
 from seerob.protocols.plc import s7_web
@@ -149,11 +149,11 @@ class SiemensWeb(EmulatorOptions, frozen=True, kw_only=True):
     def ready(self) -> Ready:
         """The PLC."""
         program = {
-            '"Belt".running': plc_cell.running,
-            '"Belt".speed': plc_cell.speed,
-            '"Belt".position': plc_cell.position,
-            '"Curtain".clear': plc_cell.clear,
-            '"Door".open': plc_cell.door_open,
+            '"Belt".running': motions.running,
+            '"Belt".speed': motions.speed,
+            '"Belt".position': motions.position,
+            '"Curtain".clear': motions.clear,
+            '"Door".open': motions.door_open,
         }
         server = SiemensWebServer(
             program,

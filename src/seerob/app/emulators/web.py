@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from seerob.app.emulation import plc_cell
+from seerob.app.emulation import motions
 from seerob.app.emulation.http import HttpEmulator
 from seerob.app.emulation.options import EmulatorOptions, Ready, port
 
@@ -97,10 +97,10 @@ class Web(EmulatorOptions, frozen=True, kw_only=True):
 def _cell(t: float) -> Mapping[str, Any]:
     return {
         "belt": {
-            "running": plc_cell.running(t),
-            "speed": plc_cell.speed(t),
-            "position": plc_cell.position(t),
+            "running": motions.running(t),
+            "speed": motions.speed(t),
+            "position": motions.position(t),
         },
-        "curtain": {"clear": plc_cell.clear(t)},
-        "door": {"open": plc_cell.door_open(t)},
+        "curtain": {"clear": motions.clear(t)},
+        "door": {"open": motions.door_open(t)},
     }

@@ -1,6 +1,8 @@
 """The server as a whole: a thread with a loop of its own, started and stopped from ordinary code.
 
 At ``/`` is the page, at ``/mesh/<hash>.glb`` are the meshes, at ``/ws`` the snapshots.
+
+The built page's files: only what is listed is served, so that no path can lead elsewhere.
 """
 
 from __future__ import annotations
@@ -12,9 +14,11 @@ import logging
 import socket
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager
+from functools import lru_cache
 from ipaddress import ip_address
 from pathlib import Path
 from threading import Event, Thread
+from time import monotonic
 from types import TracebackType
 from typing import Self
 
@@ -22,10 +26,9 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
-from seerob.app.server import page
 from seerob.app.server.access import Role, Tokens
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
@@ -33,13 +36,68 @@ from seerob.app.server.connection import Doorstep, PromptLoop, PromptRequests, W
 from seerob.app.server.door import Door
 from seerob.app.server.feed import Feed
 from seerob.app.server.hub import PATIENCE, Hub
-from seerob.app.server.page import FOLDER
 from seerob.app.server.visits import Visits
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
 from seerob.devices.live.headset_offers import Offers
 from seerob.protocols.links.tcp_server import stop_accepting
+
+FOLDER = Path(__file__).parent / "page"
+
+_TYPES = {
+    # Written down: some systems' own tables call JavaScript text/plain, which a browser refuses.
+    ".css": "text/css; charset=utf-8",
+    ".html": "text/html; charset=utf-8",
+    ".ico": "image/x-icon",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".map": "application/json",
+    ".mjs": "text/javascript; charset=utf-8",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+    ".txt": "text/plain; charset=utf-8",
+    ".webmanifest": "application/manifest+json",
+    ".woff2": "font/woff2",
+}
+
+_NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>seerob: page not built</title>
+<h1>The page is not built</h1>
+<p>The server runs, but the files of its page are not there. In a checkout of the repository, run</p>
+<pre>make web</pre><p>and reload. A released package contains them.</p></html>
+"""
+
+
+def files(folder: Path) -> dict[str, Path]:
+    """Files below a folder by path as asked for, without links and hidden ones."""
+    return {
+        path.relative_to(folder).as_posix(): path
+        for path in folder.rglob("*")
+        if path.is_file() and not path.is_symlink() and not path.name.startswith(".")
+    }
+
+
+LISTED = 1.0
+"""How long the list of a folder's files counts [s]: long enough that requests without end do not read it
+each time, short enough for a page that is built anew."""
+
+
+@lru_cache(8)
+def _files(folder: Path, _: int) -> dict[str, Path]:
+    return files(folder)
+
+
+def answer(folder: Path, path: str) -> Response:
+    """The file at ``path`` (the page itself when empty); 503 when the page was not built."""
+    listed = _files(folder, int(monotonic() / LISTED))
+    if "index.html" not in listed:
+        return HTMLResponse(_NOT_BUILT, 503)
+    file = listed.get(path or "index.html")
+    if file is None:
+        return PlainTextResponse("no such file\n", 404)
+    kind = _TYPES.get(file.suffix.lower(), "application/octet-stream")
+    return Response(file.read_bytes(), media_type=kind, headers={"Cache-Control": "no-store"})
+
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
@@ -63,7 +121,7 @@ def build(*, hub: Hub, meshes: Mapping[str, bytes], folder: Path, lifespan: Life
         return Response(data, media_type="model/gltf-binary", headers=headers)
 
     async def file(request: Request) -> Response:
-        return await run_in_threadpool(page.answer, folder, request.path_params["path"])
+        return await run_in_threadpool(answer, folder, request.path_params["path"])
 
     routes = [
         WebSocketRoute("/ws", hub.attend),

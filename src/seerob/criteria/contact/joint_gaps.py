@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.files.whole_file import whole_file
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.transforms import Array
 from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints
 from seerob.distance.least import Query, Shapes

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
-from seerob.core.files.outside import REMEDY, leads_outside
+from seerob.core.files.bounded import REMEDY, leads_outside
 from seerob.core.files.toml_file import read_toml
 from seerob.core.snapshot import Input, Origin, Result, Verdict
 from seerob.core.transforms import Array

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import Undecided
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.snapshot import Input, Origin, Verdict
 from seerob.core.transforms import Array
 from seerob.description.humans import manikin

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.domains import number
 from seerob.core.errors import UnknownName
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
 

@@ -22,7 +22,7 @@ from seerob.criteria.sensors.sensing import (
     seen_in_field,
     sensor_of,
 )
-from seerob.distance.rays import Rays
+from seerob.distance.scan import Rays
 from seerob.model.model import Model
 from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State

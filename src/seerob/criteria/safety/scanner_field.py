@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from seerob.core import markers
 from seerob.core.errors import InputError, Undecided
-from seerob.core.shapes.floor_polygon import contains
+from seerob.core.shapes import contains
 from seerob.core.snapshot import Basis, Result
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
@@ -27,8 +27,7 @@ from seerob.criteria.sensors.sensing import (
     seen_in_field,
     sensor_of,
 )
-from seerob.distance.rays import Rays
-from seerob.distance.scan import Coverage, beam_angles, directions, outline, spans
+from seerob.distance.scan import Coverage, Rays, beam_angles, directions, outline, spans
 from seerob.model.model import Model
 from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State

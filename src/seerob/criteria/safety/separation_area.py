@@ -24,7 +24,7 @@ from seerob.criteria.criterion import Criterion, Evaluate, Follows
 from seerob.criteria.partly_seen import seen_first
 from seerob.criteria.sensors.sensing import Names, bodies_of, names_of
 from seerob.distance.least import Per
-from seerob.distance.offset_shell import offset_shell
+from seerob.distance.voxels import offset_shell
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.accuracy.tracking_error import TrackingError

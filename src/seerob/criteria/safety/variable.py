@@ -14,7 +14,7 @@ from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.spans import Fall, Falls, Points
 from seerob.twin.state import State
-from seerob.workstation.variables.dictionary import Kind, Value
+from seerob.workstation.variables import Kind, Value
 
 
 class MachineVariable(Criterion, frozen=True, kw_only=True):

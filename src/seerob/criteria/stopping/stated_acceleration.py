@@ -36,8 +36,7 @@ from seerob.model.model import Mechanism, Model
 from seerob.twin.speed_noise import SpeedNoise
 from seerob.twin.state import State
 from seerob.twin.states import Bench, Motion, Questions
-from seerob.workstation.plausibility.of_file import confirmation
-from seerob.workstation.plausibility.ranges import Quantity, how_to_confirm
+from seerob.workstation.plausibility.ranges import Quantity, confirmation, how_to_confirm
 
 NOISE = 0.02
 """By so much a part may get faster without contradicting anything [m/s]: speeds that controllers measure are

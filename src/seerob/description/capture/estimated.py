@@ -3,14 +3,176 @@
 Between a hand and an upper arm an elbow follows from the bones' lengths; of a leg of which only the foot is
 seen the knee may be anywhere on a circle. A headset with two controllers sees head and hands: arms, legs,
 pelvis and spine are a guess, and neither a distance nor a score may be made of them.
+
+Hands, feet and heads of which a device sees too little: how they are turned is a guess.
+
+A wrist that is seen says where the hand begins. Where the fingers are it does not say, and the twin's are
+where rest has them. Told is how such a bone is turned by an orientation, by other places on it, or by the
+joint at its other end. Places on one line leave open how the bone is turned about that line: a wrist and a
+fingertip do not say whether the palm is up.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections import defaultdict
+from collections.abc import Collection, Iterable
 from functools import lru_cache
 
-from seerob.description.humans.skeleton import BONES, PARENTS, SIDES, without_side
+import numpy as np
+
+from seerob.core.samples import BodyPoint, Vec3
+from seerob.core.transforms import Array
+from seerob.description.humans.skeleton import AXES, BONES, PARENTS, SIDES, without_side
+
+ENDS = frozenset({"head", *(f"{side}_{bone}" for side in SIDES for bone in ("hand", "foot"))})
+"""Bones beyond which no joint says where they point; a foot may have its toes."""
+APART = 0.02
+"""Places on a bone that are nearer to each other, or to one line, than this [m] do not tell how it is
+turned, or not about that line."""
+OPEN = 0.4
+"""Share of the line along an axis of the bone from which on the turn about that axis is open; a choice."""
+Turn = tuple[str, int]
+"""A bone and one of its axes: 0 forward, 1 up, 2 right, in the anatomical position."""
+_END_OF: dict[str, tuple[str, Vec3]] = {
+    name: end
+    for side in SIDES
+    for name, end in (
+        (f"{side}_foot", (f"{side}_toes", (0.15, 0.0, 0.0))),
+        (f"{side}_forearm", (f"{side}_hand", (0.0, -0.25, 0.0))),
+    )
+}
+"""Bone → the one at its other end, and about where that begins [m]."""
+_LIMBS = {f"{side}_{bone}" for side in SIDES for bone in ("clavicle", "upper_arm", "thigh", "shank")}
+_TURNING = ENDS | _END_OF.keys() | _LIMBS | {"neck"}
+_WAYS = {"foot": (1, 2), "clavicle": (0, 1)}
+"""Axes about which a bone must be known to be turned for it to be known where it points: of a foot, which
+points forward, and a clavicle, which points sideways; of others `_HANGING`."""
+_HANGING = (0, 2)
+_ROLLED = {f"{side}_hand": f"{side}_forearm" for side in SIDES}
+"""With an unseen hand it is not seen either how its forearm is turned about itself."""
+
+
+def turned(points: Iterable[BodyPoint]) -> set[Turn]:
+    """About which axes points tell how limbs, neck and head are turned.
+
+    Args:
+        points: That are believed.
+    """
+    found: set[Turn] = set()
+    places: dict[str, set[Vec3]] = defaultdict(set)
+    for p in points:
+        if p.wxyz is not None and p.orientation_weight > 0 and p.bone in _TURNING:
+            found |= {(p.bone, axis) for axis in range(3)}
+        if p.position is not None and p.position_weight > 0:
+            places[p.bone].add(p.at)
+    for bone, (after, there) in _END_OF.items():
+        if after in places:
+            places[bone].add(there)
+    for bone in _TURNING & places.keys():
+        found |= {(bone, axis) for axis in _told(frozenset(places[bone]))}
+    return found
+
+
+@lru_cache(maxsize=1024)
+def _told(places: frozenset[Vec3]) -> tuple[int, ...]:
+    """Axes of a bone about which places on it, and its joint, tell how it is turned."""
+    spots = np.array([(0.0, 0.0, 0.0), *sorted(places)])
+    lengths = np.linalg.norm(spots[:, None] - spots, axis=2)
+    i, j = np.unravel_index(lengths.argmax(), lengths.shape)
+    if lengths[i, j] <= APART:
+        return ()
+    line = (spots[j] - spots[i]) / lengths[i, j]
+    beside = float(np.linalg.norm(np.cross(spots - spots[i], line), axis=1).max())
+    return tuple(axis for axis in range(3) if beside > APART or abs(line[axis]) < OPEN)
+
+
+def aimed(turns: Collection[Turn]) -> set[str]:
+    """Bones of `ENDS` that are known to point somewhere; how they are turned about their axis is not asked.
+
+    Args:
+        turns: Of `turned`.
+    """
+    return {
+        bone
+        for bone in ENDS
+        if all((bone, axis) in turns for axis in _WAYS.get(without_side(bone), _HANGING))
+    }
+
+
+_SHOWN_BY = {
+    f"{prefix}{bone}": tuple(f"{prefix}{other}" for other in others)
+    for prefixes, bone, others in (
+        (("",), "neck", ("head",)),
+        (("right_", "left_"), "clavicle", ("upper_arm", "forearm")),
+        (("right_", "left_"), "upper_arm", ("forearm", "hand")),
+        (("right_", "left_"), "forearm", ("hand",)),
+        (("right_", "left_"), "thigh", ("shank", "foot")),
+        (("right_", "left_"), "shank", ("foot", "toes")),
+    )
+    for prefix in prefixes
+}
+"""Bone → bones beyond it, of which the place of one shows where it points: the next one, or the one after
+it, by which the next one is told."""
+
+
+def bare(observed: Collection[str], placed: Collection[str], turns: Collection[Turn]) -> frozenset[str]:
+    """Bones of limbs of which the joint is seen and nothing shows where they point.
+
+    An elbow that is seen does not say where the forearm is when neither hand nor forearm is.
+
+    Args:
+        observed: Bones of which something is seen.
+        placed: Those of them of which a place is seen.
+        turns: Of `turned`.
+    """
+    return frozenset(
+        bone
+        for bone, beyond in _SHOWN_BY.items()
+        if bone in observed
+        and not any(other in placed for other in beyond)
+        and not all((bone, axis) in turns for axis in _WAYS.get(without_side(bone), _HANGING))
+    )
+
+
+def untold(turns: Collection[Turn]) -> frozenset[tuple[str, int]]:
+    """Angles of `humans.angles` that nothing tells, each with its side: 0 right or none, 1 left.
+
+    A wrist bends forward or sideways only to somebody who knows how the forearm is turned about itself: by
+    places on the forearm, or by those on the hand, which does not turn in its joint.
+
+    Args:
+        turns: Of `turned`.
+    """
+    neck = (("neck_side_bend", 0), ("neck_twist", 1), ("neck_flexion", 2))
+    found = {(angle, 0) for angle, axis in neck if ("head", axis) not in turns}
+    for k, side in enumerate(SIDES):
+        hand = f"{side}_hand"
+        rolled = (hand, 1) in turns or (f"{side}_forearm", 1) in turns
+        found |= set() if rolled else {("forearm_rotation", k)}
+        for angle, axis in (("wrist_deviation", 0), ("wrist_flexion", 2)):
+            if not rolled or (hand, axis) not in turns:
+                found.add((angle, k))
+    return frozenset(found)
+
+
+def swing(bone: str, q: Array, lower: Array, upper: Array) -> float:
+    """Bound on the angle between how a bone of the twin is turned and how the person's may be [rad].
+
+    Angles of rotations one after the other add up at most; each joint is somewhere within its limits.
+
+    Args:
+        bone: One of `ENDS`.
+        q: Of the twin [rad or m], shape (53,).
+        lower: Limits, shape (53,).
+        upper: Shape (53,).
+    """
+    own = [k for k, axis in enumerate(AXES) if axis.bone == bone or _rolls(axis.name, axis.bone, bone)]
+    return float(min(np.pi, np.maximum(upper[own] - q[own], q[own] - lower[own]).sum()))
+
+
+def _rolls(name: str, of: str, bone: str) -> bool:
+    return of == _ROLLED.get(bone) and "pronation" in name
+
 
 HIPS = frozenset(f"{side}_thigh" for side in SIDES)
 SHOULDERS = frozenset(f"{side}_upper_arm" for side in SIDES)
@@ -25,7 +187,7 @@ def estimated(seen: Collection[str], bare: Collection[str] = ()) -> tuple[str, .
     Args:
         seen: Bones that a device sees now. Whom joints or keyframes move nobody sees, and nothing of it is
             estimated: that is not asked here.
-        bare: Those of them of which nothing shows where they point (`seerob.description.capture.ends.bare`).
+        bare: Those of them of which nothing shows where they point (`bare`).
     """
     return _estimated(frozenset(seen), frozenset(bare))
 

@@ -22,8 +22,18 @@ from msgspec import structs
 
 from seerob.core.samples import BodyPoint, BodySample, Quality, Vec3
 from seerob.core.transforms import Array, inverse
-from seerob.description.capture.ends import ENDS, Turn, aimed, bare, swing, turned, untold
-from seerob.description.capture.estimated import estimated, in_doubt_with, located
+from seerob.description.capture.estimated import (
+    ENDS,
+    Turn,
+    aimed,
+    bare,
+    estimated,
+    in_doubt_with,
+    located,
+    swing,
+    turned,
+    untold,
+)
 from seerob.description.capture.fitting import Fitter, Pulls, pulls
 from seerob.description.capture.frozen import Frozen
 from seerob.description.capture.handover import Handover, between

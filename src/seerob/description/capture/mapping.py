@@ -23,8 +23,8 @@ from seerob.core.printable import printable_table
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import Layout
+from seerob.description.humans.anthropometry import table
 from seerob.description.humans.skeleton import BONES, SIDES
-from seerob.description.humans.tables import table
 
 SPELLINGS = {"right": ("right", "r"), "left": ("left", "l")}
 """What ``{side}`` in a pattern stands for."""

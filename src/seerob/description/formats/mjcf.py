@@ -18,20 +18,28 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.files.bounded import TooLarge, content
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array, rotation_from_wxyz, transform
 from seerob.description import lint
-from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
+from seerob.description.description import (
+    Description,
+    Inertial,
+    Joint,
+    JointKind,
+    Link,
+    Mimic,
+    Quantity,
+    displacement,
+)
 from seerob.description.formats.mimic import flattened
 from seerob.description.formats.mjcf_compiled import Compiled, compiled
 from seerob.description.formats.resolve import Resolver
 from seerob.description.formats.urdf_geometry import moved
 from seerob.description.mesh import MAX_BYTES as MAX_MESH_BYTES
-from seerob.description.pose import displacement
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh
-from seerob.description.shapes.split_surfaces import with_insides
+from seerob.description.shapes.mesh_mending import with_insides
 from seerob.description.xml_values import FARTHEST, HEAVIEST, MAX_BYTES, SMALLEST, Reader, parse_xml
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from seerob.core.errors import InputError, Problem, UnknownName
-from seerob.core.files.outside import REMEDY
+from seerob.core.files.bounded import REMEDY
 
 MAX_URI = 4096
 """Longest file reference accepted [characters]."""

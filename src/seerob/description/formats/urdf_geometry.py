@@ -10,13 +10,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.transforms import Array, apply
 from seerob.description.formats.resolve import Resolver
 from seerob.description.mesh import LoadedMeshes, load_meshes
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh
-from seerob.description.shapes.split_surfaces import with_insides
+from seerob.description.shapes.mesh_mending import with_insides
 from seerob.description.xml_values import FARTHEST, SMALLEST, Reader
 
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")

@@ -23,7 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from seerob.core.errors import InputError, Problem, suggestion
-from seerob.core.files.outside import REMEDY
+from seerob.core.files.bounded import REMEDY
 from seerob.core.files.parser_process import parsed
 from seerob.description.formats.resolve import Resolver
 

@@ -7,14 +7,20 @@ regressions of Zatsiorsky and Seluyanov 1979 (what the paper cites). The tables 
 
 The regressions are ``y = b0 + b1 · body mass [kg] + b2 · stature [cm]``. They are made for ordinary builds:
 far from them a mass or a moment becomes impossible, and the person is refused.
+
+The published tables that ship with seerob, read once.
 """
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +29,13 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.humans.overrides import with_lengths, with_masses
 from seerob.description.humans.skeleton import SIDES
-from seerob.description.humans.tables import table
+
+
+@cache
+def table(name: str) -> dict[str, Any]:
+    """One of the tables in ``data/``, by name without ending."""
+    return tomllib.loads(files("seerob.description.humans").joinpath(f"data/{name}.toml").read_text("utf-8"))
+
 
 KG_CM2 = 1e-4
 """[kg·m²]"""

@@ -27,7 +27,7 @@ from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array, transform
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
 from seerob.description.humans import anthropometry
-from seerob.description.humans.anthropometry import Body, Masses, Sex, body, unfit
+from seerob.description.humans.anthropometry import Body, Masses, Sex, body, table, unfit
 from seerob.description.humans.skeleton import (
     AXES,
     BONES,
@@ -39,7 +39,6 @@ from seerob.description.humans.skeleton import (
     without_side,
 )
 from seerob.description.humans.skin import skin
-from seerob.description.humans.tables import table
 
 SOURCES = {
     Masses.DELEVA: "de Leva 1996, Table 4 (shares of body mass, radii of gyration)",

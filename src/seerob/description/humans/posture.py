@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seerob.core import units
+from seerob.core import quantities
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.transforms import Array
 from seerob.description.description import Description, JointKind
+from seerob.description.humans.anthropometry import table
 from seerob.description.humans.skeleton import AXES, JOINTS, bone_poses, resolve
-from seerob.description.humans.tables import table
 
 HEIGHT = JOINTS.index("pelvis_z")
 SOLES = ("right_foot", "left_foot", "right_toes", "left_toes")
@@ -123,7 +123,7 @@ def _read(
     key: str, raw: object, file: str, problems: list[Problem]
 ) -> tuple[tuple[tuple[int, float], ...], float]:
     """Places in q with their signs, and the value in SI."""
-    stem, unit, factor = units.split(key) or (key, "", 1.0)
+    stem, unit, factor = quantities.split(key) or (key, "", 1.0)
     places = resolve(stem)
     expected = "m" if AXES[places[0][0]].kind is JointKind.PRISMATIC else "rad"
     if unit not in ("", expected):

@@ -18,12 +18,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from seerob.core.shapes.geometry import Solid, capsule, dilated_rectangle
+from seerob.core.shapes import Solid, capsule, dilated_rectangle
 from seerob.core.transforms import Array
-from seerob.description.humans.anthropometry import Body
+from seerob.description.humans.anthropometry import Body, table
 from seerob.description.humans.body_areas import eyes, in_front, outer_shoulder
 from seerob.description.humans.skeleton import without_side
-from seerob.description.humans.tables import table
 
 Vector = Array
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from seerob.core.transforms import Array
-from seerob.description.mesh_files.source import Color, MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files import Color, MeshSource, RawFile, RawMesh
 
 _MAX_DEPTH = 200
 _MAX_NODES = 200_000

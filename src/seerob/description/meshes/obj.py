@@ -14,8 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seerob.core.transforms import Array
-from seerob.description.mesh_files.polygons import triangles
-from seerob.description.mesh_files.source import Color, MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files import Color, MeshSource, RawFile, RawMesh, triangles
 
 _Key = tuple[str, str]
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seerob.description.mesh_files.polygons import triangles
-from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files import MeshSource, RawFile, RawMesh, triangles
 
 
 def read(source: MeshSource) -> RawFile:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files import MeshSource, RawFile, RawMesh
 
 
 def read(source: MeshSource) -> RawFile:

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from seerob.description.mesh_files.source import MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files import MeshSource, RawFile, RawMesh
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER = 84

@@ -15,7 +15,7 @@ import numpy as np
 
 from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.transforms import Array
-from seerob.description.mesh_files.source import Color, MeshSource, RawFile, RawMesh
+from seerob.description.mesh_files import Color, MeshSource, RawFile, RawMesh
 
 _METERS = {
     "micron": 1e-6,

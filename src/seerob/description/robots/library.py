@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from seerob.core import transforms, units
+from seerob.core import quantities, transforms
 from seerob.core.errors import UnknownName
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
@@ -158,7 +158,7 @@ def _si(table: Table) -> dict[str, Any]:
     """The table with ``rpy_deg`` and the like converted to SI under their plain names."""
     result: dict[str, Any] = {}
     for key, value in table.items():
-        suffixed = units.split(key)
+        suffixed = quantities.split(key)
         if suffixed is None:
             result[key] = _si(value) if isinstance(value, dict) else value
         else:

@@ -13,12 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, inverse
-from seerob.description.description import Description, Link
+from seerob.description.description import Description, Link, base_from_links, groups
 from seerob.description.formats.urdf_geometry import moved
-from seerob.description.pose import base_from_links, groups
 from seerob.kernels.signed_distance import outside
 from seerob.kernels.tree_file import tree_of
 

@@ -18,7 +18,7 @@ import numpy as np
 from seerob.core.errors import InputError
 from seerob.core.extras import need
 from seerob.core.files.whole_file import whole_file
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.description.shapes.detail import display_mesh, manifold
 from seerob.description.shapes.moments import signed_volume
 from seerob.description.shapes.tidy import tidied

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.description.shapes.mesh_bodies import bodies, joined_unmerged
 from seerob.description.shapes.tidy import tidied

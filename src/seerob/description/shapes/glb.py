@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_file
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.tidy import tidied
 

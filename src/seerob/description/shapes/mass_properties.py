@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Inertial

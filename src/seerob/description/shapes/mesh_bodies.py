@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.description.shapes.moments import signed_volume
 from seerob.description.shapes.tidy import tidied

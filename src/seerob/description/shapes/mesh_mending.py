@@ -1,20 +1,145 @@
 """Open meshes closed, with a bound on what the missing surface can change.
 
-Only mass properties use this: distances never see a triangle that the file does not have.
+Only mass properties use what is mended: distances never see a triangle that the file does not have.
+
+Which side of a surface is out, where a file contradicts itself: no triangle is added, moved or left out.
+
+What is inside of a mesh goes by the winding number. Triangles that disagree with their neighbours, a body
+inside out that overlaps others, and a surface that is there twice, once for each side, all make it 0 where
+there is an inside, and whoever is in there would be far from the surface and outside.
+
+Surfaces that a file splits into open pieces, by colour or by name, and that enclose a volume together.
+
+None of the pieces has an inside, and whoever is in there would be far from all of them and outside.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
-from seerob.description.shapes.mesh_bodies import edge_balance, is_closed
+from seerob.description.shapes.detail import physics_mesh
+from seerob.description.shapes.mesh_bodies import (
+    bodies,
+    edge_balance,
+    is_closed,
+    joined,
+    joined_unmerged,
+    outward,
+)
+from seerob.description.shapes.moments import signed_volume
 from seerob.description.shapes.tidy import tidied
+
+MOST_BODIES = 300
+"""Of one mesh, whose sides are compared: the time grows with the square."""
+
+
+def sided(mesh: Mesh) -> tuple[Mesh, str]:
+    """Turn the triangles of a surface so that closed bodies have an inside.
+
+    Args:
+        mesh: Tidied.
+
+    Returns:
+        The mesh, and what was turned in words; the same mesh and nothing where nothing is.
+    """
+    said = []
+    # Of a closed surface that is there twice four triangles or more meet at every edge.
+    if (edge_balance(mesh.faces)[2] >= 4).all():
+        single = one_sided(mesh)
+        agreed = oriented(single)[0]
+        if 2 * len(single.faces) == len(mesh.faces) and is_closed(agreed):
+            mesh = agreed
+            said.append("every triangle is there twice, once for each side: taken once")
+    unbalanced = _contradictions(mesh)
+    if unbalanced:
+        agreed, turned = oriented(mesh)
+        if _contradictions(agreed) < unbalanced:
+            mesh = agreed
+            said.append(f"{turned} triangles turned over, so that neighbours agree which side is out")
+    if is_closed(mesh):
+        parts = bodies(mesh)
+        inward = [signed_volume(part) < 0 for part in parts]
+        mixed = any(inward) and not all(inward)
+        if mixed and len(parts) > MOST_BODIES:
+            said.append(
+                f"{sum(inward)} of {len(parts)} bodies are inside out: too many to tell cavities from"
+            )
+        elif mixed:
+            turned_parts, count = outward(parts)
+            if count:
+                mesh = joined_unmerged(turned_parts)
+                said.append(f"{count} of {len(parts)} bodies were inside out: turned")
+    return mesh, ", ".join(said)
+
+
+def _contradictions(mesh: Mesh) -> int:
+    """Edges between two triangles that take different sides for out."""
+    _, balance, uses = edge_balance(mesh.faces)
+    return int(np.count_nonzero((uses == 2) & (balance != 0)))
+
+
+SEAM = 1e-6
+"""How far apart corners of two pieces may be that are the same one, rounded differently [m]."""
+MEET = 6
+"""Pieces that may meet in one corner."""
+
+
+def enclosing(meshes: Sequence[Mesh]) -> Mesh | None:
+    """All of them as one closed mesh, corners on its seams moved by no more than rounding.
+
+    Returns:
+        None where they leave a hole.
+    """
+    whole = joined(meshes)[0]
+    for _ in range(2):
+        around = sided(whole)[0]
+        if is_closed(around):
+            return around
+        whole = _sewn(whole)
+    return None
+
+
+def with_insides(solids: Sequence[Solid]) -> tuple[Solid, ...]:
+    """The solids of one body, those that are open and close together as one."""
+    split = [s for s in solids if s.mesh is not None and s.radius == 0 and not is_closed(s.mesh)]
+    around = enclosing([s.mesh for s in split if s.mesh is not None]) if len(split) > 1 else None
+    if around is None:
+        return tuple(solids)
+    rest = [s for s in solids if all(s is not piece for piece in split)]
+    notes = dict.fromkeys(piece.note for piece in split if piece.note)
+    whole = Solid(mesh=physics_mesh(around), name=split[0].name, note=", ".join(notes))
+    return *rest, whole
+
+
+def _sewn(mesh: Mesh) -> Mesh:
+    """Corners on open edges that are within `SEAM` of each other merged."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    edges, _, uses = edge_balance(mesh.faces)
+    seam = np.unique(edges[uses == 1])
+    if len(seam) < 2:
+        return mesh
+    corners = mesh.vertices[seam]
+    k = min(MEET, len(seam))
+    _, other = cKDTree(corners).query(corners, k=k, distance_upper_bound=SEAM)
+    here, there = np.repeat(np.arange(len(seam)), k), other.ravel()
+    near = there < len(seam)
+    pairs = coo_matrix((np.ones(near.sum(), bool), (here[near], there[near])), shape=(len(seam),) * 2)
+    _, label = connected_components(pairs, directed=False)
+    _, first = np.unique(label, return_index=True)
+    vertices = mesh.vertices.copy()
+    vertices[seam] = corners[first[label]]
+    return tidied(Mesh(vertices, mesh.faces, mesh.color))[0]
+
 
 MAX_HOLES = 500
 """More holes than this are a heap of triangles, not a surface that something is missing from."""

@@ -22,7 +22,7 @@ from math import pi
 
 import numpy as np
 
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Inertial

@@ -20,8 +20,7 @@ from seerob.core.quantities import Pose, Seconds
 from seerob.core.samples import BodySample, Quality
 from seerob.core.snapshot import Finding
 from seerob.description.capture.calibration import CalibrationPose
-from seerob.description.capture.captured import Captured, CaptureFrame
-from seerob.description.capture.exchanged import Exchanges
+from seerob.description.capture.captured import Captured, CaptureFrame, Exchanges
 from seerob.description.capture.mapping import read_conventions
 from seerob.description.capture.observing import Observer
 from seerob.devices.capture.options import (

@@ -16,7 +16,7 @@ from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz,
 from seerob.description.capture import mapping as names
 from seerob.description.capture.calibration import Calibrated, CalibrationPose, calibrate
 from seerob.description.capture.captured import CaptureFrame, Layout
-from seerob.description.capture.ends import bare, turned
+from seerob.description.capture.estimated import bare, turned
 from seerob.description.capture.estimated import estimated as without_neighbours
 from seerob.description.capture.observing import Observer, bind, with_mounts, with_places, without_unplaced
 from seerob.description.capture.smoothing import HIGHEST, LOWEST, group_delay

@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seerob.core.orientation import product
-from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.core.transforms import Array, product, rotation_from_wxyz
 from seerob.protocols.tracking.mvn_pose import JOINTS, SEGMENTS
 
 ISB_AXES: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

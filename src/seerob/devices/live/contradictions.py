@@ -43,7 +43,7 @@ POSITION_NOISE = {"rad": 5e-4, "m": 1e-4}
 LAG = 0.03
 """By which a filter may delay velocities [s]: a low-pass of 5 Hz, lower than controllers have."""
 FASTEST = {"rad": 30.0, "m": 10.0}
-"""No joint is faster [rad/s or m/s]; as `seerob.twin.control.sample_values.LARGEST_SPEED`."""
+"""No joint is faster [rad/s or m/s]; as `seerob.twin.control.reference.LARGEST_SPEED`."""
 TIMES_LIMIT = 2.0
 """Nor faster than so many times its speed limit, where that is known."""
 LOOSE = 0.05

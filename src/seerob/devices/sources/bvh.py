@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import regular
-from seerob.core.orientation import about, cross, product
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, about, cross, product
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.devices.capture.file_source import CaptureFile
 from seerob.files.motion_capture.frame_arrays import FAR

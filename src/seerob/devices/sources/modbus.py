@@ -19,7 +19,7 @@ from seerob.protocols.plc import modbus
 from seerob.protocols.plc.modbus import Place, Table
 from seerob.protocols.plc.modbus_client import Refused, connect
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 
 class Modbus(VariablesSource, frozen=True, kw_only=True):

@@ -27,7 +27,7 @@ from seerob.protocols.plc import modbus
 from seerob.protocols.plc.modbus import SUFFIX, Block, Joints, RegisterMap, blocks, load
 from seerob.protocols.plc.modbus_client import Device, Refused, connect, take
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.dictionary import BadValue
+from seerob.workstation.variables import BadValue
 
 Values = Mapping[str, int | float | bool]
 COARSE = "its registers are too coarse for energies, impact and measured torques"

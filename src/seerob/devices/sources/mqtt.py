@@ -25,7 +25,7 @@ from seerob.protocols.links.json_pointer import document, parts
 from seerob.protocols.plc import sparkplug
 from seerob.protocols.plc.broker_pulse import Pulse, known_end
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 if TYPE_CHECKING:
     import aiomqtt

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.files.bounded import regular
-from seerob.core.orientation import product
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, product
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.devices.capture.file_source import CaptureFile
 from seerob.devices.capture.xsens import anatomical, correction, differences

@@ -28,8 +28,7 @@ from seerob.protocols.plc.opcua_client import (
     write_bool,
 )
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.dictionary import Kind, Variable
-from seerob.workstation.variables.units import unit
+from seerob.workstation.variables import Kind, Variable, unit
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client

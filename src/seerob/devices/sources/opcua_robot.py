@@ -25,7 +25,7 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.plc.opcua_client import Changes, Said, Security, Way, connect
 from seerob.protocols.plc.opcua_robotics import MODES, Robot, robots
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.units import unit
+from seerob.workstation.variables import unit
 
 SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""

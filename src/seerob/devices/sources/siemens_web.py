@@ -26,7 +26,7 @@ from seerob.protocols.links.credentials import Server, secret, server_of, trusti
 from seerob.protocols.links.http_answer import answer
 from seerob.protocols.plc import s7_web
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 if TYPE_CHECKING:
     import httpx

@@ -16,7 +16,7 @@ from seerob.core.files.bounded import regular
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.workstation.source import Opened, Source, Target
-from seerob.workstation.variables.dictionary import BadValue, Kind, Value, Variable
+from seerob.workstation.variables import BadValue, Kind, Value, Variable
 
 MOST_ROWS = 1_000_000
 LONGEST_LINE = 100_000

@@ -28,7 +28,7 @@ from seerob.protocols.links.http_answer import LARGEST, answer
 from seerob.protocols.links.json_pointer import document, parts
 from seerob.protocols.links.websocket_link import linked_to
 from seerob.workstation.source import Opened, Target
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 PATIENCE = 2.0
 """With each answer [s]."""

@@ -24,7 +24,7 @@ from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import AGAIN, REORDERED, RESTART_HOLD
 from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
-from seerob.workstation.variables.dictionary import BadValue, Value, Variable
+from seerob.workstation.variables import BadValue, Value, Variable
 
 COVER_WITHIN = 1.0
 """How long a device is listened to for what it has of the dictionary, at start [s]."""

@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.quantities import LENGTHS
 from seerob.core.snapshot import Finding
-from seerob.core.units import LENGTHS
 from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture import body_table, persons
 from seerob.files.motion_capture.body_table import BodyTable

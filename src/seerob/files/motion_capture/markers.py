@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.quantities import LENGTHS
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, transform
-from seerob.core.units import LENGTHS
 from seerob.description.capture.captured import Captured, Layout, Seen
 from seerob.files.motion_capture.frame_arrays import FrameArrays, checked
 from seerob.files.motion_capture.upright import CLEAR, Up, up_axis, world_from_file

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.quantities import LENGTHS
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.core.units import LENGTHS
 from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture.frame_arrays import MAX_VALUES
 from seerob.files.motion_capture.markers import MarkerReading, Points, recording

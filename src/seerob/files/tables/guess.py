@@ -16,8 +16,7 @@ import numpy as np
 from msgspec import convert, structs
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.orientation import CONVENTIONS, columns_of, is_convention
-from seerob.core.transforms import Array
+from seerob.core.transforms import CONVENTIONS, Array, columns_of, is_convention
 from seerob.files.tables.grid import blank, number
 from seerob.files.tables.headers import ROTATION_VECTOR, UR_POSE, Role
 from seerob.files.tables.layout import Layout, find_layout

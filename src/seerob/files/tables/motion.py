@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem, suggestion
-from seerob.core.orientation import wxyz_from
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, wxyz_from
 from seerob.files.tables.grid import Numbers, place, read_numbers
 from seerob.files.tables.guess import Guess, guess
 from seerob.files.tables.layout import Layout

@@ -23,11 +23,10 @@ from msgspec import Meta
 from seerob.core.errors import InputError, Problem
 from seerob.core.extras import need
 from seerob.core.files.bounded import TooLarge, content
-from seerob.core.orientation import wxyz_from
 from seerob.core.printable import printable_table
 from seerob.core.quantities import Metres3, Pose, Radians, Table, unit
 from seerob.core.samples import Vec4
-from seerob.core.transforms import rotation_from_rpy, wxyz_from_rotation
+from seerob.core.transforms import rotation_from_rpy, wxyz_from, wxyz_from_rotation
 from seerob.files.tables.grid import Grid, blank, number, place
 from seerob.files.tables.mapping import SI
 from seerob.files.tables.table_files import (

@@ -18,7 +18,7 @@ from math import isfinite
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.orientation import wxyz_from
+from seerob.core.transforms import wxyz_from
 from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Move, Program, ToolPose, Waypoint
 
 TOKEN = re.compile(

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.shapes.floor_polygon import prism_mesh
-from seerob.core.shapes.geometry import Mesh, Solid, dilated_rectangle
+from seerob.core.shapes import Mesh, Solid, dilated_rectangle, prism_mesh
 from seerob.core.snapshot import Finding
 from seerob.description.shapes.detail import display_mesh
 from seerob.model.mounting.specification import Mounting, pose_matrix

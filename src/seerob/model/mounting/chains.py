@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from msgspec.structs import replace
 
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.snapshot import Finding, LinkMass, Origin
 from seerob.core.transforms import Array
-from seerob.description.description import Description, Inertial, Joint, Link
+from seerob.description.description import Description, Inertial, Joint, Link, base_from_links, groups
 from seerob.description.lint import DENSITIES, FLANGES, LIGHT, TIPS, too_light
-from seerob.description.pose import base_from_links, groups
 from seerob.model.model import Mechanism
 from seerob.model.mounting.specification import extreme_points
 

@@ -30,8 +30,7 @@ from seerob.model.mounting.chains import assumed, payload, placeholder
 from seerob.model.mounting.contacts import add_contacts
 from seerob.model.mounting.in_place import implausible
 from seerob.model.mounting.mechanisms import MechanismDraft, Riders, mechanism
-from seerob.model.mounting.overrides import home, overridden
-from seerob.model.mounting.people import describe
+from seerob.model.mounting.overrides import describe, home, overridden
 from seerob.model.mounting.picked_up import picked_up
 from seerob.model.mounting.specification import Mounting, extreme_points
 from seerob.model.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
@@ -45,7 +44,7 @@ from seerob.model.mounting.things import (
 )
 from seerob.model.mounting.unasked import unasked
 from seerob.model.variables import Bound, bound
-from seerob.recording.filing import filed
+from seerob.recording.format import filed
 from seerob.workstation.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
 
 

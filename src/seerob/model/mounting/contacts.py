@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import wxyz_from_rotation
 from seerob.model.model import Body

@@ -20,9 +20,8 @@ from seerob.distance.depth import Depths
 from seerob.distance.least import Query
 from seerob.model.model import Body, Mechanism, Model
 from seerob.model.mounting.chains import beyond_flange
-from seerob.workstation.plausibility.of_file import entries_of, findings, listed
-from seerob.workstation.plausibility.ranges import Quantity, data, quantities
-from seerob.workstation.variables.dictionary import VARIABLE
+from seerob.workstation.plausibility.ranges import Quantity, data, entries_of, findings, listed, quantities
+from seerob.workstation.variables import VARIABLE
 
 SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
 """Bones that a person stands, sits or kneels with."""

@@ -1,4 +1,7 @@
-"""A robot's description with what the workstation file says instead."""
+"""A robot's description with what the workstation file says instead.
+
+The body of a person as the workstation file describes it.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,58 @@ from typing import Any
 import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName
-from seerob.core.snapshot import Origin
+from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Description, Joint, JointKind, Quantity
+from seerob.description.humans import manikin
+from seerob.description.humans.anthropometry import Body, body, stature_given
 from seerob.model.mounting.things import link_by_hand
-from seerob.workstation.workstation import Robot
+from seerob.workstation.workstation import Human, Robot
+
+SLIPS = (
+    "follow = task with contacts: hands that are pushed against something hard may slip through it; "
+    "follow = posture holds there"
+)
+
+
+def describe(human: Human, *, touches: bool) -> tuple[Description, tuple[Finding, ...]]:
+    """Tree of bones and joints, and what is to be said of it beside its own findings.
+
+    Args:
+        human: The table of the file.
+        touches: Whether the file asks for contacts.
+
+    Raises:
+        InputError: A value is not a plausible adult's, or not known.
+    """
+    stature, findings = stature_given(human.stature, human.sex, name=human.name)
+    if touches and human.follow == "task":
+        findings = (*findings, Finding(level="warning", subject=human.name, text=SLIPS))
+    description = manikin.build(
+        name=human.name,
+        stature=stature,
+        mass=human.mass,
+        sex=human.sex,
+        lengths=human.lengths if isinstance(human.lengths, str) else "drillis",
+        masses=human.masses if isinstance(human.masses, str) else "deleva",
+        own_lengths=None if isinstance(human.lengths, str) else human.lengths,
+        own_masses=None if isinstance(human.masses, str) else human.masses,
+        hand=human.hand,
+    )
+    return description, findings
+
+
+def size(human: Human) -> Body:
+    """Lengths of the person."""
+    return body(
+        name=human.name,
+        stature=stature_given(human.stature, human.sex, name=human.name)[0],
+        mass=human.mass,
+        sex=human.sex,
+        lengths=human.lengths if isinstance(human.lengths, str) else "drillis",
+        own_lengths=None if isinstance(human.lengths, str) else human.lengths,
+    )
+
 
 ROUNDING = 1e-6
 """Beyond a limit by less than this is the rounding of a printed number [rad or m]."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.quantities import Pose
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.description.description import Inertial, Joint, JointKind, Quantity

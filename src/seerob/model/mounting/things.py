@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.shapes.floor_polygon import prism_mesh
-from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.shapes import Mesh, Solid, capsule, prism_mesh
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
@@ -18,8 +17,8 @@ from seerob.description.description import Inertial, Link
 from seerob.description.mesh import load_meshes
 from seerob.description.shapes import detail, mass_properties, shapes
 from seerob.description.shapes.mesh_bodies import is_closed, joined
+from seerob.description.shapes.mesh_mending import enclosing
 from seerob.description.shapes.moments import signed_volume
-from seerob.description.shapes.split_surfaces import enclosing
 from seerob.workstation.workstation import Area, Shape, Thing
 from seerob.workstation.workstation import Body as BodyTable
 

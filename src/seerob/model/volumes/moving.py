@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.mesh_bodies import is_closed
-from seerob.description.shapes.split_surfaces import enclosing
+from seerob.description.shapes.mesh_mending import enclosing
 from seerob.kernels.fields import Field, mesh_field
 from seerob.kernels.tree_file import tree_of
 from seerob.model.model import Model

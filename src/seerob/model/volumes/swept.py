@@ -23,7 +23,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from seerob.core.shapes.geometry import Mesh
+from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.distance.voxels import VoxelGrid, check_room
 from seerob.kernels.voxels import motion_bounds, stamp
@@ -74,7 +74,7 @@ class Swept:
 
 
 class Holding(Protocol):
-    """What grippers hold as a motion goes on, instant by instant: see `seerob.twin.machines.held`."""
+    """What grippers hold as a motion goes on, instant by instant: see `seerob.twin.machines.gripping`."""
 
     mj: mujoco.MjModel
     """The `mujoco.MjModel` that tells where bodies are on those that carry them."""

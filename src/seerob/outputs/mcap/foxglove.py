@@ -28,7 +28,6 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from seerob.core.errors import InputError
-from seerob.core.orientation import cross
 from seerob.core.snapshot import (
     Arrow,
     Box,
@@ -48,9 +47,9 @@ from seerob.core.snapshot import (
     Vec4,
     Verdict,
 )
-from seerob.core.transforms import Array
-from seerob.outputs.picture.glb_reader import read_glb
+from seerob.core.transforms import Array, cross
 from seerob.outputs.picture.marker_shapes import prism
+from seerob.outputs.picture.stage_bodies import read_glb
 from seerob.recording.format import nanoseconds
 
 ROOT = "world"

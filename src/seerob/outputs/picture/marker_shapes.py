@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.shapes.floor_polygon import cut_ears
+from seerob.core.shapes import cut_ears
 from seerob.core.snapshot import (
     Arrow,
     Box,

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from seerob.core.snapshot import Arrow, Finding, Highlight, Marker, Result, Scene, Segment, Snapshot, Verdict
 from seerob.core.transforms import Array
 from seerob.outputs.palette import DARK, FILL
-from seerob.outputs.picture.camera import Camera, look_along
-from seerob.outputs.picture.canvas import OVERSAMPLING, Canvas, Color, font, png, words
+from seerob.outputs.picture.canvas import OVERSAMPLING, Camera, Canvas, Color, font, look_along, png, words
 from seerob.outputs.picture.marker_shapes import draw_marker, label_of, points_of
 from seerob.outputs.picture.stage_bodies import MOVERS, poses, read_bodies
 from seerob.outputs.sentences import shortened

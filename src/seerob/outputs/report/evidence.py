@@ -7,8 +7,7 @@ import hashlib
 from seerob.core.figures import figure
 from seerob.core.snapshot import Verdict
 from seerob.outputs.html import Html, joined, table, tag, whole
-from seerob.outputs.report.bone_errors import bones_told
-from seerob.outputs.report.masses import masses
+from seerob.outputs.report.masses import bones_told, masses
 from seerob.outputs.report.report import DOUBTFUL, WHO, Report, input_row
 from seerob.outputs.report.setup import UNKNOWN, Setup
 from seerob.outputs.sentences import number

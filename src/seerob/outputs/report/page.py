@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from base64 import b64encode
 
-from seerob.core.report_section import ReportSection, ReportTable
 from seerob.core.snapshot import Basis, CriterionInfo, Verdict
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.palette import DARK_HEX, HEX
 from seerob.outputs.report import plots as _plots
 from seerob.outputs.report.evidence import assumed, evaluated, not_covered
 from seerob.outputs.report.posture_safety import posture_safety_section
-from seerob.outputs.report.report import Report, badge, input_row
+from seerob.outputs.report.report import Report, ReportSection, ReportTable, badge, input_row
 from seerob.outputs.report.time_shares import spread_over_time
 from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
 from seerob.recording.series import Series

@@ -1,16 +1,41 @@
-"""What a report is made from, and the words and cells that all of its sections share."""
+"""What a report is made from, and the words and cells that all of its sections share.
+
+A section that a command adds to the report: sentences and tables, in plain data.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from seerob.core.report_section import ReportSection
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
 from seerob.outputs.html import Html, tag, whole
 from seerob.outputs.palette import MARK, WORD
 from seerob.outputs.report.setup import Setup
 from seerob.outputs.sentences import number
 from seerob.recording.result_log import ResultLog
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """A table of words and figures that are already written out."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class ReportSection:
+    """What stands under one heading."""
+
+    title: str
+    sentences: tuple[str, ...] = ()
+    tables: tuple[ReportTable, ...] = ()
+    picture: bytes | None = None
+    """PNG."""
+    caption: str = ""
+    """Caption of the picture."""
+
 
 DOUBTFUL = (Origin.ASSUMED, Origin.MISSING, Origin.ESTIMATED)
 WHO = {

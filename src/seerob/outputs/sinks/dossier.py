@@ -12,9 +12,9 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_file
-from seerob.core.report_section import ReportSection
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Basis, Finding, Result, Scene, Snapshot
+from seerob.outputs.report.report import ReportSection
 from seerob.outputs.sink import AtEndWithResults, Sink
 from seerob.recording.result_log import result_named
 

@@ -14,7 +14,7 @@ import numpy as np
 from seerob.core.samples import BodySample, Sample
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.core.transforms import Array
-from seerob.outputs.tables import sample_cells as _sample_cells
+from seerob.outputs.tables import people as _sample_cells
 from seerob.outputs.tables.growing_table import Pace
 from seerob.outputs.tables.people import people
 

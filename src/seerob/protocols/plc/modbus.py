@@ -21,8 +21,7 @@ from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.files.toml_file import read_toml
 from seerob.core.quantities import Seconds
 from seerob.workstation.conversion import convert
-from seerob.workstation.variables.dictionary import Kind, Variable
-from seerob.workstation.variables.units import unit
+from seerob.workstation.variables import Kind, Variable, unit
 
 PORT = 502
 MOST = 120

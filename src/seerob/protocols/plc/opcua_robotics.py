@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc import opcua_address
 from seerob.protocols.plc.opcua_client import stated_unit
-from seerob.workstation.variables.units import unit
+from seerob.workstation.variables import unit
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client

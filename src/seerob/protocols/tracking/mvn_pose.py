@@ -25,8 +25,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.orientation import wxyz_from
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, wxyz_from
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.mvn import Items, Kind
 

@@ -13,10 +13,10 @@ from itertools import starmap
 import numpy as np
 
 from seerob.core.extras import need
-from seerob.core.report_section import ReportSection, ReportTable
 from seerob.core.snapshot import Result, Scene
 from seerob.core.transforms import Array
 from seerob.files.trajectories.path_map import Place, path_markers
+from seerob.outputs.report.report import ReportSection, ReportTable
 from seerob.session.permissible.between_samples import METHOD, Bound
 from seerob.session.permissible.ceilings import BY, EITHER_NEEDS, By, Ceiling
 from seerob.session.permissible.evaluation import PermissibleSpeed

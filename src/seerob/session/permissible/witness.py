@@ -14,7 +14,7 @@ from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import Hearing, State
 from seerob.twin.validity.hearing import EVERYWHERE, BonesHeard
-from seerob.workstation.variables.dictionary import Value
+from seerob.workstation.variables import Value
 
 
 class Seen(NamedTuple):

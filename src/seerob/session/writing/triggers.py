@@ -21,7 +21,7 @@ from seerob.devices.live.listening import because
 from seerob.model.model import Model
 from seerob.outputs.sink import Closing
 from seerob.workstation.tables.writing import Trigger
-from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.variables import Variable
 
 _log = logging.getLogger(__name__)
 

@@ -102,7 +102,7 @@ class TrackingError:
 
     A bone that is off by p and turned by α moves its points by no more than p + α ρ, where ρ is how far they
     are from its origin. Of a hand, foot or head of which only the joint is seen, α is not known but bounded
-    by φ (`seerob.description.capture.ends`), and the chord :math:`2 ρ \sin(φ/2)` takes its place. What no
+    by φ (`description.capture.estimated`), and the chord :math:`2 ρ \sin(φ/2)` takes its place. What no
     device sees adds what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody
     knows, and `State.require_bodies` leaves it undecided. What is held because it was not seen just now, or
     what another device sees elsewhere, adds `Hearing.slack`. A bone between two that are seen adds how far

@@ -12,7 +12,7 @@ from seerob.core.samples import SignalSample
 from seerob.core.transforms import Array
 from seerob.twin.signals import Signals
 from seerob.workstation.tables.machines import AtEnd, Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
-from seerob.workstation.variables.dictionary import Value
+from seerob.workstation.variables import Value
 from seerob.workstation.workstation import Machine
 
 SETTLE = 0.3

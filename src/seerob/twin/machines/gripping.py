@@ -3,6 +3,8 @@
 A workpiece is held from the tick on at which both fingers are as near to it as ``touch`` and it reaches
 between them; it then keeps its place in the hand. It is let go when a finger is farther from it than twice
 that, and lies where it was then: nothing falls, and no belt takes it along.
+
+What grippers hold along a motion that was recorded: picked up and let go as in the run that it is of.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import InputError
-from seerob.core.shapes.geometry import Solid
+from seerob.core.shapes import Solid
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.distance.least import Query, Shapes
 from seerob.model.model import Body, Model
@@ -22,9 +24,55 @@ from seerob.model.mounting.machines import BODY, FINGERS
 from seerob.model.mounting.picked_up import AWAY, RESTING
 from seerob.twin.joint_columns import Columns
 from seerob.twin.machines.following import ON_ITS_WAY
-from seerob.twin.state import State
+from seerob.twin.state import Hearing, State
 from seerob.workstation.tables.machines import Fingers
 from seerob.workstation.workstation import Workpiece
+
+
+class Held:
+    """The grippers of a workstation at one instant of a motion after the other.
+
+    Attributes:
+        mj: The `mujoco.MjModel` that tells where bodies are on those that carry them: what is held is where
+            it was taken, what was not yet is in the hand as the file has it.
+    """
+
+    def __init__(self, model: Model) -> None:
+        """At the begin: nothing is held."""
+        own = own_masses(model)
+        self.mj: mujoco.MjModel = own.mj
+        hearings = {name: Hearing(given=True, driven=False) for name in own.mechanisms}
+        self._data = mujoco.MjData(own.mj)
+        self._state = State(own, self._data, hearings)
+        self._loose = any(body.holder for body in own.bodies)
+        self._grips = Grips(self._state, own.mj)
+
+    def follow(self, qpos: Array) -> None:
+        """The next instant.
+
+        Args:
+            qpos: Positions of all joints [rad or m], shape (nq,).
+        """
+        if not self._loose:
+            return
+        self._data.qpos[:] = qpos
+        self._state.refresh(self._state.t)
+        if self._grips.follow(self._state):
+            self._state.refresh(self._state.t)
+
+
+def before(model: Model, qpos: Array) -> Held:
+    """The grippers after a motion.
+
+    Args:
+        model: The compiled workstation.
+        qpos: Positions of all joints at its instants [rad or m], shape (N, nq).
+    """
+    held = Held(model)
+    for at in np.asarray(qpos, float):
+        held.follow(at)
+    return held
+
 
 LET_GO = 2.0
 """A finger that is farther than this times ``touch`` does not hold any more."""

@@ -1,4 +1,7 @@
-"""What is known of where a robot, a machine or a person really is."""
+"""What is known of where a robot, a machine or a person really is.
+
+Which bones of people a question is about, and what is said of those that nobody sees.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,33 @@ from seerob.description.capture.estimated import estimated
 from seerob.description.capture.following import Followed, PartDoubt
 from seerob.description.humans.skeleton import BONES
 from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
+from seerob.model.model import Model
+
+
+def bones_of(model: Model, bodies: Sequence[int]) -> tuple[tuple[str, ...], dict[str, frozenset[str]]]:
+    """Who moves bodies: all but people, and of each person the bones among them.
+
+    Args:
+        model: The compiled workstation.
+        bodies: By index. What a person holds asks for the whole person.
+    """
+    others: dict[str, None] = {}
+    people: dict[str, set[str]] = {}
+    for body in (model.bodies[i] for i in bodies):
+        if body.role == "human":
+            people.setdefault(body.owner, set()).add(body.name.removeprefix(f"{body.owner}/"))
+        elif body.mover:
+            others[body.mover] = None
+    return tuple(others), {name: frozenset(bones) for name, bones in people.items()}
+
+
+def unobserved_reason(person: str, bones: Sequence[str]) -> str:
+    """Why nothing is decided of a person of whom bones are not seen; empty when there are none."""
+    if not bones:
+        return ""
+    shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
+    return f"{person}: no device sees {shown}"
+
 
 STANDS = 1e-2
 """Speed below which a motion that ends has stopped [rad/s or m/s]: noise of encoders makes standing robots

@@ -16,9 +16,8 @@ from seerob.core.errors import NotAsked, Undecided
 from seerob.model.model import Model
 from seerob.twin.attachments import Attachments
 from seerob.twin.signals import Signals
-from seerob.twin.validity.hearing import Hearing, nobody_says
-from seerob.twin.validity.seen_bones import bones_of, unobserved_reason
-from seerob.workstation.variables.dictionary import VARIABLE, Value
+from seerob.twin.validity.hearing import Hearing, bones_of, nobody_says, unobserved_reason
+from seerob.workstation.variables import VARIABLE, Value
 
 MOST = 4096
 """Sets of bodies of which it is kept whom they belong to."""

@@ -16,7 +16,7 @@ from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.files.bounded import TooLarge, content
 from seerob.core.files.toml_file import read_toml
 from seerob.core.quantities import Coordinate, Corners, Metres3, Name, Pose, Table, unit
-from seerob.core.shapes.floor_polygon import check_polygon
+from seerob.core.shapes import check_polygon
 from seerob.workstation.conversion import convert, tables
 from seerob.workstation.tables.simple_shape import MAX_SIZE
 

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from seerob.core.quantities import Corner, Length, Seconds, Table, unit
-from seerob.core.shapes.track import Track
+from seerob.core.shapes import Track
 
 Travel = Annotated[float, unit("m", ge=-1000, le=1000)]
 Turned = Annotated[float, unit("rad", ge=-1000, le=1000)]

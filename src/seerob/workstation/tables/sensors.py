@@ -7,7 +7,7 @@ from typing import Annotated
 
 from seerob.core.errors import suggestion
 from seerob.core.quantities import Corners, Length, Metres3, Name, Pose, Seconds, Table, unit
-from seerob.core.shapes.floor_polygon import check_polygon
+from seerob.core.shapes import check_polygon
 
 MOST_RAYS = 20_000
 """Most rays of one scanner, or beams of one curtain."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from seerob.core.quantities import Coordinate, Corners, Length, Table, unit
-from seerob.core.shapes.floor_polygon import check_polygon
+from seerob.core.shapes import check_polygon
 
 MAX_SIZE = 1000.0
 """Largest size of a simple shape [m]."""

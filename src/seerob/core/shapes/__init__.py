@@ -1,1 +1,0 @@
-"""Shapes with one meaning each, on the floor and in the room."""

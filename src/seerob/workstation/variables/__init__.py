@@ -1,1 +1,0 @@
-"""What the variables of controllers and machines mean."""

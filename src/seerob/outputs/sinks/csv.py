@@ -16,7 +16,7 @@ from msgspec import Meta
 from seerob.core.errors import InputError
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Result, Row, Scene, Snapshot, Verdict
-from seerob.outputs.report.masses import HEAD, bone_rows
+from seerob.outputs.report.masses import BONE_HEAD, bone_rows
 from seerob.outputs.sink import Sink
 from seerob.outputs.tables import people as _sample_cells
 from seerob.outputs.tables.growing_table import GrowingTable, Pace, no_formula
@@ -181,7 +181,7 @@ class CsvWriter(WholeFolder):
         """Finish every table."""
         rows = [list(row) for row in bone_rows(self._errors)]
         if rows:
-            head = [str(title) for title in HEAD]
+            head = [str(title) for title in BONE_HEAD]
             summary = self._table("tracking errors over the run", head)
             for row in rows:
                 summary.append([self._text(cell) for cell in row])

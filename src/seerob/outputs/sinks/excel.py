@@ -15,7 +15,7 @@ from seerob.core.samples import Sample
 from seerob.core.snapshot import Basis, Scene, Snapshot
 from seerob.description.norms.editions import editions
 from seerob.outputs.report import posture_safety as _posture_safety
-from seerob.outputs.report.masses import HEAD as ERRORS
+from seerob.outputs.report.masses import BONE_HEAD as ERRORS
 from seerob.outputs.report.masses import bone_rows
 from seerob.outputs.report.time_shares import HEAD, time_rows
 from seerob.outputs.sink import AtEndWithResults, Sink

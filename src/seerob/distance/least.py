@@ -284,6 +284,8 @@ class Survey:
             positions: Likewise.
             caps: Of every answer [m]; -infinity where none is asked for.
         """
+        if len(self._columns) == 1:
+            return self._run(rotations, positions, (), self._memory, np.ascontiguousarray(caps, float))
         own = np.empty_like(self._caps)
         own[self._in_turn] = caps
         return self._run(rotations, positions, (), self._memory, own).of(self._in_turn)

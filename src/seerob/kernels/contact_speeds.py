@@ -74,6 +74,71 @@ def permissible_speeds(
     return least, which, by_force, by_pressure, by_energy, reduced
 
 
+@njit("f8(f8, f8)", cache=True, nogil=True, error_model="numpy")
+def _admitted(limit: float, rounding: float) -> float:
+    return limit if math.isinf(limit) else limit - rounding * max(1.0, abs(limit))
+
+
+@njit("void(f8[:,:], f8[:,:], f8[:,:], f8[:,:], f8, i8[:,::1])", cache=True, nogil=True, error_model="numpy")
+def ranks(
+    v: Array, pressure: Array, low: Array, high: Array, rounding: float, found: NDArray[np.int64]
+) -> None:
+    """Judge relative speeds against what is permitted, as `seerob.core.verdict.keeps` does.
+
+    Args:
+        v: [m/s], shape (b, r).
+        pressure: Permissible by it alone [m/s], NaN where that is not known, shape (b, r).
+        low: What is permitted at least [m/s], shape (b, r).
+        high: At most, likewise.
+        rounding: Share of a limit, and of 1 where it is less, by which a speed must keep it.
+        found: 2 exceeded, 1 open, 0 within, shape (b, r).
+    """
+    for i in range(v.shape[0]):
+        for j in range(v.shape[1]):
+            keeps = v[i, j] <= _admitted(low[i, j], rounding)
+            known = not (math.isnan(v[i, j]) or math.isnan(high[i, j]))
+            if known and not v[i, j] <= _admitted(high[i, j], rounding):
+                found[i, j] = 2
+            else:
+                found[i, j] = 1 if math.isnan(pressure[i, j]) or not keeps else 0
+
+
+@njit("void(i1[::1], i8, b1[:,::1], f8[::1], b1[:,::1], b1[::1], f8[::1])", cache=True, nogil=True)
+def reached(
+    kinds: NDArray[np.int8],
+    within: int,
+    member: NDArray[np.bool_],
+    fast: Array,
+    near: NDArray[np.bool_],
+    close: NDArray[np.bool_],
+    speeds: Array,
+) -> None:
+    """Find which regions of people each of b surfaces may hit; writes into the last three arguments.
+
+    Args:
+        kinds: Of the distance of each surface to each of n bones, shape (b·n,).
+        within: The kind that says that they are near.
+        member: Which bone counts for which region, shape (n, k).
+        fast: Bound on the speed of each bone [m/s], shape (n,).
+        near: Shape (b, k).
+        close: Which bones are near any surface, shape (n,).
+        speeds: Bound on those of each region's bones that are near [m/s], 0 of none, shape (k,).
+    """
+    n, k = member.shape
+    near[:] = False
+    close[:] = False
+    speeds[:] = 0.0
+    for i in range(len(near)):
+        for bone in range(n):
+            if kinds[i * n + bone] != within:
+                continue
+            close[bone] = True
+            for region in range(k):
+                if member[bone, region]:
+                    near[i, region] = True
+                    speeds[region] = np.maximum(speeds[region], fast[bone])
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def governing(
     v: Array,

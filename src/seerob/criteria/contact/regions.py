@@ -25,6 +25,7 @@ from seerob.description.humans.skeleton import bone_poses, without_side
 from seerob.description.humans.skin import BODY_REGION
 from seerob.description.norms import body_limits
 from seerob.distance.least import DistanceKind, Per, Query, Survey
+from seerob.kernels.contact_speeds import reached
 from seerob.model.model import Mechanism, Model
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.spans import Span, rows_of
@@ -98,6 +99,7 @@ class Person:
         self._off = TrackingError(model, self.bodies)
         self._names = [model.bodies[body].name for body in self.bodies]
         self._close: NDArray[np.bool_] = np.zeros(len(self.bodies), bool)
+        self._still = np.zeros(len(self.bodies))
         self._shape = len(robot.moving), len(self.bodies)
         self._member = np.zeros((len(self.bodies), len(REGIONS)), bool)
         for i, body in enumerate(self.bodies):
@@ -154,14 +156,14 @@ class Person:
             found = self._farther.within(*state.placed(self._asked), caps)
         else:
             found = state.distances(self._query, Per.WHETHER)
-        close: NDArray[np.bool_] = np.asarray(found.kind == _WITHIN_CAP).reshape(self._shape)
-        self._close = np.asarray(close.any(axis=0))
-        near: NDArray[np.bool_] = close @ self._member
-        if speed is not None:
-            return near, np.full(len(REGIONS), speed)
-        fast = state.fastest_speeds(self.bodies) if span is None else (span.fast + span.noise)[self._people]
-        v = np.where(self._close, fast, 0.0)
-        return near, np.asarray(np.max(v[:, None] * self._member, axis=0))
+        fast = self._still
+        if speed is None:
+            fast = (
+                state.fastest_speeds(self.bodies) if span is None else (span.fast + span.noise)[self._people]
+            )
+        near, v = np.empty((self._shape[0], len(REGIONS)), bool), np.empty(len(REGIONS))
+        reached(found.kind, _WITHIN_CAP, self._member, fast, near, self._close, v)
+        return near, v if speed is None else np.full(len(REGIONS), speed)
 
 
 ANYWHERE = frozenset({"Upper arms and elbow joints", "Lower arms and wrist joints", "Hands and fingers"})

@@ -31,10 +31,11 @@ from seerob.core.domains import number
 from seerob.core.snapshot import Verdict
 from seerob.core.tolerances import Shifts, Spread, Tolerance, spread
 from seerob.core.transforms import Array
+from seerob.core.verdict import ROUNDING
 from seerob.criteria.contact.impact_mass import masses_along_motion
 from seerob.criteria.contact.limits import RegionArrays, Speeds
+from seerob.kernels import contact_speeds as kernel
 from seerob.model.model import Mechanism, Model
-from seerob.recording.answers import keep_many
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.state import State
 
@@ -142,9 +143,9 @@ class ContactEnds:
 def ranks(v: Array, speeds: Speeds, ends: Spread | None) -> NDArray[np.int64]:
     """2 exceeded, 1 open, 0 within, of relative speeds [m/s] (b, r)."""
     low, high = (speeds.permissible,) * 2 if ends is None else (ends.low, ends.high)
-    open_ = np.isnan(speeds.pressure) | ~keep_many(v, low)
-    beyond = ~(keep_many(v, high) | np.isnan(v) | np.isnan(high))
-    return np.where(beyond, 2, np.where(open_, 1, 0))
+    found = np.empty(v.shape, np.int64)
+    kernel.ranks(v, speeds.pressure, low, high, ROUNDING, found)
+    return found
 
 
 def area_verdict(verdict: Verdict, region: Verdict | None, ends: Spread | None) -> Verdict:

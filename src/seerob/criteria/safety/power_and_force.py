@@ -408,9 +408,10 @@ class Contacts:
         riders = () if mover is not None else self.behind.riding(state)
         # A drive presses as hard however slowly it moves.
         pressing = {body for rider in riders for body in rider.moving}
-        driven = np.isin(self.moving, sorted(pressing)) | (mover is not None)
-        moves = v_r > np.where(driven, STILL, STANDSTILL)
-        slowest = STILL if driven.any() else STANDSTILL
+        driven = np.array([mover is not None or body in pressing for body in self.moving])
+        by_drive = mover is not None or (bool(pressing) and bool(driven.any()))
+        moves = v_r > (np.where(driven, STILL, STANDSTILL) if by_drive else STANDSTILL)
+        slowest = STILL if by_drive else STANDSTILL
         projected = self.behind.along_motion(state, mover, self.moving, standstill=slowest)
         masses = robot_masses(spec.mass, simplified, projected)
         people = people or self.people

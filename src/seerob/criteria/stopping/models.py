@@ -20,7 +20,7 @@ from seerob.criteria.stopping.by_energy import bind_braked_in_span
 from seerob.criteria.stopping.by_table import bind_table, not_its_own
 from seerob.criteria.stopping.in_span import InSpan, Stopping, bind_in_span
 from seerob.criteria.stopping.onset import At as OnsetAt
-from seerob.criteria.stopping.onset import Onset, accelerated
+from seerob.criteria.stopping.onset import Onset, by_speed
 from seerob.criteria.stopping.reaction import Reactions, bind_reaction, joint_limits
 from seerob.criteria.stopping.simulated import Stopped, StopSimulation
 from seerob.criteria.stopping.table import StoppingTable
@@ -213,7 +213,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
         )
         found = replace(found, doubts=(*found.doubts, unbounded_reason))
-    by_onset, T_r, a = found.by_onset, stop.reaction, stop.acceleration or 0.0
+    by_onset, given = found.by_onset, by_speed(stop.reaction, stop.acceleration or 0.0)
     asked, how, left_out = bind_reaction(
         model, robot, gap, stop.reaction, stop.acceleration,
         points=stop.model != "simulated", joints=not found.timed,
@@ -257,7 +257,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         found.doubts,
         (*found.not_modelled, *left_out),
         _inverse(stop) if found.timed else None,
-        None if by_onset is None else lambda v: by_onset(accelerated(v, T_r, a, np.zeros(0))),
+        None if by_onset is None else lambda v: by_onset(given(v)),
         found.in_span,
         stop.acceleration is None,
         found.costly,

@@ -117,6 +117,16 @@ def accelerated(v: Array, T_r: float, a: float, qd: Array) -> Onset:
     return Onset(v, v * T_r + a * T_r**2 / 2, v + a * T_r, None, None)
 
 
+def by_speed(T_r: float, a: float) -> Callable[[Array], Onset]:
+    """`accelerated`, of the speeds of parts [m/s] (n,) alone; arguments as there."""
+    none = np.zeros(0)
+    gained, faster = accelerated(none, T_r, a, none), a * T_r
+    if a == 0.0:
+        return lambda v: Onset(v, v * T_r, v, gained.ways, gained.speeds)
+    way = a * T_r**2 / 2
+    return lambda v: Onset(v, v * T_r + way, v + faster, None, None)
+
+
 def constant(robot: Mechanism, gap: Gap, T_r: float, a: float, unbounded_reason: str = "") -> Reaction:
     """Every part accelerates by a given figure [m/s²]."""
 

@@ -375,9 +375,12 @@ class Validity:
         return self._sound
 
     def _is_sound(self, name: str) -> bool:
-        if self.invalid_reason(name) or self.invalid_place_reason(name) or self.heard_doubt(name):
+        if self.invalid_place_reason(name):
             return False
-        return not self._hearings[name].bones_heard or not self._bones_in_doubt(name)
+        # Of whom nothing is heard bone by bone there is no other reason.
+        if not self._hearings[name].bones_heard:
+            return True
+        return not self.invalid_reason(name) and not self._bones_in_doubt(name)
 
     def _owners(self, bodies: tuple[int, ...]) -> _Owners:
         last = self._owners_last.get(id(bodies))

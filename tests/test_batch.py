@@ -11,13 +11,17 @@ import pytest
 
 from made_cell import TWO_R, UR10, heard, made, meant, two_r, wave
 from seerob.core.errors import InputError, UnknownName
+from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.recording.answers import Answers
 from seerob.recording.series import CODES, NO_VERDICT
+from seerob.session import batch as batches
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
+from seerob.twin.spans import Ways
 from seerob.twin.states import States
+from seerob.workstation.source import Opened, Pump
 
 N = 70
 T = 0.01 * np.arange(N)
@@ -247,6 +251,63 @@ def test_sources_are_followed_tick_by_tick_with_what_is_not_heard(tmp_path):
         np.testing.assert_allclose(column.value, log[name].values, rtol=1e-12)
         assert column.verdict is log[name].verdict
         assert sum("not heard for" in reason for reason in column.reasons) > 50
+
+
+def lies(seed: int, name: str) -> list[JointSample]:
+    """Samples with gaps, doubts, noise and lateness, as fast or slow as it comes, that may end in motion."""
+    rng = np.random.default_rng(seed)
+    period = rng.choice([0.0013, 0.01, 0.02, 0.03])
+    t = np.arange(rng.choice([0.0, 0.004, 0.31]), 1.5, period)
+    t = t + rng.choice([0, 1e-10, 0.3 * period]) * rng.uniform(-1, 1, len(t))
+    t = np.abs(t[(t < rng.uniform(0.3, 1)) | (t > 0.95)])
+    says = dict(enumerate(["bad", "", "worse"])) if rng.random() < 0.5 else {}
+    found = []
+    for k, instant in enumerate(t.tolist()):
+        q, qd = (each[:2] for each in wave(instant))
+        more = (
+            {"qd_error": tuple(rng.uniform(0, 1, 2).tolist())} if seed % 3 == 0 and rng.random() < 0.7 else {}
+        )
+        late = rng.uniform(0, 0.3) if seed % 4 == 1 else 0.0
+        reason = says.get(k % 17, "")
+        quality = Quality.DEGRADED if seed % 5 == 2 and k % 23 == 0 else Quality.GOOD
+        found.append(heard(name, instant, q, qd, late=late, reason=reason, quality=quality, **more))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_file_is_followed_in_arrays_as_sample_by_sample(tmp_path, monkeypatch, seed):
+    mimic = '<mimic joint="j1" multiplier="-0.7" offset="0.2"/>' if seed % 2 else ""
+    text = "".join(
+        f'[[robots]]\nname = "{name}"\nmodel = "{name}.urdf"\n' for name in ("one", "two", "rests")
+    )
+    text += "base = { position = [0, 9, 0] }\n" + ("q = [1]\n" if seed % 4 == 3 else "")
+    text += "".join(
+        f'[[sources]]\nkind = "csv"\nrobot = "{name}"\nfile = "x.csv"\n' for name in ("one", "two")
+    )
+    text += "[engine]\ntracking_limit = 10\n"
+    files = {f"{name}.urdf": two_r() for name in ("one", "two")} | {"rests.urdf": two_r(mimic=mimic)}
+    files["x.csv"] = "t,a,b\n0,0,0\n1,0,0\n"
+    station = made(tmp_path, text, files)
+    samples = {name: lies(10 * seed + k, name) for k, name in enumerate(("one", "two"))}
+    end = max(each[-1].t for each in samples.values())
+    pumps = [Pump(Opened(samples=each, duration=end)) for each in samples.values()]
+    feed = [tuple(s for pump in pumps for s in pump.until(0.01 * k)) for k in range(round(100 * end) + 3)]
+    together = batches.recorded(station.model, feed, end)
+    assert isinstance(together.ways, Ways)
+    monkeypatch.setattr(batches, "known_motion", lambda *_: None)
+    one_by_one = batches.recorded(station.model, feed, end)
+    assert not isinstance(one_by_one.ways, Ways)
+    for key in ("t", "q", "v"):
+        np.testing.assert_array_equal(getattr(together, key), getattr(one_by_one, key))
+    for key in ("doubts", "speed_errors"):
+        found, wanted = getattr(together, key), getattr(one_by_one, key)
+        assert found.keys() == wanted.keys()
+        for name, rows in wanted.items():
+            np.testing.assert_array_equal(found[name], rows)
+    for ours, theirs in zip(together.ways, one_by_one.ways, strict=True):
+        for key in ("t", "q", "v"):
+            np.testing.assert_array_equal(getattr(ours, key), getattr(theirs, key))
+        assert ours.broken == theirs.broken
 
 
 class Own(Criterion, frozen=True, kw_only=True):

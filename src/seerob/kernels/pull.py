@@ -53,8 +53,10 @@ def along(
     """
     last = len(instants) - 1
     n = points.shape[1]
+    k = -1
     for row in range(len(t)):
-        k = -1
+        if row and t[row] < t[row - 1]:
+            k = -1
         while k < last and instants[k + 1] <= t[row] + SLACK:
             k += 1
         if k < 0 or (k < last and jumps[k + 1]):

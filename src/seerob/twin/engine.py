@@ -75,6 +75,7 @@ class Engine:
     Attributes:
         state: The twin at the last tick; the same object throughout.
         signals: What machines say, by variable.
+        ahead: Whose future is known: past their newest sample nothing will be said.
         end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
     """
 
@@ -141,10 +142,9 @@ class Engine:
         }
         # What a variable says of a machine stands until it says something else.
         coasting = set(live) - {machine.name for machine in model.workstation.machines}
-        self._ahead = set(driven) - set(live) - {m.name for m in model.workstation.machines}
-        """Whose future is known: past their newest sample nothing will be said."""
+        self.ahead = set(driven) - set(live) - {m.name for m in model.workstation.machines}
         following = {machine.name for machine in model.workstation.machines if machine.motion.variables()}
-        self._stands = self._ahead | following
+        self._stands = self.ahead | following
         """Who stands when nothing more is said, and may not when it was in motion."""
         self._live = {*live, *following}
         self._leapt = dict.fromkeys(following, (-np.inf, ""))
@@ -275,7 +275,7 @@ class Engine:
             for found in following.until(self._next()):
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
-                hearing.leaves_at = self._references[name].leaves_at if name in self._ahead else 0.0
+                hearing.leaves_at = self._references[name].leaves_at if name in self.ahead else 0.0
 
     def _contradicted(self, sample: JointSample) -> str:
         """Why what a source says of itself is not the twin; empty when it may be."""
@@ -407,14 +407,14 @@ class Engine:
             if not (self.controllers and hearing.given):
                 return None
             return np.tile(mechanism.home, (len(t), 1)), np.zeros((len(t), len(mechanism.home))), ""
-        if name not in self._ahead:
+        if name not in self.ahead:
             return None
         q, qd, _ = self._references[name].course(t)
         return q, qd, hearing.doubt_ahead(self.state.t, float(t[-1]) if len(t) else self.state.t)
 
     def _knots_of(self, name: str, begin: float, end: float) -> Array:
         """Tell between which instants that is one cubic (`seerob.twin.spans.Knots`)."""
-        if name not in self._ahead:
+        if name not in self.ahead:
             return np.zeros(0)
         return self._references[name].between(begin + kernel.SLACK, end - kernel.SLACK)
 

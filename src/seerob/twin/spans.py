@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import mujoco
 import numpy as np
@@ -119,6 +119,37 @@ class Path:
         inside = self.t[(self.t > begin) & (self.t < end)]
         half = (begin + end) / 2
         return float(inside[np.abs(inside - half).argmin()]) if len(inside) else half
+
+
+class Ways(Sequence[Path]):
+    """Paths from each of some instants to the next, which share their ends.
+
+    Args:
+        t: Knots of all, increasing [s], shape (k,).
+        q: ``qpos`` there, shape (k, nq).
+        v: ``qvel`` there, shape (k, nv).
+        first: Which knots the instants are, shape (N,) of N - 1 paths.
+    """
+
+    def __init__(self, t: Array, q: Array, v: Array, first: Indices) -> None:
+        self.t, self.q, self.v, self.first = t, q, v, first
+
+    def __len__(self) -> int:
+        return max(len(self.first) - 1, 0)
+
+    @overload
+    def __getitem__(self, k: int) -> Path: ...
+    @overload
+    def __getitem__(self, k: slice) -> Ways: ...
+    def __getitem__(self, k: int | slice) -> Path | Ways:
+        if isinstance(k, slice):
+            begin, end, step = k.indices(len(self))
+            if step != 1:
+                raise ValueError("ways are taken one after the other: a slice without a step")
+            return Ways(self.t, self.q, self.v, self.first[begin : max(begin, end) + 1])
+        k = range(len(self))[k]
+        knots = slice(int(self.first[k]), int(self.first[k + 1]) + 1)
+        return Path(self.t[knots], self.q[knots], self.v[knots])
 
 
 class Fall(NamedTuple):

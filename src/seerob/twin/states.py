@@ -28,7 +28,7 @@ from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
 from seerob.twin.attachments import untold
 from seerob.twin.joint_columns import Columns, moving_dofs
-from seerob.twin.spans import Path
+from seerob.twin.spans import Path, Ways
 from seerob.twin.trees import Followed, Tree
 
 Reasons = NDArray[np.object_]
@@ -49,7 +49,7 @@ class Motion:
     """Why a robot or human may not be there, by name."""
     foreseen: bool = False
     """Whether one instant leads to the next: a motion, and not a collection of places."""
-    ways: tuple[Path, ...] | None = None
+    ways: Sequence[Path] | None = None
     """From each instant to the next, N - 1 of them; None where the instants are no motion."""
 
     speed_errors: Mapping[str, Array] = field(default_factory=dict)
@@ -389,8 +389,7 @@ def motion_of(
     motion = _placed(model, given, instants)
     if t is None:
         return motion
-    pairs = [slice(k, k + 2) for k in range(count - 1)]
-    return replace(motion, ways=tuple(Path(motion.t[k], motion.q[k], motion.v[k]) for k in pairs))
+    return replace(motion, foreseen=count > 1, ways=Ways(motion.t, motion.q, motion.v, np.arange(count)))
 
 
 def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) -> Motion:

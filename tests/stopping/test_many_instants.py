@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.recording.series import CODES
+from seerob.criteria.stopping import many_instants
+from seerob.recording.series import CODES, NO_VERDICT
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [6, 0, -1] }\n'
 ASKED = (
@@ -50,3 +51,35 @@ def test_many_instants_are_each_of_them(tmp_path, name):
     np.testing.assert_allclose(many.limit, [result.limit for result in alone], rtol=1e-9)
     assert many.verdict.tolist() == [CODES[result.verdict] for result in alone]
     assert {result.verdict for result in alone} == {"undecided" if more == "" else "within", "exceeded"}
+
+
+AHEAD = [
+    ("reaction = 0.1, stopping = 0.1", 3.6),
+    ('model = "constant_deceleration", reaction = 0.033, stopping = 0.2', 3.2),
+]
+
+
+@pytest.mark.parametrize(("stop", "x"), AHEAD)
+def test_what_a_file_does_ahead_is_that_of_each_instant_by_itself(tmp_path, monkeypatch, stop, x):
+    asked = (
+        '[[safety]]\nkind = "separation"\nname = "apart"\nbetween = ["arm", "op"]\nhuman_uncertainty = 0\n'
+        f"robot_uncertainty = 0\nintrusion = 0.2\nstop = {{ {stop} }}\n"
+    )
+    source = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "motion.csv"\nbegins = 0.004\n'
+    source += 'mapping = { time = "t", joints = ["a", "b"], time_unit = "s", joint_unit = "rad" }\n'
+    t = np.arange(0, 1.2, 0.03)  # most of its samples lie between two ticks
+    rows = [f"{s:.3f},{np.sin(3 * s)},{0.5 * np.cos(4 * s)}" for s in t]
+    text = FLOATING + TWO_R + PERSON.replace("[6, 0, -1]", f"[{x}, 0, -1]") + source + asked
+    files = {"arm.urdf": two_r(), "motion.csv": "\n".join(["t,a,b", *rows])}
+    cell = made(tmp_path, text, files)
+    found = cell.batch()["apart"]
+    assert not found.note
+    monkeypatch.setattr(many_instants._Ahead, "of", lambda *_: None)
+    alone = cell.batch()["apart"]
+    assert "not made for batches" in alone.note
+    np.testing.assert_array_equal(found.answers.verdict, alone.answers.verdict)
+    np.testing.assert_allclose(found.value, alone.value, rtol=1e-12)
+    np.testing.assert_allclose(found.answers.limit, alone.answers.limit, rtol=1e-12)
+    assert set(found.answers.verdict.tolist()) == set(CODES.values()) - {NO_VERDICT}
+    # Where the motion ends, nobody says what it does after: that is asked of each instant by itself.
+    assert found.reasons[-1] == alone.reasons[-1] != ""

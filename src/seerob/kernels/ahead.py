@@ -234,3 +234,42 @@ def farthest(
         # What lies outside of the stretch is at its ends.
         way[c] = np.maximum(np.maximum(far - lead * outside, 0.0), now[c] * T_r)
         top[c] = fastest
+
+
+@njit(
+    f"void({_ROW}, {_PAIR}, i8[::1], i8[::1], {_ROWS}, f8, f8, f8, {_ROWS}, {_ROWS})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def reactions(
+    t: Array,
+    bounds: Array,
+    first: Indices,
+    last: Indices,
+    now: Array,
+    T_r: float,
+    lead: float,
+    slack: float,
+    ways: Array,
+    tops: Array,
+) -> None:
+    """Bound ways and speeds of parts until braking begins, from each of many instants on.
+
+    Args:
+        t: Instants of a motion, increasing [s], shape (m,).
+        bounds: Largest speeds from instant to instant, as of `part_speeds`, shape (m - 1, 2, n).
+        first: At which of them each reaction begins, shape (N,).
+        last: At which it ends, ``T_r + lead`` later, shape (N,).
+        now: Speeds when it begins, which may be larger [m/s], shape (N, n).
+        T_r: Reaction time [s].
+        lead: A reaction begins until then [s].
+        slack: Instants nearer than this are one [s].
+        ways: Receives them [m], shape (N, n).
+        tops: Receives the largest speeds [m/s], shape (N, n).
+    """
+    for k in range(len(first)):
+        a, b = first[k], last[k]
+        farthest(
+            t[a : b + 1], t[a], T_r + lead, bounds[a:b, 0], now[k], T_r, lead, slack, ways[k], tops[k]
+        )  # fmt: skip

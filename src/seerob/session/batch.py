@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -29,7 +30,7 @@ from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, ONE_INSTANT
 from seerob.session.known_motion import known_motion
 from seerob.session.run import Bound, Feed, engine_of, settled
-from seerob.twin.spans import Path
+from seerob.twin.spans import Path, Ways
 from seerob.twin.state import Hearing, State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
 from seerob.twin.validity.hearing import SLACK, STANDS, Heard
@@ -39,6 +40,8 @@ STRETCH, LONGEST = 256, 1024
 processor's cache."""
 SHARES = 8
 """Parts that a motion has between the two, so that threads end together."""
+TOGETHER = 32
+"""Ways from one instant to the next that are bounded together, at most."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,6 +184,7 @@ def judged(
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, length), n]) if begin < end]
     questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
+    left: dict[str, list[Flags]] = {name: [] for name in asked}
     speeds: list[Array] = []
     noisy: set[str] = set()
     if asked and parts:
@@ -193,8 +197,9 @@ def judged(
             stretch, fast, rested = made[k % len(shares)][k // len(shares)]
             speeds.append(fast)
             noisy |= rested
-            for name, answers in stretch.items():
-                found[name].append(answers)
+            for name, (answers, reasons, alone) in stretch.items():
+                found[name].append((answers, reasons))
+                left[name].append(alone)
     for name in noisy:
         # How far errors of speeds reach is asked of a state (`seerob.criteria.noisy_speeds`).
         del asked[name], found[name]
@@ -202,10 +207,13 @@ def judged(
     slow = [one for one in bound if one.criterion.name not in asked]
     walked = _walked(model, slow, motion, findings) if slow else {}
     walked |= {name: _joined(answers) for name, answers in found.items()}
+    again = {name: np.concatenate([np.zeros(0, bool), *left[name]]) for name in asked}
     if motion.ways and asked:
-        for one, spans in list(_uncleared(model, bound, asked, motion, walked, np.concatenate(speeds))):
-            again = _walked(model, [one], motion, findings, spans)
-            walked[one.criterion.name] = _with(walked[one.criterion.name], again[one.criterion.name], spans)
+        _mark_uncleared(model, bound, again, motion, walked, np.concatenate(speeds))
+    for one in bound:
+        name = one.criterion.name
+        if name in asked and (spans := again[name]).any():
+            walked[name] = _with(walked[name], _walked(model, [one], motion, findings, spans)[name], spans)
     columns = {}
     for one in bound:
         name = one.criterion.name
@@ -219,60 +227,70 @@ def judged(
     return Batch(motion.t, columns)
 
 
-def _uncleared(
+def _mark_uncleared(
     model: Model,
     bound: Sequence[Bound],
-    asked: Mapping[str, _Able],
+    again: Mapping[str, Flags],
     motion: Motion,
     said: Stretch,
     speeds: Array,
-) -> Iterator[tuple[Bound, Flags]]:
-    """Criteria that were judged together, and at which instants the way there is to be looked at.
+) -> None:
+    """Mark, of criteria that were judged together, at which instants the way there is to be looked at.
 
     The same bounds as on the road (`seerob.criteria.between_ticks`) clear the others.
+
+    Args:
+        model: The compiled workstation.
+        bound: Its criteria.
+        again: By name, instants that are asked again anyway; written.
+        motion: Where everybody is.
+        said: What was found of each instant.
+        speeds: Of all bodies [m/s], shape (N, n).
     """
-    assert motion.ways is not None
-    watches = {b.criterion.name: b for b in bound if b.criterion.name in asked and b.watch is not None}
-    ends: dict[str, tuple[Array, Array]] = {}
-    open_ = {name: np.zeros(len(motion.t), bool) for name in watches}
-    for name, one in watches.items():
-        answers, verdict = said[name][0], said[name][0].verdict
-        at_most, off = one.criterion.at_most, np.zeros(len(verdict))
+    ways = motion.ways
+    assert ways is not None
+    ids = np.array([body.mj for body in model.bodies], np.int64)
+    for one in bound:
+        name, watch = one.criterion.name, one.watch
+        if name not in again or watch is None:
+            continue
+        open_, (answers, _) = again[name], said[name]
+        at_most, off = one.criterion.at_most, np.zeros(len(open_))
         bare = answers.limit - answers.value if at_most else answers.value - answers.limit
         if answers.interval is not None:
             low, high = answers.interval
             off = high - answers.value if at_most else answers.value - low
-        ends[name] = bare, off
-        within, exceeded = verdict == WITHIN, verdict == CODES[Verdict.EXCEEDED]
+        within = (answers.verdict == WITHIN) & ~open_
+        exceeded = (answers.verdict == CODES[Verdict.EXCEEDED]) & ~open_
         undecided = ~(exceeded[1:] | exceeded[:-1])
-        either = (within[1:] | within[:-1]) & ~(within[1:] & within[:-1])
-        assert one.watch is not None
+        both = within[1:] & within[:-1]
+        either = (within[1:] | within[:-1]) & ~both
         # What is bounded by a judgement of its own is judged on the road, idle or not.
-        open_[name][1:] = undecided & (either if one.watch.falls is not None else True)
-    # A figure without a limit, or one that is never within, has nothing to lose on the way.
-    simple = {
-        name: (one, one.watch.falls)
-        for name, one in watches.items()
-        if one.watch is not None and one.watch.falls is not None and (said[name][0].verdict == WITHIN).any()
-    }
-    points = next((one.watch.points for one, _ in simple.values() if one.watch is not None), None)
-    ids = np.array([body.mj for body in model.bodies], np.int64)
-    for k, way in enumerate(motion.ways if points is not None else ()):
-        assert points is not None
-        span = points.span(way, float(motion.t[k]), float(motion.t[k + 1]), ids, model.mj)
-        span.between_speeds(speeds[k], speeds[k + 1])
-        for name, (_, falls) in simple.items():
-            verdict = said[name][0].verdict
-            if verdict[k] != WITHIN or verdict[k + 1] != WITHIN:
+        open_[1:] |= undecided & (either if watch.falls is not None else True)
+        if watch.falls is None:
+            continue
+        # A figure without a limit, or one that is never within, has nothing to lose on the way.
+        k, size, left = 0, 1, np.append(np.flatnonzero(~both), len(both)).tolist()
+        ends = iter(left)
+        end = next(ends)
+        while k < len(both):
+            if k == end:
+                k, end = k + 1, next(ends, len(both))
                 continue
-            bare, off = ends[name]
-            m, other = bare[k], bare[k + 1]
-            fall, bend = falls(span, min(m - off[k], other - off[k + 1]))
-            low = np.maximum((m + other - fall) / 2, min(m, other) - bend) - max(off[k], off[k + 1])
-            open_[name][k + 1] = not np.min(low) >= 0
-    for name, one in watches.items():
-        if open_[name].any():
-            yield one, open_[name]
+            size = min(size, end - k) if isinstance(ways, Ways) else 1
+            path = ways.joined(k, k + size) if isinstance(ways, Ways) else ways[k]
+            span = watch.points.span(path, float(motion.t[k]), float(motion.t[k + size]), ids, model.mj)
+            span.between_speeds(speeds[k], speeds[k + size])
+            m, o = bare[k : k + size + 1], off[k : k + size + 1]
+            fall, bend = watch.falls(span, float((m - o).min()))
+            # Of several ways at once the bound is no sharper than of each, and the least margin counts.
+            one_way = (m[0] + m[1] - fall) / 2 if size == 1 else m.min() - np.asarray(fall) / 2
+            if np.min(np.maximum(one_way, m.min() - bend) - o.max()) >= 0:
+                k, size = k + size, min(2 * size, TOGETHER)
+            elif size > 1:
+                size = size // 2
+            else:
+                open_[k + 1], k = True, k + 1
 
 
 def _with(
@@ -328,6 +346,8 @@ def _movers(criterion: Criterion, model: Model) -> tuple[str, ...]:
 
 
 Stretch = dict[str, tuple[Answers, Reasons]]
+Part = dict[str, tuple[Answers, Reasons, Flags]]
+"""With the instants that are to be asked one by one."""
 
 
 def _share(
@@ -335,20 +355,21 @@ def _share(
     questions: Questions,
     asked: dict[str, _Able],
     parts: Sequence[Motion],
-) -> list[tuple[Stretch, Array, set[str]]]:
+) -> list[tuple[Part, Array, set[str]]]:
     """The work of one thread."""
     bench = Bench(model, questions)
     return [_stretch(bench, asked, part) for part in parts]
 
 
-def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Stretch, Array, set[str]]:
+def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Part, Array, set[str]]:
     """What criteria say, speeds of all bodies, and which criteria asked for speeds that are noisy."""
     states = bench.place(motion)
-    found: Stretch = {}
+    found: Part = {}
     noisy: set[str] = set()
     for name, one in asked.items():
         states.asked.clear()
         states.speeds_asked.clear()
+        states.alone = np.zeros(len(states), bool)
         answers, reasons = _said(one, states)
         with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
         if not motion.speed_errors.keys().isdisjoint(with_carriers | states.speeds_asked):
@@ -360,9 +381,9 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Str
         if texts := [text for held_name, text in one.held.items() if held_name in states.asked]:
             reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
             answers = answers.open()
-        found[name] = answers, reasons
+        found[name] = answers, reasons, states.alone
     # Only what is within, and so has a limit, is to stay so on the way.
-    kept = any((answers.verdict == WITHIN).any() for answers, _ in found.values())
+    kept = any((answers.verdict == WITHIN).any() for answers, _, _ in found.values())
     if motion.ways is not None and kept:
         return found, states.largest_speeds(), noisy
     return found, np.full((len(states), len(bench.ids)), np.nan), noisy
@@ -473,10 +494,11 @@ def _walked(
         for one in bound
     ]
     judge = Judge(fresh, findings)
+    many = settled() if only is None else nullcontext()
     if motion.foreseen:
         state.foresee, state.knots = partial(_foresee, model, motion, state), partial(_knots, motion)
     rows: list[tuple[Result, ...]] = []
-    with settled():
+    with many:
         for k, t in enumerate(motion.t.tolist()):
             if only is not None and not (only[k] or only[min(k + 1, len(only) - 1)]):
                 rows.append(())

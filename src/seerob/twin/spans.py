@@ -148,7 +148,11 @@ class Ways(Sequence[Path]):
                 raise ValueError("ways are taken one after the other: a slice without a step")
             return Ways(self.t, self.q, self.v, self.first[begin : max(begin, end) + 1])
         k = range(len(self))[k]
-        knots = slice(int(self.first[k]), int(self.first[k + 1]) + 1)
+        return self.joined(k, k + 1)
+
+    def joined(self, begin: int, end: int) -> Path:
+        """Paths that follow one another as one."""
+        knots = slice(int(self.first[begin]), int(self.first[end]) + 1)
         return Path(self.t[knots], self.q[knots], self.v[knots])
 
 

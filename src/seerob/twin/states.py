@@ -54,6 +54,10 @@ class Motion:
 
     speed_errors: Mapping[str, Array] = field(default_factory=dict)
     """By name, see `seerob.twin.state.State.speed_error`, shape (N, n)."""
+    of: Motion | None = None
+    """The whole motion that it is a part of; None of a whole one."""
+    begin: int = 0
+    """Which of its instants is the first one here."""
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
@@ -61,7 +65,8 @@ class Motion:
         ways = None if self.ways is None else self.ways[begin : end - 1]
         part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
         errors = {name: found[begin:end] for name, found in self.speed_errors.items()}
-        return Motion(*part, doubts, self.foreseen, ways, errors)
+        whole = self if self.of is None else self.of
+        return Motion(*part, doubts, self.foreseen, ways, errors, whole, self.begin + begin)
 
 
 class Questions:
@@ -154,12 +159,23 @@ class States:
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.speeds_asked: set[str] = set()
         """Those of which speeds were asked since it was last cleared."""
+        self.alone = np.zeros(len(motion.t), bool)
+        """Instants that whoever was asked last leaves to be asked one by one, shape (N,)."""
         self._bench = bench
         self._cache: dict[Any, Any] = {}
         self._answers: dict[tuple[Query, Per], Closests] = {}
 
     def __len__(self) -> int:
         return len(self._motion.t)
+
+    @property
+    def motion(self) -> Motion:
+        """Where everybody is, whoever was heard."""
+        return self._motion
+
+    def elsewhere(self, motion: Motion) -> States:
+        """Return the twin at other instants."""
+        return States(self._bench, motion)
 
     # Each is found when it is asked first: what only a robot's own tree says does not follow the others.
 

@@ -470,7 +470,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if self.mode == "fixed" or own._tolerances():
             return None
         incomplete = bool(self.unknown(model))
-        return at_instants(own.stop, gap, own._distances, K, incomplete=incomplete)
+        return at_instants(model, own.stop, gap, own._distances, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""

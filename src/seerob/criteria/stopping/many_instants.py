@@ -9,19 +9,29 @@ import numpy as np
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import EvaluateMany
 from seerob.criteria.stopping.models import SHARES, Stop
-from seerob.criteria.stopping.onset import accelerated
+from seerob.criteria.stopping.onset import LARGEST_WINDOW, Onset, accelerated
 from seerob.criteria.stopping.terms import Course, braking
-from seerob.model.model import Gap
+from seerob.kernels.ahead import part_speeds, reactions
+from seerob.model.model import Gap, Mechanism, Model
 from seerob.recording.answers import Answers
-from seerob.twin.states import States
+from seerob.twin.spans import ROUNDING, Chains, Points, Ways, rows_of
+from seerob.twin.states import Motion, States
+from seerob.twin.validity.hearing import SLACK
 
 
 def separations(
-    stop: Stop, gap: Gap, S_p: Callable[[Course, float, Array], Array], K: float, *, incomplete: bool
+    model: Model,
+    stop: Stop,
+    gap: Gap,
+    S_p: Callable[[Course, float, Array], Array],
+    K: float,
+    *,
+    incomplete: bool,
 ) -> EvaluateMany | None:
     """What the part that governs comes to; None where the stopping time is not given, or has a tolerance.
 
     Args:
+        model: The workstation.
         stop: How the robot stops.
         gap: From whom to its moving parts.
         S_p: Of a course, K and the speed that a person is seen to have [m/s] (N,), shape (N, b) [m].
@@ -30,20 +40,100 @@ def separations(
     """
     if stop.model not in SHARES or stop.stopping is None or stop.tolerance is not None:
         return None
-    if stop.acceleration is None:
+    a, T_r, T_s, share = stop.acceleration, stop.reaction, stop.stopping, SHARES[stop.model]
+    ahead = None if a is not None else _Ahead.of(model, gap, T_r)
+    if a is None and ahead is None:
         # What the motion does ahead is asked instant by instant.
         return None
-    a = stop.acceleration
-    T_s, share = stop.stopping, SHARES[stop.model]
 
     def evaluate(states: States) -> Answers:
         distance = states.closest_per_body(gap).distance
         v_r, _, _ = states.fastest_points(gap.b)
         seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)
-        least = S_p(braking(accelerated(v_r, stop.reaction, a, np.zeros(0)), T_s, share), K, seen)
+        if a is not None:
+            onset = accelerated(v_r, T_r, a, np.zeros(0))
+        else:
+            assert ahead is not None
+            onset = ahead.at(states, v_r)
+        least = S_p(braking(onset, T_s, share), K, seen)
         k = (distance - least).argmin(axis=1)[:, None]
         value, limit = (np.take_along_axis(found, k, axis=1)[:, 0] for found in (distance, least))
         found = Answers.against(value, limit, at_most=False)
         return found.open() if incomplete else found
 
     return evaluate
+
+
+class _Ahead:
+    """Speeds of the parts along a motion that is known ahead, of a robot that stands on its own.
+
+    They are bounded as by `seerob.criteria.stopping.onset.Foreseen`.
+    """
+
+    def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float, chains: Chains) -> None:
+        self._robot, self._parts, self._T_r, self._chains = robot, list(gap.b), T_r, chains
+        self._period, self._home = model.workstation.engine.tick, model.mj.qpos0[chains.dofs]
+
+    @classmethod
+    def of(cls, model: Model, gap: Gap, T_r: float) -> _Ahead | None:
+        """None where more than the robot's own joints moves the parts, or the time is too long."""
+        movers = {model.bodies[i].mover for i in gap.b}
+        robot = model.mechanisms.get(next(iter(movers)) or "") if len(movers) == 1 else None
+        if robot is None or robot.role != "robot" or robot.on or robot.riders or T_r > LARGEST_WINDOW:
+            return None
+        if any(model.bodies[i].holder for i in gap.b):
+            return None
+        ids = np.array([body.mj for body in model.bodies], np.int64)
+        chains = Points(model).chains(rows_of(gap.b), ids, model.mj)
+        own = chains.dofs.tolist() == robot.v_address.tolist()
+        direct = np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not robot.offset.any()
+        return cls(model, robot, gap, T_r, chains) if own and direct else None
+
+    def at(self, states: States, v_r: Array) -> Onset:
+        """From each instant to the beginning of braking; what is not known ahead is left to be asked alone.
+
+        Args:
+            states: The instants.
+            v_r: Speeds of the parts there [m/s], shape (N, b).
+        """
+        n, motion = len(states), states.motion
+        whole, begin = (motion if motion.of is None else motion.of), motion.begin
+        states.alone |= True
+        nothing = Onset(v_r, v_r * self._T_r, v_r, None, None)
+        if not whole.foreseen or not isinstance(whole.ways, Ways):
+            return nothing
+        period, T_r, chains, ways = self._period, self._T_r, self._chains, whole.ways
+        every = np.arange(len(whole.t))
+        on_time = np.flatnonzero(whole.t != period * every)
+        count = int(on_time[0]) if len(on_time) else len(whole.t)
+        ends = np.ceil((motion.t + T_r + period) / period - 1e-6).astype(np.int64)
+        k = np.arange(begin, begin + n)
+        doubted = np.cumsum([0, *(whole.doubts[self._robot.name] != "")])
+        known = (k < count) & (ends < count)
+        top = np.minimum(ends, len(whole.t) - 1)
+        known &= doubted[top + 1] == doubted[k]
+        if not known.any():
+            return nothing
+        a, b = int(ways.first[begin]), int(ways.first[top[known][-1]])
+        t, q, v = (np.ascontiguousarray(each[a : b + 1]) for each in (ways.t, ways.q, ways.v))
+        own = ways.first[begin : begin + n] - a
+        own = own[own < len(t)]
+        others = np.setdiff1d(np.arange(len(t)), own)
+        speeds = np.empty((len(t), len(self._parts)))
+        speeds[own] = v_r[: len(own)]
+        if len(others):
+            elsewhere = states.elsewhere(Motion(t[others], q[others], v[others], whole.doubts))
+            speeds[others] = elsewhere.largest_speeds()[:, self._parts]
+        joint_q, joint_v = (np.ascontiguousarray(each[:, chains.dofs]) for each in (q, v))
+        bounds = np.empty((len(t) - 1, 2, len(self._parts)))
+        part_speeds(
+            t, joint_q, joint_v, speeds, self._home,
+            chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, bounds,
+        )  # fmt: skip
+        states.alone &= ~known
+        S_r, v_s = nothing.S_r.copy(), v_r.copy()
+        ways_there, tops = np.empty((2, int(known.sum()), len(self._parts)))
+        first, last = (np.asarray(ways.first[each[known]] - a, np.int64) for each in (k, ends))
+        reactions(t, bounds, first, last, v_r[known], T_r, period, SLACK, ways_there, tops)
+        S_r[known], v_s[known] = ways_there, tops
+        return Onset(v_r, S_r, v_s, None, None)

@@ -9,6 +9,7 @@ from made_cell import TWO_R, heard, made, person, two_r
 from seerob.core.snapshot import Verdict
 from seerob.criteria.judging import Judge
 from seerob.criteria.stopping.stated_acceleration import explains, largest_gain
+from seerob.recording.series import CODES
 from seerob.twin.engine import Engine
 
 ENGINE = "[engine]\nphysics = false\ngravity = [0, 0, 0]\n"
@@ -170,12 +171,15 @@ def test_acceleration_limits_that_a_recorded_motion_contradicts_hold_what_may_re
 
 
 def test_arrays_that_contradict_acceleration_limits_are_not_within(tmp_path):
-    """Of arrays nobody knows what comes next: the limits bound S_p."""
+    """Of arrays with instants it is known what comes next, as of a log, until they end in motion."""
     text = ENGINE + LIMITED.format("[5, 5]") + person("op", 9.0, 0, 0) + UNSTATED
     station = made(tmp_path, text, {"arm.urdf": two_r()})
     for rate, verdict in ((12.0, Verdict.UNDECIDED), (4.0, Verdict.WITHIN)):
         q, qd = (np.column_stack([x, 0 * x]) for x in faster(rate))
-        assert station.batch({"arm": q}, {"arm": qd}, t=T)["s"].verdict is verdict
+        found = station.batch({"arm": q}, {"arm": qd}, t=T)["s"]
+        assert set(found.answers.verdict[:60].tolist()) == {CODES[verdict]}
+        assert found.reasons[-1]
+        assert found.verdict is Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -74,6 +74,65 @@ def raster(
                     owner[y, x] = ids[f]
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def cover(points: Array, inverse_depth: Array, faces: Ints, owner: Ints) -> None:
+    """Find what triangles cover, whichever is nearest.
+
+    Args:
+        points: As of `raster`, shape (n, 2).
+        inverse_depth: As of `raster`, shape (n,).
+        faces: Corners, shape (m, 3).
+        owner: Buffer, shape (height, width); 0 is written where a triangle is.
+    """
+    height, width = owner.shape
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if not (inverse_depth[a] > 0 and inverse_depth[b] > 0 and inverse_depth[c] > 0):
+            continue
+        ax, ay = points[a, 0], points[a, 1]
+        bx, by = points[b, 0], points[b, 1]
+        cx, cy = points[c, 0], points[c, 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if not abs(area) > 1e-12:
+            continue
+        x0 = int(max(0.0, np.ceil(min(ax, bx, cx) - 0.5)))
+        x1 = int(min(width - 1.0, np.floor(max(ax, bx, cx) - 0.5)))
+        y0 = int(max(0.0, np.ceil(min(ay, by, cy) - 0.5)))
+        y1 = int(min(height - 1.0, np.floor(max(ay, by, cy) - 0.5)))
+        inverse_area = 1.0 / area
+        for y in range(y0, y1 + 1):
+            py = y + 0.5
+            for x in range(x0, x1 + 1):
+                if owner[y, x] >= 0:
+                    continue
+                px = x + 0.5
+                wa = ((cx - bx) * (py - by) - (cy - by) * (px - bx)) * inverse_area
+                wb = ((ax - cx) * (py - cy) - (ay - cy) * (px - cx)) * inverse_area
+                if not (wa < 0 or wb < 0 or 1.0 - wa - wb < 0):
+                    owner[y, x] = 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def nearest_of(
+    points: Array, inverse_depth: Array, names: NDArray[np.int64], depth: Array, owner: NDArray[np.int64]
+) -> None:
+    """Find the nearest of some points in each cell of a grid, the later of two that are as near.
+
+    Args:
+        points: Screen position [cell], x right, y down, shape (n, 2).
+        inverse_depth: 1/z [1/m], shape (n,); one of 0 or less is left out.
+        names: What each belongs to, shape (n,).
+        depth: Buffer of 1/z, 0 where nothing is, shape (height, width); written.
+        owner: Buffer of names, same shape; written.
+    """
+    height, width = depth.shape
+    for i in range(len(points)):
+        x, y, z = np.floor(points[i, 0]), np.floor(points[i, 1]), inverse_depth[i]
+        if z > 0 and 0 <= x < width and 0 <= y < height and z >= depth[int(y), int(x)]:
+            depth[int(y), int(x)] = z
+            owner[int(y), int(x)] = names[i]
+
+
 Colors = NDArray[np.float32]
 
 JUMP = 0.03

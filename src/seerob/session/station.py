@@ -311,7 +311,8 @@ class Station:
                 who is not named stands where the file says. Without it, what the workstation's sources
                 say at every tick.
             qd: Velocities likewise [rad/s or m/s].
-            t: Instants of ``q``, increasing [s], shape (N,); the ways from each to the next are judged too.
+            t: Instants of ``q``, increasing [s], shape (N,); the ways from each to the next are judged too,
+                and what comes next is known, as in a run of a file.
                 When not given they are instants of their own, a tick apart.
             threads: How many work at once; as many as there are processors when not given.
 

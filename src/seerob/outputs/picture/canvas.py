@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.paint import averaged, darken, glaze, outline, raster, solid, stroke
+from seerob.kernels.paint import averaged, cover, darken, glaze, outline, raster, solid, stroke
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -97,19 +97,40 @@ _LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
 """Toward the light, in the world."""
 
 
-class Canvas:
-    """Buffers of one view, drawn at `OVERSAMPLING` times the size and averaged at the end."""
+class Room:
+    """Memory for one canvas after the other: some 110 MB."""
 
-    def __init__(self, camera: Camera) -> None:
+    def __init__(self) -> None:
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def array(self, name: str, shape: tuple[int, ...], kind: type[np.generic]) -> NDArray[Any]:
+        """Return the array of a name, with whatever is in it."""
+        found = self._arrays.get(name)
+        if found is None or found.shape != shape or found.dtype != kind:
+            found = self._arrays[name] = np.empty(shape, kind)
+        return found
+
+
+class Canvas:
+    """Buffers of one view, drawn at `OVERSAMPLING` times the size and averaged at the end.
+
+    Args:
+        camera: The view.
+        room: Where the buffers are, which no other canvas uses meanwhile.
+    """
+
+    def __init__(self, camera: Camera, room: Room | None = None) -> None:
         self.camera = camera
         self.fine = camera.scaled(OVERSAMPLING)
+        self._room = Room() if room is None else room
         shape = (self.fine.height, self.fine.width)
-        self.depth = np.zeros(shape)
-        self.owner = np.full(shape, -1, np.int32)
+        self.depth: Array = self._room.array("depth", shape, np.float64)
+        self.owner: NDArray[np.int32] = self._room.array("owner", shape, np.int32)
+        self.rgb: NDArray[np.float32] = self._room.array("rgb", (*shape, 3), np.float32)
         ramp = np.linspace(1.0, 0.93, shape[0], dtype=np.float32)[:, None, None]
-        self.rgb: NDArray[np.float32] = np.empty((*shape, 3), np.float32)
+        self.depth.fill(0)
+        self.owner.fill(-1)
         self.rgb[:] = np.array(PAPER, np.float32) * ramp
-        self._scratch: tuple[Array, Array, NDArray[np.int32]] | None = None
 
     def bodies(
         self, vertices: Array, normals: Array, faces: NDArray[np.int32], ids: NDArray[np.int32], colors: Array
@@ -124,7 +145,7 @@ class Canvas:
             colors: sRGB 0…1 per id, shape (k, 3).
         """
         screen, inverse = self.fine.project(vertices)
-        lit = np.zeros_like(self.depth)
+        lit = self._room.array("lit", self.depth.shape, np.float64)  # read only where a body is
         shade = brightness(vertices, normals, self.camera.eye)
         raster(screen, inverse, shade, faces, ids, self.depth, lit, self.owner)
         solid(self.rgb, self.owner, lit, np.ascontiguousarray(colors, float).reshape(-1, 3))
@@ -135,8 +156,8 @@ class Canvas:
         height = np.maximum(vertices[:, 2] - floor, 0.0)
         flat = vertices - height[:, None] * np.array([0.15, -0.2, 1.0])
         screen, inverse = self.fine.project(flat)
-        depth, lit, owner = self._layer()
-        raster(screen, inverse, np.zeros(len(flat)), faces, np.zeros(len(faces), np.int32), depth, lit, owner)
+        _, _, owner = self._layer()
+        cover(screen, inverse, faces, owner)
         darken(self.rgb, owner, 0.9)
 
     def veil(self, vertices: Array, faces: NDArray[np.int32], color: Color, alpha: float) -> None:
@@ -176,12 +197,12 @@ class Canvas:
 
     def _layer(self) -> tuple[Array, Array, NDArray[np.int32]]:
         """Empty buffers (1/z, brightness, owner) for one surface; the next call takes them back."""
-        if self._scratch is None:
-            self._scratch = np.zeros_like(self.depth), np.zeros_like(self.depth), np.full_like(self.owner, -1)
-        else:
-            self._scratch[0].fill(0)
-            self._scratch[2].fill(-1)
-        return self._scratch
+        shape = self.depth.shape
+        depth = self._room.array("depth of a layer", shape, np.float64)
+        owner = self._room.array("owner of a layer", shape, np.int32)
+        depth.fill(0)
+        owner.fill(-1)
+        return depth, self._room.array("lit", shape, np.float64), owner
 
     def dot(self, point: Array, color: Color, *, radius: float) -> None:
         """A filled disc of ``radius`` [px] with a light rim, never hidden."""

@@ -14,8 +14,19 @@ from numpy.typing import NDArray
 
 from seerob.core.snapshot import Arrow, Finding, Highlight, Marker, Result, Scene, Segment, Snapshot, Verdict
 from seerob.core.transforms import Array
+from seerob.kernels.paint import nearest_of
 from seerob.outputs.palette import DARK, FILL
-from seerob.outputs.picture.canvas import OVERSAMPLING, Camera, Canvas, Color, font, look_along, png, words
+from seerob.outputs.picture.canvas import (
+    OVERSAMPLING,
+    Camera,
+    Canvas,
+    Color,
+    Room,
+    font,
+    look_along,
+    png,
+    words,
+)
 from seerob.outputs.picture.marker_shapes import draw_marker, label_of, points_of
 from seerob.outputs.picture.stage_bodies import MOVERS, poses, read_bodies
 from seerob.outputs.sentences import shortened
@@ -105,12 +116,7 @@ def _coarse(camera: Camera, surface: Array, owner: NDArray[np.int64]) -> tuple[A
     depth = np.zeros((camera.height, camera.width))
     body = np.full(depth.shape, -1, np.int64)
     screen, inverse = camera.project(surface)
-    x, y = np.floor(screen).astype(np.int64).T
-    inside = (inverse > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
-    order = np.argsort(inverse[inside], kind="stable")  # of several in a cell the nearest is written last
-    cell = y[inside][order], x[inside][order]
-    depth[cell] = inverse[inside][order]
-    body[cell] = owner[inside][order]
+    nearest_of(screen, inverse, owner, depth, body)
     return depth, body
 
 
@@ -191,6 +197,8 @@ class Stage:
         self.findings: tuple[Finding, ...] = self._bodies.findings
         """Nodes whose mesh cannot be read."""
         self._names = [node.name for node in scene.nodes]
+        self._rooms: list[Room] = []
+        """Of pictures that are done, for those that follow: to get memory takes longer than to fill it."""
         self._weight, self._face = scattered(self._bodies.vertices, self._bodies.faces, 12_000)
 
     def picture(
@@ -214,19 +222,29 @@ class Stage:
         placed = self._bodies.placed(snapshot)
         if camera is None:
             camera = self._view(placed[0], snapshot, result, tuple(subjects), size)
-        canvas = self._drawn(camera, placed, snapshot, result)
+        try:
+            room = self._rooms.pop()
+        except IndexError:  # as many as pictures are drawn at once
+            room = Room()
+        canvas = self._drawn(camera, placed, snapshot, result, room)
         image = self._with_labels(canvas, result)
         near = close_up(camera, () if result is None else result.markers)
         if near is not None:
-            image = inset(image, canvas, self._drawn(near, placed, snapshot, result).pixels())
+            image = inset(image, canvas, self._drawn(near, placed, snapshot, result, Room()).pixels())
+        self._rooms.append(room)
         return png(image)
 
     def _drawn(
-        self, camera: Camera, placed: tuple[Array, Array], snapshot: Snapshot, result: Result | None
+        self,
+        camera: Camera,
+        placed: tuple[Array, Array],
+        snapshot: Snapshot,
+        result: Result | None,
+        room: Room,
     ) -> Canvas:
         vertices, normals = placed
         bodies = self._bodies
-        canvas = Canvas(camera)
+        canvas = Canvas(camera, room)
         canvas.shadow(vertices, bodies.faces, 0.0)
         self._grid(canvas, vertices)
         lit = self._highlights(result)

@@ -7,17 +7,21 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from msgspec.structs import replace as changed
 
 from made_cell import TWO_R, made, two_r
 from seerob.app.cli import main
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
+from seerob.criteria.judging import Judge
 from seerob.outputs.sinks import recorder
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.format import END_METADATA, SAMPLES, Tick
 from seerob.recording.mcap_index import scan
 from seerob.recording.recording import Recording
+from seerob.session import run, scene
 from seerob.session.recorded_station import load_recorded
+from seerob.session.station import load
 
 CELL = (
     "[engine]\nphysics = false\n"
@@ -166,3 +170,35 @@ def test_a_recording_that_lacks_more_than_damage_leaves_out_is_refused(whole, tm
     recording = Recording.open(rewritten(whole, tmp_path / "run.mcap", far))
     with pytest.raises(InputError, match="follows tick 99; do not trust this recording"):
         load_recorded(recording).replay(recording)
+
+
+# -- a recording that another version made ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("then", [Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN])
+def test_what_another_version_did_not_call_within_is_not_within_now(tmp_path, monkeypatch, then):
+    """Nothing tells which of the two is right."""
+
+    class Other(Judge):
+        def __call__(self, state):
+            found = super().__call__(state)
+            return tuple(changed(r, verdict=then) if 1 < state.t < 1.2 else r for r in found)
+
+    station = made(tmp_path, CELL, {"arm.urdf": two_r(), "motion.csv": motion(0.2)})
+    with monkeypatch.context() as patch:
+        patch.setattr(run, "Judge", Other)
+        patch.setattr(scene, "version", lambda _: "0.0.9")
+        station.run(folder=tmp_path / "run", sinks=[Recorder(lossless=True)])
+    recording = Recording.open(tmp_path / "run" / "run.mcap")
+    again = load_recorded(recording).replay(recording)
+    series = again.results["tip"]
+    assert again.verdict is (then if then is Verdict.WITHIN else Verdict.UNDECIDED)
+    differs = (series.t > 1.0005) & (series.t < 1.1995)
+    assert set(series.verdicts[~differs].tolist()) == {0}
+    if then is not Verdict.WITHIN:
+        assert set(series.verdicts[differs].tolist()) == {2}
+        assert f"seerob 0.0.9, which recorded it, said {then} of the same samples" in series.worst().reason
+    stricter = tmp_path / "cell.toml"
+    stricter.write_text(CELL.replace("limit = 3", "limit = 2.5"))
+    (tmp_path / "arm.urdf").write_text(two_r())
+    assert load(stricter).replay(recording).verdict is Verdict.WITHIN  # another question

@@ -35,8 +35,8 @@ from seerob.core.snapshot import Verdict
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
 
-CELLS = 100
-"""Random cells."""
+CELLS = 300
+"""Random cells, `short` ones."""
 EACH = 1
 """Relations that are asked of a cell, by chance; of one that somebody names, all are."""
 DEPTH = 0.03
@@ -48,6 +48,22 @@ WITHIN = 0
 RANK = {Verdict.WITHIN: 0, None: 0, Verdict.UNDECIDED: 1, Verdict.EXCEEDED: 2}
 NAMED = [int(seed) for seed in os.environ.get("SEEROB_CELLS", "").split()]
 """``SEEROB_CELLS="1234 5678"`` asks of these alone, as `make soak` says of what it finds."""
+
+
+def short(seed: int, cell: Cell) -> Cell:
+    """Half of its motion; of three cells in four, and of all robots of the library, without contacts.
+
+    To work out where such a robot can clamp takes longer than all the rest. `make soak` asks whole cells.
+    """
+    dear = bool(cell.library) or np.random.default_rng([seed, 4]).random() < 0.75
+    left_out = cell.left_out | {"contact", "cart contact"} if dear else cell.left_out
+    return replace(cell, duration=cell.duration / 2, left_out=left_out)
+
+
+def made(seed: int, *, published: bool = True) -> Cell:
+    """The cell of a seed, as it is asked here."""
+    cell = random_cell(seed, published=published)
+    return short(seed, cell) if seed < CELLS and not NAMED else cell
 
 
 def pair(folder, cell: Cell, other: Cell) -> tuple[ResultLog, ResultLog]:
@@ -106,29 +122,36 @@ SAME = {
 }
 
 
+def spoken(cell: Cell) -> bool:
+    """Whether a PLC tells where its machine is."""
+    return cell.machine is not None and not cell.machine.by_file
+
+
 def nothing_changes(what, seed, folder):
-    cell = random_cell(seed, published=not what.startswith("links"))
+    cell = made(seed, published=not what.startswith("links"))
     one, other = pair(folder, cell, SAME[what](cell))
+    if any("sources[0].degrees" in reason for series in other.values() for reason in series.reasons):
+        no_relief(one, other)  # so small in degrees that they may be radians: it asks
+        return
     # Speeds of what a PLC tells are derived as it comes: a row that rounding puts beyond a tick comes later.
-    spoken = cell.machine is not None and not cell.machine.by_file
-    same(one, other, within=1e-3 if spoken and what == "another start time" else 1e-5)
+    same(one, other, within=1e-3 if spoken(cell) and what == "another start time" else 1e-5)
 
 
 def a_criterion_changes_no_other(seed, folder):
-    cell = random_cell(seed)
+    cell = made(seed)
     rng = np.random.default_rng(seed)
     names = ["speed", "fastest", "energy", "distance", "separation", "area", "felt", "contact"]
     names += ["cart distance", "cart contact"] * (cell.machine is not None)
     # Who asks for no speed of what carries a robot is told so.
     left_out = frozenset(rng.choice(names, rng.integers(1, 8), replace=False).tolist())
-    one, other = pair(folder, cell, replace(cell, left_out=left_out))
+    one, other = pair(folder, cell, replace(cell, left_out=cell.left_out | left_out))
     for name in other:
         assert one[name].verdict is other[name].verdict, name
         np.testing.assert_array_equal(one[name].values, other[name].values, name)
 
 
 def another_tick_does_not_contradict(seed, folder):
-    cell = random_cell(seed)
+    cell = made(seed)
     one, other = pair(folder, cell, replace(cell, tick=0.002))
     for name in one:
         verdicts = one[name].verdict, other[name].verdict
@@ -140,15 +163,15 @@ def another_tick_does_not_contradict(seed, folder):
 
 
 def replayed_and_in_arrays_it_says_the_same(seed, folder):
-    cell = random_cell(seed)
-    made = station(cell, folder)
+    cell = made(seed)
+    here = station(cell, folder)
     from seerob.outputs.sinks.recorder import Recorder
 
-    run = made.run(folder=folder / "run", sinks=[Recorder()]).results
+    run = here.run(folder=folder / "run", sinks=[Recorder()]).results
     (file,) = (folder / "run").glob("*.mcap")
-    again = made.replay(Recording.open(file)).results
+    again = here.replay(Recording.open(file)).results
     same(run, again, within=0.0)
-    batch = made.batch()
+    batch = here.batch()
     for name in run:
         np.testing.assert_array_equal(batch[name].answers.verdict, run[name].verdicts, name)
 
@@ -157,7 +180,7 @@ def replayed_and_in_arrays_it_says_the_same(seed, folder):
 
 
 def heavier_never_relieves(seed, folder):
-    cell = random_cell(seed, published=False)
+    cell = made(seed, published=False)
     no_relief(*pair(folder, cell, heavier(cell)))
 
 
@@ -166,18 +189,18 @@ ELSEWHERE = "felt", "contact", "cart contact"
 
 
 def thicker_never_relieves(seed, folder):
-    cell = random_cell(seed, published=False)
+    cell = made(seed, published=False)
     no_relief(*pair(folder, cell, thicker(cell)), *(name for name in ALL if name not in ELSEWHERE))
 
 
 def faster_never_relieves(seed, folder):
-    cell = replace(random_cell(seed), walks=False)
+    cell = replace(made(seed), walks=False)
     no_relief(*pair(folder, cell, faster(cell)), slack=1e-6)
 
 
 def nearer_never_relieves(seed, folder):
     """The person, along the shortest distance at the worst instant, by less than what there is of it."""
-    cell = random_cell(seed)
+    cell = made(seed)
     names = ["distance", "separation"] + ["cart distance", "cart separation"] * (cell.machine is not None)
     name = names[seed // 2 % len(names)]
     cell = replace(cell, left_out=frozenset(ALL) - {name})
@@ -187,7 +210,7 @@ def nearer_never_relieves(seed, folder):
 
 
 def wider_tolerances_never_relieve(seed, folder):
-    cell = random_cell(seed)
+    cell = made(seed)
     one, other = pair(folder, cell, replace(cell, uncertainty=0.05, mass_tolerance=0.2))
     for name in one:
         assert not (other[name].verdict is Verdict.WITHIN and one[name].verdict is not Verdict.WITHIN), name
@@ -195,7 +218,7 @@ def wider_tolerances_never_relieve(seed, folder):
 
 def a_finer_tick_never_finds_a_larger_separation(seed, folder):
     """What a tick says of a motion that is known ahead holds until the next one."""
-    cell = replace(random_cell(seed), duration=0.3, walks=False, left_out=frozenset(ALL) - {"separation"})
+    cell = replace(made(seed), duration=0.3, walks=False, left_out=frozenset(ALL) - {"separation"})
     coarse, fine = (each["separation"] for each in pair(folder, cell, replace(cell, tick=0.002)))
     told = {round(t, 6): m for t, m in zip(coarse.t.tolist(), coarse.values - coarse.limits, strict=True)}
     compared = 0
@@ -212,8 +235,9 @@ def a_finer_tick_never_finds_a_larger_separation(seed, folder):
 
 
 def a_gap_in_the_log_is_never_greener(seed, folder):
-    cell = replace(random_cell(seed), duration=0.6, speeds=bool(seed // 2 % 2))
-    beside = (0.2 - 1 / cell.rate, 0.5 + 1 / cell.rate) if cell.speeds else (np.inf, 0.0)
+    cell = replace(made(seed), duration=0.6, speeds=bool(seed // 2 % 2))
+    known = cell.speeds or spoken(cell)
+    beside = (0.2 - 1 / cell.rate, 0.5 + 1 / cell.rate) if known else (np.inf, 0.0)
     never_greener(*pair(folder, cell, replace(cell, gap=(0.2, 0.5))), beside=beside)
 
 
@@ -222,7 +246,7 @@ APART = "cart speed", "cart distance", "cart separation"
 
 
 def a_robot_that_nobody_heard_is_never_within(seed, folder):
-    cell = random_cell(seed)
+    cell = made(seed)
     log = said(replace(cell, heard=False), folder)
     carried = cell.machine is not None and cell.machine.carries
     for name in log:
@@ -234,7 +258,7 @@ def a_robot_that_nobody_heard_is_never_within(seed, folder):
 
 def a_machine_that_nobody_heard_is_never_within(seed, folder):
     """Nor is what it carries."""
-    cell = random_cell(seed)
+    cell = made(seed)
     machine = cell.machine or random_machine(np.random.default_rng(seed))
     log = said(replace(cell, machine=replace(machine, heard=False, by_file=False)), folder)
     for name in log:
@@ -243,24 +267,24 @@ def a_machine_that_nobody_heard_is_never_within(seed, folder):
 
 
 def a_mass_that_nobody_gave_is_never_within(seed, folder):
-    cell = random_cell(seed, published=False)
+    cell = made(seed, published=False)
     k = seed % len(cell.links)
     links = tuple(replace(each, inertial=None) if i == k else each for i, each in enumerate(cell.links))
     one, other = pair(folder, cell, replace(cell, links=links))
-    for name in ("energy", "felt", "contact"):
+    for name in {"energy", "felt", "contact"} & set(other):
         assert other[name].verdict is not Verdict.WITHIN, name
     never_greener(one, other)
 
 
 def a_shape_that_nobody_gave_is_never_within(seed, folder):
-    cell = random_cell(seed, published=False)
+    cell = made(seed, published=False)
     k = seed % len(cell.links)
     links = tuple(replace(each, shaped=False) if i == k else each for i, each in enumerate(cell.links))
     try:
         one, other = pair(folder, cell, replace(cell, links=links))
     except Undecided:
         return
-    for name in ("fastest", "distance", "separation", "area", "contact"):
+    for name in {"fastest", "distance", "separation", "area", "contact"} & set(other):
         assert other[name].verdict is not Verdict.WITHIN, name
     never_greener(one, other)
 
@@ -268,7 +292,7 @@ def a_shape_that_nobody_gave_is_never_within(seed, folder):
 def a_live_stream_is_never_greener_than_the_truth(seed, folder):
     """What happens to a stream turns nothing into within that was exceeded all the while."""
     what = list(SPOILED)[seed % len(SPOILED)]
-    found, _ = greener_than_the_truth(what, seed, random_cell(seed), folder)
+    found, _ = greener_than_the_truth(what, seed, made(seed), folder)
     assert not found, (what, found)
 
 
@@ -299,7 +323,7 @@ RELATIONS = {
 }
 
 
-FINDS = [("a live stream is never greener than the truth", 5)]
+FINDS = [("a live stream is never greener than the truth", seed) for seed in (5, 2026112500)]
 """Relations that did not hold, of cells that show it."""
 
 
@@ -322,7 +346,7 @@ def ask(name, seed, folder):
 
 
 @pytest.mark.parametrize("seed", NAMED or [*range(CELLS - len(FOUND)), *FOUND])
-def test_what_must_hold_of_a_random_cell(seed, tmp_path):
+def test_what_must_hold_of_a_made(seed, tmp_path):
     for name in asked_of(seed):
         ask(name, seed, tmp_path)
 

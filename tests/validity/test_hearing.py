@@ -77,14 +77,26 @@ def arm(tmp_path_factory):
 def test_silence_is_undecided_after_the_time_out_and_not_before(arm, timeout):
     engine = Engine(arm.model, driven={"arm": timeout})
     judge = Judge(bind(arm.model))
-    engine.take([heard("arm", 0.0, (0.1, 0.2))])
+    engine.take([heard("arm", 0.0, (0.1, 0.2), (0, 0))])
     engine.start()
     for _ in range(60):
         state = engine.tick()
         verdict = judge(state)[0].verdict
         assert verdict == ("undecided" if state.t > timeout + 1e-9 else "within"), state.t
-    engine.take([heard("arm", state.t, (0.1, 0.2))])
+    engine.take([heard("arm", state.t, (0.1, 0.2), (0, 0))])
     assert judge(engine.tick())[0].verdict == "within"
+
+
+def test_how_fast_a_robot_is_that_was_heard_once_nobody_knows(arm):
+    """At the first sample, and at the first one after a silence; a second position tells, or a speed."""
+    engine, judge = Engine(arm.model, driven={"arm": 0.05}), Judge(bind(arm.model))
+    engine.take([heard("arm", 0.0, (0.1, 0.2))])
+    first = judge(engine.start())[0]
+    assert (first.verdict, "arm: no source says how it moves" in first.reason) == ("undecided", True)
+    for k in range(1, 30):
+        engine.take([heard("arm", k * 0.01, (0.1, 0.2))] if k < 5 or k > 15 else [])
+        verdict = judge(engine.tick())[0].verdict
+        assert verdict == ("undecided" if 9 < k <= 16 else "within"), k
 
 
 def test_a_feed_without_a_source_goes_stale_too(arm):

@@ -253,9 +253,8 @@ def _open(part: Result, reason: str) -> Result:
 
 
 def unmoved(state: State) -> str:
-    """Robots whose speeds were asked for and that nothing ever moves; empty when there is none."""
-    robots = (name for name in state.speeds_asked if state.model.mechanisms[name].role == "robot")
-    return ", ".join(sorted(name for name in robots if not state.moved(name)))
+    """Whose speeds were asked for although nothing tells them; empty when there is none."""
+    return ", ".join(sorted(name for name in state.speeds_asked if not state.moved(name)))
 
 
 def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 import gc
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import count
 
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.samples import Sample, printable_sample
@@ -18,7 +19,7 @@ from seerob.core.snapshot import Result, Scene, Snapshot, Verdict
 from seerob.criteria.between_ticks import watched
 from seerob.criteria.judging import Bound as Bound  # noqa: PLC0414
 from seerob.criteria.judging import Judge as Judge  # noqa: PLC0414
-from seerob.criteria.judging import bound_to
+from seerob.criteria.judging import bound_to, undecided
 from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.real_time import Clock
 from seerob.model.model import Model
@@ -219,6 +220,39 @@ def ticks(
         yield snapshot(state, seq, judge(state), looks, late), samples
 
 
+def no_greener(
+    judge: Callable[[State], tuple[Result, ...]], before: Iterable[Snapshot], by: str
+) -> Callable[[State], tuple[Result, ...]]:
+    """A judge that calls nothing within that was not when the same samples were judged before.
+
+    Another version may know better or worse, and nothing here tells which.
+
+    Args:
+        judge: Asked at each tick in turn.
+        before: What was said then; ticks may be missing.
+        by: Who said it.
+    """
+    ticks, earlier = count(), iter(before)
+    then = next(earlier, None)
+
+    def judged(state: State) -> tuple[Result, ...]:
+        nonlocal then
+        seq, results = next(ticks), judge(state)
+        while then is not None and then.seq < seq:
+            then = next(earlier, None)
+        if then is None or then.seq > seq:
+            return results
+        others = {r.name: r for r in then.results if r.verdict in (Verdict.UNDECIDED, Verdict.EXCEEDED)}
+        return tuple(
+            undecided(now, f"{by} said {others[now.name].verdict} of the same samples")
+            if now.verdict is Verdict.WITHIN and now.name in others
+            else now
+            for now in results
+        )
+
+    return judged
+
+
 @contextmanager
 def settled() -> Iterator[None]:
     """Spare the garbage collector what was made before the loop: it all lives as long as the loop does.
@@ -273,6 +307,7 @@ def run(
     *,
     bound: Sequence[Bound],
     scene: Scene,
+    before: tuple[Iterable[Snapshot], str] | None = None,
     end: float = math.inf,
     writers: Sequence[Writer] = (),
     clock: Clock | None = None,
@@ -286,6 +321,7 @@ def run(
         feed: Samples per tick.
         bound: Criteria, from `bind`.
         scene: The same that the writers were opened with.
+        before: What was said of the same samples, and by whom, see `no_greener`.
         end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
         writers: Open sinks; they are closed at the end, whatever happens.
         clock: Real time; as fast as possible when None.
@@ -294,7 +330,7 @@ def run(
     """
     log = ResultLog(scene.criteria)
     begun = time.perf_counter()
-    count, t = 0, 0.0
+    done, t = 0, 0.0
     late: dict[str, tuple[float, float]] = {}
     with ExitStack() as open_writers, settled():
         for writer in writers:
@@ -302,8 +338,11 @@ def run(
             if isinstance(writer, KeepsResults):
                 writer.share(log)
         engine = engine_of(model)
-        for out, samples in ticks(engine, Judge(bound, scene.findings), feed, end):
-            count, t = count + 1, out.t
+        judge: Callable[[State], tuple[Result, ...]] = Judge(bound, scene.findings)
+        if before is not None:
+            judge = no_greener(judge, *before)
+        for out, samples in ticks(engine, judge, feed, end):
+            done, t = done + 1, out.t
             for writer in writers:
                 writer.write(out, samples)
             log.add(out)  # after those who look on
@@ -317,7 +356,7 @@ def run(
     return Summary(
         results=log,
         scene=scene,
-        ticks=count,
+        ticks=done,
         duration=t,
         wall=time.perf_counter() - begun,
         slipped=0.0 if clock is None else clock.slipped,

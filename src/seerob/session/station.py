@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from hashlib import sha256
@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Finding, Scene
+from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.criteria.contact.measured import curves
 from seerob.criteria.criterion import Criterion
 from seerob.devices.live.contact import Contact
@@ -227,6 +227,7 @@ class Station:
         feed: Feed | None = None,
         end: float = math.inf,
         scene: Scene | None = None,
+        before: tuple[Iterable[Snapshot], str] | None = None,
         stop: Callable[[], bool] = lambda: False,
         progress: Callable[[float], None] = lambda _: None,
     ) -> Summary:
@@ -241,6 +242,7 @@ class Station:
             end: When that ends, and the last tick with it [s]; a motion that ends within a tick is
                 undecided there when not given.
             scene: The one that ``writers`` were opened with.
+            before: What was said of the same samples, and by whom: nothing is within that was not.
             stop: Asked once per tick.
             progress: Told the run time once per tick [s].
 
@@ -287,6 +289,7 @@ class Station:
                 feed,
                 bound=bound,
                 scene=scene,
+                before=before,
                 end=end,
                 writers=[*opened, *writers],
                 clock=clock,
@@ -466,6 +469,8 @@ class Station:
     ) -> Summary:
         """Compute a recording again from its samples: same samples, same ticks, same figures.
 
+        What another version called exceeded or undecided, of the same workstation, is not within now.
+
         Raises:
             InputError: The recording was made with another tick than this workstation has.
         """
@@ -477,6 +482,9 @@ class Station:
                 f"set engine.tick = {recording.scene.period} in the workstation file",
             )
         scene = self.replay_scene(recording)
+        before = None
+        if recording.scene.workstation_hash == scene.workstation_hash:
+            before = recording.snapshots(), f"seerob {recording.scene.version}, which recorded it,"
         return self.run(
             folder=folder,
             sinks=sinks,
@@ -484,6 +492,7 @@ class Station:
             feed=recording.heard(),
             end=recording.end,
             scene=scene,
+            before=before,
             stop=stop,
             progress=progress,
         )

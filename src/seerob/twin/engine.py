@@ -276,6 +276,7 @@ class Engine:
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
                 hearing.leaves_at = self._references[name].leaves_at if name in self.ahead else 0.0
+                hearing.once = self._references[name].once
 
     def _contradicted(self, sample: JointSample) -> str:
         """Why what a source says of itself is not the twin; empty when it may be."""
@@ -335,6 +336,7 @@ class Engine:
             torques = None if sample is None else torques_of(sample)
             off = None if sample is None else self._speed_error(name, sample)
             hearing.take(Heard(t, reason or jump, torques, off))
+            hearing.once = self._references[name].once
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
 
     def _speed_error(self, name: str, sample: JointSample | PoseSample) -> Array | None:

@@ -99,6 +99,11 @@ class Reference:
         return not self._times
 
     @property
+    def once(self) -> bool:
+        """Whether all that is known is one position: a second one, or a velocity, tells how fast it is."""
+        return len(self._times) == 1 and self._guessed[0]
+
+    @property
     def until(self) -> float:
         """Instant of the newest sample [s]; -inf before the first."""
         return self._times[-1] if self._times else -np.inf

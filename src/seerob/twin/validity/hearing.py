@@ -137,6 +137,8 @@ class Hearing:
     """How much older than its instant what was heard last may be [s]."""
     leaves_at: float = 0.0
     """Of who stands where he was last said to be: largest speed of a joint then [rad/s or m/s]."""
+    once: bool = False
+    """It was heard once, or once after a silence, and that told no speed."""
     grace: float = 0.0
     """How long after its newest sample it may be late all the same [s]."""
     coarse: str = ""

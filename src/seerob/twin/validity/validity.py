@@ -111,9 +111,14 @@ class Validity:
         self._sound = None
 
     def moved(self, name: str) -> bool:
-        """Whether anything moves a robot: a source of its own, or of what carries it."""
-        names = (name, *self._model.carriers_of(name))
-        return any(self._hearings[each].driven or self._hearings[each].heard for each in names)
+        """Whether anything tells how fast somebody is: a source of its own, or of what carries it.
+
+        A single position does not. Of a robot that no source moves nobody tells; people and machines stand then.
+        """
+        every = [self._hearings[each] for each in (name, *self._model.carriers_of(name))]
+        if any(hearing.once for hearing in every):
+            return False
+        return self._model.mechanisms[name].role != "robot" or any(h.driven or h.heard for h in every)
 
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 

@@ -84,6 +84,14 @@ def paused(rng: np.random.Generator, packets: Packets) -> Spoiling:
     return Spoiling(packets, {int(k): float(rng.uniform(0.05, 0.5)) for k in ticks})
 
 
+def played_again(rng: np.random.Generator, packets: Packets) -> Spoiling:
+    """By whoever connects in the place of the device: what was said, stamped as it was or as of now."""
+    cut = rng.uniform(0.4, 0.9)
+    before, now = [p for p in packets if p[0] < cut], rng.random() < 0.5
+    again = [(at + cut, device + cut * now, words) for at, device, words in before]
+    return Spoiling(before + again, again=(cut,))
+
+
 def everything(rng: np.random.Generator, packets: Packets) -> Spoiling:
     for spoil in (noisy, shuffled, doubled):
         packets = spoil(rng, packets).packets
@@ -99,6 +107,7 @@ SPOILED = {
     "in another order": shuffled,
     "noisy": noisy,
     "paused": paused,
+    "played again in a new connection": played_again,
     "all of that": everything,
 }
 
@@ -120,7 +129,7 @@ def greener_than_the_truth(what: str, seed: int, cell: Cell, folder: Path) -> tu
     limits = dict(cell.limits)
     for name, of in (("fastest", "speed"), ("energy", "energy"), ("distance", "distance")):
         if np.isfinite(log[name].values).any():
-            limits[of] = float(np.nanmedian(log[name].values))
+            limits[of] = max(float(np.nanmedian(log[name].values)), 1e-3)  # parts may lie in one another
     beyond = {}
     for name in FIGURES:
         limit = log[name].limits if name == "separation" else limits[LIMITED[name]]

@@ -550,6 +550,24 @@ def heavier(cell: Cell) -> Cell:
     return replace(cell, links=links, machine=machine, tool=None if cell.tool is None else 1.5 * cell.tool)
 
 
+def mirrored(cell: Cell) -> Cell:
+    """Left and right exchanged: a random arm, the person and what is around, without machines."""
+    over, turned = np.array([1.0, -1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
+
+    def link(k: Link) -> Link:
+        # An axis to turn about is a pseudovector: the sense of turning changes, too.
+        axis = k.axis * (turned if k.kind == "revolute" else over)
+        inertial = k.inertial and replace(k.inertial, com=k.inertial.com * over)
+        return replace(k, origin=k.origin * over, axis=axis, middle=k.middle * over, inertial=inertial)
+
+    return replace(
+        cell,
+        links=tuple(map(link, cell.links)),
+        person=cell.person * np.array([1.0, -1.0, -1.0]),
+        post=None if cell.post is None else cell.post * np.array([1.0, -1.0]),
+    )
+
+
 def thicker(cell: Cell) -> Cell:
     machine = cell.machine and replace(cell.machine, wider=0.04)
     return replace(cell, links=tuple(replace(k, box=k.box + 0.04) for k in cell.links), machine=machine)

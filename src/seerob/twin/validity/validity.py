@@ -113,7 +113,7 @@ class Validity:
     def moved(self, name: str) -> bool:
         """Whether anything tells how fast somebody is: a source of its own, or of what carries it.
 
-        A single position does not. Of a robot that no source moves nobody tells; people and machines stand then.
+        A single position does not. People and machines that no source moves stand; of a robot nobody knows.
         """
         every = [self._hearings[each] for each in (name, *self._model.carriers_of(name))]
         if any(hearing.once for hearing in every):

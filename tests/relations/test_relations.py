@@ -354,7 +354,7 @@ def ask(name, seed, folder):
 
 
 @pytest.mark.parametrize("seed", NAMED or [*range(CELLS - len(FOUND)), *FOUND])
-def test_what_must_hold_of_a_made(seed, tmp_path):
+def test_what_must_hold_of_a_random_cell(seed, tmp_path):
     for name in asked_of(seed):
         ask(name, seed, tmp_path)
 

@@ -16,10 +16,10 @@ from the shapes and the ranges of the joints:
 
 - of two parts that several joints move against each other (a tool and the upper arm), a body part counts as
   thick as the widest of the sizes that fit between them in some position of these joints;
-- of two parts that are near wherever their joints stand (an elbow, two fingers, an upper arm and the base
-  under its shoulder), nearer than the thinnest body part is thick, every place is looked at by itself; see
-  `seerob.criteria.contact.joint_gaps`. Beyond three joints such parts clamp whenever they move against each
-  other.
+- of two parts that one joint moves against each other (an elbow, two fingers), every place is looked at by
+  itself; see `seerob.criteria.contact.joint_gaps`;
+- of two parts that are near wherever several joints stand (an upper arm and the base under its shoulder),
+  nearer than the thinnest body part is thick, whatever moves clamps as it does at any other surface.
 """
 
 from __future__ import annotations
@@ -47,8 +47,6 @@ SAMPLED = 64
 """Positions of several joints in which it is looked how far two parts can be apart."""
 MISSED = 0.1
 """By which share they may be farther apart in a position in between."""
-MOST_PLACED = 3
-"""Joints between two parts that are looked at place by place."""
 ENDLESS = 1.0
 """How far to either side a slide without ends is looked at [m]."""
 
@@ -279,7 +277,7 @@ class OwnJoints:
 
 def robot_pinch_pairs(
     model: Model, robot: Mechanism, *, cap: float, thinnest: float
-) -> tuple[PinchPairs, Array, list[tuple[int, int, tuple[Coordinate, ...]]]]:
+) -> tuple[PinchPairs, Array, list[tuple[int, int, Coordinate]]]:
     """The gaps of a robot to parts and other robots, and between its own parts.
 
     Args:
@@ -290,7 +288,7 @@ def robot_pinch_pairs(
 
     Returns:
         Its gaps; how far their sides can be apart [m], infinity of surfaces and of what clamps wherever it is
-        near, shape (g,); and pairs of its own bodies to look at place by place, with the joints between them.
+        near, shape (g,); and pairs of its own bodies to look at place by place, with the joint between them.
     """
     own = (*robot.bodies, *robot.carried)
     still = [i for i in own if i not in robot.moving]
@@ -300,7 +298,8 @@ def robot_pinch_pairs(
     joints = OwnJoints(model)
     between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
     endless = {pair for pair, of in between.items() if any(map(joints.endless, of))}
-    placed = [(i, j, tuple(of)) for (i, j), of in between.items() if len(of) == 1 and (i, j) not in endless]
+    one = ((pair, next(iter(of))) for pair, of in between.items() if len(of) == 1 and pair not in endless)
+    placed = [(*pair, coordinate) for pair, coordinate in one]
     apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in endless)
     pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
     inner = pairs.inner
@@ -316,11 +315,7 @@ def robot_pinch_pairs(
         widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
         for gap in np.flatnonzero(inner).tolist():
             i, j = sorted((pairs.moving[pairs.first[gap]], int(pairs.across[gap])))
-            of = between[i, j]
             # Without ends anything may get between, and may be clamped wherever they are near.
-            hidden = widest[gap] < thinnest
-            if (i, j) in endless or (hidden and len(of) > MOST_PLACED):
+            if (i, j) in endless or widest[gap] < thinnest:
                 widest[gap] = np.inf
-            elif hidden:
-                placed.append((i, j, tuple(joints.in_order(of))))
     return pairs, widest, placed

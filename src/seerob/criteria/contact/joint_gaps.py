@@ -1,21 +1,23 @@
-r"""Gaps between two parts that touch at their joints: an elbow, fingers, an upper arm that folds on its base.
+r"""Gaps between two parts that one joint moves against each other: an elbow, fingers, a bearing.
 
-Parts that one joint moves against each other, or a few whose axes lie close together, are near wherever
-these stand, so how near they are says nothing. Each place on the surface of the one is looked at by itself,
-over the whole range of the joints: it has the gap :math:`g(q)` to the other part. A place clamps a body part
-of the thickness D while it faces the other part, while
+Such parts are near wherever the joint stands, so how near they are says nothing. Each place on the surface of
+the one is looked at by itself, over the whole range of the joint: it has the gap :math:`g(q)` to the other
+part. A place clamps a body part of the thickness D while it faces the other part, while
 
 .. math:: \dot g < 0, \qquad g \le D
 
-and where something of the body part gets in at all: where the joints open it as wide as the thinnest of
+and where something of the body part gets in at all: where the joint opens it as wide as the thinnest of
 the body part, and by more than a fingertip. What slides in its bearing never closes (a housing that is not
-quite round comes nearer by a hair, see `SLOWEST`), and what is always in touch never opens. Nothing is
-remembered: the range of the joints is part of the model.
+quite round comes nearer by a hair, see `SLOWEST`), and what is always in touch never opens. That the places
+of one part see it close is enough: an overhang that passes at a constant width comes over what lies there,
+and shears it. Nothing is remembered: the range of the joint is part of the model.
 
-All of this depends on these joints, so it is settled once, on a grid of their positions; between its nodes
-the nearest gap counts, and of each joint the largest of the mean rates along it. Of several joints that move
-at once those that close count, as if no other opened, and both parts must see it close, somewhere on each:
-a housing that turns past another one at a constant distance brings its own places nearer and nobody's else.
+All of this depends on the joint, so it is settled once, on a grid of its positions. Between two of them, of
+which a place is s apart, its gap counts as no wider than :math:`(g_0 + g_1 - s)/2` and closes with the
+largest of the rates there. A surface is looked at in pieces half as large as the thinnest of the body part,
+those of a hand half a finger, wherever that can change anything: from place to place a gap changes by no
+more than the way, so what is wide or buried as a whole, or could only repeat what is known of the same
+positions, is settled by one place on it.
 """
 
 from __future__ import annotations
@@ -27,7 +29,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,24 +43,24 @@ from seerob.model.model import Mechanism, Model
 from seerob.twin.spans import Span
 from seerob.twin.state import State
 
-STEPS = {1: 72, 2: 30, 3: 12}
-"""By how many joints are between two parts: positions of each on the grid, of a whole turn or of a slide."""
-DETAIL = 8
-"""Into so many pieces the largest extent of a part is divided."""
-FINEST, COARSEST = 0.01, 0.06
-"""Smallest and largest piece [m]: half a fingertip, half a hand."""
+STEPS = 72
+"""Positions of a joint that are looked at, of a whole turn or of a slide."""
+PIECES = (0.08, 0.03, 0.0125)
+"""Into which a surface is divided [m], down to half a finger."""
+MOST_PIECES = 200
+"""Into so many the largest extent of a part is divided at most: what is larger is known less finely."""
 SLOWEST = 0.025
-"""What closes by less than the thickness of a finger in a radian or metre only slides [m/rad or m/m]."""
+"""What closes by less than the thickness of a finger in a radian or metre only slides [m/rad or m/m], and so
+does less in a gap that is narrower and would not be shut by then, down to a fingertip."""
 ASIDE = 0.05
 """Cosine of the largest angle at which a place faces another surface: whatever is not beside it."""
 ROUNDING = 1e-9
 """What bounds give away against rounding."""
 ROUND = 8
-"""Places around a capsule."""
+"""Places around a capsule, at least."""
 MOST_KNOWN = 256
 """Pairs that are remembered, since a cell is often bound several times."""
 _KNOWN: dict[bytes, Array] = {}
-Value = TypeVar("Value", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,81 +71,164 @@ class Places:
     """[m], shape (k, 3)."""
     normals: Array
     """Outward unit vectors, shape (k, 3)."""
+    about: float
+    """How far around each it speaks of the surface [m]."""
 
 
 def places(solids: Sequence[Solid]) -> Places:
     """Places all over the surface of a body, none inside another of its solids."""
     points = np.concatenate([s.points if s.mesh is None else s.mesh.vertices for s in solids])
     size = float(np.ptp(points, axis=0).max() + 2 * max(s.radius for s in solids))
-    h = float(np.clip(size / DETAIL, FINEST, COARSEST))
+    h = max(PIECES[-1], size / MOST_PIECES)
     found = [_of_solid(solid, h) for solid in solids]
     if len(solids) > 1:
         found = [_outside(of, k, solids) for k, of in enumerate(found)]
-    return Places(np.concatenate([p for p, _ in found]), np.concatenate([n for _, n in found]))
+    return Places(np.concatenate([p for p, _ in found]), np.concatenate([n for _, n in found]), h / 2)
 
 
-def closing(
-    gaps: Array, faces: Flags, steps: Sequence[Array], thickness: Array, fits: Array, *, least: float
-) -> Array:
-    """How fast places close that clamp, between the nodes of a grid of k joints.
+def closing(looks: Looks, about: Array, step: Array, thickness: Array, fits: Array, *, least: float) -> Array:
+    """How fast places close that clamp, between positions of the joint.
 
     Args:
-        gaps: Of each place at each node [m], not below 0, shape (m_1, ..., m_k, p).
-        faces: Whether it faces the other part there, likewise.
-        steps: Of each joint, from each position to the next [rad or m], shape (m_j - 1,).
+        looks: The places.
+        about: How far around each it speaks of the surface for each body part [m], shape (p, r).
+        step: From each position to the next [rad or m], shape (m,).
         thickness: Of body parts [m], shape (r,).
         fits: Thinnest that a body part is [m], shape (r,).
         least: By how much a gap changes that closes at all [m].
 
     Returns:
-        Per unit of each joint, as it grows and as it falls, 0 where nothing clamps, shape (2, k,
-        m_1 - 1, ..., m_k - 1, r).
+        Per unit of the joint, as it grows and as it falls, 0 where nothing clamps, shape (2, m, r).
     """
-    joints = len(steps)
-    found = np.zeros((2, joints, *(len(step) for step in steps), len(thickness)))
-    if not gaps.shape[-1]:
+    gaps = looks.gaps
+    found = np.zeros((2, len(step), len(thickness)))
+    if not gaps.shape[1]:
         return found
-    widest, nodes = gaps.max(axis=tuple(range(joints))), tuple(range(joints))
-    varies = widest - gaps.min(axis=nodes) >= least - ROUNDING
-    opens = varies[:, None] & (widest[:, None] >= fits - ROUNDING)
-    faced, nearest = faces, gaps
-    for axis in nodes:
-        (one, other), (near, also) = _neighbours(faced, axis), _neighbours(nearest, axis)
-        faced, nearest = one | other, np.minimum(near, also)
-    for axis, step in enumerate(steps):
-        rate = np.diff(gaps, axis=axis) / step.reshape([-1 if j == axis else 1 for j in (*nodes, joints)])
-        for k, way in enumerate((-1, 1)):
-            fast = np.maximum(way * rate, 0.0)
-            for node in nodes:
-                fast = fast if node == axis else np.maximum(*_neighbours(fast, node))
-            fast = np.where(faced & (fast >= SLOWEST - ROUNDING), fast, 0.0)
-            for r, thick in enumerate(thickness):
-                counts = opens[:, r] & (nearest <= thick + ROUNDING)
-                found[k, axis, ..., r] = np.where(counts, fast, 0.0).max(axis=-1)
+    widest, narrowest = gaps.max(axis=0), gaps.min(axis=0)
+    opens = (widest - narrowest >= least - ROUNDING)[:, None] & (widest[:, None] + about >= fits - ROUNDING)
+    slowest = np.clip(np.minimum(gaps[1:], gaps[:-1]), least, SLOWEST)
+    mean = np.diff(gaps, axis=0) / step[:, None]
+    for k, way in enumerate((1, -1)):
+        fast = np.maximum(np.maximum(way * looks.falls[1:], way * looks.falls[:-1]), -way * mean)
+        closes = looks.asked & (looks.faces[1:] | looks.faces[:-1]) & (fast >= slowest - ROUNDING)
+        fast = np.where(closes, fast, 0.0)
+        for r, thick in enumerate(thickness):
+            counts = opens[:, r] & (looks.near - about[:, r] <= thick + ROUNDING)
+            found[k, :, r] = np.where(counts, fast, 0.0).max(axis=1)
     return found
 
 
-def _neighbours(values: NDArray[Value], axis: int) -> tuple[NDArray[Value], NDArray[Value]]:
-    """Both ends of each step along an axis."""
-    m = values.shape[axis]
-    return values.take(range(1, m), axis), values.take(range(m - 1), axis)
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Some places on a part as another one sees them, at m + 1 positions of the joint between."""
+
+    gaps: Array
+    """To the other part [m], not below 0, shape (m + 1, p)."""
+    faces: Flags
+    """Whether it faces the other part, likewise."""
+    falls: Array
+    """How fast that gap falls while the joint grows [m/rad or m/m], likewise."""
+    near: Array
+    """Bound on the gap from one position to the next [m], shape (m, p)."""
+    asked: Flags
+    """Where all of that is known, likewise; elsewhere gaps are those of a place nearby."""
+
+
+class _Side:
+    """The places on one body of a pair, as the other sees them."""
+
+    def __init__(self, on: Places, other: Sequence[Solid], poses: Sequence[tuple[Array, Array]]) -> None:
+        self._on, self._other = on, other
+        (R, x), (S, y) = poses
+        # As seen from the other body, place by place: from one position to the next little changes.
+        across = np.swapaxes(S, 1, 2)
+        self._turn, self._shift = across @ R, np.einsum("mij,mj->mi", across, x - y)
+        self._left = np.arange(len(on.points))
+        self._wanted = np.ones((len(R) - 1, len(on.points)), bool)
+        self._gaps = np.zeros((len(R), len(on.points)))
+        """At a place that stands for each."""
+        self._varies = np.zeros(len(on.points), bool)
+        """Of which that is known."""
+
+    def look(self, h: float, step: Array, thickness: Array, fits: Array, least: float, found: Array) -> None:
+        """Raise rates, as `closing` tells them, by those of pieces of a size [m] that may still matter."""
+        on, left = self._on, self._left
+        if not len(left):
+            return
+        which, of = (np.arange(len(left)),) * 2 if h == PIECES[-1] else _stand_for(on, left, h)
+        about = np.full(len(which), on.about)
+        np.maximum.at(
+            about, of, on.about + np.linalg.norm(on.points[left] - on.points[left[which[of]]], axis=1)
+        )
+        wanted = np.zeros((len(step), len(which)), bool)
+        np.logical_or.at(wanted.T, of, self._wanted.T)
+        looks = self._looks(left[which], wanted, self._gaps[:, which], self._varies[which], step)
+        enough = h <= np.maximum(fits / 2, PIECES[-1])
+        around = np.where(enough, about[:, None], on.about)
+        np.maximum(found, closing(looks, around, step, thickness, fits, least=least), out=found)
+        widest, narrowest = looks.gaps.max(axis=0), looks.gaps.min(axis=0)
+        may = np.zeros_like(wanted)
+        for r in np.flatnonzero(~enough):
+            thick, thin, free = thickness[r], fits[r], (found[..., r] == 0).any(axis=0)[:, None]
+            may |= free & (looks.near - about <= thick + ROUNDING) & (widest + about >= thin - ROUNDING)
+        may &= wanted & (widest - narrowest + 2 * about >= least - ROUNDING)
+        self._wanted = may[:, of]
+        self._gaps, self._varies = looks.gaps[:, of], (widest - narrowest - 2 * about >= least)[of]
+        still = self._wanted.any(axis=0)
+        self._left, self._wanted = left[still], self._wanted[:, still]
+        self._gaps, self._varies = self._gaps[:, still], self._varies[still]
+
+    def _looks(
+        self, which: NDArray[np.int64], wanted: Flags, known: Array, varies: Flags, step: Array
+    ) -> Looks:
+        """Look at some places where it is wanted, and everywhere where it is not known how much they vary."""
+        points = np.einsum("mij,pj->mpi", self._turn, self._on.points[which]) + self._shift[:, None]
+        normals = np.einsum("mij,pj->mpi", self._turn, self._on.normals[which])
+        asked = np.zeros(known.shape, bool)
+        asked[1:] |= wanted
+        asked[:-1] |= wanted
+        asked |= ~varies
+        place, node = np.nonzero(asked.T)
+        distance, nearest = _distances(self._other, points[node, place])
+        way = nearest - points[node, place]
+        gaps, faces, falls = known.copy(), np.zeros(known.shape, bool), np.zeros(known.shape)
+        gaps[node, place] = np.maximum(distance, 0.0)
+        towards = (way * normals[node, place]).sum(axis=1)
+        faces[node, place] = (distance > 0) & (towards > ASIDE * distance)
+        moved = np.gradient(points, np.concatenate([[0.0], np.cumsum(step)]), axis=0)[node, place]
+        falls[node, place] = np.where(
+            distance > 0, (moved * way).sum(axis=1) / np.maximum(distance, ROUNDING), 0.0
+        )
+        half = np.minimum(step / 2, np.pi / 2)[:, None]
+        arcs = np.linalg.norm(np.diff(points, axis=0), axis=-1) * half / np.sin(half)
+        return Looks(gaps, faces, falls, (gaps[1:] + gaps[:-1] - arcs) / 2, wanted)
+
+
+def _stand_for(on: Places, left: NDArray[np.int64], h: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """One of some places for each piece of a size [m] that looks one way, and the piece of each."""
+    key = np.column_stack([np.floor(on.points[left] / h), np.round(on.normals[left])])
+    _, first, of = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    of = of.reshape(-1)
+    middle = np.zeros((len(first), 3))
+    np.add.at(middle, of, on.points[left])
+    middle /= np.bincount(of)[:, None]
+    order = np.lexsort((np.linalg.norm(on.points[left] - middle[of], axis=1), of))
+    return order[np.searchsorted(of[order], np.arange(len(first)))], of
 
 
 @dataclass(frozen=True, eq=False)
 class _Joint:
-    """Of those between a pair of bodies, and the grid of its positions."""
+    """Between a pair of bodies, and the grid of its positions."""
 
     mechanism: str
     column: int
     low: float
     step: float
-    count: int
-    """Of steps."""
     turns: bool
     """Whether it goes round without end."""
 
     @classmethod
-    def of(cls, model: Model, joints: OwnJoints, coordinate: Coordinate, count: int) -> _Joint:
+    def of(cls, model: Model, joints: OwnJoints, coordinate: Coordinate) -> _Joint:
         low, high = joints.range(coordinate)
         mechanism = model.mechanisms[coordinate[0]]
         whole = mechanism.coupling[:, coordinate[1]]
@@ -154,44 +238,42 @@ class _Joint:
             and bool((whole == np.round(whole)).all())
         )
         high = low + 2 * np.pi if turns else high
-        return cls(*coordinate, low, max((high - low) / count, 1e-12), count, turns)
+        return cls(*coordinate, low, max((high - low) / STEPS, 1e-12), turns)
 
     @property
     def grid(self) -> Array:
-        """Its positions [rad or m], shape (count + 1,)."""
-        return np.linspace(self.low, self.low + self.count * self.step, self.count + 1)
+        """Its positions [rad or m], shape (STEPS + 1,)."""
+        return np.linspace(self.low, self.low + STEPS * self.step, STEPS + 1)
 
     def seen(self, start: float, end: float) -> NDArray[np.int64]:
         """Steps from one position to another."""
-        ends = sorted(int((q - self.low) // self.step) for q in (start, end))
-        seen = np.arange(ends[0], min(ends[1], ends[0] + self.count) + 1)
-        return seen % self.count if self.turns else np.clip(seen, 0, self.count - 1)
+        first, last = sorted(int((q - self.low) // self.step) for q in (start, end))
+        seen = np.arange(first, min(last, first + STEPS) + 1)
+        return seen % STEPS if self.turns else np.clip(seen, 0, STEPS - 1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """Of a pair of bodies and the joints between them."""
+    """Of a pair of bodies and the joint between them."""
 
-    joints: tuple[_Joint, ...]
+    joint: _Joint
     rows: tuple[int, ...]
     """Of the moving bodies of the pair."""
     rates: Array
-    """How fast places close, per unit of each joint, as `closing` returns them."""
+    """How fast places close, per unit of the joint, as `closing` returns them."""
 
-    def at(self, ways: Sequence[tuple[float, float]], qd: Sequence[tuple[float, float]]) -> Array:
+    def at(self, way: tuple[float, float], qd: tuple[float, float]) -> Array:
         """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,).
 
         Args:
-            ways: From where to where on each joint is looked at [rad or m].
-            qd: Least and largest speed of each [rad/s or m/s].
+            way: From where to where is looked at [rad or m].
+            qd: Least and largest speed [rad/s or m/s].
         """
-        cells = np.ix_(*(joint.seen(*way) for joint, way in zip(self.joints, ways, strict=True)))
-        nodes = tuple(range(len(self.joints)))
+        cells, (slowest, fastest) = self.joint.seen(*way), qd
         speed = np.zeros(self.rates.shape[-1])
-        for j, (slowest, fastest) in enumerate(qd):
-            senses = [sense for sense, moves in enumerate((fastest > 0, slowest < 0)) if moves]
-            most = [self.rates[sense, j][cells].max(axis=nodes) for sense in senses]
-            speed += np.max([np.zeros_like(speed), *most], axis=0) * max(abs(slowest), abs(fastest))
+        for sense, most in enumerate((fastest, -slowest)):
+            if most > 0:
+                speed = np.maximum(speed, self.rates[sense, cells].max(axis=0) * most)
         return np.where(speed > STILL, speed, 0.0)
 
 
@@ -202,7 +284,7 @@ class JointGaps:
         self,
         model: Model,
         robot: Mechanism,
-        pairs: Sequence[tuple[int, int, tuple[Coordinate, ...]]],
+        pairs: Sequence[tuple[int, int, Coordinate]],
         thickness: Array,
         fits: Array,
         *,
@@ -213,7 +295,7 @@ class JointGaps:
         Args:
             model: The compiled workstation.
             robot: The robot.
-            pairs: Two of its bodies and the joints between them, at most three.
+            pairs: Two of its bodies and the joint between them.
             thickness: Of body parts [m], shape (r,).
             fits: Thinnest that a body part is [m], shape (r,).
             least: See `closing`.
@@ -221,21 +303,17 @@ class JointGaps:
         row = {body: k for k, body in enumerate(robot.moving)}
         joints = OwnJoints(model)
         self._tables: list[_Table] = []
-        for a, b, coordinates in pairs:
+        for a, b, coordinate in pairs:
             rows = tuple(row[i] for i in (a, b) if i in row)
             if not rows:
                 continue
-            between = tuple(_Joint.of(model, joints, c, STEPS[len(coordinates)]) for c in coordinates)
-            grids = np.meshgrid(*(joint.grid for joint in between), indexing="ij")
-            rotations, positions = joints.poses(
-                {c: grid.reshape(-1) for c, grid in zip(coordinates, grids, strict=True)}
-            )
+            joint = _Joint.of(model, joints, coordinate)
+            rotations, positions = joints.poses({coordinate: joint.grid})
             poses = [(rotations[:, i], positions[:, i]) for i in (a, b)]
             solids = [model.bodies[i].solids for i in (a, b)]
-            steps = [np.diff(joint.grid) for joint in between]
-            rates = _rates(solids, poses, steps, thickness, fits, least, model.cache)
+            rates = _rates(solids, poses, np.diff(joint.grid), thickness, fits, least, model.cache)
             if rates.any():
-                self._tables.append(_Table(between, rows, rates))
+                self._tables.append(_Table(joint, rows, rates))
 
     def speeds(self, state: State, wanted: Flags, span: Span | None = None) -> Array:
         """At which speed moving bodies clamp body parts now [m/s], 0 where they do not, shape (b, r).
@@ -250,26 +328,23 @@ class JointGaps:
             rows = list(table.rows)
             if not wanted[rows].any():
                 continue
-            ways, speeds = [], []
-            for joint in table.joints:
-                mechanism = state.model.mechanisms[joint.mechanism]
-                q, qd = (float(each(mechanism)[joint.column]) for each in (state.q, state.qd))
-                way, change = 0.0, 0.0
-                if span is not None:
-                    dof = mechanism.v_address[mechanism.own[joint.column]]
-                    way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T + span.joint_noise[dof]
-                least, most = qd - change, qd + change
-                ways.append((q - way, q + way))
-                speeds.append((least, most))
-            if any(least or most for least, most in speeds):
-                found[rows] = np.maximum(found[rows], table.at(ways, speeds))
+            mechanism, column = state.model.mechanisms[table.joint.mechanism], table.joint.column
+            q, qd = (float(each(mechanism)[column]) for each in (state.q, state.qd))
+            way, change = 0.0, 0.0
+            if span is not None:
+                dof = mechanism.v_address[mechanism.own[column]]
+                way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T + span.joint_noise[dof]
+            if qd or change:
+                found[rows] = np.maximum(
+                    found[rows], table.at((q - way, q + way), (qd - change, qd + change))
+                )
         return found * wanted
 
 
 def _rates(
     solids: Sequence[Sequence[Solid]],
     poses: Sequence[tuple[Array, Array]],
-    steps: Sequence[Array],
+    step: Array,
     thickness: Array,
     fits: Array,
     least: float,
@@ -279,22 +354,20 @@ def _rates(
     cores = [_core(solid) for of in solids for solid in of]
     radii = [[s.radius for s in of] for of in solids]
     of_pair = repr((radii, [core.shape for core in cores], least)).encode()
-    arrays = [*cores, *(part for pose in poses for part in pose), *steps, thickness, fits]
+    arrays = [*cores, *(part for pose in poses for part in pose), step, thickness, fits]
     key = hashlib.sha256(
         b"".join([_how(), of_pair, *(np.ascontiguousarray(array).tobytes() for array in arrays)])
     ).digest()
     if key not in _KNOWN:
         file = None if cache is None else cache / f"{key.hex()}.gaps"
-        cells = tuple(len(step) for step in steps)
-        shape = (2, len(steps), *cells, len(thickness))
+        shape = (2, len(step), len(thickness))
         found = None if file is None else _read(file, shape)
         if found is None:
-            nodes, sides = tuple(count + 1 for count in cells), []
-            for one, other in ((0, 1), (1, 0)):
-                gaps, faces = _gaps(places(solids[one]), solids[other], (poses[one], poses[other]))
-                gaps, faces = gaps.reshape(*nodes, -1), faces.reshape(*nodes, -1)
-                sides.append(closing(gaps, faces, steps, thickness, fits, least=least))
-            found = np.maximum(*sides) if len(steps) == 1 else np.minimum(*sides)
+            found = np.zeros(shape)
+            sides = [_Side(places(solids[i]), solids[j], (poses[i], poses[j])) for i, j in ((0, 1), (1, 0))]
+            for h in PIECES:
+                for side in sides:
+                    side.look(h, step, thickness, fits, least, found)
             if file is not None:
                 _write(file, found)
         if len(_KNOWN) >= MOST_KNOWN:
@@ -335,22 +408,6 @@ def _core(solid: Solid) -> Array:
     return solid.points
 
 
-def _gaps(on: Places, other: Sequence[Solid], poses: Sequence[tuple[Array, Array]]) -> tuple[Array, Flags]:
-    """Gap [m] of each place to another body and whether it faces it, shape (m, p) each."""
-    (R, x), (S, y) = poses
-    count = len(on.points)
-    if not count:
-        return np.zeros((len(R), 0)), np.zeros((len(R), 0), bool)
-    # As seen from the other body, place by place: from one position of the joint to the next little changes.
-    across = np.swapaxes(S, 1, 2)
-    points = np.einsum("mij,mpj->pmi", across, np.einsum("mij,pj->mpi", R, on.points) + (x - y)[:, None])
-    normals = np.einsum("mij,pj->pmi", across @ R, on.normals)
-    distance, nearest = _distances(other, points.reshape(-1, 3))
-    distance, nearest = distance.reshape(count, -1).T, nearest.reshape(points.shape)
-    towards = ((nearest - points) * normals).sum(axis=2).T
-    return np.maximum(distance, 0.0), (distance > 0) & (towards > ASIDE * distance)
-
-
 def _distances(solids: Sequence[Solid], points: Array) -> tuple[Array, Array]:
     """How far points are from a body, shape (k,), and where it is nearest, (k, 3) [m]."""
     shapes = Shapes.build([("body", solids), ("point", [Solid(points=np.zeros((2, 3)))])])
@@ -374,7 +431,8 @@ def _of_solid(solid: Solid, h: float) -> tuple[Array, Array]:
     axis = (end - start) / length if length > 0 else np.array([0.0, 0, 1])
     side = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     side /= np.linalg.norm(side)
-    angles = 2 * np.pi * np.arange(ROUND) / ROUND
+    count = max(ROUND, math.ceil(2 * np.pi * solid.radius / h))
+    angles = 2 * np.pi * np.arange(count) / count
     around = np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * np.cross(axis, side)
     along = np.linspace(0, 1, int(np.ceil(length / h)) + 1)[:, None] * (end - start) + start
     points = (along[:, None] + solid.radius * around).reshape(-1, 3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from seerob.criteria.stopping.onset import farthest
-from seerob.kernels.ahead import joint_speeds, kept
+from seerob.criteria.stopping.onset import accelerated, by_speed, farthest
+from seerob.kernels.ahead import instants, joint_speeds, kept
 
 
 def motion(seed, m=9, j=3):
@@ -42,6 +42,32 @@ def test_no_stretch_of_a_reaction_is_longer_than_the_farthest():
             part = np.diff(np.clip(t, begin, begin + T_r)) @ each
             assert (way >= part - 1e-15).all()
         assert (way >= now * T_r).all()
+
+
+def test_instants_are_ticks_of_the_clock_and_every_knot_that_is_none_of_them():
+    rng, period, slack = np.random.default_rng(2), 0.01, 1e-9
+    for _ in range(200):
+        first, count = int(rng.integers(0, 9)), int(rng.integers(1, 6))
+        ticks = period * np.arange(first, first + count)
+        begin = ticks[0] = ticks[0] + rng.choice([0.0, 0.004])
+        near = rng.choice(
+            [*ticks, *(ticks + 5e-10), *(ticks - 5e-10), *rng.uniform(begin, ticks[-1] + 1e-6, 4)]
+        )
+        knots = np.sort(np.append(rng.uniform(begin, ticks[-1] + 1e-3, rng.integers(0, 5)), near))
+        found, rows = np.empty(count + len(knots)), np.empty(count, np.int64)
+        n = instants(begin, first, period, knots, slack, found, rows)
+        own = [t for t in np.unique(knots) if np.abs(ticks - t).min() > slack]
+        np.testing.assert_array_equal(found[:n], np.sort([*ticks, *own]))
+        np.testing.assert_array_equal(found[rows], ticks)
+
+
+@pytest.mark.parametrize("a", [0.0, 0.7])
+def test_what_follows_from_speeds_alone_is_what_accelerates(a):
+    v = np.random.default_rng(3).uniform(0, 2, 5)
+    found, wanted = by_speed(0.1, a)(v), accelerated(v, 0.1, a, np.zeros(0))
+    for ours, theirs in ((found.v_r, wanted.v_r), (found.S_r, wanted.S_r), (found.v_s, wanted.v_s)):
+        assert ours.tobytes() == theirs.tobytes()
+    assert (found.ways is None) == (wanted.ways is None)
 
 
 def window(seed, rows):

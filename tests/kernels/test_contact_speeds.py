@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from seerob.core.verdict import ROUNDING
 from seerob.criteria.contact import collision
 from seerob.kernels.axes import reciprocals
 from seerob.kernels.contact_forces import drawn_corners
-from seerob.kernels.contact_speeds import governing, permissible_speeds
+from seerob.kernels.contact_speeds import governing, permissible_speeds, ranks, reached
 from seerob.kernels.speed import carried, directions
+from seerob.recording.answers import keep_many
 
 
 def test_speeds_are_those_of_the_formulae():
@@ -38,7 +40,7 @@ def test_worst_surface_is_that_of_a_search():
     for _ in range(50):
         v, permissible = rng.uniform(0, 2, (b, k)), rng.uniform(0, 2, (b, 4))
         near, known = rng.random((b, k)) < 0.6, rng.integers(0, 3, (b, 4))
-        rows, ranks = governing(v, near, columns, permissible, known, 1e6)
+        rows, found = governing(v, near, columns, permissible, known, 1e6)
         for j in range(k):
             hit = np.flatnonzero(near[:, j])
             if not len(hit):
@@ -48,15 +50,45 @@ def test_worst_surface_is_that_of_a_search():
                 c = columns.tolist().index(j)
                 rank, worse = known[:, c], v[:, j] - permissible[:, c]
             assert rows[j] == hit[np.lexsort((worse[hit], rank[hit]))[-1]]
-            assert ranks[j] == rank[rows[j]]
+            assert found[j] == rank[rows[j]]
 
 
 def test_what_is_not_a_number_governs():
-    rows, ranks = governing(
+    rows, found = governing(
         np.array([[1.0], [np.nan], [2.0]]), np.ones((3, 1), bool), np.array([0]),
         np.ones((3, 1)), np.array([[2], [1], [2]]), 1e6,
     )  # fmt: skip
-    assert (rows[0], ranks[0]) == (1, 1)
+    assert (rows[0], found[0]) == (1, 1)
+
+
+def test_speeds_rank_as_the_verdict_s_own_rule_has_it():
+    rng, odd = np.random.default_rng(2), [0.0, 1.0, 1 - 1e-9, 1 + 1e-9, 1e6, np.inf, np.nan]
+    v, pressure, low, high = (rng.choice([*odd, *rng.uniform(0, 2, 5)], (60, 14)) for _ in range(4))
+    found = np.empty(v.shape, np.int64)
+    ranks(v, pressure, low, high, ROUNDING, found)
+    beyond = ~(keep_many(v, high) | np.isnan(v) | np.isnan(high))
+    open_ = np.isnan(pressure) | ~keep_many(v, low)
+    np.testing.assert_array_equal(found, np.where(beyond, 2, np.where(open_, 1, 0)))
+    assert np.bincount(found.ravel()).min() > 20
+
+
+def test_what_is_reached_is_what_any_of_its_bones_is_near_to():
+    rng, within = np.random.default_rng(3), 3
+    b, n, k = 5, 9, 6
+    for _ in range(50):
+        kinds, member = rng.integers(0, 4, b * n).astype(np.int8), rng.random((n, k)) < 0.3
+        fast = rng.choice([0.0, 1.0, np.inf, *rng.uniform(0, 2, 4)], n)
+        near, close, speeds = np.ones((b, k), bool), np.ones(n, bool), np.ones(k)
+        reached(kinds, within, member, fast, near, close, speeds)
+        hit = kinds.reshape(b, n) == within
+        np.testing.assert_array_equal(near, hit.astype(int) @ member > 0)
+        np.testing.assert_array_equal(close, hit.any(axis=0))
+        moving = np.where(member & close[:, None], fast[:, None], 0.0)
+        np.testing.assert_array_equal(speeds, moving.max(axis=0))
+    # What is not a number is none that may be left out.
+    kinds = np.full(b * n, within, np.int8)
+    reached(kinds, within, np.ones((n, k), bool), np.full(n, np.nan), near, close, speeds)
+    assert np.isnan(speeds).all()
 
 
 def test_directions_have_length_one_or_none():

@@ -147,6 +147,7 @@ class Query:
         self.shapes = shapes
         self.a, self.b = tuple(dict.fromkeys(map(int, a))), tuple(dict.fromkeys(map(int, b)))
         _check_sets(shapes, self.a, self.b, cap)
+        self.bodies = *self.a, *self.b
         self.cap = float(cap)
         rows, bodies, groups = [], [], []
         mesh = shapes.which[:, MESH]

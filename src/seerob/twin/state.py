@@ -98,6 +98,8 @@ class State(Validity):
         n = len(model.bodies)
         self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
         self._quaternions = np.zeros((n, 4))
+        self._alone = [(i,) for i in range(n)]
+        """Each body by itself, as it is asked for."""
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
         self.captured_qpos: Array | None = None
@@ -343,7 +345,7 @@ class State(Validity):
         Raises:
             Undecided: The body may be elsewhere.
         """
-        self.require_bodies((index,), allow_estimated=allow_estimated, strayed=strayed)
+        self.require_bodies(self._alone[index], allow_estimated=allow_estimated, strayed=strayed)
         found: tuple[float, float, float] = in_body(self._rotations, self._positions, index, point)
         return found
 
@@ -784,8 +786,8 @@ class State(Validity):
         Returns:
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
-        self.require_bodies((index,))
-        self._ask_speeds((index,))
+        self.require_bodies(self._alone[index])
+        self._ask_speeds(self._alone[index])
         speed, point, velocity = self._fastest()
         return float(speed[index]), point[index], velocity[index]
 
@@ -851,7 +853,7 @@ class State(Validity):
 
     def distances(self, query: Query, per: Per, *, allow_estimated: bool = False) -> Closests:
         """What a query says now; ``allow_estimated`` as in `require_bodies`."""
-        self.require_bodies((*query.a, *query.b), allow_estimated=allow_estimated)
+        self.require_bodies(query.bodies, allow_estimated=allow_estimated)
         return self._distances(query, per)
 
     def _distances(self, query: Query, per: Per) -> Closests:

@@ -71,6 +71,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
     def _bound(self, model: Model, watched: tuple[_Watched, ...], depths: Depths) -> Evaluate:
         several = len(_names(self.area)) > 1
         offs = [TrackingError(model, each.gap.bodies) for each in watched]
+        surfaces = [np.full(len(each.gap.b), each.gap.deviation) for each in watched]
         concerned = tuple(dict.fromkeys(i for each in watched for i in each.gap.bodies))
 
         def evaluate(state: State) -> Result:
@@ -79,10 +80,12 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
             lit: list[tuple[str, Depth, Array]] = []
             asked = [state.closest_per_body(each.gap, strayed=True) for each in watched]
             entered: list[tuple[_Watched, Closests, int]] = []
-            for each, found, off in zip(watched, asked, offs, strict=True):
-                errors, on = off.at(state), len(each.gap.a)
-                # An area that a person carries may be elsewhere, too.
-                may = errors[:on].max() + errors[on:] + each.gap.deviation
+            for each, found, off, still in zip(watched, asked, offs, surfaces, strict=True):
+                may = still
+                if not off.none(state):
+                    errors, on = off.at(state), len(each.gap.a)
+                    # An area that a person carries may be elsewhere, too.
+                    may = errors[:on].max() + errors[on:] + each.gap.deviation
                 i = int(found.distance.argmin())
                 nearest = min(nearest, (float(found.distance[i]), _where(model, each, i, several)))
                 # Another may be nearer than it, shapes and devices being what they are.

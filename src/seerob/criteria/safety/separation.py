@@ -346,6 +346,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
         stop = self._stop(model)
         C, Z_d, Z_r = self._terms()[0]
         K = C + Z_d + Z_r + gap.deviation
+        terms = {"C": C + gap.deviation, "Z_d": Z_d, "Z_r": Z_r}
+        rest = sum(terms.values())
+        given = tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
         places, names = BodyPlaces(model), [body.name for body in model.bodies]
         human = self._sides(model)[1]
         ends_of_distance = DistanceEnds(model, gap)
@@ -434,7 +437,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 interval=parts[k].interval,
                 parts=(
                     *parts,
-                    *self._shown(now, k, limit, (C + gap.deviation, Z_d, Z_r), seen[0]),
+                    *self._shown(now, k, limit, rest, seen[0]),
+                    *given,
                     *self._more(S_p, most, unbounded_reason),
                     *self._permissible(stop, state, course, now, found.distance, K, seen, stray),
                 ),
@@ -451,16 +455,17 @@ class Separation(Criterion, frozen=True, kw_only=True):
         most = 0.0 if highest is S_p else float((highest - S_p).max())
         return (Result(name=MORE, value=most, unit="m"),) if most > 0 else ()
 
-    def _shown(
-        self, now: Course, k: int, S_p: float, rest: tuple[float, float, float], seen: float
-    ) -> tuple[Result, ...]:
-        """The terms of S_p of the part that governs; S_h is what the others leave."""
-        S_h = S_p - float(now.S_r[k] + now.S_s[k]) - sum(rest)
+    def _shown(self, now: Course, k: int, S_p: float, K: float, seen: float) -> tuple[Result, ...]:
+        """The terms of S_p of the part that governs, but for those of K; S_h is what the others leave."""
+        S_r, S_s = float(now.S_r[k]), float(now.S_s[k])
+        S_h = S_p - (S_r + S_s) - K
         if self.mode == "dynamic" and self.human_speed is not None:
             S_h = float(way_of_person(max(self.human_speed, seen), self.stop.reaction, now.T_s))
-        terms = {"S_h": S_h, "S_r": float(now.S_r[k]), "S_s": float(now.S_s[k])}
-        terms |= dict(zip(("C", "Z_d", "Z_r"), rest, strict=True))
-        return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+        return (
+            Result(name="S_h", value=S_h, unit="m"),
+            Result(name="S_r", value=S_r, unit="m"),
+            Result(name="S_s", value=S_s, unit="m"),
+        )
 
     def batch(self, model: Model) -> EvaluateMany | None:
         """Judge many instants at once, where the stopping time is given and S_p is that of present speeds."""
@@ -701,14 +706,15 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 raise Undecided(required.unbounded_reason)
             return required.most
 
-        least, most = stop.reactions(state)
-        onset = least if most is None else most
+        least, highest = stop.reactions(state)
+        onset = least if highest is None else highest
+        present = onset(1.0)
         if stray or now.unbounded_reason or (now.most is not None and now.most.unbounded_reason):
             reason = "S_p is at least what is shown: no speed follows"
-        elif stop.inverse is not None and onset(1.0).linear:
+        elif stop.inverse is not None and present.linear:
             v_h = np.empty(len(distance))
             approach_speeds(distance, self._approach, seen[1], REACHING, WALKING, iso_13855.ARM_REACH, v_h)
-            speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
+            speed, factor = stop.inverse(onset(0.0), present, distance, v_h, K)
         elif now.v_r.max() > MOVING:
             factor = factor_by_search(S_p, distance, stop.costly)
             speed = factor * float(now.v_r.max())

@@ -36,6 +36,7 @@ from seerob.criteria.stopping.terms import (
     largest_speed_in_time,
 )
 from seerob.distance.least import Per
+from seerob.kernels.pull import greatest
 from seerob.kernels.separation import largest_factor_in_time
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.moving_base import first_moving
@@ -310,7 +311,7 @@ def _inverse(stop: Stop) -> Inverse:
     T_s = math.nan if stop.stopping is None else stop.stopping
 
     def at(rest: Onset, now: Onset, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
-        top = float(now.v_r.max())
+        top = float(greatest(now.v_r))
         if top < MOVING:
             # At rest nobody knows which part will be fastest: each may be.
             more, faster = now.S_r - now.v_r * T_r, now.v_s - now.v_r

@@ -10,8 +10,9 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.core.errors import InputError, NotAsked, Undecided
 from seerob.core.snapshot import Result, Row, Verdict
+from seerob.core.verdict import ROUNDING
 from seerob.criteria.criterion import GIVEN_A_MODEL, Criterion
-from seerob.criteria.judging import Judge, contradiction
+from seerob.criteria.judging import Judge, contradiction, declared, needed
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.velocity import Velocity
 from seerob.session.run import bind
@@ -155,6 +156,17 @@ def test_what_is_worked_out_once_is_depended_on_by_everybody_who_takes_it(own):
         assert state.asked == {"arm"}
 
 
+def test_a_link_without_a_shape_is_of_its_robot_and_what_is_none_is_of_nobody(own):
+    """A criterion that says so, and asks nothing, rests on the robot all the same."""
+    head = HEAD.replace('of: str = "arm"', 'of: str = "arm/tip"')
+    station = own(BIND.format(READS["nothing"]), head=head, more=person("op", 3, 0, 0))
+    found = unheard(station)
+    assert (found.verdict, "arm: no source drives it" in found.reason) == (UNDECIDED, True)
+    assert needed(station.bound[0].criterion, station.model) == (("arm",), ())
+    assert declared(station.model, ["arm/tip"]) == ("arm",)
+    assert declared(station.model, ["a sensor"]) == ()
+
+
 # -- a criterion that is not one ----------------------------------------------------------------
 
 NO_BASIS = HEAD.replace('    def basis(self, model): return Basis(formula="as below", source="ACME")\n', "")
@@ -270,6 +282,10 @@ def test_a_whole_is_no_greener_than_its_parts(own):
     assert "its part a" in contradiction(
         Result(name="own", rows=(Row(name="a", verdict=EXCEEDED),), **within), criterion
     )
+    for verdict, found in ((WITHIN, ""), (None, ""), (UNDECIDED, "its part a is undecided")):
+        rows = (Row(name="a", verdict=verdict),)
+        assert contradiction(Result(name="own", rows=rows, **within), criterion).endswith(found)
+        assert bool(contradiction(Result(name="own", rows=rows, **within), criterion)) is bool(found)
     wide = Result(name="own", interval=(0.5, 2.5), **within)
     assert "2.5  lies above its limit" in contradiction(wide, criterion)
     low = Result(name="own", value=3.0, limit=2.0, at_most=False, interval=(1.5, 4.0), verdict=WITHIN)
@@ -280,6 +296,17 @@ def test_a_whole_is_no_greener_than_its_parts(own):
     assert "its limit is inf" in contradiction(boundless, criterion)
     least = MinimumDistance(name="own", between=("arm", "op"), limit=2.0)
     assert "from the other side" in contradiction(Result(name="own", **within), least)
+    for limit, off, side in (
+        (0.0, ROUNDING, "but for rounding on"),
+        (2e3, 1e3 * ROUNDING, "but for rounding on"),
+        (1e-3, 0.5 * ROUNDING, "but for rounding on"),
+        (2.0, 5 * ROUNDING, "above"),
+    ):
+        edge = Result(name="own", value=limit + off, limit=limit, verdict=WITHIN)
+        assert f"lies {side} its limit" in contradiction(edge, criterion)
+    for end, at_most in ((2, True), (2.0 - 3 * ROUNDING, True), (2.0 + 3 * ROUNDING, False)):
+        kept = Result(name="own", value=end, limit=2.0, at_most=at_most, verdict=WITHIN)
+        assert "its limit" not in contradiction(kept, criterion)
     nested = Result(name="a", parts=(Result(name="b", verdict=EXCEEDED),))
     assert "its part b" in contradiction(Result(name="own", parts=(nested,), **within), criterion)
     assert contradiction(Result(name="own", parts=(Result(name="a"),), **within), criterion) == ""

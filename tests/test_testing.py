@@ -117,8 +117,9 @@ def everything(tmp_path_factory):
         yield made(tmp_path_factory.mktemp("everything"), text, files)
 
 
-def test_whatever_ships_is_never_within_where_nothing_is_known(everything):
+def test_whatever_ships_is_never_within_where_nothing_is_known(everything, caplog):
     never_within(everything, {"free": True})
+    assert not [record.message for record in caplog.records if " failed: " in record.message]
 
 
 def test_whatever_ships_is_asked(everything):
@@ -150,6 +151,39 @@ FORGETS = {
     "peeks": ("value, markers = float(state._data.qpos[-1]), ()", "it changes when other moves"),
     "undeclared": ("value, markers = float(state.q(arm)[0] + state.q(other)[0]), ()", "it depends on other"),
     "raw": ("value, markers = float(state.data.qpos[0]), ()", "State.data does not say whether"),
+    "catches": (
+        "markers = ()\n            try: value = float(state.q(other)[0])\n"
+        "            except Exception: value = 0.0",
+        "it depends on other",
+    ),
+    "keeps": (
+        "kept.append(float(state.q(arm)[0])); value, markers = kept[0], ()",
+        "it hangs on earlier instants, and does not say so",
+    ),
+    "keeps every other": (
+        "kept[:] = kept[:1] + [float(state.q(arm)[0])]; value, markers = sum(kept), ()",
+        "it hangs on earlier instants, and does not say so",
+    ),
+    "random": ("value, markers = float(np.random.default_rng().random()), ()", "when the same is said again"),
+    "clock": (
+        "import time; value, markers = time.perf_counter() % 1, ()",
+        "when the same is said again",
+    ),
+    "wrong side": ("value, markers = float(state.q(arm)[0]) + 9, ()", "it is exceeded"),
+    "its own verdict": (
+        "state.q(arm); return Result(name=self.name, value=10.0, limit=9.0, verdict=Verdict.WITHIN)",
+        "contradicts itself: it is within, and 10  lies above",
+    ),
+    "the other side": (
+        "state.q(arm); return Result(name=self.name, value=10.0, limit=9.0, at_most=False, "
+        "verdict=Verdict.WITHIN)",
+        "it bounds from the other side",
+    ),
+    "a part": (
+        "part = Result(name='a', verdict=Verdict.UNDECIDED)\n            "
+        "return Result(name=self.name, value=1.0, limit=9.0, verdict=Verdict.WITHIN, parts=(part,))",
+        "its part a is undecided",
+    ),
     "fails": ("value = kept[3]", "failed: IndexError"),
     "not a number": ("value, markers = float('nan'), ()", "not a finite number|it is undecided"),
 }

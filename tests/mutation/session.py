@@ -19,6 +19,7 @@ import time
 import types
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -243,6 +244,8 @@ def _plain(function: Any) -> Any:
     """The function below its decorators."""
     if isinstance(function, property):
         return _plain(function.fget)
+    if isinstance(function, cached_property):
+        return _plain(function.func)
     function = getattr(function, "__func__", function)
     return _plain(function.__wrapped__) if hasattr(function, "__wrapped__") else function
 

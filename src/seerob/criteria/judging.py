@@ -95,16 +95,19 @@ def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[i
     names: dict[str, None] = {}
     bodies: dict[int, None] = {}
     for name in criterion.depends(model) if criterion.whole else ():
-        meant = () if name in model.mechanisms else _meant(model, name)
         if name in model.mechanisms:
             names[name] = None
-        elif meant:
+        elif meant := _meant(model, name):
             bodies |= dict.fromkeys(meant)
-        elif name in model.frames:
-            at = model.frames[name].mj
-            moving = (m for m in model.mechanisms.values() if at in m.mj_bodies)
-            names |= dict.fromkeys(m.name for m in moving)
+        else:
+            names |= dict.fromkeys(_of_link(model, name))
     return tuple(names), tuple(bodies)
+
+
+def _of_link(model: Model, name: str) -> tuple[str, ...]:
+    """Robot, person or machine that has a link without a shape; none where the name means none."""
+    link = model.frames.get(name)
+    return () if link is None else tuple(m.name for m in model.mechanisms.values() if link.mj in m.mj_bodies)
 
 
 def declared(model: Model, names: Iterable[str]) -> tuple[str, ...]:
@@ -116,9 +119,8 @@ def declared(model: Model, names: Iterable[str]) -> tuple[str, ...]:
             continue
         if bodies := _meant(model, name):
             found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in bodies)))
-        else:  # a link without a shape
-            at = model.frames[name].mj if name in model.frames else -1
-            found |= dict.fromkeys(m.name for m in model.mechanisms.values() if at in m.mj_bodies)
+        else:
+            found |= dict.fromkeys(_of_link(model, name))
     for name in tuple(found):
         mechanism = model.mechanisms[name]
         found |= dict.fromkeys((*mechanism.riders, *mechanism.holders))

@@ -3,8 +3,9 @@
 ``never_within("my_cell")`` takes a workstation in which every criterion is within (or informs), says where
 everybody is, and then spoils what is said: of each robot, person and machine that a criterion depends on,
 and of its variables. A criterion fails when it, a part, a row or a marker of it is within all the same; when
-it rests on somebody whom it does not declare (`Criterion.depends`); or when it is no criterion (no basis, a
-result that contradicts itself).
+it rests on somebody whom it does not declare (`Criterion.depends`), on chance, on the time of day, or on what
+was before without saying so (`Criterion.remembers`); or when it is no criterion (no basis, a result that
+contradicts itself).
 
 ``sources_never_within("my_cell")`` takes one in which every criterion is within while its files are played,
 and lets each source lie: it stops, fails, repeats itself, goes back in time, speaks of the future, jumps,
@@ -331,6 +332,7 @@ class _Harness:
             if strangers := sorted(rests - known):
                 what = f"it depends on {', '.join(strangers)}: say so in depends, or in variables"
                 told.append(f"{criterion.name}: {what}")
+        told += self._unsteady(clean)
         for name in self.model.mechanisms:
             concerned = [i for i, names in enumerate(whom) if name in names]
             moved = self._run(elsewhere=name) if len(concerned) < len(criteria) else ()
@@ -353,6 +355,23 @@ class _Harness:
         told += self._green(self._run(quiet=True), asking, "no variable was heard")
         told += self._green(self._run(muted=True), range(len(criteria)), "it is muted")
         return told
+
+    def _unsteady(self, clean: Sequence[tuple[int, list[tuple[Result, set[str]]]]]) -> list[str]:
+        """Who says another thing of what was said before, or hangs on earlier instants without saying so."""
+        told: dict[int, str] = {}
+        for (k, before), (_, after) in zip(clean, self._run(anew=True), strict=True):
+            for i, (criterion, _) in enumerate(self._asked):
+                if i in told or _alike(before[i][0], after[i][0]):
+                    continue
+                if k < TICKS - 1:
+                    told[i] = (
+                        f"{criterion.name}: it says another thing when the same is said again (chance, time)"
+                    )
+                elif not criterion.remembers(self.model):
+                    told[i] = (
+                        f"{criterion.name}: it hangs on earlier instants, and does not say so (remembers)"
+                    )
+        return list(told.values())
 
     def _green(
         self,
@@ -378,16 +397,19 @@ class _Harness:
         hidden: str = "",
         quiet: bool = False,
         muted: bool = False,
+        anew: bool = False,
     ) -> Iterator[tuple[int, list[tuple[Result, set[str]]]]]:
-        """What every criterion says at every tick, and on whom that depends."""
+        """What every criterion says at every tick, and on whom that depends; the last asked ``anew``."""
         model = self.model
         sources = {v.source: TIMEOUT * _PERIOD for v in model.dictionary.values()}
         driven = dict.fromkeys(model.mechanisms, (TIMEOUT + 0.5) * _PERIOD)
         engine = Engine(model, driven=driven, live=driven, signals=sources)
-        judges = [
-            Judge([bound_to(model, changed(c, active=MUTE) if muted else c, group)], findings)
-            for c, group in self._asked
-        ]
+
+        def bound() -> list[Judge]:
+            asked = ((changed(c, active=MUTE) if muted else c, group) for c, group in self._asked)
+            return [Judge([bound_to(model, c, group)], findings) for c, group in asked]
+
+        judges = bound()
         values = {**self._values, MUTE: not muted}
         for k in range(TICKS):
             said = []
@@ -402,6 +424,8 @@ class _Harness:
             if hidden:
                 doubt = "seerob.testing", tuple(BONES)
                 state.hearings[hidden].bones_heard = [BonesHeard(state.t, parts=(doubt,))]
+            if anew and k == TICKS - 1:
+                judges = bound()
             results = []
             for judge in judges:
                 (result,) = judge(state)

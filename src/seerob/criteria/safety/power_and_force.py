@@ -370,8 +370,10 @@ class Contacts:
 
     def without(self, lost: tuple[int, ...]) -> Evaluate | None:
         """Judge contacts with the other bones of these people; None when there are none."""
+        if {i for name in self.humans for i in self.model.human(name).bodies} <= set(lost):
+            return None
         rest = Person(self.model, self.robot, *self.humans, horizon=self.spec.horizon, without=lost)
-        return (lambda state: self.evaluate(state, rest)) if rest.bodies else None
+        return lambda state: self.evaluate(state, rest)
 
     def whoever_is_known(self, judge: Evaluate) -> Evaluate:
         """Judge several people: if one is not known, another's contact may be exceeded, never within."""

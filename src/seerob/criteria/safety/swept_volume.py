@@ -40,6 +40,10 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         """What sweeps."""
         return (self.of,)
 
+    def remembers(self, model: Model) -> bool:
+        """What was swept before counts."""
+        return True
+
     def bind(self, model: Model) -> Evaluate:
         """Look up the bodies and return the function that marks voxels; refuses more than memory allows."""
         bodies = model.select(self.of)

@@ -10,6 +10,7 @@ from seerob import load
 from seerob.core.errors import InputError, Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
+from seerob.criteria.contact.clamped_regions import Clamping
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
 
@@ -319,3 +320,50 @@ def test_what_is_picked_up_in_motion_is_as_fast_as_the_hand_at_once(tmp_path, ev
     limit = f'[[safety]]\nkind = "velocity"\nname = "v"\nof = "nut"\nlimit = 0.5\n{every}'
     light = STATION.replace("mass = 2.0", "mass = 0.2")
     assert made(tmp_path, light + sources + limit, tables).run().verdict is Verdict.EXCEEDED
+
+
+ROD = """
+[engine]
+physics = false
+[[robots]]
+name = "arm"
+model = "arm.urdf"
+[[machines]]
+name = "hand"
+on = "arm/tip"
+at = { position = [0, 0, 0.12] }
+shape = { box = [0.02, 0.02, 0.06] }
+mass = 0.2
+grip = { upper = 0.1 }
+[[workpieces]]
+name = "rod"
+on = "hand"
+shape = { box = [1.6, 0.04, 0.04] }
+mass = 1.0
+rest = { position = [1.2, 0, 0.12] }
+"""
+
+
+def test_what_was_picked_up_clamps_where_it_was_taken_not_where_the_file_has_it_in_the_hand(tmp_path):
+    """A rod that reaches back over the inner link, 5 cm above it; held in its middle it would not."""
+    model = made(tmp_path, ROD, {"arm.urdf": two_r()}).model
+    engine = Engine(model, driven={"arm": 0.05, "hand": 0.05})
+    clamping = Clamping(model, model.robot("arm"), {}, ("Hands and fingers",), None)
+
+    def clamps(k, opening, speed):
+        """Bodies that clamp a hand while the elbow turns."""
+        said = {"arm": ((0.0, 0.0), (0.0, speed)), "hand": ((opening / 2,), (0.0,))}
+        engine.take(
+            JointSample(source=name, seq=k, t=k * TICK, target=name, q=q, qd=qd)
+            for name, (q, qd) in said.items()
+        )
+        state = engine.tick() if k else engine.start()
+        moving = model.robot("arm").moving
+        flags, *_ = clamping.at(state, np.ones((len(moving), 1), bool))
+        return {model.bodies[i].name for i, flag in zip(moving, flags[:, 0], strict=True) if flag}
+
+    assert "rod" not in clamps(0, WIDE, 0.3)
+    clamps(1, 0.041, 0.3)
+    assert {"rod", "arm/l1"} <= clamps(2, 0.041, 0.3)
+    assert "rod" in clamps(3, 0.041, -0.3)
+    assert "rod" not in clamps(4, 0.041, 0.0)

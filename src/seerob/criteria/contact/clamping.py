@@ -19,7 +19,8 @@ from the shapes and the ranges of the joints:
 - of two parts that one joint moves against each other (an elbow, two fingers), every place is looked at by
   itself; see `seerob.criteria.contact.joint_gaps`;
 - of two parts that are near wherever several joints stand (an upper arm and the base under its shoulder),
-  nearer than the thinnest body part is thick, whatever moves clamps as it does at any other surface.
+  nearer than the thinnest body part is thick, and between what a gripper picks up and whatever moves against
+  it, what moves clamps as it does at any other surface.
 """
 
 from __future__ import annotations
@@ -297,10 +298,15 @@ def robot_pinch_pairs(
     others = [b.index for b in around if b.mover]
     joints = OwnJoints(model)
     between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
-    endless = {pair for pair, of in between.items() if any(map(joints.endless, of))}
-    one = ((pair, next(iter(of))) for pair, of in between.items() if len(of) == 1 and pair not in endless)
+    # Without ends anything may get between, and what is picked up lies in the hand as it was taken: who is
+    # near clamps.
+    loose = {i for i in own if model.bodies[i].holder}
+    always = {
+        pair for pair, of in between.items() if any(map(joints.endless, of)) or (of and loose & {*pair})
+    }
+    one = ((pair, next(iter(of))) for pair, of in between.items() if len(of) == 1 and pair not in always)
     placed = [(*pair, coordinate) for pair, coordinate in one]
-    apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in endless)
+    apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in always)
     pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
     inner = pairs.inner
     widest = np.full(len(pairs.first), np.inf)
@@ -315,7 +321,6 @@ def robot_pinch_pairs(
         widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
         for gap in np.flatnonzero(inner).tolist():
             i, j = sorted((pairs.moving[pairs.first[gap]], int(pairs.across[gap])))
-            # Without ends anything may get between, and may be clamped wherever they are near.
-            if (i, j) in endless or widest[gap] < thinnest:
+            if (i, j) in always or widest[gap] < thinnest:
                 widest[gap] = np.inf
     return pairs, widest, placed

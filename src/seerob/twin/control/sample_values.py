@@ -36,11 +36,15 @@ def is_possible(sample: JointSample | PoseSample) -> bool:
 
 def beyond_limits(sample: JointSample, mechanism: Mechanism) -> str:
     """Which joint is said to be where it cannot be; empty when none is."""
+    if not any(
+        (joint.lower is not None and joint.lower - value > BEYOND)
+        or (joint.upper is not None and value - joint.upper > BEYOND)
+        for joint, value in zip(mechanism.joints, sample.q, strict=True)
+    ):
+        return ""
     q = np.array(sample.q)
     over = np.maximum(mechanism.lower - q, q - mechanism.upper)
     k = int(np.argmax(over))
-    if not over[k] > BEYOND:
-        return ""
     limit = mechanism.lower[k] if q[k] < mechanism.lower[k] else mechanism.upper[k]
     unit = mechanism.units[k]
     return (

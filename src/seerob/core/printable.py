@@ -18,7 +18,7 @@ _OBEYED = re.compile(
 _WRITTEN = re.compile(
     rb"\\u00[01]|\\[bfr]|\x7f|\xc2[\x80-\x9f]|\xd8\x9c|\xe2(?:\x80[\x8e\x8f\xa8-\xae]|\x81[\xa6-\xa9])"
 )
-"""The same in JSON, as msgspec writes it, and at times what only looks so."""
+"""Matches such characters in JSON, as msgspec writes it, and at times what only looks so."""
 
 
 def printable(text: str) -> str:

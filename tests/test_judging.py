@@ -219,8 +219,9 @@ def test_what_is_taken_back_is_taken_back_whole():
     assert (bad.verdict, bad.reason, bad.parts[0].verdict) == ("exceeded", "a ↔ b", "undecided")
     figure = undecided(Result(name="d", value=1.0), "nobody knows")
     assert (figure.verdict, figure.reason) == (None, "")
-    nobody = undecided(Result(name="d", reason="nobody is near"), "nobody knows")
+    nobody = undecided(Result(name="d", reason="nobody is near", nothing=True), "nobody knows")
     assert (nobody.verdict, nobody.reason) == ("undecided", "nobody knows; nobody is near")
+    assert (figure.nothing, nobody.nothing) == (False, False)
 
 
 @pytest.mark.parametrize(

@@ -49,13 +49,13 @@ TICK = 0.01
 class Cell:
     """A gripper on an arm of one joint, told where to be at each tick."""
 
-    def __init__(self, folder, text=STATION):
+    def __init__(self, folder, text=STATION, angle=0.0, opening=WIDE):
         (folder / "workstation.toml").write_text(text)
         self.station = load(folder)
         self.model = self.station.model
         self.engine = Engine(self.model, driven={"axis": 0.05, "hand": 0.05})
         self.k = 0
-        self._hear(0.0, WIDE)
+        self._hear(angle, opening)
         self.state = self.engine.start()
 
     def _hear(self, angle, opening, speed=0.0):
@@ -367,3 +367,23 @@ def test_what_was_picked_up_clamps_where_it_was_taken_not_where_the_file_has_it_
     assert {"rod", "arm/l1"} <= clamps(2, 0.041, 0.3)
     assert "rod" in clamps(3, 0.041, -0.3)
     assert "rod" not in clamps(4, 0.041, 0.0)
+
+
+@pytest.mark.parametrize(("opening", "known"), [(WIDE, True), (0.041, False), (0.0, True)])
+def test_a_run_that_begins_with_it_in_the_hand_does_not_know_where_it_is(tmp_path, opening, known):
+    """Shut or wide open it is not held; lying between the fingers it is, and keeps its place."""
+    cell = Cell(tmp_path, STATION, angle=LIFTED, opening=opening)
+    hand = cell.model.mechanisms["hand"]
+    for _ in range(3):
+        if known:
+            assert cell.between("nut", "post") > 1
+            cell.state.weigh(hand)
+        else:
+            for ask in (lambda: cell.between("nut", "post"), lambda: cell.state.weigh(hand)):
+                with pytest.raises(
+                    Undecided, match="nut: the run begins with the fingers of hand as if they held it"
+                ):
+                    ask()
+        # However it goes on.
+        cell.go((LIFTED, opening), (LIFTED, WIDE))
+    assert not Cell(tmp_path, STATION, angle=0.0, opening=SHUT).state.attachments.unknown

@@ -2,7 +2,9 @@
 
 A workpiece is held from the tick on at which both fingers are as near to it as ``touch`` and it reaches
 between them; it then keeps its place in the hand. It is let go when a finger is farther from it than twice
-that, and lies where it was then: nothing falls, and no belt takes it along.
+that, and lies where it was then: nothing falls, and no belt takes it along. Where a run begins with fingers
+that are not shut and no farther apart than if they held it, as the file has it in the hand, and it does not
+lie between them, nobody knows where it is.
 
 What grippers hold along a motion that was recorded: picked up and let go as in the run that it is of.
 """
@@ -137,6 +139,7 @@ class _Grip:
         solids = tuple(solid for index in self._resting for solid in model.bodies[index].solids)
         self._gap = Query(Shapes.build([("gap", (plate,)), ("piece", solids)]), (0,), (1,), cap=self._touch)
         cap = 2 * LET_GO * self._touch
+        self._apart = Query(model.shapes, *((finger.index,) for finger in self._fingers), cap=cap)
         self._queries = {
             places: [Query(model.shapes, (finger.index,), places, cap=cap) for finger in self._fingers]
             for places in (tuple(self._held), tuple(self._resting))
@@ -145,6 +148,7 @@ class _Grip:
             state.attachments.unknown.pop(index, None)
         self._holds = True
         self._unheard = ""
+        self._begins = True
         self._bring(state, held=False)
 
     def follow(self, state: State) -> bool:
@@ -155,7 +159,16 @@ class _Grip:
             self._unheard = state.invalid_reason(self._hand) or "not heard"
             return False
         unheard, self._unheard = self._unheard, ""
-        if self._holds == self._grips(state):
+        begins, self._begins = self._begins, False
+        grips = self._grips(state)
+        if begins and not grips and self._as_if_held(state):
+            reason = (
+                f"{self._piece}: the run begins with the fingers of {self._hand} as if they held it, nobody "
+                "knows where it is: begin with fingers that are open or shut, or let it rest between them"
+            )
+            state.attachments.unknown |= dict.fromkeys((*self._held, *self._resting), reason)
+            return False
+        if self._holds == grips:
             return False
         if not self._holds:
             self._pick_up(state)
@@ -189,6 +202,19 @@ class _Grip:
         palm = state.data.xmat[self._palm].reshape(3, 3), state.data.xpos[self._palm]
         both = np.stack([palm[0], R[places[0]]]), np.stack([palm[1], x[places[0]]])
         return self._holds or self._gap.minimum(*both).distance <= 0
+
+    def _as_if_held(self, state: State) -> bool:
+        """Whether fingers that are not shut would be at it in the hand, where the file has it there."""
+        if self._apart.minimum(state.rotations, state.positions).distance <= self._touch:
+            return False
+        R, x, held = state.rotations.copy(), state.positions.copy(), self._held
+        turn, mj = state.data.xmat[self._palm].reshape(3, 3), state.model.mj
+        own = np.empty(9)
+        mujoco.mju_quat2Mat(own, mj.body_quat[self._in_hand])
+        R[held] = turn @ own.reshape(3, 3)
+        x[held] = state.data.xpos[self._palm] + turn @ mj.body_pos[self._in_hand]
+        near = LET_GO * self._touch
+        return all(query.minimum(R, x).distance <= near for query in self._queries[tuple(held)])
 
     def _pick_up(self, state: State) -> None:
         index = self._resting[0]

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seerob.devices.live import device_clock
 from seerob.devices.live.arrivals import Arrivals
 from seerob.devices.live.device_clock import (
     AGAIN,
@@ -162,6 +163,43 @@ def test_what_is_played_again_and_again_is_never_relied_on(live, again):
                 found = clock.hear(PERIOD * now, 5 + PERIOD * now + 1e-4, hash(PERIOD * now))
                 assert found.t is None or found.invalid_reason
             now += 1
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.02], ids=["whole", "some lost"])
+@pytest.mark.parametrize("since", [0, 3000], ids=["of long ago", "of just now"])
+def test_a_long_recording_that_is_played_after_a_silence_is_never_relied_on(monkeypatch, since, lost):
+    """Half a minute of what was heard, of a device that has connected anew: more stamps than are kept."""
+    monkeypatch.setattr(device_clock, "KEPT", 500)
+    clock, chance = DeviceClock(), np.random.default_rng(4)
+    count = 8000
+    assert not any(
+        i.invalid_reason for i in heard(clock, [(PERIOD * k, 5 + PERIOD * k) for k in range(count)])
+    )
+    clock.reconnect()
+    for k in range(since, since + 4000):
+        if chance.random() >= lost:
+            host = 7 + PERIOD * (count + k - since)
+            found = clock.hear(PERIOD * k, host, hash(PERIOD * k), forgeable=True)
+            assert found.t is None or found.invalid_reason, k
+    assert "is a recording played to it?" in found.invalid_reason
+
+
+def test_a_device_that_starts_again_and_moves_is_relied_on_though_its_stamps_were_heard():
+    clock = DeviceClock()
+    for run in range(3):
+        clock.reconnect()
+        for k in range(2000):
+            found = clock.hear(PERIOD * k, 5 + 1000 * run + PERIOD * k, hash((run, k)), forgeable=True)
+            assert bool(found.invalid_reason) == (run > 0 and PERIOD * k <= RESTART_HOLD)
+
+
+def test_what_is_remembered_of_a_clock_is_bounded(monkeypatch):
+    monkeypatch.setattr(device_clock, "KEPT", 300)
+    monkeypatch.setattr(device_clock, "MARKED", 100)
+    clock = DeviceClock()
+    for k in range(1000):
+        clock.hear(2.0 * k, 5 + 2.0 * k, k)
+    assert (len(clock._said), len(clock._marks)) == (300, 100)
 
 
 def test_a_backlog_keeps_its_own_instants():

@@ -54,6 +54,8 @@ FOUND = [
     ("obj", b"f ", b"v inf 0 0\nv 0 inf 0\nf -1 -2 1 2\nf "),
     ("motion csv", b"\n0.01,", b"\n5e-324,"),
     ("motion csv", b"\n0.01,", b"\n-1e308,"),
+    ("tool path", b"\n0.01,", b"\n5e-324,"),
+    ("zones of a controller", b"[0, 2.5]", b"[0, 0x" + b"1" * 5000 + b"]"),
     ("waypoints xlsx", b'<row r="2">', b'<row r="999999999">'),
 ]
 """Kind of file, what stands in the valid one, and what a hunt put there that hung, warned or raised."""

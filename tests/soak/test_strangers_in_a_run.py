@@ -21,11 +21,15 @@ from seerob.app.emulation import mvn_person
 from seerob.app.emulation.motions import swing
 from seerob.app.emulators.kinect import KinectSender, animated, measured
 from seerob.app.emulators.mvn import MvnSender
+from seerob.app.emulators.rokoko import RokokoSender
 from seerob.app.emulators.rtde import RtdeServer
+from seerob.app.emulators.vive import ViveSender, worn
 from seerob.core.snapshot import Snapshot
 from server.frames import PATIENCE, Visitor
 
 HERE = "127.0.0.1"
+SILENCE = 3.0
+"""After which a source listens anew [s]."""
 CELL = """
 title = "Strangers"
 engine = {{ physics = false }}
@@ -77,6 +81,10 @@ def sender(kind, port):
     if kind == "kinect":
         return KinectSender(measured(animated("library:reach"), 2e-4), to=(HERE, port), rate=30.0)
     person = mvn_person.measured(mvn_person.animated("library:reach"), 2e-4)
+    if kind == "rokoko":
+        return RokokoSender({"Anna": person}, to=(HERE, port), rate=30.0)
+    if kind == "vive":
+        return ViveSender(worn(person), to=(HERE, port), rate=30.0)
     return MvnSender({0: person}, to=(HERE, port), rate=30.0)
 
 
@@ -89,11 +97,11 @@ class Relay(threading.Thread):
 
     def __init__(self, to):
         super().__init__(daemon=True)
-        self._to, self._kept, self._loop = (HERE, to), [], []
+        self._to, self._kept, self._sent, self._loop = (HERE, to), [], [], []
         self.inside, self._way = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
         self.inside.bind((HERE, 0))
         self.port = self.inside.getsockname()[1]
-        self.mixed = False
+        self.mixed = self.muted = False
         self.start()
 
     def run(self):
@@ -105,11 +113,18 @@ class Relay(threading.Thread):
                     self._way.sendto(next(d for t, d in self._kept if t > time.monotonic() - 0.7), self._to)
                 if self._loop:
                     data, k = self._loop[k % len(self._loop)], k + 1
-                self._way.sendto(data, self._to)
+                else:
+                    self._sent.append(self._kept[-1])
+                if not self.muted:
+                    self._way.sendto(data, self._to)
 
     def loop(self, seconds):
         """From now on, the newest that was heard, again and again, and nothing live."""
         self._loop = [data for t, data in self._kept if t > time.monotonic() - seconds]
+
+    def mute(self, seconds):
+        """Send nothing, until that is undone; then the newest that was sent live, again and again."""
+        self.muted, self._loop = True, [data for t, data in self._sent if t > self._sent[-1][0] - seconds]
 
 
 class Watching:
@@ -147,7 +162,7 @@ class Watching:
 @pytest.fixture(
     params=[
         pytest.param(("mvn",), id="short"),
-        pytest.param(("mvn", "kinect"), id="long", marks=pytest.mark.soak),
+        pytest.param(("mvn", "kinect", "rokoko", "vive"), id="long", marks=pytest.mark.soak),
     ]
 )
 def run(tmp_path, request):
@@ -201,6 +216,17 @@ def test_nobody_is_within_by_what_strangers_send_or_by_what_is_old(run, tmp_path
     shown.until("undecided", people, "played again", "went back", "says again", "not heard for")
     shown.never_within(people, 3.0, after=0.5)
     shown.until("within", ("arm",))
+
+    # What was heard, after a silence, from the same address and port: no device that starts again.
+    for relay in relays.values():
+        relay.mute(6.0)
+    shown.until("undecided", people, "not heard for")
+    time.sleep(SILENCE)
+    for relay in relays.values():
+        relay.muted = False
+    shown.until("undecided", people, "says again", "went back")
+    shown.never_within(people, 6.0)
+    shown.until("undecided", people, "is a recording played to it?")
 
     process.send_signal(signal.SIGSTOP)
     with suppress(TimeoutError):

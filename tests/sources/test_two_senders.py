@@ -105,8 +105,8 @@ def test_packets_of_the_first_that_are_played_again_leave_the_person_undecided(k
             begun = len(samples)
             end = time.monotonic() + 3 * HOLD
             while time.monotonic() < end:
-                way.sendto(seen[-back], (HERE, port))
                 seen.append(tap.recv(1 << 16))
+                way.sendto(seen[-back], (HERE, port))
                 way.sendto(seen[-1], (HERE, port))
         finally:
             sender.stop()
@@ -139,3 +139,39 @@ def test_another_port_of_the_same_address_is_another_sender():
     assert found == [b"1", b"3"]
     assert strangers == 1
     assert told == [f"{HERE} port {names[1]} sends to port {port}, too; heard is {HERE} port {names[0]}"]
+
+
+def test_after_a_silence_the_address_that_was_heard_is_waited_for_and_no_other():
+    told, found = [], []
+
+    async def listen(port, count):
+        async with datagrams.listening("0.0.0.0", port) as heard:
+            async for datagram in heard.receive(0.3):
+                found.append(datagram.data)
+                if len(found) == count:
+                    return
+
+    async def run():
+        datagrams.DISTRUST.set(told.append)
+        datagrams.HEARD.set({})
+        port = free_port()
+        with a_socket() as first, a_socket() as other, a_socket() as again:
+            first.bind((HERE, 0))
+            other.bind(("127.0.0.2", 0))
+            again.bind((HERE, 0))
+
+            def send(link, data):
+                link.sendto(data, (HERE, port))
+
+            loop = asyncio.get_running_loop()
+            loop.call_later(0.05, send, first, b"first")
+            with pytest.raises(TimeoutError):
+                await listen(port, 0)
+            for k, link in enumerate((other, again, other)):
+                loop.call_later(0.05 * (k + 1), send, link, b"%d" % k)
+            with pytest.raises(TimeoutError):
+                await listen(port, 0)
+
+    asyncio.run(run())
+    assert found == [b"first", b"1"]
+    assert [text.partition("heard is ")[2].split(" port")[0] for text in told] == [HERE, HERE]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import random
 import socket
 import time
 from collections.abc import Awaitable, Callable, Sequence
@@ -46,6 +47,12 @@ class MessageSender(LoopEmulator):
         self.to, self.host, self.port, self.rate, self.way = to, host, port, rate, way
         self.sent = 0
         """Messages so far."""
+        self.phase = 0.0
+        """Of its clock [s]: one that starts again says nothing that it said before to the last bit."""
+
+    def t(self, k: int) -> float:
+        """When the message number ``k`` is, on the sender's own clock [s]."""
+        return self.phase + k / self.rate
 
     def message(self, k: int) -> bytes:
         """The message number ``k``."""
@@ -57,6 +64,7 @@ class MessageSender(LoopEmulator):
         Raises:
             OSError: The address cannot be listened on, or is none.
         """
+        self.phase = random.uniform(0.0, 0.25 / self.rate)  # noqa: S311 - no secret
         if self.to is not None:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
                 link.setblocking(False)

@@ -37,7 +37,7 @@ class DrflSender(MessageSender):
 
     def message(self, k: int) -> bytes:
         """The message number ``k``."""
-        t = k / self.rate
+        t = self.t(k)
         q, qd = self.motion(t)
         return encode(
             Message(

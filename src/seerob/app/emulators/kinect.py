@@ -154,8 +154,8 @@ class KinectSender(MessageSender):
 
     def message(self, k: int) -> bytes:
         """The message of a picture."""
-        picture = self.scene(k / self.rate)
-        return encode_message(replace(picture, t=FIRST + k / self.rate, frame=k))
+        picture = self.scene(self.t(k))
+        return encode_message(replace(picture, t=FIRST + self.t(k), frame=k))
 
 
 # -- options ------------------------------------------------------------------------------------

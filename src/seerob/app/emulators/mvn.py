@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import socket
 import struct
 import time
@@ -196,6 +197,8 @@ class MvnSender(Emulator):
         self.units, self.tcp, self.items_each, self.old, self.way = units, tcp, items_each, old, way
         self.sent = 0
         """Instants so far."""
+        self.phase = 0.0
+        """Of its clock [s]: one that starts again says nothing that it said before to the last bit."""
 
     def begin(self) -> Callable[[], object]:
         """Connect.
@@ -203,6 +206,7 @@ class MvnSender(Emulator):
         Raises:
             OSError: With TCP, nobody listens there.
         """
+        self.phase = random.uniform(0.0, 0.25 / self.rate)  # noqa: S311 - no secret
         if self.tcp:
             link = socket.create_connection(self.to, PATIENCE)
             link.settimeout(PATIENCE)
@@ -213,7 +217,7 @@ class MvnSender(Emulator):
 
     def instant(self, k: int) -> list[bytes]:
         """All datagrams of an instant, as they are sent."""
-        t = k / self.rate
+        t = self.phase + k / self.rate
         seldom = k % max(round(self.rate), 1) == 0
         found: list[bytes] = []
         for number, person in self.people.items():

@@ -62,7 +62,7 @@ class RokokoSender(MessageSender):
 
     def message(self, k: int) -> bytes:
         """The datagram number ``k``."""
-        return encode(self.scene(k / self.rate), compressed=self.compressed)
+        return encode(self.scene(self.t(k)), compressed=self.compressed)
 
 
 # -- options ------------------------------------------------------------------------------------

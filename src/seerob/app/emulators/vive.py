@@ -88,7 +88,7 @@ class ViveSender(MessageSender):
 
     def message(self, k: int) -> bytes:
         """The message number ``k``."""
-        return encode(self.trackers(k / self.rate))
+        return encode(self.trackers(self.t(k)))
 
 
 # -- options ------------------------------------------------------------------------------------

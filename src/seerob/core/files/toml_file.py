@@ -17,6 +17,9 @@ _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{100}}")
 """The time that `tomllib` takes for a key grows with the square of its dots."""
 
+_LONG_NUMBER = re.compile(r"[0-9a-fA-F_]{17}")
+"""`tomllib` takes 0x… of any length, and a message that shows it fails."""
+
 
 def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
     """Content of a TOML file, parsed, with every text `printable`, and raw.
@@ -38,12 +41,24 @@ def loads(text: str) -> dict[str, Any]:
     """As `tomllib.loads`, of what strangers wrote.
 
     Raises:
-        tomllib.TOMLDecodeError: It is not TOML, or a key has more parts than any table has levels.
+        tomllib.TOMLDecodeError: It is not TOML, a key has more parts than any table has levels, or a whole
+            number more than 64 bits.
     """
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
         raise tomllib.TOMLDecodeError(f"a key of more than 100 parts (at line {line})")
-    return tomllib.loads(text)
+    table = tomllib.loads(text)
+    if _LONG_NUMBER.search(text):
+        _check_whole_numbers(table)
+    return table
+
+
+def _check_whole_numbers(value: Any) -> None:
+    if isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            _check_whole_numbers(item)
+    elif isinstance(value, int) and value.bit_length() > 64:
+        raise tomllib.TOMLDecodeError(f"a whole number of {value.bit_length()} bits")
 
 
 def parsed_toml(raw: bytes, path: Path) -> dict[str, Any]:

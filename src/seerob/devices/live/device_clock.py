@@ -8,12 +8,13 @@ of the way, and never later than it arrived. What is over that least one is how 
 The minimum may fall at once, by whatever came faster than anything before. It rises no faster than clocks
 drift (`DRIFT`), through silences and connections alike: a delay that lasts stays a delay. What is made of it
 moves smoothly (`SLEW`), so that intervals between samples never collapse. Time that goes back is a restart
-once, and a loop after that.
+once, and a loop after that; datagrams that say again what was said at that time are a recording.
 """
 
 from __future__ import annotations
 
 import math
+import random
 from typing import NamedTuple
 
 DRIFT = 2e-4
@@ -42,6 +43,9 @@ AGAIN = 60.0
 controller is switched on so often."""
 KEPT = 16384
 """Stamps of which it is known what was said with them: half a minute of the fastest source."""
+MARKED, MARK_EVERY = 1 << 15, 1.0
+"""Of so many stamps that is known for hours, one within that time [s], which is below `RESTART_HOLD`: a
+recording of what was heard is found out however long it is."""
 LATEST = 1e12
 """No clock counts further [s]: what is later or not finite is no instant."""
 AFTER = 1e-6
@@ -96,6 +100,9 @@ class DeviceClock:
         self._restarted = -math.inf
         """When it last started again."""
         self._said: dict[float, int] = {}
+        self._marks: dict[float, int] = {}
+        """As `_said`, of a few."""
+        self._next_mark = -math.inf
         self._doubt, self._until = "", -math.inf
         self.latency = 0.0
         if known is not None:
@@ -111,13 +118,15 @@ class DeviceClock:
         """Host time less device time [s], too large by the least latency; None before anything arrived."""
         return self._offset if math.isfinite(self._offset) else None
 
-    def hear(self, device: float, host: float, said: int = 0) -> Instant:
+    def hear(self, device: float, host: float, said: int = 0, *, forgeable: bool = False) -> Instant:
         """When a sample was taken.
 
         Args:
             device: Its device time [s].
             host: When it arrived, on the host's monotonic clock [s].
             said: What tells its content from that of others: a hash.
+            forgeable: Whether anybody can send it, as with datagrams: who says again what was said is then no
+                device that starts again, also after a silence.
 
         Returns:
             At most ``host``, but for `SETTLED` where the offset fell just now.
@@ -134,10 +143,9 @@ class DeviceClock:
         self._connected = False
         self._newest, self._host = device, max(host, self._host)
         self.latency = raw - self._offset
-        if len(self._said) >= KEPT:
-            del self._said[next(iter(self._said))]
-        self._said.pop(device, None)
-        self._said[device] = said
+        if forgeable and said in (self._said.get(device), self._marks.get(device)):
+            self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
+        self._remember(device, said)
         t = device + self._applied
         if t <= self._last and self._until > host:
             # The clock has stepped back: what comes is news all the same, and nothing is relied on.
@@ -145,6 +153,13 @@ class DeviceClock:
             self._hold(host, HOLD, self._doubt)
         self._last = max(self._last, t)
         return Instant(t, self._standing(host))
+
+    def _remember(self, device: float, said: int) -> None:
+        """Keep what is said at a time for a while, and now and then for hours: when, no player can know."""
+        _keep(self._said, KEPT, device, said)
+        if device >= self._next_mark:
+            _keep(self._marks, MARKED, device, said)
+            self._next_mark = device + MARK_EVERY * random.uniform(0.5, 1.0)  # noqa: S311 - no secret
 
     def _follow(self, raw: float, host: float) -> bool:
         """Let the offset follow; False for a sample that is ahead of its time and is not believed yet."""
@@ -193,6 +208,7 @@ class DeviceClock:
         self._restarted = host
         self._offset = self._applied = math.inf
         self._newest, self._ahead = -math.inf, None
+        self._next_mark = -math.inf
         return True
 
     def _hold(self, host: float, seconds: float, why: str) -> None:
@@ -202,3 +218,10 @@ class DeviceClock:
     def _standing(self, host: float) -> str:
         """The doubt that holds at ``host`` [s]."""
         return self._doubt if host <= self._until else ""
+
+
+def _keep(known: dict[float, int], most: int, device: float, said: int) -> None:
+    known.pop(device, None)
+    if len(known) >= most:
+        del known[next(iter(known))]
+    known[device] = said

@@ -39,7 +39,7 @@ from seerob.devices.live.arrivals import Arrivals, Statistics
 from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
-from seerob.protocols.links.datagrams import DISTRUST
+from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
 
 _log = logging.getLogger(__name__)
@@ -237,6 +237,8 @@ class Listener:
         """What contradicted itself, and until when that counts [s]."""
         self._distrusted = "", -math.inf
         """Why it may be somebody else who is heard, and until when that counts [s]."""
+        self._senders: dict[int, str] = {}
+        """Who was heard at which port, by datagrams."""
         self._posted: dict[tuple[str, ...], Sample] = {}
         self._people: dict[tuple[str, ...], _Person] = {}
         self._lock = Lock()
@@ -279,6 +281,7 @@ class Listener:
                 return
         _said.set(set())
         DISTRUST.set(self._distrust)
+        HEARD.set(self._senders)
         pause = FIRST_PAUSE
         while True:
             self._clock.reconnect()
@@ -321,7 +324,7 @@ class Listener:
         host, what = sample.t, key(sample)
         heard = Instant(host)
         if sample.t_device is not None:
-            heard = self._clock.hear(sample.t_device, host, _content(sample))
+            heard = self._clock.hear(sample.t_device, host, _content(sample), forgeable=bool(self._senders))
         if heard.t is None:
             self._arrivals.repeat()
             if heard.invalid_reason and what in self._posted:

@@ -119,7 +119,9 @@ class ToolTrajectory(Timed):
 def plausible(trajectory: ToolTrajectory) -> None:
     """InputError where the tool would move or turn as no robot's does, with the first such rows."""
     problems = []
-    speeds, turns = trajectory.speeds(), trajectory.turns()
+    with np.errstate(over="ignore"):  # instants may be as near as floats can be: infinitely fast
+        speeds, turns = trajectory.speeds(), trajectory.turns()
+        rates = turns / np.diff(trajectory.t)
     fast = np.flatnonzero(speeds > MAX_SPEED)
     if fast.size:
         i = int(fast[0])
@@ -130,7 +132,6 @@ def plausible(trajectory: ToolTrajectory) -> None:
         )
         remedy = "correct tcp_position_unit or time_unit, or the row"
         problems.append(Problem(trajectory.file, trajectory.place(i + 1), what, remedy))
-    rates = turns / np.diff(trajectory.t)
     jumps = np.flatnonzero(((turns > SMALLEST_JUMP) & (rates > MAX_TURN)) | (turns > LARGEST_STEP))
     if jumps.size:
         i = int(jumps[0])

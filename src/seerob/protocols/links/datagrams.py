@@ -39,6 +39,10 @@ DISTRUST: ContextVar[Callable[[str], None]] = ContextVar("distrust")
 """Is told, by whoever listens, why what is heard may not be from whom it seems to be."""
 
 
+HEARD: ContextVar[dict[int, str]] = ContextVar("heard")
+"""Port → address that was heard there before a silence, for whoever listens for as long as a run."""
+
+
 def distrust(reason: str) -> None:
     """Say why what is heard may not be from whom it seems to be."""
     if (told := DISTRUST.get(None)) is not None:
@@ -48,6 +52,8 @@ def distrust(reason: str) -> None:
 class Datagrams(asyncio.DatagramProtocol):
     """What arrives at one port from the first who sends there, address and port; who else sends is told.
 
+    After a silence it is the first from that address, whatever port it has then, as after a restart.
+
     Attributes:
         port: Of this machine.
         dropped: Datagrams that nobody read in time.
@@ -55,9 +61,15 @@ class Datagrams(asyncio.DatagramProtocol):
     """
 
     def __init__(
-        self, senders: frozenset[str] | None, answer: Answer | None, *, one_port: bool = True
+        self,
+        senders: frozenset[str] | None,
+        answer: Answer | None,
+        *,
+        one_port: bool = True,
+        before: dict[int, str] | None = None,
     ) -> None:
         self._senders, self._answer, self._one_port = senders, answer, one_port
+        self._before = {} if before is None else before
         self._first: tuple[str, int] | None = None
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
@@ -102,11 +114,11 @@ class Datagrams(asyncio.DatagramProtocol):
 
     def _take(self, arrived: float, data: bytes, sender: tuple[str | Any, int]) -> None:
         who = plain(sender[0]), int(sender[1]) if self._one_port else 0
-        if self._first is None and (self._senders is None or who[0] in self._senders):
-            self._first = who
+        if self._first is None and self._may(who[0]):
+            self._first, self._before[self.port] = who, who[0]
         if who != self._first:
             self.strangers += 1
-            heard = "nobody yet" if self._first is None else _shown(self._first)
+            heard = _shown(self._first) if self._first else self._before.get(self.port, "nobody yet")
             distrust(f"{_shown(who)} sends to port {self.port}, too; heard is {heard}")
             return
         self.dropped += len(self._waiting) == WAITING
@@ -114,6 +126,12 @@ class Datagrams(asyncio.DatagramProtocol):
         self._wakeup.wake()
         if self._answer is not None:
             self._loop.call_soon(self._reply, data, sender)
+
+    def _may(self, address: str) -> bool:
+        """Whether it may be the first: of those who are named, else who was heard before."""
+        if self._senders is None:
+            return address == self._before.get(self.port, address)
+        return address in self._senders
 
     def _reply(self, data: bytes, sender: Any) -> None:
         if self._answer is not None and (reply := self._answer(data)) is not None:
@@ -195,7 +213,7 @@ async def listening(
         senders = frozenset(plain(address[0]) for *_, address in known)
     (found, *_) = await loop.getaddrinfo(bind, port, type=socket.SOCK_DGRAM)
     link = _bound(found[0], found[4]) if group is None else _member(bind, port, group)
-    heard = Datagrams(senders, answer, one_port=one_port)
+    heard = Datagrams(senders, answer, one_port=one_port, before=HEARD.get(None))
     try:
         loop.add_reader(link, heard.attach(link))
     except NotImplementedError:  # a loop of Windows

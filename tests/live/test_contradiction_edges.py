@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample
+from seerob.devices.live import contradictions
 from seerob.devices.live.contradictions import Contradictions
 from seerob.workstation.source import Target
 
@@ -422,3 +423,31 @@ def test_what_was_right_for_long_is_forgotten_on_a_long_way():
         way, last = way + abs(q - last), q
         found.append((way, looking.find(said(60.0 + t, (q,), (rate,)))))
     assert next(way for way, why in found if "factor" in why) < 6.0
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_not_compared_anchor_by_anchor_is_where_nothing_is_found(monkeypatch, seed):
+    """Motions with noise, lag, wrong scales, jumps, and joints that hang, creep or speed up: word by word."""
+    chance = np.random.default_rng(seed)
+    t = np.arange(300) / chance.choice([50, 125, 500])
+    size, pace, phase = chance.uniform(0, 0.8, 2), chance.uniform(0.3, 6, 2), chance.uniform(0, 6, 2)
+    lag, scale = chance.choice([0.0, 0.005, 0.02, 0.05]), chance.choice([1.0, 1.0, 0.95, 1.2, -1.0])
+    q = size * np.sin(np.outer(t, pace) + phase) + chance.normal(0, chance.choice([0, 2e-5, 1e-3]), (300, 2))
+    qd = scale * size * pace * np.cos(np.outer(t - lag, pace) + phase) + chance.normal(0, 5e-3, (300, 2))
+    k = int(chance.integers(300))
+    if seed % 3 == 0:
+        q[k:] = q[k]
+    elif seed % 3 == 1:
+        q[k:] += chance.normal(0, 0.05, 2)
+    else:
+        begun = np.maximum(t - t[k // 2], 0.0)[:, None]
+        q, qd = 0.02 * begun + [0.0, 4.0] * begun**2, [0.0, 8.0] * begun
+    limited = Target(name="arm", units=("rad", "m"), velocity=(3.2, 1.0), acceleration=(5.0,))
+    said_ = [said(a, tuple(b), tuple(c)) for a, b, c in zip(t.tolist(), q.tolist(), qd.tolist(), strict=True)]
+    for target in (SLIDER, limited):
+        looking = Contradictions(target)
+        found = [looking.find(sample) for sample in said_]
+        monkeypatch.setattr(contradictions, "CLOSE", 0.0)
+        every = Contradictions(target)
+        assert found == [every.find(sample) for sample in said_]
+        monkeypatch.undo()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SOURCES = Path(__file__).parents[1] / "src" / "seerob"
+ROOT = Path(__file__).parents[1]
 POINTS_ELSEWHERE = re.compile(r"\s*(The same\b|See\b|Of what\b|As in\b|Likewise\b)")
 
 
@@ -26,9 +26,7 @@ def test_pointing_is_found_below_a_field_and_in_a_private_function(text: str) ->
 
 
 def test_every_docstring_stands_alone() -> None:
-    files = sorted(SOURCES.rglob("*.py"))
+    files = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "examples").rglob("*.py")])
     assert files
-    found = [
-        f"{f.relative_to(SOURCES)}:{p}" for f in files for p in pointing(ast.parse(f.read_text("utf-8")))
-    ]
+    found = [f"{f.relative_to(ROOT)}:{p}" for f in files for p in pointing(ast.parse(f.read_text("utf-8")))]
     assert not found, "say it in a sentence of its own, with shape and unit:\n" + "\n".join(found)

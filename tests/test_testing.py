@@ -71,6 +71,7 @@ SAFETY = {
     "joint_torque": 'robot = "arm"\n',
     "velocity": 'of = "arm"\nlimit = 9\n',
     "acme.work_height": 'at = "arm"\nlimit = 9\n',
+    "acme.tool_clearance": 'at = "arm"\nlimit = -9\n',
 }
 PHASE = """
 [[phases]]
@@ -101,6 +102,7 @@ ERGONOMICS = {
     "iso_11226": "",
     "en_1005_4": "",
     "acme.bending": "limit = 10\n",
+    "acme.bent_load": "limit = 2\n",
 }
 
 

@@ -25,7 +25,7 @@ class Bending(Criterion, frozen=True, kw_only=True):
         return (self.human,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look the person up once, and return the function that judges one instant."""
         read = bind_posture(model, self.human)  # a name that does not exist fails here, not in the loop
         since: list[float] = []
 
@@ -53,5 +53,5 @@ class Bending(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State formula and source."""
         return Basis(formula="time since the trunk was bent beyond 0.7 rad", source="ACME works standard 9")

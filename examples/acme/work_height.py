@@ -22,7 +22,7 @@ class WorkHeight(Criterion, frozen=True, kw_only=True):
         return (self.at,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look the name up once, and return the function that judges one instant."""
         frame = model.frame(self.at)  # a name that does not exist fails here, not in the loop
 
         def evaluate(state: State) -> Result:
@@ -34,10 +34,10 @@ class WorkHeight(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`: the height changes by no more than the point's way between two ticks."""
+        """Bound the change between two ticks: the height changes by no more than the point's way."""
         frame = model.frame(self.at)
         return approaching([points.add(frame.mj, frame.body_from_frame[:3, 3])], ())
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State formula and source."""
         return Basis(formula="z of the point", source="ACME works standard 12")

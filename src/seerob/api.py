@@ -28,7 +28,8 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval, worst
 from seerob.criteria.postures.rule import PostureRule as Rule
 from seerob.criteria.postures.rule import bind_posture
-from seerob.criteria.scoring.spans import beyond
+from seerob.criteria.scoring.phases import Phase, phase_at, shared_phases
+from seerob.criteria.scoring.spans import Span, between, beyond, exactly
 from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
 from seerob.outputs.sink import Closing, Sink, Writer
@@ -67,6 +68,7 @@ __all__ = [
     "Model",
     "Opened",
     "Origin",
+    "Phase",
     "Points",
     "Polyline",
     "PoseSample",
@@ -84,6 +86,7 @@ __all__ = [
     "Sink",
     "Snapshot",
     "Source",
+    "Span",
     "Sphere",
     "State",
     "States",
@@ -93,11 +96,15 @@ __all__ = [
     "Verdict",
     "Writer",
     "approaching",
+    "between",
     "beyond",
     "bind_posture",
+    "exactly",
     "judge",
     "judge_interval",
     "no_formula",
+    "phase_at",
     "plain",
+    "shared_phases",
     "worst",
 ]

@@ -45,6 +45,23 @@ def test_a_rule_of_ones_own_counts_how_long_somebody_bends(tmp_path, acme):
     assert [verdict for _, verdict in found].index(Verdict.EXCEEDED) == 3  # on its limit
 
 
+def test_points_of_a_rule_with_phases_are_a_span_where_nobody_said(tmp_path, acme):
+    text = HUMAN + '[[ergonomics]]\nkind = "acme.bent_load"\nhuman = "op"\nlimit = 1\naccuracy_deg = 5\n'
+    text += "[[phases]]\nstart = 1\nload = 3\n[[phases]]\nstart = 2\nload = 6\nend = 3\n"
+    stage = made(tmp_path, text)
+    found = []
+    for tilt, t in ((0, 0), (50, 0), (50, 1), (50, 2), (38, 2), (50, 3)):
+        state = state_at(stage, op=(posture(PERSON, {"pelvis_tilt_forward": np.radians(tilt)}), STILL))
+        state.t = float(t)
+        result = judged(stage.bound, state)[0]
+        found.append((result.interval, result.verdict))
+    within, exceeded, undecided = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+    assert found == [
+        ((0, 1), within), ((1, 2), undecided), ((1, 1), within), ((2, 2), exceeded), ((1, 2), undecided),
+        ((1, 2), undecided),
+    ]  # fmt: skip
+
+
 MOTION = """
 [[keyframes]]
 t = 0

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from seerob.core import figures
 from seerob.core.errors import InputError, Undecided
+from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.core.transforms import Array
@@ -222,6 +223,10 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             if polytope.inscribed < 0:
                 reason += "; without any force the torque limits cannot hold the robot"
         inscribed = polytope.inscribed if np.isfinite(polytope.inscribed) else None
+
+        def draw() -> tuple[Marker, ...]:
+            return self._markers(polytope, at, direction, value, verdict)
+
         return Result(
             name=self.name,
             value=value,
@@ -238,7 +243,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
                     for axis, u in zip("xyz", direction.tolist(), strict=True)
                 ),
             ),
-            markers=self._markers(polytope, at, direction, value, verdict),
+            markers=drawn(draw),
         )
 
     def _markers(
@@ -247,10 +252,10 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         center = tuple(at.tolist())
         markers: list[Marker] = []
         if len(polytope.triangles):
-            drawn, cut = drawn_corners(polytope.corners, at, DRAWN, LARGEST_DRAWN)
+            corners, cut = drawn_corners(polytope.corners, at, DRAWN, LARGEST_DRAWN)
             markers.append(
                 Hull(
-                    vertices=tuple(map(tuple, drawn.tolist())),
+                    vertices=tuple(map(tuple, corners.tolist())),
                     faces=tuple(map(tuple, polytope.triangles.tolist())),
                     label="cut off where it is drawn too large" if cut else "",
                     verdict=verdict,

@@ -310,6 +310,7 @@ class Contacts:
         self.robot.require_masses(spec.name)
         self.moving = self.robot.moving
         self.names = [model.bodies[i].name for i in self.moving]
+        self.undriven = np.zeros(len(self.moving), bool)
         for key, names in (("excluded", spec.excluded), ("thickness", spec.thickness)):
             for name in names:
                 if name not in REGIONS:
@@ -410,8 +411,10 @@ class Contacts:
         riders = () if mover is not None else self.behind.riding(state)
         # A drive presses as hard however slowly it moves.
         pressing = {body for rider in riders for body in rider.moving}
-        driven = np.array([mover is not None or body in pressing for body in self.moving])
-        by_drive = mover is not None or (bool(pressing) and bool(driven.any()))
+        driven, by_drive = self.undriven, mover is not None
+        if mover is not None or pressing:
+            driven = np.array([mover is not None or body in pressing for body in self.moving])
+            by_drive = bool(driven.any())
         moves = v_r > (np.where(driven, STILL, STANDSTILL) if by_drive else STANDSTILL)
         slowest = STILL if by_drive else STANDSTILL
         projected = self.behind.along_motion(state, mover, self.moving, standstill=slowest)

@@ -83,17 +83,29 @@ def in_this_process():
         yield
 
 
-def hammer_in_processes(kind, files, tell):
-    """As `hammer` does, in as many processes as there are processors; ``tell`` hears how far it is."""
-    total = Counter()
+def hammer_in_processes(kind, files, tell, done, keep):
+    """As `hammer` does, in as many processes as there are processors.
+
+    Args:
+        kind: Of file.
+        files: How many.
+        tell: Hears how far it is.
+        done: Seed of a chunk → what came of it, of an earlier time that was stopped.
+        keep: Is given ``done`` after each chunk.
+    """
+    total = sum(map(Counter, done.values()), Counter())
     context = get_context("spawn")
     with ProcessPoolExecutor(os.cpu_count(), mp_context=context, initializer=_guarded) as pool:
-        chunks = [
-            pool.submit(_watched, kind, seed, min(CHUNK, files - seed)) for seed in range(0, files, CHUNK)
-        ]
+        chunks = {
+            pool.submit(_watched, kind, seed, min(CHUNK, files - seed)): str(seed)
+            for seed in range(0, files, CHUNK)
+            if str(seed) not in done
+        }
         try:
-            for done in as_completed(chunks):
-                total += done.result()
+            for chunk in as_completed(chunks):
+                done[chunks[chunk]] = found = chunk.result()
+                total += found
+                keep(done)
                 tell(f"{kind}: {total['read']} read, {total['refused']} refused of {files}")
         except BaseException:
             pool.shutdown(cancel_futures=True)

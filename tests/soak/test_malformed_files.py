@@ -1,11 +1,13 @@
 """Any file may be given to a reader: it is read, or refused with what is wrong, and nothing else happens."""
 
 import contextlib
+import hashlib
 import io
 import re
 import warnings
 import zipfile
 from importlib import resources
+from pathlib import Path
 
 import pytest
 
@@ -132,15 +134,50 @@ def test_a_signalling_nan_of_an_stl_is_refused(tmp_path):
             KINDS["stl"].read(tmp_path / "f.stl")
 
 
+@pytest.fixture(scope="module")
+def code():
+    """What tells the code that is hunted in from that of another day."""
+    folders = (Path(sr.__file__).parent, Path(__file__).parent)
+    files = sorted(path for folder in folders for path in folder.rglob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_hundred_thousand_broken_files_are_read_or_refused(capsys, kind):
+def test_a_hundred_thousand_broken_files_are_read_or_refused(capsys, request, code, kind):
+    """Stopped, it goes on where it was the next time, as long as no line of the code has changed."""
+
     def tell(text):
         with capsys.disabled():
             print(f"\r{text}", end="", flush=True)
 
-    counts = hammer_in_processes(kind, MANY, tell)
+    place, cache = f"broken files/{kind}", request.config.cache
+    known = cache.get(place, {})
+    done = known.get("chunks", {}) if known.get("code") == code else {}
+    counts = hammer_in_processes(
+        kind, MANY, tell, done, lambda chunks: cache.set(place, {"code": code, "chunks": chunks})
+    )
     tell(f"{kind}: {counts['read']} read, {counts['refused']} refused of {MANY}\n")
     assert sum(counts.values()) == MANY
     assert counts["read"] > 0
     assert counts["refused"] > MANY // 4
+
+
+@pytest.mark.soak
+def test_a_hunt_that_is_stopped_goes_on_where_it_was():
+    kept = []
+
+    def stop(text):
+        if len(kept) == 1:
+            raise KeyboardInterrupt
+
+    def keep(done):
+        kept.append({seed: dict(found) for seed, found in done.items()})
+
+    with pytest.raises(KeyboardInterrupt):
+        hammer_in_processes("kuka log", 4100, stop, {}, keep)
+    assert len(kept) == 1
+    again = []
+    total = hammer_in_processes("kuka log", 4100, lambda text: None, dict(kept[0]), again.append)
+    assert sum(total.values()) == 4100
+    assert len(again) == 2

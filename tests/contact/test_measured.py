@@ -99,6 +99,7 @@ def test_what_was_measured_above_its_limit_is_exceeded(tmp_path: Path, changed: 
         ({"speed": "0.4"}, "measured at 0.4 m/s, and it moves at 0.45 m/s here"),
         ({"spring_N_mm": None}, "the spring constant of the device is not told"),
         ({"spring_N_mm": "20"}, "is softer than 25 N/mm"),
+        ({"pad": None}, "the pad of the device is not told"),
         ({"tools": None}, "what the robot carried is not told"),
         ({"tools": '["gripper"]'}, "the robot carried gripper, and carries nothing here"),
         ({"device": None}, "which device measured it is not told"),

@@ -102,7 +102,7 @@ class Measurement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     spring_N_mm: _Positive | None = None
     """Spring constant of the device."""
     pad: str = ""
-    """Its damping element."""
+    """Its damping element: a softer one tells less pressure."""
     date: dt.date | None = None
     """Date of the measurement."""
     calibrated: dt.date | None = None
@@ -284,6 +284,8 @@ class Measurements:
         rows = tuple(k for k, body in enumerate(robot.moving) if body in bodies)
         k = float(self._arrays.stiffness[column])
         doubts, stiff = list(_undated(said)), ""
+        if not said.pad:
+            doubts.append("the pad of the device is not told (pad)")
         if said.spring_N_mm is None:
             doubts.append("the spring constant of the device is not told (spring_N_mm)")
         elif said.spring_N_mm * 1e3 < (1 - SPRING) * k:

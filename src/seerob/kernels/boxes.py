@@ -100,6 +100,7 @@ def fit_box(T: Array, order: Indices, start: int, stop: int, node: Array, uprigh
     least_surface = np.inf
     low = np.empty(3)
     high = np.empty(3)
+    size = np.empty(3)
     for turned in range(1 if upright else 2):
         axes = _principal_axes(_spread(T, order, start, stop)) if turned else np.eye(3)
         low[:] = np.inf
@@ -112,12 +113,15 @@ def fit_box(T: Array, order: Indices, start: int, stop: int, node: Array, uprigh
                 z = x + axes[a, 0] * T[k, 6] + axes[a, 1] * T[k, 7] + axes[a, 2] * T[k, 8]
                 low[a] = min(low[a], x, y, z)
                 high[a] = max(high[a], x, y, z)
-        size = high - low
+        largest, other = 0.0, 0.0
+        for a in range(3):
+            size[a] = high[a] - low[a]
+            largest, other = max(largest, abs(low[a])), max(other, abs(high[a]))
         surface = size[0] * size[1] + size[1] * size[2] + size[2] * size[0]
         if turned == 0 or surface < least_surface:
             least_surface = surface
             # Rounded up: a box must contain its triangles in floating point too.
-            slack = 4e-15 * (np.abs(low).max() + np.abs(high).max())
+            slack = 4e-15 * (largest + other)
             radius = 0.0
             for c in range(3):
                 node[c] = 0.0

@@ -104,7 +104,7 @@ def _along_axis(
         sign = 0
         if asked > 0:
             k = 0 if asked == 1 else left[chosen]
-            near[asked] = near[k]
+            _put(near[k], near[asked])
             # No surface is crossed within the distance to it; a dilated core has another sign.
             if radius[i] == 0.0 and abs(t[asked] - t[k]) * length < 0.999 * abs(depth[k]):
                 sign = -1 if depth[k] > 0.0 else 1
@@ -188,9 +188,9 @@ def _in_cells(
     """Interval of how deep solid j reaches into solid i, between ``best`` and ``most``; `deepest`."""
     x, y = np.empty(3), np.empty(3)
     near, other, parent = np.full(3, np.nan), np.full(3, np.nan), np.empty(3)
-    c = (low + high) / 2.0
-    h = (high - low) / 2.0
-    heap = [(-most, c[0], c[1], c[2], h[0], h[1], h[2])]
+    for k in range(3):
+        x[k], y[k] = (low[k] + high[k]) / 2.0, (high[k] - low[k]) / 2.0
+    heap = [(-most, x[0], x[1], x[2], y[0], y[1], y[2])]
     used = 0
     done = best
     either = int(np.int64(0))  # a literal would be compiled for by itself

@@ -270,27 +270,24 @@ def _mark_uncleared(
         if watch.falls is None:
             continue
         # A figure without a limit, or one that is never within, has nothing to lose on the way.
-        k, size, left = 0, 1, np.append(np.flatnonzero(~both), len(both)).tolist()
-        ends = iter(left)
-        end = next(ends)
-        while k < len(both):
-            if k == end:
-                k, end = k + 1, next(ends, len(both))
-                continue
-            size = min(size, end - k) if isinstance(ways, Ways) else 1
-            path = ways.joined(k, k + size) if isinstance(ways, Ways) else ways[k]
-            span = watch.points.span(path, float(motion.t[k]), float(motion.t[k + size]), ids, model.mj)
-            span.between_speeds(speeds[k], speeds[k + size])
-            m, o = bare[k : k + size + 1], off[k : k + size + 1]
-            fall, bend = watch.falls(span, float((m - o).min()))
-            # Of several ways at once the bound is no sharper than of each, and the least margin counts.
-            one_way = (m[0] + m[1] - fall) / 2 if size == 1 else m.min() - np.asarray(fall) / 2
-            if np.min(np.maximum(one_way, m.min() - bend) - o.max()) >= 0:
-                k, size = k + size, min(2 * size, TOGETHER)
-            elif size > 1:
-                size = size // 2
-            else:
-                open_[k + 1], k = True, k + 1
+        size, runs = 1, np.flatnonzero(np.diff(both, prepend=False, append=False))
+        for begin, end in runs.reshape(-1, 2).tolist():
+            k = begin
+            while k < end:
+                size = min(size, end - k) if isinstance(ways, Ways) else 1
+                path = ways.joined(k, k + size) if isinstance(ways, Ways) else ways[k]
+                span = watch.points.span(path, float(motion.t[k]), float(motion.t[k + size]), ids, model.mj)
+                span.between_speeds(speeds[k], speeds[k + size])
+                m, o = bare[k : k + size + 1], off[k : k + size + 1]
+                fall, bend = watch.falls(span, float((m - o).min()))
+                # Of several ways at once the bound is no sharper than of each, and the least margin counts.
+                one_way = (m[0] + m[1] - fall) / 2 if size == 1 else m.min() - np.asarray(fall) / 2
+                if np.min(np.maximum(one_way, m.min() - bend) - o.max()) >= 0:
+                    k, size = k + size, min(2 * size, TOGETHER)
+                elif size > 1:
+                    size = size // 2
+                else:
+                    open_[k + 1], k = True, k + 1
 
 
 def _with(

@@ -300,6 +300,8 @@ def test_a_whole_is_no_greener_than_its_parts(own):
         (0.0, ROUNDING, "but for rounding on"),
         (2e3, 1e3 * ROUNDING, "but for rounding on"),
         (1e-3, 0.5 * ROUNDING, "but for rounding on"),
+        (1e-3, 1.05 * ROUNDING, "above"),
+        (-2e3, 1e3 * ROUNDING, "but for rounding on"),
         (2.0, 5 * ROUNDING, "above"),
     ):
         edge = Result(name="own", value=limit + off, limit=limit, verdict=WITHIN)

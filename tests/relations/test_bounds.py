@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import mujoco
@@ -11,6 +12,7 @@ from random_cells import files, random_cell
 
 from made_cell import TWO_R, made, person, two_r
 from seerob.core.snapshot import Verdict
+from seerob.criteria.between_ticks import Told
 from seerob.files.trajectories.path_map import (
     GIVEN,
     PERMISSIBLE,
@@ -22,7 +24,7 @@ from seerob.files.trajectories.path_map import (
     WHY,
     joint_columns,
 )
-from seerob.session.run import engine_of, pump, ticks
+from seerob.session.run import Judge, engine_of, looks_ahead, pump, ticks
 from seerob.session.station import load
 from seerob.twin.joint_torques import bind_needed_in_span
 from seerob.twin.spans import Points
@@ -106,6 +108,82 @@ def test_no_bound_is_beaten_by_what_is_met_between_two_ticks(tmp_path, seed):
     for name, found in room.items():
         assert min(found) >= -1e-9, name
         assert np.isfinite(found).mean() > 0.5, name  # it bounds something
+
+
+STOPS = (
+    "stop = { reaction = 0.1, stopping = 0.2 }",
+    "stop = { reaction = 0.1, stopping = 0.3, acceleration = 2.0 }",
+    'stop = { reaction = 0.2, model = "constant_deceleration", deceleration = 4.0, acceleration = 0.0 }',
+)
+
+
+def risen(station, looks):
+    """By separation, how far the bound on how S_p rises is above what it does between each two ticks [m].
+
+    S_p is that of the results, at many instants; the largest against the least of them or, where what is
+    known ahead is in it, against that at both ends, where both are within. And how far it does rise.
+    """
+    model, room, most = station.model, {}, {}
+    judge = Judge(station.bound)
+    between = judge._between
+
+    def watching(i, watch, ends, state):
+        path, own = between._way, watch.criterion
+        if ends[0].margin is None or ends[1].margin is None:
+            return Told()
+        bound = own.rises(model)(between._span(watch, path, ends, state))
+        S_p = []
+        for t in np.union1d(np.linspace(path.t[0], path.t[-1], looks), path.t).tolist():
+            result, _, _ = between._look(i, watch, path, t, state)
+            S_p.append([part.limit for part in result.parts if part.verdict is not None])
+        S_p = np.array(S_p)
+        rise = S_p.max(axis=0) - (S_p[[0, -1]].max(axis=0) if own.lasts(model) else S_p.min(axis=0))
+        room.setdefault(own.name, []).append(float((bound - rise).min()))
+        most[own.name] = max(most.get(own.name, 0.0), float(rise.max()))
+        return Told()
+
+    between._judge = watching
+    engine, ahead = engine_of(model), looks_ahead(model)
+    for _ in ticks(engine, judge, pump(station.sources, station.workstation.engine.tick, ahead=ahead)):
+        pass
+    return room, most
+
+
+def rising(folder, seed, looks):
+    """Separations of a random arm and a person who reaches, by stops that follow from present speeds."""
+    rng = np.random.default_rng(seed)
+    cell = random_cell(seed, published=False, around=False)
+    turn, more = rng.uniform(-np.pi, np.pi), ""
+    for k, stop in enumerate(STOPS):
+        for name, speed in (("", ""), (" slow", "human_speed = 0.05\n")):
+            more += f'[[safety]]\nkind = "separation"\nname = "{k}{name}"\nbetween = ["arm", "op"]\n{stop}\n'
+            more += f"intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n{speed}"
+    far = np.array([12 * np.cos(turn), 12 * np.sin(turn), turn])
+    cell = replace(
+        cell, person=far, physics=bool(seed % 2), more=more, left_out=OTHERS | {"energy"}, machine=None,
+        mass_tolerance=0.0,
+    )  # fmt: skip
+    for name, text in files(cell).items():
+        (folder / name).write_text(text)
+    return risen(load(folder), looks)
+
+
+@pytest.mark.parametrize("seed", [3])
+def test_s_p_rises_between_two_ticks_by_no_more_than_its_bound(tmp_path, seed):
+    room, most = rising(tmp_path, seed, looks=4)
+    assert len(room) == 2 * len(STOPS)
+    assert max(most.values()) > 1e-3
+    for name, found in room.items():
+        assert min(found) >= -1e-9, name
+
+
+@pytest.mark.soak
+def test_s_p_of_many_cells_rises_between_two_ticks_by_no_more_than_its_bound(tmp_path):
+    for seed in range(int(os.environ.get("SEEROB_SOAK_CELLS", "40"))):
+        (tmp_path / f"{seed}").mkdir()
+        room, _ = rising(tmp_path / f"{seed}", seed, looks=50)
+        for name, found in room.items():
+            assert min(found) >= -1e-9, (seed, name)
 
 
 def masses_of(seed):

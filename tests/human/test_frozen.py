@@ -44,6 +44,29 @@ def test_frames_that_are_sent_again_with_new_stamps_are_silence():
     assert len(told) > 100 * (1.5 - 50 / RATE - 0.25)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
+def test_a_body_that_walks_and_stands_in_one_step_is_a_picture_that_hangs(noise):
+    """Without any noise, as made motions have none, and with noise that somebody adds to what hangs."""
+    random, begin = np.random.default_rng(2), 50
+    frames = frozen(frames_of(*walking(1.5), turned=False), slice(None), begin)
+    for frame in frames[begin:] if noise else ():
+        frame.positions[:] += noise * random.normal(size=frame.positions.shape)
+    told = doubts(frames)
+    assert told[0][0] < begin / RATE + 0.12
+    assert len(told) > 100 * (1.48 - begin / RATE - 0.12)
+
+
+def test_who_slows_down_as_a_person_does_stands():
+    """From 1 m/s in 0.3 s, and somebody who is moved elsewhere in one step and stands there."""
+    t = np.arange(60) / RATE
+    slow = np.clip((0.8 - t) / 0.3, 0, 1)
+    for way in (np.cumsum(slow * slow * (3 - 2 * slow)) / RATE, np.where(t < 0.5, 0.0, 0.5)):
+        watch = Frozen()
+        for k, x in enumerate(way):
+            points = [BodyPoint(name=b, bone=b, position=(x, 0.1 * i, 1.0)) for i, b in enumerate(BONES)]
+            assert all(point.position for point in watch(tuple(points), t[k]))
+
+
 def test_made_motions_and_rounded_ones_may_stand_still():
     assert doubts(frozen(frames_of(*walking(1.2), turned=False), [FOOT], 70)) == []
     rounded = noisy(1.2)
@@ -62,5 +85,5 @@ def test_places_and_directions_freeze_apart(turned):
         place = tuple(1e-4 * random.normal(size=3)) if (not turned and k < 50) or turned else (1.0, 2.0, 3.0)
         axis = 1e-4 * random.normal(size=3) if (turned and k < 50) or not turned else (0.1, 0.2, 0.3)
         point = BodyPoint(name="a", bone="head", position=place, wxyz=(1.0, *axis))
-        (found,) = watch((point,))
+        (found,) = watch((point,), k / RATE)
     assert (found.position is None, found.wxyz is None) == (not turned, turned)

@@ -138,6 +138,52 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         {"speed", "distance"},
     ),
     "m/s in mm/s": ({"separation": "human_speed_mm_s = 1.6"}, "safety[2].human_speed", {"speed", "distance"}),
+    "radians in rpy_deg": (
+        {"at": "at = { position = [1.75, 0, 0], rpy_deg = [0, 0, 3.14159] }"},
+        "humans[0].at.rpy",
+        {"speed"},
+    ),
+    "metres in position_mm of a tool": (
+        {"tool": CELL["tool"] + "\nat = { position_mm = [0, 0, 0.06] }"},
+        "tools[0].at.position",
+        set(),
+    ),
+    "a tool in the air": (
+        {"tool": CELL["tool"] + "\nat = { position = [0, 0, 0.6] }"},
+        "tools[0].apart",
+        set(),
+    ),
+    "kg·mm² for kg·m² divided once more": (
+        {"tool": CELL["tool"] + "\ncom = [0, 0, 0]\ninertia = [3e-9, 3e-9, 3e-9, 0, 0, 0]"},
+        "tools[0].gyration",
+        set(),
+    ),
+    "g·cm² for kg·m²": (
+        {"tool": CELL["tool"] + "\ncom = [0, 0, 0]\ninertia = [3e4, 3e4, 3e4, 0, 0, 0]"},
+        "tools[0].gyration",
+        set(),
+    ),
+    "a centre of mass ten times as far out": (
+        {"tool": CELL["tool"] + "\ncom = [0, 0, 0.2]"},
+        "tools[0].com_outside",
+        set(),
+    ),
+    "an area of a third of a millimetre": (
+        {
+            "more": '[[areas]]\nname = "side"\nshape = { box = [3e-4, 3e-4, 3e-4] }\n'
+            "at = { position = [1.75, 0.5, 1] }\n"
+        },
+        "areas[0].extent",
+        {"speed", "distance", "separation"},
+    ),
+    "a drive force in kN": (
+        {
+            "more": '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "ur5"\n'
+            'human = "operator"\ndrive_force = 0.15\n'
+        },
+        "safety[3].drive_force",
+        {"speed", "distance", "separation"},
+    ),
     "inside the table": (
         {"table": "at = { position = [2.0, 0, 0.37] }"},
         "humans[0].inside.table",

@@ -182,7 +182,7 @@ class Following:
             return False
         if len(sample.points) > MOST_POINTS or not 0 < sample.hold < LARGEST:
             return False
-        sample = structs.replace(sample, points=device.frozen(sample.points))
+        sample = structs.replace(sample, points=device.frozen(sample.points, sample.t))
         if sample.smoothing:
             if not LOWEST <= sample.smoothing <= HIGHEST:
                 return False

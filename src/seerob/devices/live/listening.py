@@ -339,7 +339,7 @@ class Listener:
                 if stood > self._source.timeout and what in self._posted:
                     self._doubt(what, STILL)
                 return
-            sample = replace(sample, points=person.frozen(sample.points))
+            sample = replace(sample, points=person.frozen(sample.points, heard.t))
         late = (self._source.delay or 0.0) * (not self._source.asked)
         if sample.t_device is not None:
             late = self._clock.latency

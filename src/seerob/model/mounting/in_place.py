@@ -22,6 +22,8 @@ from seerob.model.model import Body, Mechanism, Model
 from seerob.model.mounting.chains import beyond_flange
 from seerob.workstation.plausibility.ranges import Quantity, data, entries_of, findings, listed, quantities
 from seerob.workstation.variables import VARIABLE
+from seerob.workstation.workstation import Body as GivenBody
+from seerob.workstation.workstation import Thing as GivenThing
 
 SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
 """Bones that a person stands, sits or kneels with."""
@@ -59,6 +61,7 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _feet(model, place, place.still)
     yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
     yield from _parts(model, place)
+    yield from _apart(model, place)
     yield from _bases(model, place)
     yield from _nobody(model, [place])
 
@@ -105,7 +108,7 @@ def _most(q: Mapping[str, Sequence[Array]]) -> int:
 
 def _sizes(model: Model) -> Iterator[Quantity]:
     """Extent of every thing, its mass where a density tells it, and its density where it does not."""
-    for group in ("tools", "workpieces", "parts", "machines"):
+    for group in ("tools", "workpieces", "parts", "machines", "areas"):
         for i, thing in enumerate(getattr(model.workstation, group)):
             bodies = [body for body in model.bodies if body.owner == thing.name]
             solids = [solid for body in bodies for solid in body.solids]
@@ -121,6 +124,7 @@ def _sizes(model: Model) -> Iterator[Quantity]:
             elif mass is not None and volume > 0:
                 said = f"{mass:g} kg in a box of {volume:.3g} m³{read}"
                 figures.append(("bulk_density", "kg/m³", mass / volume, said))
+                figures += _spread(thing, low, high)
             for name, unit, value, said in figures:
                 yield Quantity(
                     f"{group}[{i}].{name}", f"{group}.{name}", unit, (value,), (thing.name,), said, thing.name
@@ -128,17 +132,60 @@ def _sizes(model: Model) -> Iterator[Quantity]:
 
 
 def _links(model: Model) -> Iterator[Quantity]:
-    """Density of every link whose mass the workstation file gives, in the box around its shape."""
+    """Density and spread of every link whose mass the workstation file gives, in the box around its shape."""
     for i, robot in enumerate(model.workstation.robots):
         for link, given in robot.masses.items():
-            name, what = f"{robot.name}/{link}", f"masses.{link}.bulk_density"
+            name = f"{robot.name}/{link}"
             solids = [solid for body in model.bodies if body.name == name for solid in body.solids]
-            low, high = box(solids) if solids else (0.0, 0.0)
+            low, high = box(solids) if solids else (np.zeros(3), np.zeros(3))
             volume = float(np.prod(np.subtract(high, low)))
             if volume > 0:
-                said, density = f"{given.mass:g} kg in a box of {volume:.3g} m³", (given.mass / volume,)
-                key, kind = f"robots[{i}].{what}", f"robots.{what}"
-                yield Quantity(key, kind, "kg/m³", density, (robot.name,), said, robot.name)
+                said = f"{given.mass:g} kg in a box of {volume:.3g} m³"
+                figures = [("bulk_density", "kg/m³", given.mass / volume, said), *_spread(given, low, high)]
+                for what, unit, value, said in figures:
+                    key = f"masses.{link}.{what}"
+                    yield Quantity(
+                        f"robots[{i}].{key}", f"robots.{key}", unit, (value,), (robot.name,), said, robot.name
+                    )
+
+
+def _spread(given: GivenThing | GivenBody, low: Array, high: Array) -> list[tuple[str, str, float, str]]:
+    """Where the mass of a thing is that the file gives, and how it is spread, against the box of its shape.
+
+    Args:
+        given: With its mass.
+        low: Corner of the box [m].
+        high: The other corner.
+    """
+    figures = []
+    if given.com is not None:
+        com = np.array(given.com)
+        outside = float(np.linalg.norm(np.maximum(np.maximum(low - com, com - high), 0)))
+        figures.append(("com_outside", "m", outside, f"com {com.tolist()} m"))
+    if given.inertia is not None and given.mass is not None:
+        xx, yy, zz, xy, xz, yz = given.inertia
+        most = float(np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).max())
+        radius, size = np.sqrt(max(most, 0.0) / given.mass), float(np.linalg.norm(high - low)) / 2
+        said = f"{radius:.3g} m of {size:.3g} m, from inertia and mass"
+        figures.append(("gyration", "", float(radius / size), said))
+    return figures
+
+
+def _apart(model: Model, place: _Home) -> Iterator[Quantity]:
+    """How far tools, and what is held, are from what carries them."""
+    for group in ("tools", "workpieces"):
+        for i, thing in enumerate(getattr(model.workstation, group)):
+            own = [b.index for b in _seen(model.bodies) if b.owner == thing.name]
+            carriers = {b.carrier for b in model.bodies if b.owner == thing.name}
+            others = [b.index for b in _seen(model.bodies) if b.carrier in carriers and b.owner != thing.name]
+            if not own or not others or getattr(thing, "rest", None) is not None:
+                continue
+            gap = max(place.distance(own, others, SIGHT), 0.0)
+            said = f"from {thing.name} to anything that moves with {thing.on}"
+            key = "apart"
+            yield Quantity(
+                f"{group}[{i}].{key}", f"{group}.{key}", "m", (gap,), (thing.name,), said, thing.name
+            )
 
 
 def _payloads(model: Model) -> Iterator[Quantity]:

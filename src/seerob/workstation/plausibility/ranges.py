@@ -40,16 +40,20 @@ FOLLOWS: dict[str, tuple[str, ...]] = {
         "nobody_within",
         "inside.",
         "height",
+        "below_floor",
         "stands_on_nothing",
     ),
-    "tools": ("mass", "extent", "bulk_density"),
-    "workpieces": ("mass", "extent", "bulk_density"),
+    "tools": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart"),
+    "workpieces": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart"),
     "parts": ("extent", "bulk_density", "inside."),
-    "machines": ("extent", "mass", "bulk_density", "nobody_within"),
+    "areas": ("extent",),
+    "machines": ("extent", "mass", "bulk_density", "com_outside", "gyration", "nobody_within"),
     "sources": ("step", "degrees", "speed"),
     "humans": ("bmi", "feet", "inside."),
 }
 """What follows from a table and can be implausible, by table; with a point at the end, of a name."""
+OF_LINKS = ("bulk_density", "com_outside", "gyration")
+"""What follows from the mass that the file gives to a link of a robot."""
 KEY = re.compile(r"([a-z]+)\[(\d{1,6})\]\.(.+)")
 
 
@@ -71,6 +75,10 @@ def listed(entries: Entries, engine: Engine) -> Iterator[Quantity]:
             about = ((table.target() or "*") if group == "sources" else table.name,)
             yield from quantities(table, key=f"{group}[{i}]", kind=kind, about=about, of=name_of(table))
     yield from quantities(engine, key="engine", kind="engine", about=("*",))
+    if any(engine.gravity):
+        down = -engine.gravity[2] / math.hypot(*engine.gravity)
+        key, angle = "engine.gravity.turned", math.acos(max(-1.0, min(1.0, down)))
+        yield Quantity(key, key, "rad", (angle,), ("*",), f"gravity = {list(engine.gravity)} m/s²")
 
 
 def name_of(entry: Any) -> str:
@@ -189,9 +197,9 @@ def _follows(key: str, entries: Entries) -> bool:
     match = KEY.fullmatch(key)
     if match is None or int(match[2]) not in entries.get(match[1], {}):
         return False
-    if match[1] == "robots" and match[3].endswith(".bulk_density"):
-        masses = entries["robots"][int(match[2])].masses
-        return match[3].removeprefix("masses.").removesuffix(".bulk_density") in masses
+    link, _, what = match[3].removeprefix("masses.").rpartition(".")
+    if match[1] == "robots" and what in OF_LINKS:
+        return link in entries["robots"][int(match[2])].masses
     names = {entry.name for group in LISTS[:-1] for entry in entries.get(group, {}).values()}
     return any(
         match[3].removeprefix(what) in names if what.endswith(".") else match[3] == what
@@ -199,6 +207,8 @@ def _follows(key: str, entries: Entries) -> bool:
     )
 
 
+ROUND = 6e-4
+"""By so much, relative, a round angle that is typed in radians may be off: 3.14 for π."""
 EQUAL = 1e-6
 """By so much, relative, a value may differ from the one that was confirmed: the rounding of a conversion."""
 
@@ -212,6 +222,7 @@ class Range(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     high: float = math.inf
     zero: bool = False
     norm: bool = False
+    twice: bool = False
     because: str
     right: str
     source: str
@@ -272,7 +283,15 @@ def implausible(values: Sequence[float], row: Range) -> float | None:
     for size, value in zip(looked_at, looked_at if row.norm else values, strict=True):
         if not (size == 0 and row.zero) and not row.low <= size <= row.high:
             return value
+        if row.twice and converted_twice(size):
+            return value
     return None
+
+
+def converted_twice(angle: float) -> bool:
+    """Whether an angle [rad] is a round one in radians, a multiple of 45°, that was read in degrees."""
+    eighths = math.degrees(abs(angle)) / (math.pi / 4)
+    return 0 < round(eighths) <= 8 and abs(eighths - round(eighths)) <= ROUND * eighths
 
 
 def sentence(quantity: Quantity, value: float, row: Range) -> str:
@@ -280,11 +299,14 @@ def sentence(quantity: Quantity, value: float, row: Range) -> str:
     numbers = quantity.values
     all_of_it = shown(numbers[0]) if len(numbers) == 1 else f"[{', '.join(map(shown, numbers[:12]))}]"
     unit = f" {quantity.unit}".rstrip()
-    beyond = f"more than {row.high:g}" if abs(value) > row.high else f"less than {row.low:g}"
+    beyond = f"more than {row.high:g}{unit}" if abs(value) > row.high else f"less than {row.low:g}{unit}"
+    if row.twice and converted_twice(value):
+        typed = math.degrees(value)
+        beyond = f"{typed:.6g}°, which would be {math.degrees(typed):.3g}° were it in radians"
     less = "" if len(numbers) == 1 else f"{shown(value)} is "
     said = f" ({quantity.said})" if quantity.said else ""
     return (
-        f"{quantity.key} = {all_of_it}{unit}{said}: {less}{beyond}{unit}, which is not plausible: "
+        f"{quantity.key} = {all_of_it}{unit}{said}: {less}{beyond}, which is not plausible: "
         f"{row.because}; {row.right}"
     )
 

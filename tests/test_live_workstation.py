@@ -134,3 +134,14 @@ def test_an_emulator_plays_a_file_within_the_limits_of_its_robot(tmp_path):
     wild.write_text("t [s]," + ",".join(f"J{k} [rad]" for k in range(1, 7)) + "\n" + rows)
     with pytest.raises(InputError, match="beyond"):
         read(wild, target_of("ur10"))
+
+
+def test_another_robot_than_the_controller_s_is_not_within(tmp_path, capsys):
+    """It says itself where its tool centre point is: a UR5 that drives the twin of a UR10."""
+    with emulator("--robot", "ur5", "--primary-port", "0") as port:
+        file = at_port(tmp_path, port)
+        folder = tmp_path / "run"
+        ended = cli.main(["run", str(file), "--port", "0", "--seconds", "1", "-o", str(folder)])
+    said = capsys.readouterr().out
+    assert ended == Exit.UNDECIDED
+    assert "its source has its own tool centre point" in said

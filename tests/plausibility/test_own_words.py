@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 from oracles.pinocchio_oracle import pinocchio_model
+from seerob.app.emulators.rtde import OwnWords
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding, Verdict
 from seerob.core.transforms import rotation_from_rpy
@@ -25,7 +26,7 @@ from seerob.protocols.robots.fri import Edition, Monitoring, decode_monitoring, 
 from seerob.session.run import Judge, bind, engine_of
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
-from seerob.twin.own_words import LiveWords, fixed_offset, rigid_error, sign_or_unit
+from seerob.twin.own_words import LiveWords, fixed_offset, heavier, rigid_error, sign_or_unit
 
 DH = {
     # a2, a3, d1, d4, d5, d6 [m]: Universal Robots, "DH Parameters for calculations of kinematics"
@@ -168,6 +169,30 @@ def test_a_controller_without_a_tool_says_nothing_of_the_twins(tmp_path: Path) -
     found = about_tool(station(tmp_path, tools=TOOL))
     assert found.level == "note"
     assert "its controller knows of no tool" in found.text
+
+
+@pytest.mark.parametrize(("robot", "tcp", "payload", "words"), [
+    ("ur5e", 0.15, 0.5, ""), ("ur5e", 0.0, 0.0, ""), ("ur10e", 0.15, 0.5, "another robot, tool"),
+    ("ur5e", 0.25, 0.5, "tool centre point"), ("ur5e", -0.15, 0.5, "tool centre point"),
+    ("ur5e", 0.15, 3.0, "3 kg at its flange"),
+])  # fmt: skip
+def test_what_the_emulated_controller_says_of_another_arm_is_found(
+    tmp_path: Path, robot: str, tcp: float, payload: float, words: str
+) -> None:
+    """The emulator's tool is where the maker's parameters have it, and a live twin of another arm is told."""
+    said = OwnWords(library.load(robot), tcp=tcp, payload=payload)
+    assert np.array([said(tuple(q), (0.0,) * 6)["actual_TCP_pose"][:3] for q in MOVING]) == pytest.approx(
+        dh_tcp(robot, MOVING, (0, 0, tcp)), abs=1e-12
+    )
+    log_of(tmp_path, MOVING, None)
+    listening = LiveWords(station(tmp_path, tools=TOOL).model, "arm")
+    reasons = []
+    for t, q, qd in zip(T, MOVING, np.gradient(MOVING, T, axis=0), strict=True):
+        fields = {"timestamp": t, "actual_q": tuple(q), "actual_qd": tuple(qd), **said(tuple(q), tuple(qd))}
+        sample = rtde_sample(fields, target="arm", arrived=t)
+        reasons.append(listening.invalid_reason(sample) or heavier(sample.payload, 0.5))
+    assert all(words in reason for reason in reasons)
+    assert any(reasons) == bool(words)
 
 
 @pytest.mark.parametrize(("off", "robot", "holds"), [

@@ -1,8 +1,8 @@
 """An RTDE server that plays a motion: what a Universal Robots controller sends, over a real socket.
 
-It speaks for a robot that is switched on and does what the motion says. Fields that would need physics
-(currents, forces, tool pose) it does not have, as an old controller does not. It moves nothing and
-takes no inputs.
+It speaks for a robot that is switched on and does what the motion says, and says of itself where its tool
+centre point is, how fast that moves, and what hangs at its flange. Fields that would need physics (currents,
+forces) it does not have, as an old controller does not. It moves nothing and takes no inputs.
 """
 
 from __future__ import annotations
@@ -16,10 +16,15 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
+
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
 from seerob.core.errors import InputError
+from seerob.core.transforms import transform, wxyz_from_rotation
+from seerob.description.description import Description
+from seerob.files.waypoints.arm import Arm
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.robots.rtde import (
@@ -69,6 +74,9 @@ TYPES = {
     "robot_status_bits": "UINT32",
     "safety_status_bits": "UINT32",
 }
+OWN_WORDS = {"actual_TCP_pose": "VECTOR6D", "actual_TCP_speed": "VECTOR6D", "payload": "DOUBLE"}
+TURNED = np.diag([-1.0, -1.0, 1.0])
+"""Half a turn about z: between the base that a controller speaks of and the ``base_link`` of descriptions."""
 E_SERIES = ControllerVersion(5, 12, 4, 0)
 PLAYING = 2
 MAX_CLIENTS = 8
@@ -79,6 +87,33 @@ PRIMARY_SENDS = 100
 """Packages of the primary interface to one client."""
 LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
+
+
+class OwnWords:
+    """What a controller says of its arm, beside the joints.
+
+    Args:
+        description: The arm.
+        tcp: How far its tool centre point is ahead of the flange [m].
+        payload: What hangs at the flange, as somebody told the controller [kg].
+    """
+
+    def __init__(self, description: Description, *, tcp: float = 0.0, payload: float = 0.0) -> None:
+        self._arm = Arm(description, link_from_tcp=transform(position=(0.0, 0.0, tcp)))
+        self._payload = payload
+
+    def __call__(self, q: tuple[float, ...], qd: tuple[float, ...]) -> dict[str, Value]:
+        """Its fields at joint positions [rad] and speeds [rad/s]; the tool in the controller's base."""
+        posture = self._arm.posture(q)
+        w, *axis = wxyz_from_rotation(TURNED @ posture.rotation).tolist()
+        length = math.hypot(*axis)
+        turn = 2 * math.atan2(length, w) / length if length > 0 else 0.0
+        v, omega = (posture.jacobian() @ qd).reshape(2, 3)
+        return {
+            "actual_TCP_pose": (*(TURNED @ posture.position).tolist(), *(turn * x for x in axis)),
+            "actual_TCP_speed": (*(TURNED @ v).tolist(), *(TURNED @ omega).tolist()),
+            "payload": self._payload,
+        }
 
 
 class RtdeServer(LoopEmulator):
@@ -92,6 +127,7 @@ class RtdeServer(LoopEmulator):
         version: Highest version of the protocol.
         without: Fields that it does not have.
         values: Fields with another value than that of a robot at work.
+        own_words: What it says of its arm beside the joints; nothing when not given.
         messages: Said to every client that connects, before anything else.
         kinematics: What the primary interface says of how it was built; there is none when not given.
         primary_port: Of that interface; 0 is any free one.
@@ -107,6 +143,7 @@ class RtdeServer(LoopEmulator):
         version: int = 2,
         without: frozenset[str] = frozenset(),
         values: Mapping[str, Value] | None = None,
+        own_words: OwnWords | None = None,
         messages: tuple[str, ...] = (),
         kinematics: Kinematics | None = None,
         primary_port: int = 0,
@@ -115,7 +152,9 @@ class RtdeServer(LoopEmulator):
         self.host, self.port = host, port
         self.motion, self.controller, self.version, self.messages = motion, controller, version, messages
         self.kinematics, self.primary_port = kinematics, primary_port
-        self.types = {name: kind for name, kind in TYPES.items() if name not in without}
+        self.own_words = own_words
+        every = TYPES | (OWN_WORDS if own_words is not None else {})
+        self.types = {name: kind for name, kind in every.items() if name not in without}
         self.values = dict(values or {})
         """May be changed while it runs."""
         self.rate = 125.0 if controller.major < 5 else 500.0
@@ -143,6 +182,7 @@ class RtdeServer(LoopEmulator):
             "actual_digital_output_bits": 0,
             "robot_status_bits": 0b11,
             "safety_status_bits": 0b1,
+            **(self.own_words(q, qd) if self.own_words is not None else {}),
             **self.values,
         }
 
@@ -280,6 +320,10 @@ class Rtde(RobotOptions, frozen=True, kw_only=True):
     """A Universal Robots controller (RTDE)."""
 
     port: Annotated[int, port()] = 30004
+    tcp: Annotated[
+        float, option("how far its tool centre point is ahead of the flange", "m", ge=-2, le=2)
+    ] = 0.0
+    payload: Annotated[float, option("what it was told that hangs at its flange", "kg", ge=0, le=100)] = 0.0
     calibration: Annotated[str, option("kinematics it says it has: a file of seerob probe")] | None = None
     primary_port: Annotated[int, port("port where it says them; 0 is any free one")] = 30011
 
@@ -287,8 +331,12 @@ class Rtde(RobotOptions, frozen=True, kw_only=True):
         """The controller."""
         target = self.target(joints=JOINTS, whose="a Universal Robots arm")
         motion, what = self.motion(target, HOME)
+        words = None
+        if target.description is not None:
+            words = OwnWords(target.description, tcp=self.tcp, payload=self.payload)
         server = RtdeServer(
             motion,
+            own_words=words,
             host=self.host,
             port=self.port,
             kinematics=None if self.calibration is None else _kinematics(Path(self.calibration)),

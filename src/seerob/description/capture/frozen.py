@@ -38,11 +38,11 @@ WALKS = 0.3
 SPAN = 0.1
 """Over which it walks, and then stands [s]: from 0.3 m/s to nothing it has at most two samples, 8 m/s²."""
 STANDS = 0.15
-"""Share of the way before by which the points of a body that stands are off, RMS: noise, 5 mm at 0.3 m/s."""
+"""Share of the way before by which points of a body that stands are off, RMS: noise, 5 mm at 0.3 m/s."""
 SLACK = 1e-6
 """Of instants [s]."""
 EVENLY = 0.5
-"""Share of the mean speed that each step has of a body that walks; one that jumped and stands has one step."""
+"""Share of the mean speed that each step of a body that walks has; one that jumped has one step."""
 GOES_ON = 0.05
 """A body that is so far from where it hung moves again [m], RMS."""
 

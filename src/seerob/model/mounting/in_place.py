@@ -384,6 +384,8 @@ def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quan
 def _bases(model: Model, place: _Home) -> Iterator[Quantity]:
     """How high bases of robots are, and how far from anything that they would stand on with another sign."""
     standing = _standing(model)
+    soles = [place.lowest(_of(model, model.mechanisms[human.name])) for human in model.workstation.humans]
+    floor = any(abs(low) <= LEVEL for low in (*soles, *(place.lowest([b]) for b in standing)))
     for i, robot in enumerate(model.workstation.robots):
         own = [b for b in standing if b.owner == robot.name]
         if robot.on or not own:
@@ -391,6 +393,11 @@ def _bases(model: Model, place: _Home) -> Iterator[Quantity]:
         at = robot.base.position[2]
         said = f"the base of {robot.name} above z = 0"
         yield Quantity(f"robots[{i}].height", "robots.height", "m", (at,), (robot.name,), said, robot.name)
+        if at < 0 and floor:
+            key, said = "below_floor", f"the base of {robot.name} below z = 0"
+            yield Quantity(
+                f"robots[{i}].{key}", f"robots.{key}", "m", (-at,), (robot.name,), said, robot.name
+            )
         base, others = [b.index for b in own], [b.index for b in standing if b.owner != robot.name]
         if not others or abs(place.lowest(own)) <= LEVEL:
             continue

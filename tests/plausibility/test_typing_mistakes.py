@@ -432,6 +432,12 @@ def test_two_things_that_stand_on_one_floor_in_one_place_are_found(tmp_path: Pat
     assert found.text.startswith("parts[1].inside.table = ")
 
 
+def test_a_confirmation_says_why_in_words(tmp_path: Path) -> None:
+    confirmed = '[[confirmed]]\nkey = "safety[0].limit"\nof = "speed"\nvalue = 250\nwhy = " "\n'
+    with pytest.raises(InputError, match=r"confirmed\[0\].why"):
+        station_of(tmp_path, cell(limit="limit = 250", more=confirmed))
+
+
 def test_another_value_is_not_confirmed(tmp_path: Path) -> None:
     confirmed = (
         '[[confirmed]]\nkey = "safety[2].stop.reaction"\nof = "separation"\nvalue = 3\nwhy = "measured"\n'

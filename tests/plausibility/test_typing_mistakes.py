@@ -354,13 +354,14 @@ def test_a_mistake_is_found_and_what_rests_on_it_is_not_within(name: str, tmp_pa
     # As the message says, so it is confirmed, and only then.
     line = re.search(r"\[\[confirmed\]\] key = .*, value = .*, why = \"…\"", found[0].text)
     assert line
-    table = tomllib.loads(re.sub(r", (of|value|why) =", r"\n\1 =", line[0].replace("]] ", "]]\n")))
+    written = line[0].replace("]] ", "]]\n").replace("…", "meant")
+    table = tomllib.loads(re.sub(r", (of|value|why) =", r"\n\1 =", written))
     one = msgspec.convert(table["confirmed"][0], Confirmed)
     workstation = msgspec.structs.replace(station.workstation, confirmed=(one,))
     again = implausible(dataclasses.replace(station.model, workstation=workstation))
     (said,) = (f for f in again if f.text.startswith(f"{key} = "))
     assert (said.holds, said.level) == ((), "note")
-    assert said.text.endswith("; confirmed: …")
+    assert said.text.endswith("; confirmed: meant")
     assert not unknown({0: one}, entries_of(station.workstation), station.workstation.engine, "file")
 
 

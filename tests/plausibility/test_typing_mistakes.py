@@ -594,6 +594,7 @@ def test_every_row_of_the_data_is_of_something() -> None:
             kinds |= {(f"{group}.{what}x" if what.endswith(".") else f"{group}.{what}", unit)
                       for unit in ("m", "kg", "kg/m²", "kg/m³", "")}  # fmt: skip
     walk(Engine, "engine")
+    kinds.add(("engine.gravity.turned", "rad"))
     kinds |= {("measurements.spring_N_mm", "N/mm"), ("measurements.contact_area", "m²")}
     for group in PLUGINS:
         kinds |= {(f"{group}.{what}", unit) for what in FOLLOWS.get(group, ()) for unit in ("s", "°", "")}

@@ -101,6 +101,8 @@ class OwnWords:
     def __init__(self, description: Description, *, tcp: float = 0.0, payload: float = 0.0) -> None:
         self._arm = Arm(description, link_from_tcp=transform(position=(0.0, 0.0, tcp)))
         self._payload = payload
+        still = (0.0,) * self._arm.n
+        self(still, still)  # the first is slow, and would be late
 
     def __call__(self, q: tuple[float, ...], qd: tuple[float, ...]) -> dict[str, Value]:
         """Its fields at joint positions [rad] and speeds [rad/s]; the tool in the controller's base."""

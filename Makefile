@@ -92,7 +92,7 @@ compiled: check
 # Without it, every process that a test starts compiles every library again.
 unit: export PYTHONDONTWRITEBYTECODE :=
 unit: $(DEV) $(PAGE)
-	$(BIN)/pytest -n 2 --dist loadgroup
+	$(BIN)/pytest -n 3 --dist loadgroup
 
 web-test: $(DEV) $(PAGE)
 	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && cd web && ../scripts/npm run check && ../scripts/npm run lint && ../scripts/npm test

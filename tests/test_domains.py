@@ -253,6 +253,7 @@ CALLS = {
     "criteria.contact.shape.round_shape": {"radius": 0.01},
 }
 ELSEWHERE = {
+    "criteria.stopping.onset.by_speed": "of speeds that the twin has; `accelerated` checks T_r and a",
     "criteria.contact.clamping.thickest": "of a table of sizes that ships",
     "criteria.contact.measured.missing": "reasons in words, of records that `peaks` took",
     "criteria.contact.shape.patch_area": "of radii that `body_shape` made",

@@ -349,7 +349,7 @@ class Confirmed(_Table, frozen=True, kw_only=True):
     """Name of that entry (title of a phase), so that what is put in another order confirms nothing else."""
     value: float | list[Any]
     """The value that is meant, as the file has it; another one later is not confirmed."""
-    why: Annotated[str, Meta(min_length=1, max_length=1000, pattern=r"\w")]
+    why: Annotated[str, Meta(min_length=1, max_length=1000, pattern=r"\w", description="a reason in words")]
     """Why it is right, in words; it stands in the report."""
 
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.transforms import Array, inverse
 from seerob.description.description import Description, Joint, JointKind, Link
-from seerob.kernels.arm import postures
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +100,8 @@ class Arm:
         Args:
             q: Joint positions [rad or m], shape (..., n).
         """
+        from seerob.kernels.arm import postures
+
         q = np.asarray(q, float)
         lead, rows = q.shape[:-1], np.ascontiguousarray(q).reshape(-1, self.n)
         rotations, positions = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))

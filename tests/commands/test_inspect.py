@@ -44,6 +44,9 @@ model = "arm.urdf.xacro"
 [[robots]]
 name = "b"
 model = "package:example-robot-data/robots/x.urdf"
+[[robots]]
+name = "lift"
+model = "lift.xml"
 [[parts]]
 name = "p"
 mesh = "part.dae"
@@ -102,6 +105,7 @@ def cell(tmp_path):
     (folder / "arm.urdf.xacro").write_text(XACRO)
     (folder / "inner.xacro").write_text(XACRO)
     (folder / "part.dae").write_text("<COLLADA/>")
+    (folder / "lift.xml").write_text('<!-- lift --><mujoco><include file="lift_arm.xml"/></mujoco>')
     (folder / "evil.py").write_text("raise SystemExit('ran')")
     (folder / "rce").mkdir()
     (folder / "rce" / "evil.py").write_text("raise SystemExit('ran')")
@@ -142,6 +146,7 @@ def test_it_tells_all_of_it(cell):
         "outside /etc/hostname (named in arm.urdf.xacro): refused without --allow-outside",
         f"starts {apart} xacro, which evaluates expressions (arm.urdf.xacro)",
         f"starts {apart} the parser of COLLADA (part.dae)",
+        f"starts {apart} MuJoCo's reader of MJCF (lift.xml)",
         "refused module rce.evil (sources[0].kind): offered by no installed package; "
         "--allow-plugins imports it, which runs it",
         "connects run, probe: sources[2] (rtde) connects to 192.0.2.7:30004 and :30011, not encrypted",

@@ -79,6 +79,8 @@ def test_rates_are_kept_between_starts_and_none_that_are_damaged(tmp_path: Path,
         (0.0, 0.3, set()),  # stretched out
         (1.0, 0.3, set()),
         (2.7, 0.0, set()),  # stands still
+        (2.7, 1e-4, set()),  # as a servo that keeps its place
+        (2.7, 3e-4, BOTH),  # creeps
         (2.7 + 2 * math.pi, 0.3, BOTH),  # a turn farther
     ],
 )

@@ -38,6 +38,7 @@ APART = {
 """Ending of a file → what reads it in a process of its own."""
 _DESCRIPTIONS = (".urdf", ".xacro", ".xml")
 _NAMES = re.compile(rb"""(?:\bfile(?:name)?\s*=\s*["']|load_yaml\(\s*["'])([^"'<>\n]{1,4096})""")
+_MJCF = re.compile(rb"<(?:\w+:)?mujoco\b")
 _SHOWN = 500
 
 
@@ -129,7 +130,11 @@ def _files(table: Mapping[str, Any], file: Path, folder: Path) -> Iterator[Fact]
 
 def _apart(name: str) -> Iterator[Fact]:
     if (what := APART.get(Path(name).suffix.lower())) is not None:
-        yield Fact("starts", f"a process with limits of memory and time for {what} ({name})")
+        yield _started(what, name)
+
+
+def _started(what: str, name: str) -> Fact:
+    return Fact("starts", f"a process with limits of memory and time for {what} ({name})")
 
 
 def _named_in(path: Path, shown: str, folder: Path) -> Iterator[Fact]:
@@ -137,9 +142,10 @@ def _named_in(path: Path, shown: str, folder: Path) -> Iterator[Fact]:
     if path.stat().st_size > LARGEST:
         yield Fact("note", f"{shown} has more than {LARGEST} bytes and is refused")
         return
-    for found in dict.fromkeys(
-        match[1].decode(errors="replace") for match in _NAMES.finditer(path.read_bytes())
-    ):
+    text = path.read_bytes()
+    if _MJCF.search(text):
+        yield _started("MuJoCo's reader of MJCF", shown)
+    for found in dict.fromkeys(match[1].decode(errors="replace") for match in _NAMES.finditer(text)):
         plain = found.removeprefix("file://")
         if "://" in plain or "$" in plain:
             yield Fact("reads", f"{found}, where that is in the folder or installed (named in {shown})")

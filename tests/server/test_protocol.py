@@ -9,6 +9,7 @@ from msgspec.structs import replace as replaced
 
 from live_story import wait_for
 from seerob.app.server import hub
+from seerob.app.server import live as live_view
 from seerob.app.server.client import WINDOW
 from seerob.app.server.live import Live, LiveView
 from seerob.app.server.player import Player
@@ -19,7 +20,7 @@ from seerob.outputs.sink import Writer
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
-from server.frames import MESHES, Remembered, Visitor, scene, snapshot
+from server.frames import MESHES, PATIENCE, Remembered, Visitor, scene, snapshot
 
 
 @pytest.fixture
@@ -31,6 +32,12 @@ def live():
 
 def replay(snapshots, **options):
     return Server(scene=scene(), meshes=MESHES, feed=Player(Remembered(snapshots), **options), port=0)
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """However long a busy machine takes, what is shown here is the present; see test_stopped_run.py."""
+    monkeypatch.setattr(live_view, "OLD", PATIENCE)
 
 
 def test_a_page_is_told_everything_once_and_then_each_frame(live):

@@ -23,7 +23,6 @@ from seerob.app.emulators.kinect import KinectSender, animated, measured
 from seerob.app.emulators.mvn import MvnSender
 from seerob.app.emulators.rokoko import RokokoSender
 from seerob.app.emulators.rtde import RtdeServer
-from seerob.app.emulators.vive import ViveSender, worn
 from seerob.core.snapshot import Snapshot
 from server.frames import PATIENCE, Visitor
 
@@ -83,8 +82,6 @@ def sender(kind, port):
     person = mvn_person.measured(mvn_person.animated("library:reach"), 2e-4)
     if kind == "rokoko":
         return RokokoSender({"Anna": person}, to=(HERE, port), rate=30.0)
-    if kind == "vive":
-        return ViveSender(worn(person), to=(HERE, port), rate=30.0)
     return MvnSender({0: person}, to=(HERE, port), rate=30.0)
 
 
@@ -162,7 +159,7 @@ class Watching:
 @pytest.fixture(
     params=[
         pytest.param(("mvn",), id="short"),
-        pytest.param(("mvn", "kinect", "rokoko", "vive"), id="long", marks=pytest.mark.soak),
+        pytest.param(("mvn", "kinect", "rokoko"), id="long", marks=pytest.mark.soak),
     ]
 )
 def run(tmp_path, request):

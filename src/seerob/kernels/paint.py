@@ -1,4 +1,4 @@
-r"""Colours onto pixels, after `seerob.kernels.paint` has said what is where.
+r"""What is where in a picture, and colours onto its pixels.
 
 Over is :math:`c \leftarrow (1 - \alpha) c + \alpha c_{new}`. A line of half width :math:`h` covers the
 pixel centre at distance :math:`d` from it by :math:`\mathrm{clip}(h + 1/2 - d, 0, 1)`. Depth is kept as
@@ -14,6 +14,35 @@ from numpy.typing import NDArray
 from seerob.core.transforms import Array
 
 Ints = NDArray[np.int32]
+
+
+Corners = tuple[float, float, float, float, float, float]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _around(corners: Corners, width: int, height: int) -> tuple[int, int, int, int, float]:
+    """First and last column and row of the pixels that a triangle may cover, none without area; 1/area."""
+    ax, ay, bx, by, cx, cy = corners
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    if not abs(area) > 1e-12:
+        return 0, -1, 0, -1, 0.0
+    # Pixel centres lie at half integers.
+    return (
+        int(max(0.0, np.ceil(min(ax, bx, cx) - 0.5))),
+        int(min(width - 1.0, np.floor(max(ax, bx, cx) - 0.5))),
+        int(max(0.0, np.ceil(min(ay, by, cy) - 0.5))),
+        int(min(height - 1.0, np.floor(max(ay, by, cy) - 0.5))),
+        1.0 / area,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _weights(corners: Corners, inverse_area: float, px: float, py: float) -> tuple[float, float, float]:
+    """Of the corners at a place: all at least 0 inside."""
+    ax, ay, bx, by, cx, cy = corners
+    wa = ((cx - bx) * (py - by) - (cy - by) * (px - bx)) * inverse_area
+    wb = ((ax - cx) * (py - cy) - (ay - cy) * (px - cx)) * inverse_area
+    return wa, wb, 1.0 - wa - wb
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -46,25 +75,11 @@ def raster(
         za, zb, zc = inverse_depth[a], inverse_depth[b], inverse_depth[c]
         if not (za > 0 and zb > 0 and zc > 0):
             continue
-        ax, ay = points[a, 0], points[a, 1]
-        bx, by = points[b, 0], points[b, 1]
-        cx, cy = points[c, 0], points[c, 1]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if not abs(area) > 1e-12:
-            continue
-        # Pixel centres lie at half integers.
-        x0 = int(max(0.0, np.ceil(min(ax, bx, cx) - 0.5)))
-        x1 = int(min(width - 1.0, np.floor(max(ax, bx, cx) - 0.5)))
-        y0 = int(max(0.0, np.ceil(min(ay, by, cy) - 0.5)))
-        y1 = int(min(height - 1.0, np.floor(max(ay, by, cy) - 0.5)))
-        inverse_area = 1.0 / area
+        corners = (points[a, 0], points[a, 1], points[b, 0], points[b, 1], points[c, 0], points[c, 1])
+        x0, x1, y0, y1, inverse_area = _around(corners, width, height)
         for y in range(y0, y1 + 1):
-            py = y + 0.5
             for x in range(x0, x1 + 1):
-                px = x + 0.5
-                wa = ((cx - bx) * (py - by) - (cy - by) * (px - bx)) * inverse_area
-                wb = ((ax - cx) * (py - cy) - (ay - cy) * (px - cx)) * inverse_area
-                wc = 1.0 - wa - wb
+                wa, wb, wc = _weights(corners, inverse_area, x + 0.5, y + 0.5)
                 if wa < 0 or wb < 0 or wc < 0:
                     continue
                 z = wa * za + wb * zb + wc * zc
@@ -89,26 +104,14 @@ def cover(points: Array, inverse_depth: Array, faces: Ints, owner: Ints) -> None
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         if not (inverse_depth[a] > 0 and inverse_depth[b] > 0 and inverse_depth[c] > 0):
             continue
-        ax, ay = points[a, 0], points[a, 1]
-        bx, by = points[b, 0], points[b, 1]
-        cx, cy = points[c, 0], points[c, 1]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if not abs(area) > 1e-12:
-            continue
-        x0 = int(max(0.0, np.ceil(min(ax, bx, cx) - 0.5)))
-        x1 = int(min(width - 1.0, np.floor(max(ax, bx, cx) - 0.5)))
-        y0 = int(max(0.0, np.ceil(min(ay, by, cy) - 0.5)))
-        y1 = int(min(height - 1.0, np.floor(max(ay, by, cy) - 0.5)))
-        inverse_area = 1.0 / area
+        corners = (points[a, 0], points[a, 1], points[b, 0], points[b, 1], points[c, 0], points[c, 1])
+        x0, x1, y0, y1, inverse_area = _around(corners, width, height)
         for y in range(y0, y1 + 1):
-            py = y + 0.5
             for x in range(x0, x1 + 1):
                 if owner[y, x] >= 0:
                     continue
-                px = x + 0.5
-                wa = ((cx - bx) * (py - by) - (cy - by) * (px - bx)) * inverse_area
-                wb = ((ax - cx) * (py - cy) - (ay - cy) * (px - cx)) * inverse_area
-                if not (wa < 0 or wb < 0 or 1.0 - wa - wb < 0):
+                wa, wb, wc = _weights(corners, inverse_area, x + 0.5, y + 0.5)
+                if not (wa < 0 or wb < 0 or wc < 0):
                     owner[y, x] = 0
 
 

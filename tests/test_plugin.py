@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import shutil
 import subprocess
 import sys
@@ -179,3 +180,16 @@ def test_an_installed_package_offers_its_kinds_by_entry_points(installed, monkey
     assert plugin.kind_of("ergonomics", station.ergonomics[0]) == "acme.bending"
     with pytest.raises(SeerobError, match=r"kind 'acme\.work_hight'.*acme\.work_height"):
         plugin.load("safety", "acme.work_hight", Criterion)
+
+
+def test_the_kind_of_a_class_needs_nobody_to_have_loaded_it(tmp_path, monkeypatch):
+    """As in a process that a pickled station arrives in: its class is imported, its kind never was."""
+    (tmp_path / "renamed_rules.py").write_text("class Speed:\n    pass\n")
+    info = tmp_path / "renamed_rules-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: renamed-rules\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[seerob.safety]\nacme.speed = renamed_rules:Speed\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    speed = importlib.import_module("renamed_rules").Speed()
+    assert plugin.kind_of("safety", speed) == "acme.speed"
+    assert plugin.kind_of("ergonomics", speed) == "renamed_rules"

@@ -15,6 +15,7 @@ import os
 import pkgutil
 import sys
 from collections.abc import Sequence
+from functools import cache
 from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -44,13 +45,22 @@ def home(package: str) -> str:
     return HOMES[package]
 
 
-_OFFERED: dict[type, str] = {}
-"""Classes of installed packages → the kind that they are offered as."""
-
-
 def kind_of(package: str, plugin: object) -> str:
     """The kind that a plug-in is of, as the workstation file says it: dotted where it is one's own."""
-    return _OFFERED.get(type(plugin)) or type(plugin).__module__.removeprefix(f"{home(package)}.")
+    return _kind_of(package, type(plugin))
+
+
+@cache
+def _kind_of(package: str, cls: type) -> str:
+    """Kind of a class: what an installed package offers it as, else its module's name below the table's home."""
+    name = cls.__module__.removeprefix(f"{home(package)}.")
+    if name != cls.__module__:
+        return name
+    for kind, point in offered(package).items():
+        module = sys.modules.get(point.module)
+        if cls is getattr(module, point.attr, None) if point.attr else point.module == name:
+            return kind
+    return name
 
 
 def kinds(package: str) -> tuple[str, ...]:
@@ -107,8 +117,6 @@ def load(
     found = getattr(module, point.attr, None) if point is not None and point.attr else _only(module, base)
     if not (isinstance(found, type) and issubclass(found, base)):
         raise PluginError(f"the entry point of kind {kind!r} must be a {base.__name__}, it is {found!r}")
-    if point is not None:
-        _OFFERED[found] = kind
     return found
 
 

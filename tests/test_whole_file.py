@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 
 from interrupted_anywhere import interrupted_anywhere
-from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
-from seerob.core.files.whole_file import whole_file
+from seerob.core.files.whole_file import whole_file, whole_folder
 from seerob.core.shapes import Mesh
 from seerob.description.shapes.glb import stl_bytes, write_mesh
 from seerob.outputs.sinks.dossier import write_whole
-from seerob.outputs.tables.growing_table import GrowingTable
-from seerob.outputs.tables.whole_folder import WholeFolder
-from seerob.outputs.workbook.sheets import workbook
+from seerob.outputs.tables.growing_table import GrowingTable, WholeFolder
+from seerob.outputs.workbook import workbook
 
 MESH = Mesh(np.eye(3), np.array([[0, 1, 2]]))
 

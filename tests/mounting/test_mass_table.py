@@ -12,7 +12,7 @@ from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import Undecided
 from seerob.criteria.contact.impact_mass import moving_masses
-from seerob.outputs.report.masses import masses
+from seerob.outputs.report.evidence import masses
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
 BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'

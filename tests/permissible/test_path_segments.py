@@ -13,8 +13,8 @@ from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PFL, SOURCE, cell, t
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.app import cli
-from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_folder
 from seerob.core.samples import PoseSample
 from seerob.core.verdict import Verdict
 from seerob.criteria.safety.path_speed import passed

@@ -1,7 +1,7 @@
 """The report's table of tracking errors says of how many bones it speaks; a score says what it may be."""
 
 from seerob.core.figures import whatever_is_missing
-from seerob.outputs.report.masses import bones_told
+from seerob.outputs.report.evidence import bones_told
 from seerob.recording.bone_errors import BoneErrors
 
 

@@ -11,8 +11,8 @@ from seerob.core.errors import InputError
 from seerob.core.figures import DECIMALS
 from seerob.core.snapshot import Verdict
 from seerob.description.norms.editions import editions
+from seerob.outputs import workbook as sheets_module
 from seerob.outputs.sinks.excel import Excel
-from seerob.outputs.workbook import sheets as sheets_module
 from seerob.recording.result_log import log_of
 from seerob.recording.series import CODES
 

@@ -12,7 +12,7 @@ from seerob.outputs.report import posture_safety as _posture_safety
 from seerob.outputs.sinks.dossier import Dossier
 from seerob.outputs.sinks.excel import Excel
 from seerob.outputs.tables.growing_table import GrowingTable
-from seerob.outputs.workbook.motion_sheets import ThinnedTable
+from seerob.outputs.workbook import ThinnedTable
 from seerob.recording.result_log import log_of
 
 N = 100

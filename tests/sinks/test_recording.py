@@ -21,7 +21,7 @@ from mcap_protobuf.decoder import DecoderFactory
 import seerob
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.snapshot import Scene, Snapshot
-from seerob.outputs.mcap.tape import McapTape
+from seerob.outputs.mcap import McapTape
 from seerob.outputs.sinks import recorder as recorder_module
 from seerob.outputs.sinks.recorder import FLUSH_PERIOD, Recorder
 from seerob.recording.format import SAMPLES, SCENE, SNAPSHOT, nanoseconds
@@ -243,7 +243,7 @@ def test_what_the_index_remembers_of_hours_of_chunks_is_not_in_memory(tmp_path, 
 
 
 def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkeypatch):
-    from seerob.outputs.mcap.tape import McapTape
+    from seerob.outputs.mcap import McapTape
 
     gate = Event()
     tick = McapTape.tick
@@ -277,7 +277,7 @@ def test_an_interrupt_while_the_thread_begins_leaves_none_and_a_whole_file(tmp_p
 
 
 def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
-    from seerob.outputs.mcap.tape import McapTape
+    from seerob.outputs.mcap import McapTape
 
     tick = McapTape.tick
     monkeypatch.setattr(McapTape, "tick", lambda *a: (time.sleep(1e-3), tick(*a))[1])
@@ -288,7 +288,7 @@ def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
 
 
 def test_a_disk_that_refuses_stops_the_recording_not_the_run(tmp_path, monkeypatch):
-    from seerob.outputs.mcap.tape import McapTape
+    from seerob.outputs.mcap import McapTape
 
     def refuse(*_):
         raise OSError(28, "No space left on device")
@@ -374,7 +374,7 @@ def test_wrong_files_are_refused_with_their_name(tmp_path):
 
 
 def test_poses_that_do_not_fit_the_scene_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("seerob.outputs.mcap.tape.VIEW_PERIOD", float("inf"))
+    monkeypatch.setattr("seerob.outputs.mcap.VIEW_PERIOD", float("inf"))
     with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
         writer.write(made_run.snapshot(0), ())
         writer.write(msgspec.structs.replace(made_run.snapshot(1), poses=b"\0" * 28), ())

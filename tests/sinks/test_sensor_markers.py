@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from seerob.core.snapshot import Polyline, Prism, Rays, Result, Snapshot, Verdict
-from seerob.outputs.mcap.foxglove import marker_update
+from seerob.outputs.mcap import marker_update
 from seerob.outputs.picture.marker_shapes import label_of, points_of
 
 LINE = Polyline(points=((0, 0, 0), (1, 0, 0), (1, 1, 0)), closed=True, label="field")

@@ -14,9 +14,8 @@ import pytest
 from openpyxl.utils import column_index_from_string
 from openpyxl.utils.escape import unescape
 
-from seerob.outputs.workbook import sheet_rows as _sheet_rows
-from seerob.outputs.workbook import sheets as _sheets
-from seerob.outputs.workbook.sheets import workbook
+from seerob.outputs import workbook as _sheets
+from seerob.outputs.workbook import workbook
 
 
 def written(head, rows, **options):
@@ -90,7 +89,7 @@ def test_a_sheet_is_no_wider_than_excel_takes_and_says_so(monkeypatch):
 
 
 def test_a_sheet_that_is_full_goes_on_in_another(monkeypatch):
-    monkeypatch.setattr(_sheet_rows, "FULL", 5_000)
+    monkeypatch.setattr(_sheets, "FULL", 5_000)
     out = written(["a", "b"], ([float(k), 1.0] for k in range(200)))
     book = openpyxl.load_workbook(out)
     assert len(book.sheetnames) > 1

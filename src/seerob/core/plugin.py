@@ -47,20 +47,21 @@ def home(package: str) -> str:
 
 def kind_of(package: str, plugin: object) -> str:
     """The kind that a plug-in is of, as the workstation file says it: dotted where it is one's own."""
-    return _kind_of(package, type(plugin))
+    return _kind_of(package, type(plugin).__module__, type(plugin).__qualname__)
 
 
 @cache
-def _kind_of(package: str, cls: type) -> str:
-    """Kind of a class: what an installed package offers it as, else its module's name below the table's home."""
-    name = cls.__module__.removeprefix(f"{home(package)}.")
-    if name != cls.__module__:
-        return name
+def _kind_of(package: str, module: str, name: str) -> str:
+    """Kind of a class: what a package offers it as, else the name of its module."""
+    if module.startswith(f"{home(package)}."):
+        return module.removeprefix(f"{home(package)}.")
     for kind, point in offered(package).items():
-        module = sys.modules.get(point.module)
-        if cls is getattr(module, point.attr, None) if point.attr else point.module == name:
+        found = getattr(sys.modules.get(point.module), point.attr, None) if point.attr else None
+        if (point.module if found is None else found.__module__) != module:
+            continue
+        if found is None or found.__qualname__ == name:
             return kind
-    return name
+    return module
 
 
 def kinds(package: str) -> tuple[str, ...]:

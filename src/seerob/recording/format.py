@@ -16,7 +16,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 from collections.abc import Iterable, Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePosixPath
 
 from msgspec import Struct
@@ -206,3 +208,14 @@ class Visitor(Struct, frozen=True, kw_only=True):
 def nanoseconds(t: float) -> int:
     """Log time [ns] of a run time [s]."""
     return max(0, round(t * 1e9))
+
+
+def versions() -> dict[str, str]:
+    """Name → version of Python and of the packages that results depend on; absent ones are left out."""
+    found = {"python": platform.python_version()}
+    for name in ("seerob", "mujoco", "mujoco-core", "numpy", "numba", "scipy"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from seerob.app.commands.measure import add_person, measured, person_table, reader
 from seerob.app.console.terminal import line
-from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_folder
 from seerob.workstation.workstation import FILE_NAME
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def _masses(station: Station) -> None:
     """The mass table of every robot; frames, which weigh nothing, in one line."""
-    from seerob.outputs.report.masses import cells, total, weighed
+    from seerob.outputs.report.evidence import cells, total, weighed
 
     for mechanism in weighed(station.scene()):
         line("mass", f"{mechanism.name}: {total(mechanism.masses)}", "bold")

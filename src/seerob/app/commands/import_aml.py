@@ -9,8 +9,8 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from seerob.app.console.terminal import Exit, line, tell
-from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_folder
 from seerob.core.snapshot import Finding
 from seerob.files.tables.mapping import toml_value
 

@@ -7,8 +7,8 @@ from importlib import resources
 from pathlib import Path
 
 from seerob.app.console.terminal import Exit, line
-from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_folder
 
 HELP = "make a commented workstation folder to start from"
 EXAMPLE = "seerob new my_cell"

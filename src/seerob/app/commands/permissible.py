@@ -31,9 +31,9 @@ from seerob.app.console.terminal import (
     seconds,
     tell,
 )
-from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
 from seerob.core.extras import need
+from seerob.core.files.whole_file import whole_folder
 from seerob.core.same_names import by_name
 
 if TYPE_CHECKING:

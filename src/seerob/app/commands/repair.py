@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
         InputError: It is no recording, needs no repair, or the copy cannot be written.
     """
     from seerob.core.files.whole_file import whole_file
-    from seerob.outputs.mcap.tape import mend
+    from seerob.outputs.mcap import mend
     from seerob.recording.recording import Recording
 
     recording = Recording.open(options.recording)

@@ -1,18 +1,25 @@
-"""What a report is made from, and the words and cells that all of its sections share.
-
-A section that a command adds to the report: sentences and tables, in plain data.
-"""
+"""What a report is made from, how the run was driven, and the words and cells that all sections share."""
 
 from __future__ import annotations
 
+import shlex
+import sys
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+import msgspec
+
+from seerob.core import plugin
+from seerob.core.errors import SeerobError, UnknownName
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
 from seerob.outputs.html import Html, tag, whole
 from seerob.outputs.palette import MARK, WORD
-from seerob.outputs.report.setup import Setup
 from seerob.outputs.sentences import number
 from seerob.recording.result_log import ResultLog
+from seerob.workstation.source import Source
+from seerob.workstation.workstation import Engine
 
 
 @dataclass(frozen=True)
@@ -89,3 +96,100 @@ def input_row(item: Input) -> list[str | Html]:
         else WHO[item.origin]
     )
     return [item.name, value, origin, item.source or "–"]
+
+
+UNKNOWN = "unknown: the workstation file is not at hand or cannot be read"
+ORIGINS = {
+    "controller": "measured: the real robot's controller",
+    "vendor_emulator": "the maker's own controller software, without the robot: preliminary",
+    "simulator": "a generic simulator: preliminary until it is confirmed on the controller",
+    "planned": "a planned path that nobody has executed: preliminary until it is confirmed on the controller",
+    "recording": "one of our recordings; what fed it is written there",
+    "live": "measured: a person captured as they move",
+    "file": "a captured person, as the file has it",
+}
+_ADDRESSES = ("file", "host", "url", "port", "address", "stream")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Lines for the report."""
+
+    engine: tuple[tuple[str, str], ...]
+    """What and how much."""
+    sources: tuple[tuple[str, ...], ...]
+    """Name, what it drives, where it comes from, class of origin, time-out, at the end."""
+    readable: bool
+    """Whether the workstation file was there."""
+
+
+def setup(files: dict[str, bytes]) -> Setup:
+    """What the workstation file, the first of ``files``, says of engine and sources."""
+    try:
+        table = tomllib.loads(next(iter(files.values())).decode()) if files else None
+    except (ValueError, RecursionError):
+        table = None
+    if table is None:
+        return Setup((("physics", UNKNOWN),), (), readable=False)
+    entries = table.get("sources", [])
+    found = [_source(e) for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
+    return Setup(_engine(table.get("engine", {})), tuple(found), readable=True)
+
+
+def command() -> str:
+    """The command line that is running now, when it is ours."""
+    program = Path(sys.argv[0]).stem if sys.argv and sys.argv[0] else ""
+    if program in ("seerob", "cli", "__main__"):
+        return shlex.join(["seerob", *sys.argv[1:]])
+    return "a Python program that uses seerob"
+
+
+def _engine(table: Any) -> tuple[tuple[str, str], ...]:
+    try:
+        e = msgspec.convert(table, Engine, strict=False)
+    except msgspec.ValidationError:
+        return (("engine as the file has it", str(table)),)
+    return (
+        ("ticks", f"every {number(e.tick, 's')} ({number(1 / e.tick, 'Hz')})"),
+        ("physics", f"steps of {number(e.timestep, 's')} ({number(1 / e.timestep, 'Hz')}), MuJoCo"),
+        (
+            "controllers",
+            f"critically damped; bandwidth {number(e.bandwidth, 'Hz')} for robots, "
+            f"{number(e.human_bandwidth, 'Hz')} for people",
+        ),
+        ("largest tracking error that is still judged", f"{number(e.tracking_limit)} rad or m"),
+        ("the same of people", f"{number(e.human_tracking_limit)} rad or m"),
+        ("gravity", ", ".join(number(x) for x in e.gravity) + " m/s²"),
+    )
+
+
+def _source(entry: dict[str, Any]) -> tuple[str, ...]:
+    kind = str(entry.get("kind", ""))
+    rest = {key: value for key, value in entry.items() if key != "kind"}
+    source: Source | None
+    try:
+        # A report must not import a module because a recording names it.
+        if kind not in plugin.kinds("sources"):
+            raise UnknownName("kind", kind, ())
+        source = msgspec.convert(rest, plugin.load("sources", kind, Source), strict=False)
+        drives = source.target()
+    except (SeerobError, msgspec.ValidationError, ImportError):
+        source, drives = None, str(rest.get("robot") or rest.get("human") or "")
+    name = str(rest.get("name") or f"{kind} {drives}".strip())
+    places = [str(rest[key]) for key in _ADDRESSES if key in rest]
+    captured = "" if source is None else source.captured
+    origin = getattr(source, "origin", None) or rest.get("origin") or captured or None
+    says = "this kind does not say: see what was assumed" if origin is None else str(origin)
+    if source is None:
+        timeout, end = str(rest.get("timeout", "unknown")), "unknown"
+    else:
+        timeout = number(source.timeout, "s")
+        end = f"starts again after {number(source.loop_pause, 's')}" if source.loop else "stops"
+    return (
+        name,
+        drives or "–",
+        " ".join([kind, *places]),
+        ORIGINS.get(says, says),
+        timeout,
+        end,
+    )

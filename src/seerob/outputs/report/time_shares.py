@@ -12,7 +12,7 @@ from seerob.core.figures import figure
 from seerob.core.snapshot import CriterionInfo, Level
 from seerob.outputs.html import Html, joined, table, tag
 from seerob.outputs.sentences import percent
-from seerob.outputs.workbook.sheet_rows import Cell
+from seerob.outputs.workbook import Cell
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import Series
 

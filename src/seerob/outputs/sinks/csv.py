@@ -16,12 +16,11 @@ from msgspec import Meta
 from seerob.core.errors import InputError
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Result, Row, Scene, Snapshot, Verdict
-from seerob.outputs.report.masses import BONE_HEAD, bone_rows
+from seerob.outputs.report.evidence import BONE_HEAD, bone_rows
 from seerob.outputs.sink import Sink
 from seerob.outputs.tables import people as _sample_cells
-from seerob.outputs.tables.growing_table import GrowingTable, Pace, no_formula
+from seerob.outputs.tables.growing_table import NAME, GrowingTable, Pace, WholeFolder, checked, no_formula
 from seerob.outputs.tables.people import people
-from seerob.outputs.tables.whole_folder import NAME, WholeFolder, checked
 from seerob.recording.bone_errors import BoneErrors
 
 Cell = str | float | None

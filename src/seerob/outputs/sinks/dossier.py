@@ -80,9 +80,8 @@ class DossierWriter(AtEndWithResults):
             InputError: It cannot be written.
         """
         from seerob.outputs.report.page import page
-        from seerob.outputs.report.report import Report
-        from seerob.outputs.report.setup import command, setup
-        from seerob.outputs.versions import versions
+        from seerob.outputs.report.report import Report, command, setup
+        from seerob.recording.format import versions
 
         pictures = self._drawn()
         report = Report(

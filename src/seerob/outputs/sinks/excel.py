@@ -15,13 +15,11 @@ from seerob.core.samples import Sample
 from seerob.core.snapshot import Basis, Scene, Snapshot
 from seerob.description.norms.editions import editions
 from seerob.outputs.report import posture_safety as _posture_safety
-from seerob.outputs.report.masses import BONE_HEAD as ERRORS
-from seerob.outputs.report.masses import bone_rows
+from seerob.outputs.report.evidence import BONE_HEAD as ERRORS
+from seerob.outputs.report.evidence import bone_rows
 from seerob.outputs.report.time_shares import HEAD, time_rows
 from seerob.outputs.sink import AtEndWithResults, Sink
-from seerob.outputs.workbook.motion_sheets import MotionSheets
-from seerob.outputs.workbook.sheet_rows import Cell
-from seerob.outputs.workbook.sheets import workbook
+from seerob.outputs.workbook import Cell, MotionSheets, workbook
 from seerob.recording.series import CODES, Series
 
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}

@@ -23,9 +23,8 @@ from seerob.description.humans.skeleton import JOINTS
 from seerob.files.motion_capture import joint_angles, storage, trc
 from seerob.outputs.sentences import percent
 from seerob.outputs.sink import Sink
-from seerob.outputs.tables.growing_table import GrowingTable
+from seerob.outputs.tables.growing_table import NAME, GrowingTable, WholeFolder, checked
 from seerob.outputs.tables.people import Person, people
-from seerob.outputs.tables.whole_folder import NAME, WholeFolder, checked
 
 STEP = 1e-3
 """Of a joint, to see which coordinates follow it [rad or m]."""

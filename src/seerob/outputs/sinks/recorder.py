@@ -18,7 +18,7 @@ from seerob.outputs.sink import Closing, Sink, Visited
 from seerob.recording.format import Visitor
 
 if TYPE_CHECKING:
-    from seerob.outputs.mcap.tape import McapTape
+    from seerob.outputs.mcap import McapTape
 
 FLUSH_PERIOD = 0.4
 """Longest time that a tick waits before it is on disk [s]."""
@@ -47,7 +47,7 @@ class Recorder(Sink, frozen=True, kw_only=True):
         Raises:
             InputError: The file's name is wrong, it exists, or it cannot be written.
         """
-        from seerob.outputs.mcap.tape import McapTape
+        from seerob.outputs.mcap import McapTape
 
         if self.file != Path(self.file).name or not self.file.endswith(".mcap"):
             raise InputError.at(

@@ -25,8 +25,8 @@ from seerob.files.trajectories.path_map import (
 )
 from seerob.files.trajectories.trajectory import Trajectory
 from seerob.model.model import Mechanism
+from seerob.outputs import workbook as _workbook
 from seerob.outputs.tables.growing_table import no_formula
-from seerob.outputs.workbook import sheets as _sheets
 from seerob.session.permissible.ceilings import BY, Ceiling
 from seerob.session.permissible.evaluation import PermissibleSpeed
 from seerob.session.permissible.rescaled import Rescaled
@@ -232,7 +232,7 @@ def workbook(found: PermissibleSpeed, cut: Sequence[PathSegment], scene: Scene, 
         period: Of the rescaled motion's rows [s].
     """
     out = io.BytesIO()
-    with _sheets.workbook(out) as sheets:
+    with _workbook.workbook(out) as sheets:
         sheets.add("Summary", ["what", "value"], _summary(found, scene), fit=True)
         sheets.add("Segments", list(SEGMENT_HEAD), segment_rows(cut))
         sheets.add("Map", list(map_head(found.map)), map_rows(found.map))

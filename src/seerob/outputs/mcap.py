@@ -1,6 +1,8 @@
 """Writes one recording: what `seerob.recording.recording` reads back, and what foreign viewers show.
 
-Copies what is whole of a recording that was cut off, with an end and an index.
+Copies what is whole of a recording that was cut off, with an end and an index. Viewers get our scene and
+markers as Foxglove's messages. Those of this family take glTF to be y up and turn it by +90° about x on
+loading; our meshes are z up, so each model is placed with the inverse turn and ends where it belongs.
 """
 
 from __future__ import annotations
@@ -8,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -16,6 +18,23 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from foxglove_schemas_protobuf.Color_pb2 import Color
+from foxglove_schemas_protobuf.CubePrimitive_pb2 import CubePrimitive
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.ModelPrimitive_pb2 import ModelPrimitive
+from foxglove_schemas_protobuf.Point3_pb2 import Point3
+from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
+from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
+from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.data_stream import RecordBuilder
 from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, ChunkIndex, Header, Message, Metadata, Schema
@@ -24,11 +43,31 @@ from mcap.writer import Writer
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
 
+from seerob.core.errors import InputError
 from seerob.core.markers import plain
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Scene, Snapshot
-from seerob.outputs.mcap.foxglove import frame_transforms, marker_update, scene_update
-from seerob.outputs.versions import versions
+from seerob.core.snapshot import (
+    Arrow,
+    Box,
+    Ellipsoid,
+    Highlight,
+    Hull,
+    Label,
+    Marker,
+    Polyline,
+    Prism,
+    Rays,
+    Scene,
+    Segment,
+    Snapshot,
+    Sphere,
+    Vec3,
+    Vec4,
+    Verdict,
+)
+from seerob.core.transforms import Array, cross
+from seerob.outputs.picture.marker_shapes import prism
+from seerob.outputs.picture.stage_bodies import read_glb
 from seerob.recording.column import Column, Spill
 from seerob.recording.format import (
     DIGEST,
@@ -49,7 +88,217 @@ from seerob.recording.format import (
     Tick,
     Visitor,
     nanoseconds,
+    versions,
 )
+
+ROOT = "world"
+"""Frame that every other hangs on."""
+
+Z_UP_FROM_Y_UP_UNDONE: Vec4 = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
+"""−90° about x, as w, x, y, z: cancels the turn that the viewer applies to a glTF."""
+
+_COLORS: dict[Verdict | None, tuple[float, float, float]] = {
+    Verdict.WITHIN: (0x14 / 255, 0xAA / 255, 0xB8 / 255),
+    Verdict.UNDECIDED: (0xFC / 255, 0xEA / 255, 0x92 / 255),
+    Verdict.EXCEEDED: (0xC1 / 255, 0x15 / 255, 0x40 / 255),
+    None: (0.62, 0.68, 0.75),
+}
+_MARKS = {Verdict.WITHIN: "✓ ", Verdict.UNDECIDED: "? ", Verdict.EXCEEDED: "✕ ", None: ""}
+_SOLID, _CLEAR = 1.0, 0.35
+
+
+def timestamp(t: float) -> Timestamp:
+    """Run time [s] as a message."""
+    seconds, nanos = divmod(nanoseconds(t), 1_000_000_000)
+    return Timestamp(seconds=seconds, nanos=nanos)
+
+
+def scene_update(scene: Scene, meshes: dict[str, bytes]) -> SceneUpdate:
+    """Every node's mesh, each in the frame of its node; sent once."""
+    entities = []
+    for node in scene.nodes:
+        data = meshes.get(node.mesh or "")
+        if data is None:
+            continue
+        model = ModelPrimitive(
+            pose=_pose((0.0, 0.0, 0.0), Z_UP_FROM_Y_UP_UNDONE),
+            scale=Vector3(x=1, y=1, z=1),
+            media_type="model/gltf-binary",
+            data=data,
+        )
+        color = clear_color(data)
+        if color is not None:
+            # Not every viewer reads the material's blending.
+            model.override_color = True
+            model.color.CopyFrom(color)
+        entities.append(
+            SceneEntity(
+                timestamp=timestamp(0), frame_id=node.name, id=node.name, frame_locked=True, models=[model]
+            )
+        )
+    return SceneUpdate(entities=entities)
+
+
+def clear_color(data: bytes) -> Color | None:
+    """Colour of a translucent mesh, such as a safety area; None for an opaque or unreadable one."""
+    try:
+        primitives = read_glb(data, "mesh")
+    except InputError:
+        return None
+    clear = [p for p in primitives if p.alpha < 1]
+    if not clear or len(clear) < len(primitives):
+        return None
+    r, g, b = clear[0].color
+    return Color(r=r, g=g, b=b, a=clear[0].alpha)
+
+
+def frame_transforms(scene: Scene, snapshot: Snapshot) -> FrameTransforms:
+    """Pose of every node in the world."""
+    stamp = timestamp(snapshot.t)
+    poses = np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7).tolist()
+    return FrameTransforms(
+        transforms=[
+            FrameTransform(
+                timestamp=stamp,
+                parent_frame_id=ROOT,
+                child_frame_id=node.name,
+                translation=Vector3(x=x, y=y, z=z),
+                rotation=Quaternion(w=qw, x=qx, y=qy, z=qz),
+            )
+            for node, (x, y, z, qw, qx, qy, qz) in zip(scene.nodes, poses, strict=True)
+        ]
+    )
+
+
+def marker_update(snapshot: Snapshot) -> SceneUpdate:
+    """One entity per result; it replaces the one before, so that old markers vanish."""
+    return SceneUpdate(entities=[_entity(r.name, r.markers, snapshot.t) for r in snapshot.results])
+
+
+def _entity(name: str, markers: Iterable[Marker], t: float) -> SceneEntity:
+    entity = SceneEntity(timestamp=timestamp(t), frame_id=ROOT, id=name)
+    for marker in markers:
+        _draw(entity, marker)
+    return entity
+
+
+def _draw(entity: SceneEntity, marker: Marker) -> None:
+    line, fill = _color(marker.verdict, _SOLID), _color(marker.verdict, _CLEAR)
+    match marker:
+        case Segment(start=start, end=end):
+            entity.lines.append(_lines([start, end], line))
+            _text(entity, marker, _middle(start, end))
+        case Arrow(origin=origin, vector=vector):
+            entity.lines.append(_lines(_arrow(np.array(origin), np.array(vector)), line))
+            _text(entity, marker, origin)
+        case Sphere(center=center, radius=r):
+            size = Vector3(x=2 * r, y=2 * r, z=2 * r)
+            entity.spheres.append(SpherePrimitive(pose=_pose(center), size=size, color=fill))
+            _text(entity, marker, center)
+        case Ellipsoid(center=center, wxyz=wxyz, radii=(a, b, c)):
+            size = Vector3(x=2 * a, y=2 * b, z=2 * c)
+            entity.spheres.append(SpherePrimitive(pose=_pose(center, wxyz), size=size, color=fill))
+            _text(entity, marker, center)
+        case Box(center=center, wxyz=wxyz, size=(a, b, c)):
+            size = Vector3(x=a, y=b, z=c)
+            entity.cubes.append(CubePrimitive(pose=_pose(center, wxyz), size=size, color=fill))
+            _text(entity, marker, center)
+        case Hull(vertices=vertices, faces=faces):
+            entity.triangles.append(_triangles(vertices, [i for face in faces for i in face], fill))
+            if vertices:
+                _text(entity, marker, vertices[0])
+        case Polyline(points=points):
+            entity.lines.append(_lines([p for leg in marker.legs() for p in leg], line))
+            if points:
+                _text(entity, marker, points[0])
+        case Prism():
+            placed, prism_faces, edges = prism(marker)
+            corners = [(float(x), float(y), float(z)) for x, y, z in placed]
+            entity.triangles.append(_triangles(corners, [int(i) for i in prism_faces.ravel()], fill))
+            entity.lines.append(_lines([corners[i] for edge in edges for i in edge], line))
+            if corners:
+                _text(entity, marker, corners[-1])
+        case Rays(starts=starts):
+            beams = list(enumerate(marker.beams()))
+            for hit, color in ((True, line), (False, fill)):
+                ends = [p for k, beam in beams if (k in marker.hits) is hit for p in beam]
+                entity.lines.append(_lines(ends, color))
+            if starts:
+                _text(entity, marker, starts[0])
+        case Label(position=position, text=text):
+            _text(entity, marker, position, text)
+        case Highlight():
+            # A body's colour belongs to its model, which is sent once; the verdict is in /results.
+            pass
+
+
+def _text(entity: SceneEntity, marker: Marker, position: Vec3, text: str = "") -> None:
+    text = text or getattr(marker, "label", "")
+    if text:
+        entity.texts.append(
+            TextPrimitive(
+                pose=_pose(position),
+                billboard=True,
+                font_size=14,
+                scale_invariant=True,
+                color=_color(marker.verdict, _SOLID),
+                text=_MARKS[marker.verdict] + text,
+            )
+        )
+
+
+def _lines(points: list[Vec3], color: Color) -> LinePrimitive:
+    return LinePrimitive(
+        type=LinePrimitive.LINE_LIST,
+        pose=_pose((0.0, 0.0, 0.0)),
+        thickness=3,
+        scale_invariant=True,
+        points=[_point(p) for p in points],
+        color=color,
+    )
+
+
+def _triangles(points: Iterable[Vec3], indices: list[int], color: Color) -> TriangleListPrimitive:
+    return TriangleListPrimitive(
+        pose=_pose((0.0, 0.0, 0.0)), points=[_point(v) for v in points], indices=indices, color=color
+    )
+
+
+def _arrow(origin: Array, vector: Array) -> list[Vec3]:
+    """Shaft and four barbs as a line list, shape (10, 3)."""
+    tip = origin + vector
+    length = float(np.linalg.norm(vector))
+    points = [origin, tip]
+    if length > 0:
+        along = vector / length
+        helper = np.eye(3)[int(np.abs(along).argmin())]
+        across = cross(along, helper)
+        across /= np.linalg.norm(across)
+        upward = cross(along, across)
+        for side in (across, -across, upward, -upward):
+            points += [tip, tip - length * (0.2 * along + 0.08 * side)]
+    return [(float(p[0]), float(p[1]), float(p[2])) for p in points]
+
+
+def _middle(a: Vec3, b: Vec3) -> Vec3:
+    return (a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2
+
+
+def _point(p: Vec3) -> Point3:
+    return Point3(x=p[0], y=p[1], z=p[2])
+
+
+def _pose(position: Vec3, wxyz: Vec4 = (1.0, 0.0, 0.0, 0.0)) -> Pose:
+    w, x, y, z = wxyz
+    return Pose(
+        position=Vector3(x=position[0], y=position[1], z=position[2]),
+        orientation=Quaternion(w=w, x=x, y=y, z=z),
+    )
+
+
+def _color(verdict: Verdict | None, alpha: float) -> Color:
+    r, g, b = _COLORS[verdict]
+    return Color(r=r, g=g, b=b, a=alpha)
 
 
 def mend(source: Path, to: Path) -> int:
@@ -216,8 +465,6 @@ class McapTape:
             raise
 
     def _register(self) -> dict[str, int]:
-        from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-        from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         channels = {
             topic: self._mcap.register_channel(topic, "msgpack", 0) for topic in (SCENE, SAMPLES, SNAPSHOT)

@@ -1,1 +1,0 @@
-"""The recording as it is written, for ourselves and for foreign viewers."""

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import pytest
 import trimesh
 
-from made_cell import UR10, made
+from made_cell import FLOATING, UR10, made, person, two_r
 from seerob.core.shapes import Mesh, Solid, capsule
-from seerob.criteria.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs, thickest
+from seerob.criteria.contact.clamping import (
+    STILL,
+    OwnJoints,
+    clamps,
+    pinch_pairs,
+    robot_pinch_pairs,
+    thickest,
+)
 from seerob.distance.least import Shapes
+from seerob.model.model import Model
 
 HAND, BODY = 0.1, 0.5
 THICKNESS = np.array([[HAND, BODY]])
@@ -136,3 +147,176 @@ def test_own_links_of_a_robot_are_paired_by_the_joints_between_them(tmp_path) ->
     assert ((widest[pairs.inner] <= 0.6) | np.isinf(widest[pairs.inner])).all()
     (surfaces, _), *_ = pairs.queries
     assert [model.bodies[i].name for i in surfaces.a] == ["wall"]
+
+
+def test_what_is_not_a_number_clamps() -> None:
+    assert clamps(np.array([np.nan, 0.3]), np.array([0.1, np.nan]), np.full((2, 1), 0.5)).all()
+    assert not clamps(np.array([np.nan, 0.3]), np.zeros(2), np.full((2, 1), 0.5)).any()
+
+
+def test_parts_may_be_a_tenth_farther_apart_than_they_were_found_in_any_position() -> None:
+    sizes, fits = (0.1, 0.3), np.array([0.18])
+    found = thickest(np.array([0.447, 0.45, 0.6]), fits, np.array([0.5]), sizes, least=0.004)
+    np.testing.assert_allclose(found[:, 0], [0.3, 0.446, 0.5])
+
+
+def test_the_fastest_gap_that_clamps_counts_for_both_of_its_sides_but_not_those_to_what_stands() -> None:
+    bodies = [(n, [capsule(np.zeros(3), np.array([0.0, 0, 0.1]), 0.02)]) for n in "abcd"]
+    # Gaps of b and c to the floor a, of both to d, which moves, and between them.
+    pairs = pinch_pairs(Shapes.build(bodies), [1, 2], [0], frozenset(), others=[3], cap=1.0)
+    assert pairs.across.tolist() == [-1, -1, 3, 3, 2]
+    assert pairs.inner.tolist() == [False] * 4 + [True]
+    speed = np.array([9.0, 9.0, 0.2, 0.3, 0.7])
+    clamped = np.array([[1, 1], [1, 1], [1, 0], [1, 0], [0, 1]], bool)
+    np.testing.assert_array_equal(pairs.fastest(clamped, speed), [[0.2, 0.7], [0.3, 0.7]])
+    clamped[4, 0] = True
+    np.testing.assert_array_equal(pairs.fastest(clamped, speed), [[0.7, 0.7], [0.7, 0.7]])
+    # Of a body whose number is 0, too.
+    pairs = pinch_pairs(Shapes.build(bodies), [1, 2], [], frozenset(), others=[0], cap=1.0)
+    np.testing.assert_array_equal(pairs.fastest(np.ones((3, 1), bool), speed[:3]), [[9.0], [9.0]])
+    assert pairs.per_body(np.array([[False, True], [False, False], [False, False]])).tolist() == [
+        [False, True],
+        [False, False],
+    ]
+
+
+FOLDED = ((-0.4, 1.2), (2.4, 3.0), (-0.2, 0.2))
+
+
+def folded(folder: Path, more: str = "") -> Model:
+    """Three links of 1 m × 0.1 m in a plane, the second always folded back; and who is around."""
+    links, joints = (
+        ['<link name="base"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>'],
+        [],
+    )
+    for k, (low, high) in enumerate(FOLDED):
+        links.append(
+            f'<link name="l{k}"><inertial><origin xyz="0.5 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" '
+            'izz="1" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="0.5 0 0"/><geometry>'
+            '<box size="1 0.1 0.1"/></geometry></collision></link>'
+        )
+        parent, x = ("base", 0) if k == 0 else (f"l{k - 1}", 1)
+        joints.append(
+            f'<joint name="j{k}" type="revolute"><parent link="{parent}"/><child link="l{k}"/>'
+            f'<origin xyz="{x} 0 0"/><axis xyz="0 0 1"/>'
+            f'<limit lower="{low}" upper="{high}" effort="100" velocity="2"/></joint>'
+        )
+    text = (
+        f'{FLOATING}[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n{person("op", 5, 0, 0)}'
+        '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [4, 0, 0] }\n'
+        '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'
+    )
+    return made(folder, text + more, {"arm.urdf": f'<robot name="r">{"".join(links + joints)}</robot>'}).model
+
+
+def gaps_of(model: Model, thinnest: float) -> tuple[dict[tuple[str, str], float], set[frozenset[str]]]:
+    """How far apart both sides of each gap can be, and which of its own parts are looked at by place."""
+    pairs, widest, placed = robot_pinch_pairs(model, model.robot("arm"), cap=0.6, thinnest=thinnest)
+    names = [body.name for body in model.bodies]
+    gaps = [
+        (names[pairs.moving[row]].split("/")[1], "around" if other < 0 else names[other])
+        for row, other in zip(pairs.first.tolist(), pairs.across.tolist(), strict=True)
+    ]
+    assert len({*gaps}) == len(gaps)
+    (around, _), *_ = pairs.queries
+    assert [names[i] for i in around.a] == ["wall"]
+    places = {frozenset((names[i].split("/")[1], names[j].split("/")[1])) for i, j, _ in placed}
+    return dict(zip(gaps, widest.tolist(), strict=True)), places
+
+
+def test_own_parts_are_as_far_apart_as_their_joints_can_bring_them(tmp_path: Path) -> None:
+    """A folded arm: sin 2.4 less two half widths. A thicker body part never gets there, but is clamped."""
+    model = folded(tmp_path)
+    found, places = gaps_of(model, 0.1)
+    assert places == {frozenset(pair) for pair in (("base", "l0"), ("l0", "l1"), ("l1", "l2"))}
+    around = {(f"l{k}", "around") for k in range(3)}
+    assert {*found} == around | {("l1", "arm/base"), ("l2", "arm/base"), ("l0", "arm/l2")}
+    assert all(np.isinf(found[gap]) for gap in around)
+    reach = np.sin(2.4) - 0.1
+    assert reach - 0.03 < found["l1", "arm/base"] <= reach + 1e-9
+    assert reach - 0.03 < found["l0", "arm/l2"] <= reach + 1e-9
+    # At exactly this thickness it fits; a hair thicker it does not, and wherever these are near they clamp.
+    for width, fits in ((found["l1", "arm/base"], True), (np.nextafter(found["l1", "arm/base"], 1), False)):
+        assert np.isfinite(gaps_of(model, float(width))[0]["l1", "arm/base"]) == fits
+
+
+HAND_OF = (
+    '[[machines]]\nname = "{}"\non = "arm/l2"\nat = {{ position = [1.1, 0, 0] }}\n'
+    "shape = {{ box = [0.02, 0.02, 0.02] }}\nmass = 0.2\ngrip = {{ {} }}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("ends", "endless"), [("lower = 0, upper = 0.05", False), ("upper = 0.05", True), ("", True)]
+)
+def test_fingers_without_ends_clamp_wherever_they_are_near_and_others_by_their_stroke(
+    tmp_path: Path, ends: str, endless: bool
+) -> None:
+    model = folded(tmp_path, HAND_OF.format("hand", ends))
+    found, places = gaps_of(model, 0.1)
+    fingers = {frozenset(("l2", "left")), frozenset(("l2", "right")), frozenset(("left", "right"))}
+    assert (fingers <= places) is not endless
+    assert not (fingers & places) or not endless
+    inner = {gap: width for gap, width in found.items() if gap[1] != "around"}
+    by_fingers = {
+        gap: width for gap, width in inner.items() if {"left", "right"} & {gap[0], gap[1].split("/")[1]}
+    }
+    assert len(by_fingers) == (9 if endless else 6)
+    assert all(np.isinf(width) for width in by_fingers.values()) == endless
+    assert all(np.isfinite(width) for gap, width in inner.items() if gap not in by_fingers)
+
+
+def test_joints_between_bodies_are_those_of_one_way_only_and_poses_are_where_they_bring_them(
+    tmp_path: Path,
+) -> None:
+    """A planar arm of which the second joint follows the first, and a gripper that opens without end."""
+    mimic = '<mimic joint="j1" multiplier="2" offset="0.3"/>'
+    text = FLOATING + '[[robots]]\nname = "zarm"\nmodel = "arm.urdf"\n' + HAND_OF.format("ahand", "")
+    model = made(tmp_path, text.replace("arm/l2", "zarm/l2"), {"arm.urdf": two_r(mimic=mimic)}).model
+    joints, index = OwnJoints(model), {body.name: body.index for body in model.bodies}
+    turn, grip = ("zarm", 0), ("ahand", 0)
+    expected = {
+        ("zarm/l1", "zarm/l2"): {turn},
+        ("zarm/l2", "ahand/left"): {grip},
+        ("ahand/left", "ahand/right"): {grip},
+        ("zarm/l1", "ahand/left"): {turn, grip},
+        ("zarm/l1", "zarm/l1"): set(),
+    }
+    for (a, b), between in expected.items():
+        assert joints.between(index[a], index[b]) == joints.between(index[b], index[a]) == between
+    assert joints.in_order([grip, turn]) == joints.in_order([turn, grip]) == [turn, grip]
+    assert joints.range(turn) == (-np.pi, np.pi)
+    assert joints.range(grip) == (-1.0, 1.0)
+    assert (joints.endless(turn), joints.endless(grip)) == (False, True)
+    q, opening = np.array([0.0, 0.4, -1.1]), np.array([0.0, 0.1, 0.3])
+    rotations, positions = joints.poses({turn: q, grip: opening})
+    np.testing.assert_allclose(
+        positions[:, index["zarm/l2"]], np.stack([np.cos(q), np.sin(q), 0 * q], axis=1), atol=1e-12
+    )
+    x = rotations[:, index["zarm/l2"], :, 0]
+    np.testing.assert_allclose(
+        np.arctan2(x[:, 1], x[:, 0]), (3 * q + 0.3 + np.pi) % (2 * np.pi) - np.pi, atol=1e-12
+    )
+    apart = positions[:, index["ahand/left"]] - positions[:, index["ahand/right"]]
+    np.testing.assert_allclose(
+        np.linalg.norm(apart, axis=1) - np.linalg.norm(apart[0]), 2 * opening, atol=1e-12
+    )
+
+
+def test_ends_of_joints_are_those_of_the_file_and_one_side_without_any_goes_some_way(tmp_path: Path) -> None:
+    text = HAND_OF.format("hand", "lower = 0, upper = 0.05") + HAND_OF.format("other", "").replace(
+        "1.1", "1.3"
+    )
+    model = folded(tmp_path, text)
+    joints = OwnJoints(model)
+    assert [joints.range(("arm", k)) for k in range(3)] == [*FOLDED]
+    assert not any(joints.endless(("arm", k)) for k in range(3))
+    assert joints.range(("hand", 0)) == (0.0, 0.025)  # of each finger
+    assert not joints.endless(("hand", 0))
+    assert joints.range(("other", 0)) == (-1.0, 1.0)
+    assert joints.in_order([("other", 0), ("arm", 2), ("arm", 0), ("arm", 1)]) == [
+        ("arm", 0),
+        ("arm", 1),
+        ("arm", 2),
+        ("other", 0),
+    ]

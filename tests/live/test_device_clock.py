@@ -22,6 +22,7 @@ from seerob.devices.live.device_clock import (
     SLEW,
     STEP,
     DeviceClock,
+    Known,
 )
 
 PERIOD = 0.008
@@ -209,6 +210,207 @@ def test_a_backlog_keeps_its_own_instants():
         clock.hear(0.01 * k, 5 + 0.01 * k)
     for k in range(100, 400):
         assert clock.hear(0.01 * k, 9.0).t == pytest.approx(5 + 0.01 * k, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("off", "doubted", "rate"),
+    [
+        (0.0049, False, 0.01),
+        (0.005, False, 0.01),  # up to 5 ms instants are relied on
+        (0.0051, True, 0.1),
+        (0.0199, True, 0.1),
+        (0.02, True, 0.1),  # more than 20 ms is no network
+    ],
+)
+def test_a_packet_that_came_faster_shifts_what_follows_by_a_share_of_the_devices_own_time(off, doubted, rate):
+    """Shifted by a hundredth, or a tenth of it; exactly at the edges, too: the other offset is 0."""
+    clock = DeviceClock()
+    assert clock.hear(0.0, off) == (off, "")
+    first = clock.hear(0.01, 0.01)
+    assert clock.latency == 0.0
+    assert bool(first.invalid_reason) is doubted
+    assert first.t == pytest.approx(0.01 + off - 0.01 * rate, abs=1e-12)
+    # Held back for a second, and then the next one that it took: no time in which it was shifted further.
+    second = clock.hear(0.02, 1.02)
+    assert 0.01 * (1 - rate) - 1e-12 <= second.t - first.t <= 0.0099 + 1e-12
+    assert clock.latency == pytest.approx(1.0, abs=1e-3)
+    # In the end it is where the offset is, and no farther: that has risen by as much as clocks drift.
+    *_, last = heard(clock, [(t, t) for t in (6.0, 7.0, 8.0, 9.0)])
+    assert last == (pytest.approx(9.0, abs=1e-9), "")
+
+
+def test_a_doubt_of_a_clock_that_is_being_found_ends_with_it():
+    clock = DeviceClock()
+    clock.hear(0.0, 0.006)
+    found = [clock.hear(0.001 * k, 0.001 * k) for k in range(1, 20)]
+    assert [bool(each.invalid_reason) for each in found] == [k < 10 for k in range(19)]
+
+
+@pytest.mark.parametrize("silence", [1.0, 50.0])
+def test_an_offset_rises_by_two_parts_in_ten_thousand_and_no_more(silence):
+    clock = DeviceClock()
+    clock.hear(0.0, 5.0)
+    late = clock.hear(silence, 7.0 + silence)
+    assert clock.offset == pytest.approx(5.0 + 2e-4 * (2.0 + silence), abs=1e-12)
+    assert late.t == pytest.approx(silence + clock.offset, abs=1e-12)
+    early = DeviceClock()  # of a host that was switched on just now
+    early.hear(0.0, 0.2)
+    early.hear(0.5, 1.2)
+    assert early.offset == pytest.approx(0.2 + 2e-4 * 1.0, abs=1e-12)
+    # Nor does it fall with what arrives before what was heard already, as threads may tell it.
+    before = clock.offset
+    clock.hear(silence + 0.01, 6.5 + silence)
+    assert clock.offset == before
+    clock.hear(silence + 0.02, 7.0 + silence + 0.5)
+    assert clock.offset == pytest.approx(before + 2e-4 * 0.5, abs=1e-12)
+
+
+def test_stamps_ahead_by_more_than_twenty_milliseconds_step_the_clock_at_the_second():
+    clock = DeviceClock()
+    clock.hear(0.0, 0.03)
+    assert clock.hear(1.0, 1.0 + 0.0099).t is None
+    assert clock.offset == 0.03
+    # The later of both words is believed, and nothing is relied on for half a second.
+    told = clock.hear(1.1, 1.1 + 0.005)
+    assert clock.offset == pytest.approx(0.0099)
+    assert told.t == pytest.approx(1.1 + 0.0099)
+    assert "0.025 s ahead" in told.invalid_reason
+    assert clock.hear(1.6, 1.6049).invalid_reason
+    assert clock.hear(1.61, 1.6149).invalid_reason == ""
+    # A word that was taken back is not the first of two.
+    clock = DeviceClock()
+    clock.hear(0.0, 0.03)
+    for k in range(1, 10):
+        assert (clock.hear(float(k), k + 0.03 * (k % 2 == 0)).t is None) == (k % 2 == 1)
+
+
+@pytest.mark.parametrize(("back", "restarts"), [(0.249, False), (0.25, False), (0.251, True), (0.9, True)])
+def test_what_lies_a_quarter_of_a_second_back_was_overtaken_on_the_way(back, restarts):
+    clock = DeviceClock()
+    clock.hear(1.0, 6.0, 1)
+    found = clock.hear(1.0 - back, 6.1, 2)
+    assert (found.t is not None, bool(found.invalid_reason)) == (restarts, restarts)
+    # Of one that has connected anew it is a restart, but for the same stamp again.
+    clock = DeviceClock()
+    clock.hear(1.0, 6.0, 1)
+    clock.reconnect()
+    assert clock.hear(1.0, 6.05, 1) == (None, "")
+    found = clock.hear(1.0 - back, 6.1, 1)
+    assert found.t == 6.1
+    assert f"by {back:.3g} s: it seems to have started again" in found.invalid_reason
+
+
+@pytest.mark.parametrize(("forgeable", "said"), [(True, 7), (False, 7), (None, 7), (True, 8)])
+def test_who_says_again_by_datagram_what_it_said_is_doubted_for_a_minute(forgeable, said):
+    clock = DeviceClock()
+    clock.hear(1.0, 6.0, 7)
+    clock.reconnect()
+    assert clock.hear(0.5, 100.0, 9).t == 100.0
+    found = clock.hear(1.0, 100.5, said, **({} if forgeable is None else {"forgeable": forgeable}))
+    recording = bool(forgeable) and said == 7
+    assert ("recording" in found.invalid_reason) is recording
+    assert bool(clock.hear(60.9, 160.4, 1).invalid_reason) is recording
+    assert clock.hear(61.1, 160.6, 2).invalid_reason == ""
+
+
+def test_who_says_again_within_a_connection_what_it_said_is_no_restart():
+    clock = DeviceClock()
+    for k in range(10):
+        clock.hear(1.0 * k, 5.0 + k, k)
+    found = clock.hear(2.0, 14.5, 2)
+    assert found.t is None
+    assert "says again what it said 7 s before" in found.invalid_reason
+    assert clock.hear(10.0, 15.0, 10).invalid_reason
+    assert clock.hear(10.1, 15.1, 11).invalid_reason == ""
+    # Another thing at that time is a restart.
+    assert "started again" in clock.hear(2.0, 16.0, 99).invalid_reason
+
+
+def test_a_device_that_starts_again_is_not_relied_on_for_two_and_a_half_seconds_and_then_not_for_a_minute():
+    clock = DeviceClock()
+    clock.hear(500.0, 10.0)
+    clock.hear(0.0, 11.0)
+    assert clock.hear(2.49, 13.49).invalid_reason
+    assert clock.hear(2.5, 13.5).invalid_reason
+    assert clock.hear(2.51, 13.51).invalid_reason == ""
+    assert clock.hear(0.0, 71.0, 1).invalid_reason.endswith("started again")  # a minute after: not again
+    clock.hear(1.0, 72.0)
+    assert clock.hear(0.0, 130.9, 2).invalid_reason.endswith("a loop?")
+    assert clock.hear(59.9, 190.8).invalid_reason.endswith("a loop?")
+    assert clock.hear(60.1, 191.0).invalid_reason == ""
+
+
+def test_instants_never_go_back_where_a_clock_steps_that_was_being_found():
+    clock = DeviceClock()
+    told = heard(clock, [(0.9, 5.9), (0.92, 5.905), (0.95, 5.91), (0.951, 5.911), (0.97, 5.93)])
+    assert told[0] == (5.9, "")
+    assert told[1].t == pytest.approx(5.918)  # shifted by a tenth of 20 ms, of the 15 ms that it is off
+    assert told[2].t is None  # 25 ms ahead of that
+    assert told[3].t == pytest.approx(5.918 + 1e-6, abs=1e-9)
+    assert told[4].t == pytest.approx(5.93, abs=1e-5)
+    assert all("ahead" in each.invalid_reason for each in told[2:])
+    assert "ahead" in clock.hear(1.449, 6.41).invalid_reason
+    assert clock.hear(1.455, 6.415).invalid_reason == ""
+
+
+def test_two_samples_are_never_of_one_instant():
+    clock = DeviceClock()
+    told = heard(clock, [(0.9, 5.9), (0.92, 5.905), (0.954, 5.916)])
+    assert 0.955 + ((again := told[1].t) - 0.955) == again
+    assert clock.hear(0.955, again).t == pytest.approx(again + 1e-6, abs=1e-9)
+
+
+def test_a_doubt_of_a_minute_is_not_cut_short_by_one_of_half_a_second():
+    clock = DeviceClock()
+    heard(clock, [(500.0, 10.0), (0.0, 11.0)])
+    assert "a loop?" in clock.hear(-1.0, 12.0).invalid_reason
+    assert "a loop?" in clock.hear(0.15, 13.0).invalid_reason  # 150 ms ahead
+    assert "a loop?" in clock.hear(10.0, 22.99).invalid_reason
+    assert "a loop?" in clock.hear(58.9, 71.9).invalid_reason
+    assert clock.hear(59.1, 72.1).invalid_reason == ""
+
+
+def test_what_was_said_after_a_restart_is_remembered_for_hours_too(monkeypatch):
+    monkeypatch.setattr(device_clock, "KEPT", 10)
+    clock = DeviceClock()
+    for run, said in enumerate((1, 2, 2)):
+        clock.reconnect()
+        for k in range(500):
+            host = 5 + 1000 * run + 0.1 * k
+            found = clock.hear(0.1 * k, host, hash((said, k)), forgeable=True)
+    assert "is a recording played to it?" in found.invalid_reason
+
+
+@pytest.mark.parametrize("device", [1e12, -1e12, 0.0])
+def test_clocks_count_to_a_trillion_seconds(device):
+    assert DeviceClock().hear(device, 5.0).t == pytest.approx(5.0, abs=1e-3)
+    assert DeviceClock().hear(device * 1.01 or math.inf, 5.0).t is None
+
+
+def test_what_another_listener_knew_of_a_clock_goes_on():
+    """Two seconds late are two seconds late; the time since is that in which clocks drift."""
+    clock = DeviceClock(Known(offset=5.0, device=100.0, host=105.0))
+    assert clock.offset == 5.0
+    late = clock.hear(110.0, 117.0)
+    assert clock.latency == pytest.approx(2.0 - 12 * 2e-4, abs=1e-9)
+    assert late.t == pytest.approx(115.0 + 12 * 2e-4, abs=1e-9)
+    assert DeviceClock().offset is None
+    assert DeviceClock().latency == 0.0
+    # Whose clock lies before that has started again.
+    assert "started again" in DeviceClock(Known(5.0, 100.0, 105.0)).hear(99.9, 106.0).invalid_reason
+
+
+def test_of_the_stamps_of_hours_one_of_each_second_is_remembered(monkeypatch):
+    """At random: between half and a whole second after the last, so no player knows which."""
+    monkeypatch.setattr(device_clock, "KEPT", 10)
+    clock, intervals = DeviceClock(), set()
+    for k in range(20_000):
+        clock.hear(0.01 * k, 5 + 0.01 * k, k)
+    intervals = np.diff([*clock._marks])
+    assert len(clock._said) == 10
+    assert intervals.min() == pytest.approx(0.5, abs=0.02)
+    assert intervals.max() == pytest.approx(1.0, abs=0.02)
+    assert len({*intervals.round(3)}) > 20
 
 
 @given(st.lists(st.floats(1e-4, 1.0), min_size=1, max_size=60))

@@ -1,7 +1,7 @@
 """A pytest session that runs its tests once, and then those that a mutant could fail, for each mutant.
 
 The changed code is put into the living functions of a forked process: nothing on disk changes, and what was
-imported and collected once is not imported again. Which tests call which functions is seen while they run
+imported and collected once is not imported again. Which tests run which statements is seen while they run
 unchanged.
 """
 
@@ -40,6 +40,8 @@ FIRST = 3
 
 Callers = dict[tuple[str, str], list[Any]]
 """Tests that call a function, by file and qualified name."""
+Lines = dict[tuple[str, int], set[str]]
+"""Names of the tests that run a line, by file."""
 
 
 class Outcome(NamedTuple):
@@ -48,7 +50,7 @@ class Outcome(NamedTuple):
     mutant: Mutant
     killed: bool
     tests: int
-    """That call what it changes; none of them, and it survives."""
+    """That run what it changes; none of them, and it survives."""
 
 
 class Mutation:
@@ -69,6 +71,8 @@ class Mutation:
         """Tests that fail without any change, and mutants that could not be put in."""
         self.detour: dict[str, float] = {}
         """Of each test: how long it takes, times how much it calls; little where it asks one function."""
+        self.naming: dict[str, list[Any]] = defaultdict(list)
+        """Tests that call what speaks of a constant or attribute, by its name."""
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection(self) -> None:
@@ -90,8 +94,15 @@ class Mutation:
         """Instead of running the tests once."""
         if session.testsfailed:
             raise session.Interrupted(f"{session.testsfailed} errors while tests were collected")
-        callers, seconds = self._unchanged(session)
-        queue = [(mutant, self._tests(mutant, session, callers, seconds)) for mutant in self.mutants]
+        callers, lines, seconds = self._unchanged(session)
+        statements = {file: _statements(source) for file, source in self.sources.items()}
+        queue = []
+        for mutant in self.mutants:
+            tests = self._tests(mutant, session, callers, seconds)
+            if (statement := statements[mutant.file].get(mutant.node)) and mutant.function != "<module>":
+                runs = set().union(*(lines[mutant.file, line] for line in statement))
+                tests = [item for item in tests if item.nodeid in runs]
+            queue.append((mutant, tests))
         running: dict[int, tuple[Mutant, list[Any]]] = {}
         kills: Counter[tuple[str, str, str]] = Counter()
         # Whatever is here by now stays: a collection in a forked process would copy it all.
@@ -120,18 +131,26 @@ class Mutation:
                         kills[mutant.file, mutant.function, items[first].nodeid] += 1
         return True
 
-    def _unchanged(self, session: pytest.Session) -> tuple[Callers, dict[str, float]]:
-        """Tests that call each function, and how long each takes."""
+    def _unchanged(self, session: pytest.Session) -> tuple[Callers, Lines, dict[str, float]]:
+        """Tests that call each function and run each line, and how long each takes."""
         files = {str(PACKAGE / mutant.file): mutant.file for mutant in self.mutants}
         modules = {_module(mutant.file) for mutant in self.mutants}
+        bound = {mutant.assigned for mutant in self.mutants}
         callers: Callers = defaultdict(list)
+        lines: Lines = defaultdict(set)
         seconds = {}
         for item in session.items:
             seen: set[types.CodeType] = set()
+            run: set[tuple[types.CodeType, int]] = set()
 
-            # Of what a tracer that follows no line is told: calls, and of Python's functions only.
-            def note(frame: types.FrameType, event: str, _: object, seen: set[Any] = seen) -> None:
+            def follow(frame: types.FrameType, event: str, _: object, run: set[Any] = run) -> Any:
+                run.add((frame.f_code, frame.f_lineno))
+                return follow
+
+            # Lines are followed in what is changed; of all else a tracer is told calls of Python's functions.
+            def note(frame: types.FrameType, event: str, _: object, seen: set[Any] = seen) -> Any:
                 seen.add(frame.f_code)
+                return follow if frame.f_code.co_filename in files else None
 
             # Else only the first test that asks would be seen to call what is behind the cache.
             for cached in _cached(modules):
@@ -156,24 +175,52 @@ class Mutation:
             }
             for where in called:
                 callers[where].append(item)
-        return callers, seconds
+            for name in bound.intersection(name for code in seen for name in code.co_names):
+                self.naming[name].append(item)
+            for code, line in run:
+                lines[files[code.co_filename], line].add(item.nodeid)
+        return callers, lines, seconds
 
     def _tests(
         self, mutant: Mutant, session: pytest.Session, callers: Callers, seconds: dict[str, float]
     ) -> list[Any]:
-        whole = mutant.function == "<module>"
-        found = {
-            item.nodeid: item
-            for (file, function), items in callers.items()
-            if file == mutant.file
-            and (whole or function == mutant.function or function.startswith(f"{mutant.function}."))
-            for item in items
-        }
-        # What is bound at import, such as the bound of an option, is asked for by name and calls nothing.
-        for item in session.items:
-            if mutant.assigned and mutant.assigned in _names(item) and item.nodeid in seconds:
-                found[item.nodeid] = item
+        # What is bound at import calls nothing: who speaks of it is asked.
+        if mutant.function == "<module>":
+            found = {item.nodeid: item for item in self.naming[mutant.assigned]}
+        else:
+            found = {
+                item.nodeid: item
+                for (file, function), items in callers.items()
+                if file == mutant.file
+                and (function == mutant.function or function.startswith(f"{mutant.function}."))
+                for item in items
+            }
+            found |= {
+                item.nodeid: item for item in self.naming[mutant.assigned] if mutant.assigned in _names(item)
+            }
         return sorted(found.values(), key=lambda item: self.detour[item.nodeid])
+
+
+def _statements(source: str) -> dict[int, range]:
+    """Lines of the statement that each node of a file is in, without its body; none of a function's head."""
+    tree = ast.parse(source)
+    numbers = {id(node): k for k, node in enumerate(ast.walk(tree))}
+    found: dict[int, range] = {}
+
+    def inside(node: ast.AST, statement: range | None) -> None:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            statement = None
+        elif isinstance(node, ast.stmt):
+            body = getattr(node, "body", None)
+            last = max(body[0].lineno - 1, node.lineno) if body else (node.end_lineno or node.lineno)
+            statement = range(node.lineno, last + 1)
+        if statement is not None:
+            found[numbers[id(node)]] = statement
+        for child in ast.iter_child_nodes(node):
+            inside(child, statement)
+
+    inside(tree, None)
+    return found
 
 
 def _names(item: pytest.Item) -> set[str]:

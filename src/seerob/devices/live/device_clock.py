@@ -22,7 +22,8 @@ DRIFT = 2e-4
 true time (usual data sheets: 20 to 100 ppm), two of them drift apart by 200 ppm at most. A delay that grows
 more slowly than this cannot be told from drift."""
 SLEW = 0.01
-"""How fast the instants of samples are shifted after the offset fell [s/s]: speeds are off by as much."""
+"""How fast the instants of samples are shifted after the offset fell, by the device's time [s/s]: speeds are
+off by as much."""
 SETTLED = 0.005
 """Nearer to what the offset was found to be, instants are relied on [s]: a quarter of a tick's usual delay
 behind the world. Farther away they are shifted ten times as fast, and nothing is relied on."""
@@ -138,7 +139,7 @@ class DeviceClock:
         raw = host - device
         if not math.isfinite(self._offset):
             self._offset = self._applied = raw
-        elif not self._follow(raw, host):
+        elif not self._follow(raw, host, device - self._newest):
             return Instant(None, self._standing(host))
         self._connected = False
         self._newest, self._host = device, max(host, self._host)
@@ -147,10 +148,10 @@ class DeviceClock:
             self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
         self._remember(device, said)
         t = device + self._applied
-        if t <= self._last and self._until > host:
+        if t <= self._last:
             # The clock has stepped back: what comes is news all the same, and nothing is relied on.
             t = self._last + AFTER
-            self._hold(host, HOLD, self._doubt)
+            self._hold(host, HOLD, self._standing(host))
         self._last = max(self._last, t)
         return Instant(t, self._standing(host))
 
@@ -161,8 +162,15 @@ class DeviceClock:
             _keep(self._marks, MARKED, device, said)
             self._next_mark = device + MARK_EVERY * random.uniform(0.5, 1.0)  # noqa: S311 - no secret
 
-    def _follow(self, raw: float, host: float) -> bool:
-        """Let the offset follow; False for a sample that is ahead of its time and is not believed yet."""
+    def _follow(self, raw: float, host: float, interval: float) -> bool:
+        """Let the offset follow; False for a sample that is ahead of its time and is not believed yet.
+
+        Args:
+            raw: Host time less device time [s].
+            host: When it arrived [s].
+            interval: On the device's clock, since the newest sample [s]: what was held back on the way comes
+                all at once, and is not shifted for the time that it waited.
+        """
         passed = max(0.0, host - self._host)
         risen = self._offset + DRIFT * passed
         if raw < self._offset - STEP:
@@ -181,10 +189,10 @@ class DeviceClock:
             if self._ahead is None:
                 self._hold(host, HOLD, f"its clock was found {1e3 * off:.0f} ms off")
         elif off > SETTLED:
-            self._applied -= min(off, 10 * SLEW * passed)
+            self._applied -= min(off, 10 * SLEW * interval)
             self._hold(host, 0.0, f"its clock is being found: {1e3 * off:.0f} ms off")
         elif off > 0:
-            self._applied -= min(off, SLEW * passed)
+            self._applied -= min(off, SLEW * interval)
         else:
             self._applied = self._offset
         return True
@@ -207,7 +215,7 @@ class DeviceClock:
             self._hold(host, RESTART_HOLD, what)
         self._restarted = host
         self._offset = self._applied = math.inf
-        self._newest, self._ahead = -math.inf, None
+        self._ahead = None
         self._next_mark = -math.inf
         return True
 

@@ -216,7 +216,7 @@ def test_no_effective_mass_between_two_ticks_is_above_its_bound(tmp_path, seed):
 
 
 def needed_between(station):
-    """How far the bound on each torque is above the largest that the motion needs between two ticks [N·m]."""
+    """How far each torque that the motion needs between two ticks is inside of its bounds [N·m]."""
     model, robot, room = station.model, station.model.robot("arm"), []
     points = Points(model)
     bound = bind_needed_in_span(model, robot, points)
@@ -226,7 +226,9 @@ def needed_between(station):
         path = state.path
         if path is None:
             return ()
-        most = bound(state, points.span(path, *path.t[[0, -1]], state.attachments.ids, model.mj))
+        span = points.span(path, *path.t[[0, -1]], state.attachments.ids, model.mj)
+        torques, off = bound(state, span)
+        least, most = torques.min(axis=0) - off, torques.max(axis=0) + off
         for t in np.linspace(path.t[0], path.t[-1], 23)[1:-1].tolist():
             k = np.searchsorted(path.t, t) - 1
             before, after = (path.at(t + h)[1] for h in (-1e-6, 1e-6))
@@ -239,7 +241,8 @@ def needed_between(station):
             tau = np.empty(model.mj.nv)
             mujoco.mj_rne(model.mj, data, 1, tau)
             tau += model.mj.dof_armature * data.qacc
-            room.append(most - np.abs(robot.coupling.T @ tau[robot.v_address]))
+            there = robot.coupling.T @ tau[robot.v_address]
+            room.extend([most - there, there - least])
         return ()
 
     for _ in ticks(engine_of(model), look, pump(station.sources, model.workstation.engine.tick)):

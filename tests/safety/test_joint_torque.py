@@ -25,10 +25,10 @@ def gravity(q=Q):
     return pin.computeGeneralizedGravity(model, model.createData(), q)
 
 
-def run(folder, options="", tau=None, *, ticks=3, qd=0.0):
+def run(folder, options="", tau=None, *, ticks=3, qd=0.0, live=()):
     """The last result of an arm that is heard standing (or turning about its base) with these torques."""
     station = made(folder, CELL + options)
-    engine, judge, result = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound), None
+    engine, judge, result = Engine(station.model, driven={"arm": 0.2}, live=live), Judge(station.bound), None
     for k in range(ticks):
         said = {} if tau is None else {"tau": tuple(tau)}
         q = Q + np.array([qd * 0.01 * k, 0, 0, 0, 0, 0])
@@ -80,10 +80,50 @@ def test_torques_that_nobody_measures_are_undecided(tmp_path):
     assert run(tmp_path, "").verdict is Verdict.UNDECIDED
 
 
+RESIDUAL = "largest_residual = [5, 5, 5, 2, 2, 2]\n"
+
+
 def test_a_residual_needs_an_acceleration(tmp_path):
-    first = run(tmp_path, "largest_residual = [5, 5, 5, 2, 2, 2]\n", gravity(), ticks=1)
+    """Live, nobody knows it at the first instant; of a file that ends at rest it is none."""
+    first = run(tmp_path, RESIDUAL, gravity(), ticks=1, live=["arm"])
     assert first.verdict is Verdict.UNDECIDED
     assert "two evaluations" in first.reason
+    assert run(tmp_path, RESIDUAL, gravity(), ticks=1).verdict is Verdict.WITHIN
+
+
+def recorded(folder, options, tau, end=0.3):
+    """Verdict of a whole run over a log of the arm in motion, at 500 Hz, with torques of its state."""
+    t = np.arange(0, end, 0.002)
+    f, a = 2 * np.pi * np.array([0.3, 0.25, 0.2, 0.4, 0.3, 0.5]), 0.2
+    q = Q + a * np.sin(f * t[:, None])
+    qd, qdd = a * f * np.cos(f * t[:, None]), -a * f * f * np.sin(f * t[:, None])
+    model = pinocchio_model(library.load("ur5e"))
+    data = model.createData()
+    needed = np.array([pin.rnea(model, data, *x) for x in zip(q, qd, qdd, strict=True)])
+    names = [f"actual_{what}_{i}" for what in ("q", "qd", "current_as_torque") for i in range(6)]
+    table = np.hstack([t[:, None], q, qd, tau(t, needed)])
+    text = "\n".join([" ".join(["timestamp", *names]), *(" ".join(map(repr, row.tolist())) for row in table)])
+    source = '[[sources]]\nkind = "ur_record"\nrobot = "arm"\nfile = "log.csv"\n'
+    station = made(folder, CELL + options + source, {"log.csv": text})
+    return station.run().verdict
+
+
+MODEL = 'torques = "model"\ntorque_uncertainty = [5, 5, 5, 2, 2, 2]\n'
+
+
+@pytest.mark.parametrize("options", [RESIDUAL, MODEL])
+def test_a_whole_run_can_be_within(tmp_path, options):
+    """Its first instant, and what lies between two ticks, are decided too."""
+    assert recorded(tmp_path, options, lambda _, needed: needed) is Verdict.WITHIN
+
+
+def test_what_no_model_explains_between_two_ticks_is_not_within(tmp_path):
+    """A push of 20 N·m in one sample, 2 ms from the nearest tick."""
+
+    def pushed(t, needed):
+        return needed + (np.abs(t - 0.152) < 1e-6)[:, None] * np.array([20.0, 0, 0, 0, 0, 0])
+
+    assert recorded(tmp_path, RESIDUAL, pushed) is Verdict.UNDECIDED
 
 
 def test_a_robot_without_limits_is_undecided(tmp_path):

@@ -121,10 +121,11 @@ def test_error_bound_holds_for_every_corner_of_the_uncertainty_and_one_joint_rea
 # -- the criterion ------------------------------------------------------------------------------
 
 
-def run(folder, options, tau, *, q=Q, robot=UR5E, ticks=3, files=None):
+def run(folder, options, tau, *, q=Q, robot=UR5E, ticks=3, files=None, live=()):
     """Results of the ticks of an arm that stands at q and measures tau."""
     station = made(folder, robot + TOOL + options, files)
-    engine, judge, results = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound), []
+    engine = Engine(station.model, driven={"arm": 0.2}, live=live)
+    judge, results = Judge(station.bound), []
     for k in range(ticks):
         engine.take(
             [heard("arm", 0.01 * k, q, np.zeros(len(q)), **({} if tau is None else {"tau": tuple(tau)}))]
@@ -147,7 +148,7 @@ def parts(result):
 
 
 def test_pressing_arm_at_rest(tmp_path):
-    first, *_, last = run(tmp_path, "", held())
+    first, *_, last = run(tmp_path, "", held(), live=["arm"])
     assert first.verdict is Verdict.UNDECIDED
     assert "acceleration" in first.reason
     assert last.value == pytest.approx(130, abs=0.05)
@@ -262,7 +263,8 @@ def test_moving_arm_in_the_air_exerts_no_force(tmp_path):
 
 def test_acceleration_never_bridges_a_tick_that_is_undecided(tmp_path):
     station = made(tmp_path, UR5E + TOOL)
-    engine, judge, reasons = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound), []
+    engine = Engine(station.model, driven={"arm": 0.2}, live=["arm"])
+    judge, reasons = Judge(station.bound), []
     for k in range(6):
         torques = {} if k == 3 else {"tau": tuple(held())}
         engine.take([heard("arm", 0.01 * k, Q, np.zeros(6), **torques)])
@@ -272,9 +274,13 @@ def test_acceleration_never_bridges_a_tick_that_is_undecided(tmp_path):
 
 
 def test_long_period_cannot_know_an_acceleration(tmp_path):
-    results = run(tmp_path, "every = 0.1\nlimit = 1e6\n", held(), ticks=12)
-    assert results[-1].verdict is Verdict.UNDECIDED
-    assert "acceleration" in results[-1].reason
+    """Live; a file says what comes next."""
+    options = "every = 0.1\nlimit = 1e6\n"
+    last = run(tmp_path / "live", options, held(), ticks=12, live=["arm"])[-1]
+    assert last.verdict is Verdict.UNDECIDED
+    assert "acceleration" in last.reason
+    known = run(tmp_path / "file", options, held(), ticks=12)[-1]
+    assert known.value == pytest.approx(130, abs=0.05)
 
 
 @pytest.mark.parametrize("wrong", ["[1.0]", "[1, 1, 1, 1, 1, 1, 1]"])
@@ -297,13 +303,13 @@ def test_units_of_force_moment_and_residual(tmp_path):
 
 @pytest.mark.parametrize(("every", "known"), [(0.04, True), (0.05, True), (0.06, False)])
 def test_speeds_up_to_50_ms_apart_make_an_acceleration(tmp_path, every, known):
-    last = run(tmp_path, f"every = {every}\n", (0.0, 0.0), ticks=14, **PLANAR)[-1]
+    last = run(tmp_path, f"every = {every}\n", (0.0, 0.0), ticks=14, live=["arm"], **PLANAR)[-1]
     assert (last.value is not None) is known
 
 
 def test_the_same_instant_twice_makes_no_acceleration(tmp_path):
     station = made(tmp_path, TWO_R + TOOL, PLANAR["files"])
-    engine, judge = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound)
+    engine, judge = Engine(station.model, driven={"arm": 0.2}, live=["arm"]), Judge(station.bound)
     engine.take([heard("arm", 0.0, np.zeros(2), np.zeros(2), tau=(0.0, 0.0))])
     state = engine.start()
     for _ in range(2):

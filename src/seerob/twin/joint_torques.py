@@ -59,13 +59,16 @@ def bias(state: State, mechanism: Mechanism) -> Array:
     return np.asarray(mechanism.coupling.T @ every[mechanism.v_address])
 
 
-def bind_needed_in_span(model: Model, mechanism: Mechanism, points: Points) -> Callable[[State, Span], Array]:
+def bind_needed_in_span(
+    model: Model, mechanism: Mechanism, points: Points
+) -> Callable[[State, Span], tuple[Array, Array]]:
     """Resolve what bounds the torques that a motion needs at any instant of a span, given one end of it.
 
     The mathematics is told by `seerob.criteria.safety.joint_torque.JointTorque.lowest`.
 
     Returns:
-        Largest absolute torques [N·m or N], shape (n,); infinity where nothing bounds them.
+        Torques [N·m or N], shape (k, n), and by how much others there may differ from means of these, shape
+        (n,); infinity where nothing bounds them.
     """
     mj, coupling, own = model.mj, coupling_of(model, mechanism), mechanism.v_address[mechanism.own]
     heavy = [int(body) for body in mechanism.mj_bodies if mj.body_mass[body] > 0]
@@ -76,33 +79,36 @@ def bind_needed_in_span(model: Model, mechanism: Mechanism, points: Points) -> C
     moved = np.array([coupling.shares[chain].any(axis=0) for chain in chains]).reshape(-1, len(own))
     g, stepped = float(np.linalg.norm(mj.opt.gravity)), model.workstation.engine.physics
 
-    def most(state: State, span: Span) -> Array:
+    def needed(state: State, span: Span) -> tuple[Array, Array]:
         M, now = state.mass_matrix(mechanism), bias(state, mechanism)
         qdd = span.path.accelerations(span.begin, span.end, own, stepped=stepped)
         changes = np.array([points.column_changes(row, span, coupling) for row in rows.tolist()])
         changes = changes.reshape(-1, len(own)) * span.T
         # Accelerations from speeds that were derived from noisy positions are anybody's guess.
         if not np.isfinite(changes).all() or span.joint_noise[own].any():
-            return np.full(len(own), np.inf)
+            return qdd @ M + now, np.full(len(own), np.inf)
         at_speed, varies = (each[rows] for each in points.at_constant_speeds(span))
         D, root = np.sqrt(masses @ changes**2), np.sqrt(np.diagonal(M))
         of_M = np.outer(D, root) + np.outer(root, D) + np.outer(D, D)
         of_bias = (masses * (at_speed + g)) @ changes + root * np.sqrt((masses * varies**2) @ moved)
-        found = np.abs(qdd @ M + now).max(axis=0) + of_M @ np.abs(qdd).max(axis=0) + of_bias
-        return np.asarray(found)
+        return qdd @ M + now, np.asarray(of_M @ np.abs(qdd).max(axis=0) + of_bias)
 
-    return most
+    return needed
 
 
 class Needed:
-    r"""What the joints must spend on the motion: :math:`M \ddot q + c + g`, accelerated since the last call.
+    r"""What the joints must spend on the motion: :math:`M \ddot q + c + g`.
+
+    Accelerated since the last call; where that was no instant before, and its motion is known ahead, until
+    the next tick.
 
     Args:
         mechanism: The robot.
+        ahead: How far its motion is asked then [s], see `seerob.criteria.criterion.Criterion.looks_ahead`.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._robot = mechanism
+    def __init__(self, mechanism: Mechanism, ahead: float) -> None:
+        self._robot, self._ahead = mechanism, ahead
         self._before: tuple[float, Array] | None = None
 
     def __call__(self, state: State) -> Array:
@@ -119,14 +125,28 @@ class Needed:
             raise Undecided(f"{robot.name} is moved, or moves others: {why}")
         speeds = state.qd(robot).copy()
         self._before = (state.t, speeds)
-        elapsed = np.nan if last is None else state.t - last[0]
-        if last is None or not 0 < elapsed <= LONGEST:
+        if last is not None and 0 < state.t - last[0] <= LONGEST:
+            qdd = (speeds - last[1]) / (state.t - last[0])
+        else:
+            qdd = self._coming(state)
+        return np.asarray(state.mass_matrix(robot) @ qdd + bias(state, robot))
+
+    def _coming(self, state: State) -> Array:
+        """Mean acceleration until the next tick, of a motion that is known ahead, shape (n,).
+
+        Raises:
+            Undecided: It is not.
+        """
+        coming = state.foresee(self._robot.name, state.t + np.array([0.0, self._ahead]))
+        if coming is None:
             raise Undecided(
-                f"{robot.name}: an acceleration needs two evaluations within {LONGEST:g} s; "
+                f"{self._robot.name}: an acceleration needs two evaluations within {LONGEST:g} s; "
                 "leave 'every' away or let the source send external torques"
             )
-        qdd = (speeds - last[1]) / elapsed
-        return np.asarray(state.mass_matrix(robot) @ qdd + bias(state, robot))
+        _, speeds, unknown = coming
+        if unknown:
+            raise Undecided(f"{self._robot.name}: its acceleration is not known: {unknown}")
+        return np.asarray((speeds[1] - speeds[0]) / self._ahead)
 
     def forget(self) -> None:
         """Forget the instant before: this one is undecided for another reason, and nothing bridges it."""

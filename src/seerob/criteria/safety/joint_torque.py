@@ -7,6 +7,8 @@ The residual r is friction, contact, a payload that the file does not have, or a
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -72,6 +74,10 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         """Say whether it rests on accelerations, which are differences of speeds from tick to tick."""
         return self.torques == "model" or self.largest_residual is not None
 
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """Look ahead to the next tick [s], for an acceleration where there was no tick before."""
+        return {self.robot: model.workstation.engine.tick}
+
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
         robot = model.robot(self.robot)
@@ -82,7 +88,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         units = ["N·m" if unit == "rad" else "N" for unit in robot.units]
         if self.torques == "model" or largest is not None:
             robot.require_masses(self.name)
-        needed = joint_torques.Needed(robot)
+        needed = joint_torques.Needed(robot, model.workstation.engine.tick)
 
         def evaluate(state: State) -> Result:
             why = ""
@@ -158,7 +164,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
 
     def bounded_once(self, model: Model) -> bool:
         """Say that torques that a model needs are looked at at ticks alone."""
-        return self.torques == "model"
+        return self.remembers(model)
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         r"""Least margin in a span of torques that are measured: they lie on straight lines between samples.
@@ -174,31 +180,39 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
 
         as M is the Gram matrix of the columns, and b the product of columns with the accelerations less
         gravity, both over all masses (Cauchy and Schwarz); rotors change nothing. With M and b of the end
-        that is known, :math:`M \ddot q + b` is largest at a knot of the accelerations.
+        that is known, :math:`M \ddot q + b` is largest at a knot of the accelerations. A residual is at most
+        the largest difference between a measured torque of the span and one at a knot, and that.
 
-        None with ``largest_residual``, and of what others move or what it picks up.
+        None of torques of a model where others move the robot, or it picks something up.
         """
-        if self.largest_residual is not None:
-            return None
         robot = model.robot(self.robot)
         limits, given = self._limits(model, robot), self._per_joint(model, robot, "torque_uncertainty")
         uncertainty = np.zeros(len(limits)) if given is None else given
-        if self.torques == "measured":
+        largest = self._per_joint(model, robot, "largest_residual")
 
-            def lowest(state: State, span: Span) -> float:
-                _, _, high = shares(state.torques_within(robot, span.begin, span.end), limits, uncertainty)
-                return self.limit - float(high.max())
+        def measured(state: State, span: Span) -> Array:
+            return state.torques_within(robot, span.begin, span.end)
 
-            return lowest
+        def least(torques: Array) -> float:
+            _, _, high = shares(torques, limits, uncertainty)
+            return self.limit - float(high.max())
+
+        if not self.remembers(model):
+            return lambda state, span: least(measured(state, span))
         if not robot.alone or any(body.holder for body in model.bodies):
             return None
         needed = joint_torques.bind_needed_in_span(model, robot, points)
 
-        def lowest_needed(state: State, span: Span) -> float:
-            _, _, high = shares(needed(state, span), limits, uncertainty)
-            return self.limit - float(high.max())
+        def lowest(state: State, span: Span) -> float:
+            torques, off = needed(state, span)
+            if self.torques == "model":
+                return least(np.abs(torques).max(axis=0) + off)
+            tau = measured(state, span)
+            assert largest is not None
+            residual = np.abs(tau[:, None] - torques).max(axis=(0, 1)) + off
+            return least(tau) if (residual <= largest).all() else -math.inf
 
-        return lowest_needed
+        return lowest
 
     def _limits(self, model: Model, robot: Mechanism) -> Array:
         """Of every joint [N·m or N], NaN where nobody knows, shape (n,)."""

@@ -8,6 +8,7 @@ F is the force that the robot exerts on its surroundings.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -155,6 +156,12 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         """Say whether it rests on accelerations, which are differences of speeds from tick to tick."""
         return self.torques == "measured"
 
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """Look ahead to the next tick [s], for an acceleration where there was no tick before."""
+        if self.torques == "external":
+            return {}
+        return {model.carrier(model.frame(self.at)).name: model.workstation.engine.tick}
+
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
         frame = model.frame(self.at)
@@ -164,7 +171,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         offset = np.array(self.offset)
         uncertainty = self._uncertainty(model, robot)
         rows = 3 if self.contact == "zero_moment" else 6
-        needed = joint_torques.Needed(robot)
+        needed = joint_torques.Needed(robot, model.workstation.engine.tick)
 
         def external(state: State) -> Array:
             try:

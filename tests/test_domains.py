@@ -254,7 +254,7 @@ CALLS = {
 }
 ELSEWHERE = {
     "criteria.stopping.onset.by_speed": "of speeds that the twin has; `accelerated` checks T_r and a",
-    "criteria.contact.clamping.thickest": "of a table of sizes that ships",
+    "criteria.contact.clamping.getting_in": "of openings that shapes have, in a table that ships",
     "criteria.contact.measured.missing": "reasons in words, of records that `peaks` took",
     "criteria.contact.shape.patch_area": "of radii that `body_shape` made",
     "criteria.contact.shape.force_at_pressure": "of radii that `body_shape` made",

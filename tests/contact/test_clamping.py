@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from made_cell import FLOATING, UR10, made, person, two_r
+from made_cell import FLOATING, UR10, made, person, state_at, two_r
 from seerob.core.shapes import Mesh, Solid, capsule
+from seerob.criteria.contact.clamped_regions import Clamping
 from seerob.criteria.contact.clamping import (
+    MISSED,
     STILL,
     OwnJoints,
     clamps,
+    distances,
+    getting_in,
     pinch_pairs,
     robot_pinch_pairs,
-    thickest,
 )
 from seerob.distance.least import Shapes
 from seerob.model.model import Model
@@ -43,16 +46,55 @@ def test_what_stands_still_clamps_nobody() -> None:
         assert one(np.full(3, 0.05), speed=speed).any() == found
 
 
-def test_between_own_parts_a_body_part_counts_as_thick_as_what_fits() -> None:
-    """Of a hand, 4 to 100 mm, and a body, 180 to 500 mm; nothing is clamped before it could close."""
-    fits, thickness, sizes = np.array([0.004, 0.18]), THICKNESS[0], (0.025, 0.05, 0.1, 0.18, 0.3, 0.5)
-    widest = np.array([0.0, 0.02, 0.03, 0.085, 0.3, 0.9, np.inf])
-    found = thickest(widest, fits, thickness, sizes, least=0.004)
-    np.testing.assert_allclose(found[:, 0], [-np.inf, -np.inf, 0.025, 0.05, 0.1, 0.1, 0.1])
-    np.testing.assert_allclose(found[:, 1], [-np.inf, -np.inf, -np.inf, -np.inf, 0.296, 0.5, 0.5])
-    # Wider open never lets less in.
-    rising = thickest(np.linspace(0, 1, 200), fits, thickness, sizes, least=0.004)
-    assert (np.diff(np.nan_to_num(rising, neginf=-1), axis=0) >= 0).all()
+def test_between_own_parts_a_body_part_clamps_where_its_thinnest_gets_in() -> None:
+    """Of a hand, 4 to 100 mm, and a body, 180 to 500 mm."""
+    found = getting_in(np.array([0.0, 0.02, 0.15, 0.18, np.inf]), np.array([0.004, 0.18]), THICKNESS[0])
+    np.testing.assert_array_equal(found[:, 0], [-np.inf, 0.1, 0.1, 0.1, 0.1])
+    np.testing.assert_array_equal(found[:, 1], [-np.inf, -np.inf, -np.inf, 0.5, 0.5])
+
+
+def double_elbow() -> str:
+    """Two beams of 1 m with a joint each at the ends of a link between them, 0.25 m long, without a shape."""
+    links, joints = ['<link name="base"/>'], []
+    for k, (length, x) in enumerate(((1.0, 0.0), (0.25, 1.0), (1.0, 0.25))):
+        box = f'<origin xyz="{length / 2} 0 0"/><geometry><box size="1 0.05 0.05"/></geometry>'
+        links.append(
+            f'<link name="l{k}"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" '
+            f'iyz="0"/></inertial>{"" if k == 1 else f"<collision>{box}</collision>"}</link>'
+        )
+        joints.append(
+            f'<joint name="j{k}" type="revolute"><parent link="{f"l{k - 1}" if k else "base"}"/>'
+            f'<child link="l{k}"/><origin xyz="{x} 0 0"/><axis xyz="0 0 1"/>'
+            '<limit lower="-2" upper="2" effort="99" velocity="9"/></joint>'
+        )
+    return f'<robot name="d">{"".join(links + joints)}</robot>'
+
+
+def test_two_beams_that_fold_on_a_body_clamp_it_however_near_they_are_at_their_double_elbow(
+    tmp_path,
+) -> None:
+    """There they are 0.2 to 0.25 m apart, less than a body is thick, wherever their joints stand."""
+    text = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
+    station = made(tmp_path, FLOATING + text, {"arm.urdf": double_elbow()})
+    robot = station.model.robot("arm")
+    bound = Clamping(station.model, robot, {}, ("Hands and fingers", "Chest"), None)
+    ends = np.column_stack([np.linspace(0.1, 1, 40), np.full(40, 0.0254), np.zeros(40)])
+    seen = 0
+    for q in np.linspace(0.3, 1.57, 8):
+        state = state_at(station, arm=([0.0, q, q], [0.0, 0.3, 0.3]))
+        flags, *_ = bound.at(state, np.ones((len(robot.moving), 2), bool))
+        first, last = (
+            next(i for i in robot.moving if station.model.bodies[i].name == n) for n in ("arm/l0", "arm/l2")
+        )
+        R, x = state.rotations, state.positions
+        # Places on the last beam above the first one, seen from it, and how fast they come down.
+        seen_from = ((ends @ R[last].T + x[last]) - x[first]) @ R[first]
+        gap = seen_from[:, 1] - 0.025
+        narrow = (gap > 0.2) & (gap < 0.49) & (seen_from[:, 0] > 0) & (seen_from[:, 0] < 1)
+        if narrow.any():
+            seen += 1
+            assert flags[list(robot.moving).index(last), 1], q
+    assert seen >= 2
 
 
 def slotted() -> Mesh:
@@ -115,7 +157,7 @@ def test_own_links_of_a_robot_are_paired_by_the_joints_between_them(tmp_path) ->
     text += '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'
     model = made(tmp_path, text).model
     robot = model.robot("arm")
-    pairs, widest, placed = robot_pinch_pairs(model, robot, cap=0.6, thinnest=0.1)
+    pairs, opens, placed = robot_pinch_pairs(model, robot, cap=0.6, enough=0.18)
     own = [
         {model.bodies[query.a[i]].name, model.bodies[query.b[0]].name}
         for query, _ in pairs.queries[1:]
@@ -135,16 +177,11 @@ def test_own_links_of_a_robot_are_paired_by_the_joints_between_them(tmp_path) ->
     one = [{a, b} for a in solid for b in solid if a < b and abs(place[a] - place[b]) == 1]
     found = [sorted((model.bodies[i].name, model.bodies[j].name)) for i, j, _ in placed]
     assert sorted(found) == sorted(sorted(p) for p in one)
-    # A hand is thicker than what is between these wherever their two joints stand: near, they clamp.
-    near = {
-        tuple(sorted((place[model.bodies[pairs.moving[row]].name], place[model.bodies[other].name])))
-        for row, other, inner, room in zip(pairs.first, pairs.across, pairs.inner, widest, strict=True)
-        if inner and np.isinf(room)
-    }
-    assert near == {(0, 2), (3, 5), (3, 6), (4, 6)}
-    assert len(widest) == len(pairs.first)
-    assert np.isinf(widest[~pairs.inner]).all()
-    assert ((widest[pairs.inner] <= 0.6) | np.isinf(widest[pairs.inner])).all()
+    # Wherever two links are, a body gets between somewhere; a wrist lets in no more than some of it.
+    assert len(opens) == len(pairs.first)
+    assert np.isinf(opens[~pairs.inner]).all()
+    assert (opens[pairs.inner] >= 0.18).all()
+    assert np.isfinite(opens[pairs.inner]).all()
     (surfaces, _), *_ = pairs.queries
     assert [model.bodies[i].name for i in surfaces.a] == ["wall"]
 
@@ -154,10 +191,10 @@ def test_what_is_not_a_number_clamps() -> None:
     assert not clamps(np.array([np.nan, 0.3]), np.zeros(2), np.full((2, 1), 0.5)).any()
 
 
-def test_parts_may_be_a_tenth_farther_apart_than_they_were_found_in_any_position() -> None:
-    sizes, fits = (0.1, 0.3), np.array([0.18])
-    found = thickest(np.array([0.447, 0.45, 0.6]), fits, np.array([0.5]), sizes, least=0.004)
-    np.testing.assert_allclose(found[:, 0], [0.3, 0.446, 0.5])
+def test_parts_may_open_a_tenth_wider_than_they_were_found_in_any_position() -> None:
+    least = 0.18 / (1 + MISSED)
+    found = getting_in(np.array([least - 1e-9, least + 1e-9]), np.array([0.18]), np.array([0.5]))
+    np.testing.assert_array_equal(found[:, 0], [-np.inf, 0.5])
 
 
 def test_the_fastest_gap_that_clamps_counts_for_both_of_its_sides_but_not_those_to_what_stands() -> None:
@@ -209,9 +246,9 @@ def folded(folder: Path, more: str = "") -> Model:
     return made(folder, text + more, {"arm.urdf": f'<robot name="r">{"".join(links + joints)}</robot>'}).model
 
 
-def gaps_of(model: Model, thinnest: float) -> tuple[dict[tuple[str, str], float], set[frozenset[str]]]:
-    """How far apart both sides of each gap can be, and which of its own parts are looked at by place."""
-    pairs, widest, placed = robot_pinch_pairs(model, model.robot("arm"), cap=0.6, thinnest=thinnest)
+def gaps_of(model: Model, enough: float) -> tuple[dict[tuple[str, str], float], set[frozenset[str]]]:
+    """How wide each gap opens anywhere, and which of its own parts are looked at by place."""
+    pairs, opens, placed = robot_pinch_pairs(model, model.robot("arm"), cap=0.6, enough=enough)
     names = [body.name for body in model.bodies]
     gaps = [
         (names[pairs.moving[row]].split("/")[1], "around" if other < 0 else names[other])
@@ -221,23 +258,34 @@ def gaps_of(model: Model, thinnest: float) -> tuple[dict[tuple[str, str], float]
     (around, _), *_ = pairs.queries
     assert [names[i] for i in around.a] == ["wall"]
     places = {frozenset((names[i].split("/")[1], names[j].split("/")[1])) for i, j, _ in placed}
-    return dict(zip(gaps, widest.tolist(), strict=True)), places
+    return dict(zip(gaps, opens.tolist(), strict=True)), places
 
 
-def test_own_parts_are_as_far_apart_as_their_joints_can_bring_them(tmp_path: Path) -> None:
-    """A folded arm: sin 2.4 less two half widths. A thicker body part never gets there, but is clamped."""
+def test_own_parts_open_as_wide_as_any_place_gets_from_the_other_part(tmp_path: Path) -> None:
+    """By places all over a folded arm, in positions of its joints that nobody else looked at."""
     model = folded(tmp_path)
-    found, places = gaps_of(model, 0.1)
+    found, places = gaps_of(model, 9.0)
     assert places == {frozenset(pair) for pair in (("base", "l0"), ("l0", "l1"), ("l1", "l2"))}
     around = {(f"l{k}", "around") for k in range(3)}
     assert {*found} == around | {("l1", "arm/base"), ("l2", "arm/base"), ("l0", "arm/l2")}
     assert all(np.isinf(found[gap]) for gap in around)
-    reach = np.sin(2.4) - 0.1
-    assert reach - 0.03 < found["l1", "arm/base"] <= reach + 1e-9
-    assert reach - 0.03 < found["l0", "arm/l2"] <= reach + 1e-9
-    # At exactly this thickness it fits; a hair thicker it does not, and wherever these are near they clamp.
-    for width, fits in ((found["l1", "arm/base"], True), (np.nextafter(found["l1", "arm/base"], 1), False)):
-        assert np.isfinite(gaps_of(model, float(width))[0]["l1", "arm/base"]) == fits
+    index, rng = {body.name: body.index for body in model.bodies}, np.random.default_rng(5)
+    joints = OwnJoints(model)
+    R, x = joints.poses({("arm", k): rng.uniform(*ends, 40) for k, ends in enumerate(FOLDED)})
+    for one, other in (("arm/l1", "arm/base"), ("arm/l0", "arm/l2")):
+        i, j = index[one], index[other]
+        far = 0.0
+        for a, b in ((i, j), (j, i)):
+            points = rng.uniform(
+                model.bodies[a].corners.min(axis=0), model.bodies[a].corners.max(axis=0), (60, 3)
+            )
+            seen = np.einsum("nij,kj->nki", R[:, a], points) + (x[:, a] - x[:, b])[:, None]
+            seen = np.einsum("nki,nij->nkj", seen, R[:, b]).reshape(-1, 3)
+            far = max(far, float(distances(model.bodies[b].solids, seen)[0].max()))
+        opens = found[one.split("/")[1], other]
+        assert far <= opens <= far + 0.75
+        # Where that is enough, nobody looks for more.
+        assert 0.5 <= gaps_of(model, 0.5)[0][one.split("/")[1], other] <= opens
 
 
 HAND_OF = (

@@ -80,7 +80,9 @@ def brute_force(pairs, R, x, linear, angular):
         v = [linear[n, k] + np.cross(angular[n, k], p - x[n, k]) for k in (i, j)] if i >= 0 else [0, None]
         if i < 0:
             v[1] = linear[n, j] + np.cross(angular[n, j], p - x[n, j])
-        return np.linalg.norm(v[1] - v[0], axis=1).max()
+        turn = angular[n, j] - (angular[n, i] if i >= 0 else 0)
+        around = max(s.radius for s in BODIES[j][1])
+        return np.linalg.norm(v[1] - v[0], axis=1).max() + np.linalg.norm(turn) * around
 
     moving = np.array([[speed(n, -1, i) for i in pairs.moving] for n in range(N)])
     found = moving[:, pairs.first]

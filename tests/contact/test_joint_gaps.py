@@ -14,7 +14,7 @@ from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact import joint_gaps
 from seerob.criteria.contact.clamped_regions import Clamping
-from seerob.criteria.contact.joint_gaps import Looks, closing, places
+from seerob.criteria.contact.joint_gaps import Looks, _Joint, closing, places
 from seerob.session.station import Station, load
 
 HAND, CHEST = "Hands and fingers", "Chest"
@@ -273,6 +273,18 @@ def test_a_slide_without_ends_clamps_wherever_it_is_near(tmp_path: Path) -> None
 
 
 # -- the mathematics ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_the_steps_that_a_way_sees_are_all_between_its_ends(turns: bool) -> None:
+    """Also of a way longer than the whole stroke of fast fingers, that begins before its end."""
+    low, step, rng = -0.3, 0.01, np.random.default_rng(3)
+    joint = _Joint("hand", 0, low, step, turns)
+    for _ in range(200):
+        start, way = rng.uniform(-2, 2), rng.choice([-1, 1]) * rng.uniform(0, 3) ** 2
+        cells = np.floor((np.linspace(start, start + way, 5000) - low) / step).astype(int)
+        seen = cells % joint_gaps.STEPS if turns else np.clip(cells, 0, joint_gaps.STEPS - 1)
+        assert set(seen.tolist()) <= set(joint.seen(start, start + way).tolist())
 
 
 def test_a_place_closes_where_it_faces_is_narrow_and_opens_wide_enough() -> None:

@@ -22,11 +22,13 @@ def relative_speeds(
     pairs: Indices,
     corners: Array,
     start: Indices,
+    reach: Array,
     found: Array,
 ) -> None:
-    """Largest speed of any point of a body, seen from another; writes into the last argument.
+    """Bound on the speed of any point of a body, seen from another; writes into the last argument.
 
-    It is a convex function of the point: over a hull it is largest at a corner.
+    It is a convex function of the point: over a hull it is largest at a corner. What lies around the hull
+    turns with it: a capsule about its own axis moves past its neighbour, as a cylinder does.
 
     Args:
         rotations: World from body, shape (n, 3, 3).
@@ -34,8 +36,9 @@ def relative_speeds(
         linear: Velocities of the origins, world axes [m/s], shape (n, 3).
         angular: World axes [rad/s], shape (n, 3).
         pairs: From which body, and of which, shape (k, 2).
-        corners: Points of all bodies in their own frames, whose hulls contain them [m], shape (m, 3).
+        corners: Points of all bodies in their own frames, shape (m, 3).
         start: Where each body's corners start, shape (n + 1,).
+        reach: How far a body may lie outside its corners' hull [m], shape (n,).
         found: Receives [m/s], shape (k,).
     """
     for k in range(len(pairs)):
@@ -58,7 +61,8 @@ def relative_speeds(
             vy = uy + w[2] * ax - w[0] * az
             vz = uz + w[0] * ay - w[1] * ax
             most = max(most, vx * vx + vy * vy + vz * vz)
-        found[k] = math.sqrt(most)
+        turn = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        found[k] = math.sqrt(most) + turn * reach[j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

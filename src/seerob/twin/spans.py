@@ -438,20 +438,23 @@ class Relative:
         mj: The `mujoco.MjModel`.
         pairs: From which of its bodies, and of which.
         points: Of the latter, in its frame [m], shape (k, 3) each.
+        reach: How far around them others are meant, too [m], shape (pairs,).
     """
 
-    def __init__(self, mj: mujoco.MjModel, pairs: Iterable[tuple[int, int]], points: Iterable[Array]) -> None:
+    def __init__(
+        self, mj: mujoco.MjModel, pairs: Iterable[tuple[int, int]], points: Iterable[Array], reach: Array
+    ) -> None:
         data = mujoco.MjData(mj)
         mujoco.mj_kinematics(mj, data)
         start, joints, turns, lengths = [0], [], [], []
-        for (a, b), own in zip(pairs, points, strict=True):
+        for (a, b), own, around in zip(pairs, points, reach.tolist(), strict=True):
             back, forth = joints_of(mj, a), joints_of(mj, b)
             same = sum(1 for k, j in enumerate(back) if back[: k + 1] == forth[: k + 1])
             way = [*reversed(back[same:]), *forth[same:]]
             anchors = data.xanchor[way]
             if way:
                 ends = own @ data.xmat[b].reshape(3, 3).T + data.xpos[b]
-                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max(initial=0.0))
+                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max(initial=0.0)) + around
                 lengths += [*np.linalg.norm(np.diff(anchors, axis=0), axis=1).tolist(), far]
             joints += [int(mj.jnt_dofadr[j]) for j in way]
             turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in way]

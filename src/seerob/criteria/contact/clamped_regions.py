@@ -24,11 +24,11 @@ from seerob.criteria.contact.clamping import (
     Flags,
     PinchPairs,
     clamps,
+    getting_in,
     robot_pinch_pairs,
-    thickest,
 )
 from seerob.criteria.contact.joint_gaps import JointGaps
-from seerob.description.norms.crushing_gaps import crushing_gaps, openings, sizes
+from seerob.description.norms.crushing_gaps import crushing_gaps, openings
 from seerob.distance.least import DistanceKind, Survey
 from seerob.kernels.approach import lowest_points, relative_speeds
 from seerob.kernels.pairs import CORNERS
@@ -57,7 +57,11 @@ class ClosingGaps:
         self._pairs, self._thickness = pairs, thickness
         self._shapes = shapes
         self._survey = Survey(shapes, pairs.queries) if pairs.queries else None
-        self._hulls = stacked([_corners(shapes, body) for body in range(len(shapes.names))])
+        bodies = range(len(shapes.names))
+        self._hulls = stacked([_corners(shapes, body) for body in bodies])
+        self._reach = np.array(
+            [max((shapes.radius[i] for i in shapes.solids[b]), default=0.0) for b in bodies]
+        )
         moving = np.array(pairs.moving, np.int64)
         first = moving[pairs.first] if len(pairs.first) else pairs.first
         self._seen = pairs.across >= 0
@@ -91,7 +95,8 @@ class ClosingGaps:
         """How the sides of gaps that move can move against each other, for `ever`."""
         pairs, every = self._pair.tolist(), model.bodies
         hulls = [_corners(self._shapes, j) for _, j in pairs]
-        return Relative(model.mj, [(every[i].mj, every[j].mj) for i, j in pairs], hulls)
+        of = [(every[i].mj, every[j].mj) for i, j in pairs]
+        return Relative(model.mj, of, hulls, self._reach[self._pair[:, 1]])
 
     def ever(
         self,
@@ -116,7 +121,7 @@ class ClosingGaps:
         """Of one side of each gap seen from the other [m/s], shape (g,)."""
         speed = np.array(np.asarray(speeds)[self._pairs.first], float)
         seen = np.empty(len(self._pair))
-        relative_speeds(rotations, positions, *twists, self._pair, *self._hulls, seen)
+        relative_speeds(rotations, positions, *twists, self._pair, *self._hulls, self._reach, seen)
         speed[self._seen] = seen
         return speed
 
@@ -143,7 +148,7 @@ class ClosingGaps:
 
 
 def _corners(shapes: Shapes, body: int) -> Array:
-    """Points whose hull contains the cores of a body's solids, in the body's frame [m], shape (k, 3)."""
+    """Points whose hull contains the cores of a body's solids [m], in its frame, shape (k, 3)."""
     found = [np.zeros((0, 3))]
     for i in shapes.solids[body]:
         rotation, position = shapes.local[i, :9].reshape(3, 3), shapes.local[i, 9:]
@@ -222,15 +227,13 @@ class Clamping:
         fits = np.minimum([openings()[0][name] for name in regions], plain)
         self._thickness = plain + deviation
         cap = float(self._thickness.max(initial=0.0)) + ROOM
-        thinnest = float(plain.min(initial=np.inf))
-        pairs, widest, placed = robot_pinch_pairs(model, robot, cap=cap, thinnest=thinnest)
-        least = min(openings()[0].values())
-        between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
-        self._gaps = ClosingGaps(model.shapes, pairs, between)
+        fits = np.maximum(fits - deviation, 0.0)
+        enough = float(fits.max(initial=0.0))
+        pairs, opens, placed = robot_pinch_pairs(model, robot, cap=cap, enough=enough)
+        self._gaps = ClosingGaps(model.shapes, pairs, getting_in(opens, fits, self._thickness))
         self._relative = self._gaps.relative(model)
-        self._joints = JointGaps(
-            model, robot, placed, self._thickness, np.maximum(fits - deviation, 0.0), least=least
-        )
+        least = min(openings()[0].values())
+        self._joints = JointGaps(model, robot, placed, self._thickness, fits, least=least)
         self._moving = robot.moving
         self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
         self._asked = tuple(b.index for b in others)

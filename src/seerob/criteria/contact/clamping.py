@@ -14,13 +14,14 @@ permits more. Nothing is remembered: the answer at an instant follows from the p
 Between the robot's own parts nothing gets where they are always near. Which body parts do is settled once,
 from the shapes and the ranges of the joints:
 
-- of two parts that several joints move against each other (a tool and the upper arm), a body part counts as
-  thick as the widest of the sizes that fit between them in some position of these joints;
+- of two parts that several joints move against each other (a tool and the upper arm), a body part gets
+  between where, in some position of these joints, any place on the one is as far from the other as the
+  thinnest of the body part is thick. How near they are as wholes says nothing of that: two links behind a
+  double elbow are near there however wide they gape. What gets in clamps as it does at any other surface;
 - of two parts that one joint moves against each other (an elbow, two fingers), every place is looked at by
   itself; see `seerob.criteria.contact.joint_gaps`;
-- of two parts that are near wherever several joints stand (an upper arm and the base under its shoulder),
-  nearer than the thinnest body part is thick, and between what a gripper picks up and whatever moves against
-  it, what moves clamps as it does at any other surface.
+- between parts one of which slides without ends, and between what a gripper picks up and whatever moves
+  against it, everything gets.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.core.shapes import Solid
 from seerob.core.transforms import Array
 from seerob.distance.least import Per, Query
 from seerob.kernels.shapes import Shapes
@@ -45,9 +47,13 @@ STILL = 1e-6
 """Parts that move more slowly against each other stay as they are [m/s]: rounding, and nothing else. What
 moves slowly clamps as what is fast does; noise of speeds is for `seerob.criteria.noisy_speeds`."""
 SAMPLED = 64
-"""Positions of several joints in which it is looked how far two parts can be apart."""
+"""Positions of several joints in which it is looked how wide two parts open."""
+TOGETHER = 4
+"""Of these that are looked at together: mostly the first tell enough."""
 MISSED = 0.1
-"""By which share they may be farther apart in a position in between."""
+"""By which share they may open wider in a position in between."""
+JUNG = (3 / 8) ** 0.5
+"""Radius of a ball around points whose distances are 1 at most."""
 ENDLESS = 1.0
 """How far to either side a slide without ends is looked at [m]."""
 
@@ -67,23 +73,15 @@ def clamps(gaps: Array, speed: Array, thickness: Array) -> Flags:
     return np.asarray(~(speed <= STILL)[..., None] & ~(np.asarray(gaps, float)[..., None] > thickness))
 
 
-def thickest(widest: Array, fits: Array, thickness: Array, sizes: Sequence[float], *, least: float) -> Array:
-    """Thickest of the sizes that fit between two parts, and that are of the body part [m], shape (g, r).
-
-    Never as wide as the parts can be apart: what is there when they are is not yet clamped.
+def getting_in(opens: Array, fits: Array, thickness: Array) -> Array:
+    """Thickness of body parts in gaps that let them in [m], shape (g, r), else -infinity.
 
     Args:
-        widest: How far the parts can be apart [m], shape (g,).
+        opens: How wide a gap gets anywhere [m], shape (g,).
         fits: Thinnest that a body part is [m], shape (r,).
-        thickness: Thickest likewise [m], shape (r,).
-        sizes: Between them, thinnest first [m].
-        least: By how much a gap changes that closes at all [m].
+        thickness: Of body parts [m], shape (r,).
     """
-    found = np.full((len(widest), len(thickness)), -np.inf)
-    for size in (*sizes, *thickness.tolist()):
-        counts = (fits <= size) & (size <= thickness) & (widest[:, None] >= size * (1 - MISSED))
-        found = np.where(counts, np.maximum(found, size), found)
-    return np.asarray(np.minimum(found, widest[:, None] - least))
+    return np.where(opens[:, None] * (1 + MISSED) >= fits, thickness, -np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +275,7 @@ class OwnJoints:
 
 
 def robot_pinch_pairs(
-    model: Model, robot: Mechanism, *, cap: float, thinnest: float
+    model: Model, robot: Mechanism, *, cap: float, enough: float
 ) -> tuple[PinchPairs, Array, list[tuple[int, int, Coordinate]]]:
     """The gaps of a robot to parts and other robots, and between its own parts.
 
@@ -285,11 +283,11 @@ def robot_pinch_pairs(
         model: The compiled workstation.
         robot: The robot.
         cap: Largest gap that matters [m].
-        thinnest: Body part [m].
+        enough: How wide everything gets in [m]: more is not looked for.
 
     Returns:
-        Its gaps; how far their sides can be apart [m], infinity of surfaces and of what clamps wherever it is
-        near, shape (g,); and pairs of its own bodies to look at place by place, with the joint between them.
+        Its gaps; how wide they open anywhere [m], infinity of surfaces and where everything gets in, shape
+        (g,); and pairs of its own bodies to look at place by place, with the joint between them.
     """
     own = (*robot.bodies, *robot.carried)
     still = [i for i in own if i not in robot.moving]
@@ -308,19 +306,52 @@ def robot_pinch_pairs(
     placed = [(*pair, coordinate) for pair, coordinate in one]
     apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in always)
     pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
-    inner = pairs.inner
-    widest = np.full(len(pairs.first), np.inf)
-    if inner.any():
-        every = joints.in_order(set().union(*between.values()))
-        draws = np.random.default_rng(0).random((SAMPLED, len(every)))
-        ends = [joints.range(coordinate) for coordinate in every]
-        poses = joints.poses(
-            {c: lo + draws[:, k] * (hi - lo) for k, (c, (lo, hi)) in enumerate(zip(every, ends, strict=True))}
-        )
-        own_pairs = [query for query, per in pairs.queries if per is Per.PAIR and query.a[0] in own]
-        widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
-        for gap in np.flatnonzero(inner).tolist():
-            i, j = sorted((pairs.moving[pairs.first[gap]], int(pairs.across[gap])))
-            if (i, j) in always or widest[gap] < thinnest:
-                widest[gap] = np.inf
-    return pairs, widest, placed
+    opens = np.full(len(pairs.first), np.inf)
+    poses: list[tuple[Array, Array]] = []
+    for gap in np.flatnonzero(pairs.inner).tolist():
+        i, j = pairs.moving[pairs.first[gap]], int(pairs.across[gap])
+        if (min(i, j), max(i, j)) in always:
+            continue
+        ways = (_Way(model, i, j), _Way(model, j, i))
+        opens[gap] = max(way.least for way in ways)
+        if opens[gap] < enough and not poses:
+            poses = _some_poses(joints, set().union(*between.values()))
+        for some in poses:
+            if opens[gap] >= enough:
+                break
+            opens[gap] = max(opens[gap], *(way.at(*some) for way in ways))
+    return pairs, opens, placed
+
+
+def _some_poses(joints: OwnJoints, coordinates: Iterable[Coordinate]) -> list[tuple[Array, Array]]:
+    """Poses of all bodies while some joints stand anywhere, a few at a time; see `OwnJoints.poses`."""
+    every = joints.in_order(coordinates)
+    low, high = np.array([joints.range(coordinate) for coordinate in every]).T
+    at = low + np.random.default_rng(0).random((SAMPLED, len(every))) * (high - low)
+    return [joints.poses(dict(zip(every, some.T, strict=True))) for some in np.split(at, SAMPLED // TOGETHER)]
+
+
+def distances(solids: Sequence[Solid], points: Array) -> tuple[Array, Array]:
+    """How far points are from a body, shape (k,), and where it is nearest, (k, 3) [m]."""
+    shapes = Shapes.build([("body", solids), ("point", [Solid(points=np.zeros((2, 3)))])])
+    positions = np.zeros((len(points), 2, 3))
+    positions[:, 1] = points
+    found = Query(shapes, [0], [1]).batch(np.broadcast_to(np.eye(3), (len(points), 2, 3, 3)), positions)
+    return found.distance[:, 0], found.point_a[:, 0]
+
+
+class _Way:
+    """How far any place of a body gets from another one, at most [m]."""
+
+    def __init__(self, model: Model, one: int, other: int) -> None:
+        body, self._one, self._other = model.bodies[one], one, other
+        self._corners, self._solids = body.corners, model.bodies[other].solids
+        self.least = JUNG * float(np.linalg.norm(np.ptp(body.corners, axis=0))) + body.radius
+        """No point of a hull is farther from all of its corners than their ball is wide (Jung)."""
+
+    def at(self, rotations: Array, positions: Array) -> float:
+        """In some poses of all bodies, as of `OwnJoints.poses`."""
+        points = np.einsum("nij,kj->nki", rotations[:, self._one], self._corners)
+        points += positions[:, self._one, None] - positions[:, self._other, None]
+        points = np.einsum("nki,nij->nkj", points, rotations[:, self._other]).reshape(-1, 3)
+        return self.least + float(distances(self._solids, points)[0].max())

@@ -36,8 +36,7 @@ from numpy.typing import NDArray
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Solid
 from seerob.core.transforms import Array
-from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints
-from seerob.distance.least import Query, Shapes
+from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints, distances
 from seerob.kernels._kept_loops import key_of
 from seerob.model.model import Mechanism, Model
 from seerob.twin.spans import Span
@@ -192,7 +191,7 @@ class _Side:
         asked[:-1] |= wanted
         asked |= ~varies
         place, node = np.nonzero(asked.T)
-        distance, nearest = _distances(self._other, points[node, place])
+        distance, nearest = distances(self._other, points[node, place])
         way = nearest - points[node, place]
         gaps, faces, falls = known.copy(), np.zeros(known.shape, bool), np.zeros(known.shape)
         gaps[node, place] = np.maximum(distance, 0.0)
@@ -250,9 +249,10 @@ class _Joint:
 
     def seen(self, start: float, end: float) -> NDArray[np.int64]:
         """Steps from one position to another."""
-        first, last = sorted(int((q - self.low) // self.step) for q in (start, end))
-        seen = np.arange(first, min(last, first + STEPS) + 1)
-        return seen % STEPS if self.turns else np.clip(seen, 0, STEPS - 1)
+        first, last = np.sort((np.array([start, end]) - self.low) // self.step)
+        if not self.turns:
+            first, last = np.clip([first, last], 0, STEPS - 1)
+        return np.arange(int(first), int(min(last, first + STEPS)) + 1) % STEPS
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,15 +411,6 @@ def _core(solid: Solid) -> Array:
     return solid.points
 
 
-def _distances(solids: Sequence[Solid], points: Array) -> tuple[Array, Array]:
-    """How far points are from a body, shape (k,), and where it is nearest, (k, 3) [m]."""
-    shapes = Shapes.build([("body", solids), ("point", [Solid(points=np.zeros((2, 3)))])])
-    positions = np.zeros((len(points), 2, 3))
-    positions[:, 1] = points
-    found = Query(shapes, [0], [1]).batch(np.broadcast_to(np.eye(3), (len(points), 2, 3, 3)), positions)
-    return found.distance[:, 0], found.point_a[:, 0]
-
-
 def _of_solid(solid: Solid, h: float) -> tuple[Array, Array]:
     """Places on a solid and their normals."""
     if solid.mesh is not None:
@@ -472,5 +463,5 @@ def _outside(found: tuple[Array, Array], k: int, solids: Sequence[Solid]) -> tup
     points, normals = found
     if not len(points):
         return found
-    free = _distances([solid for i, solid in enumerate(solids) if i != k], points)[0] >= 0
+    free = distances([solid for i, solid in enumerate(solids) if i != k], points)[0] >= 0
     return points[free], normals[free]

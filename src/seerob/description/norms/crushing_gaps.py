@@ -33,12 +33,6 @@ def openings() -> tuple[dict[str, float], str]:
     return {region: gap * 1e-3 for region, gap in table["fits_mm"].items()}, table["source"]
 
 
-@cache
-def sizes() -> tuple[float, ...]:
-    """Thicknesses of body parts that the norm knows [m], thinnest first."""
-    return tuple(size * 1e-3 for size in _table()["sizes_mm"])
-
-
 def gap_inputs(given: Mapping[str, float], regions: Collection[str]) -> tuple[Input, ...]:
     """The gap of each body region that decides between free and clamped, and what lets it in.
 

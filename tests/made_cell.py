@@ -20,12 +20,16 @@ FLOATING = "engine = { gravity = [0, 0, 0] }\n"
 
 
 def two_r(*, mimic: str = "", masses: tuple[float, float] = (1.0, 1.0), effort: float = 1000.0) -> str:
-    """A planar arm of two links of 1 m with point masses at their ends, turning about z."""
+    """A planar arm of two links of 1 m with masses at their ends, turning about z.
+
+    Each is a needle along z: points in the plane, and no body in its shape that nobody could build.
+    """
     links, joints = ['<link name="base"/>'], []
     for i, mass in enumerate(masses, 1):
         links.append(
             f'<link name="l{i}"><inertial><origin xyz="1 0 0"/><mass value="{mass}"/>'
-            '<inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
+            f'<inertia ixx="{2e-3 * mass}" iyy="{2e-3 * mass}" izz="{1e-11 * mass}" ixy="0" ixz="0" '
+            'iyz="0"/></inertial>'
             '<collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.1 0.1"/></geometry>'
             "</collision></link>"
         )

@@ -103,7 +103,7 @@ WRONG = {
     ),
     "nan inertia of a link": (
         "",
-        {"arm.urdf": two_r().replace('ixx="1e-12"', 'ixx="nan"', 1)},
+        {"arm.urdf": two_r().replace('ixx="0.002"', 'ixx="nan"', 1)},
         "arm.urdf: robots[0] (link[l1].inertial.inertia.ixx)",
         "finite",
     ),

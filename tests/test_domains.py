@@ -20,7 +20,7 @@ from seerob.criteria.contact import collision
 from seerob.criteria.ergonomics import eaws_posture, niosh, owas, reba, rula
 from seerob.criteria.ergonomics.eaws_posture import PostureTime
 from seerob.criteria.safety.separation import separation_bound
-from seerob.criteria.scoring import repetition
+from seerob.criteria.scoring import repetition, spans
 from seerob.criteria.stopping import terms
 from seerob.description.norms import iso_13855
 
@@ -165,12 +165,16 @@ def test_the_message_says_what_is_wrong_and_what_would_be_right():
 
 # -- every formula of the judging packages ---------------------------------------------------------
 
-PACKAGES = ("criteria.safety", "criteria.stopping", "criteria.contact", "description.norms")
+WALKED = ("criteria", "description.norms", "core.transforms")
 NUMBERS = {"float", "int", "Array", "ArrayLike", "Array | float", "ArrayLike | None", "Sequence[float]"}
 J = np.array([[1.0, 0.5], [0.2, 1.0], [0.1, 0.3]])
 M = np.array([[2.0, 0.3], [0.3, 1.0]])
 TWO = np.array([1.0, 2.0])
 HALF = np.array([0.5])
+POSE = np.eye(4)
+RULA = dict(zip(inspect.signature(rula.rula).parameters, rula.LEAST.values(), strict=True))
+REBA = dict(zip(inspect.signature(reba.reba).parameters, reba.LEAST.values(), strict=True))
+BOXED = {"J_v": np.eye(3) + 0.1, "low": -np.ones(3), "high": np.ones(3)}
 CALLS = {
     "criteria.safety.effective_mass.inverse_effective_mass": {"J_v": J, "M": M},
     "criteria.safety.effective_mass.projected_mass": {"inverse": np.eye(3), "u": np.array([1.0, 0, 0])},
@@ -251,8 +255,40 @@ CALLS = {
     "criteria.contact.measured.risen": {"force": TWO},
     "criteria.contact.tolerances.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
     "criteria.contact.shape.round_shape": {"radius": 0.01},
+    "core.transforms.apply": {"a_from_b": POSE, "points_in_b": np.ones(3)},
+    "core.transforms.cross": {"a": np.ones(3), "b": np.array([1.0, 2, 4])},
+    "core.transforms.inverse": {"a_from_b": POSE},
+    "core.transforms.product": {"p": POSE[:1], "q": POSE[:1]},
+    "core.transforms.rotation_from_axis_angle": {"axis": POSE[2, :3], "angle": 0.5},
+    "core.transforms.rotation_from_rpy": {"rpy": np.ones(3)},
+    "core.transforms.rotation_from_wxyz": {"wxyz": POSE[0]},
+    "core.transforms.transform": {"rotation": POSE[:3, :3], "position": np.ones(3)},
+    "core.transforms.turned": {"rotation": POSE[:3, :3], "wxyz": POSE[0]},
+    "core.transforms.wxyz_from_rotation": {"rotation": POSE[:3, :3]},
+    "criteria.ergonomics.niosh.asymmetry_multiplier": {"A": HALF},
+    "criteria.ergonomics.niosh.distance_multiplier": {"D": HALF},
+    "criteria.ergonomics.niosh.horizontal_multiplier": {"H": HALF},
+    "criteria.ergonomics.niosh.vertical_multiplier": {"V": HALF},
+    "criteria.ergonomics.reba.reba": REBA,
+    "criteria.ergonomics.rula.rula": RULA,
+    "criteria.ergonomics.owas.owas": {"back": 1, "arms": 1, "legs": 1, "load": 1},
+    "criteria.ergonomics.owas.only": {"code": 1, "of": 4},
+    "criteria.polytope.torque_box": BOXED,
+    "criteria.polytope.zero_moment": BOXED,
+    "criteria.polytope.free_moment": {"J": np.eye(6), "low": -np.ones(6), "high": np.ones(6)},
+    "criteria.scoring.measured.turned": {"accuracy": 0.1, "lever": HALF},
+    "criteria.scoring.repetition.repetitions": {"t": TWO, "scores": np.array([1, 2]), "window": 60.0},
+    "criteria.scoring.repetition.static": {"t": TWO, "scores": np.ones(2), "hold": 0.5, "gap": 2.0},
+    "criteria.scoring.spans.between": {"low": TWO, "high": TWO},
+    "criteria.scoring.spans.exactly": {"score": TWO},
 }
 ELSEWHERE = {
+    "criteria.scoring.score_rows.degrees": "words of edges that ship",
+    "criteria.scoring.spans.any_of": "of truths",
+    "criteria.scoring.spans.fallen": "what is not a number is, see BANDS",
+    "criteria.scoring.spans.reached": "what is not a number is, see BANDS",
+    "criteria.ergonomics.niosh.duration": "one of three words; see REFUSES",
+    **{f"criteria.ergonomics.{name.replace(' ', '.', 1).replace(' ', '_')}": "see BANDS" for name in BANDS},
     "criteria.stopping.onset.by_speed": "of speeds that the twin has; `accelerated` checks T_r and a",
     "criteria.contact.clamping.getting_in": "of openings that shapes have, in a table that ships",
     "criteria.contact.measured.missing": "reasons in words, of records that `peaks` took",
@@ -260,6 +296,7 @@ ELSEWHERE = {
     "criteria.contact.shape.force_at_pressure": "of radii that `body_shape` made",
 }
 STRICT = {
+    "criteria.scoring.measured.turned lever": "turns the direction to anywhere",
     "criteria.stopping.onset.accelerated qd": "is kept, and asked for by nobody else",
     "criteria.stopping.terms.largest_factor b": "is 0, no speed",
     "criteria.stopping.terms.largest_factor a": "is 0, no speed",
@@ -299,15 +336,16 @@ BELOW = {
 
 
 def formulas():
-    for package in PACKAGES:
-        for module in pkgutil.iter_modules(importlib.import_module(f"seerob.{package}").__path__):
-            found = importlib.import_module(f"seerob.{package}.{module.name}")
-            for name, function in inspect.getmembers(found, inspect.isfunction):
+    for walked in WALKED:
+        found = importlib.import_module(f"seerob.{walked}")
+        inside = pkgutil.walk_packages(getattr(found, "__path__", ()), f"seerob.{walked}.")
+        for module in (found, *(importlib.import_module(each.name) for each in inside)):
+            for name, function in inspect.getmembers(module, inspect.isfunction):
                 kinds = [p.annotation for p in inspect.signature(function).parameters.values()]
-                own = function.__module__ == found.__name__ and not name.startswith("_")
+                own = function.__module__ == module.__name__ and not name.startswith("_")
                 returns = inspect.signature(function).return_annotation
-                if own and kinds and set(kinds) <= NUMBERS and returns != "Input":
-                    yield f"{package}.{module.name}.{name}"
+                if own and kinds and set(kinds) <= NUMBERS and returns not in ("Input", "str"):
+                    yield f"{module.__name__.removeprefix('seerob.')}.{name}"
 
 
 def called(name, arguments):
@@ -368,3 +406,68 @@ def test_what_cannot_be_below_nothing_is_refused_by_its_name(name):
         asked = {**CALLS[name], argument: spoiled(CALLS[name][argument], -100.0)}
         with pytest.raises((ValueError, SeerobError), match=argument):
             called(name, asked)
+
+
+FREE = {
+    "core.transforms.apply a_from_b 0": "the last row is not asked",
+    "core.transforms.transform rotation 0": "written into a frame",
+    "core.transforms.transform rotation 1": "written into a frame",
+    "core.transforms.transform position 0": "written into a frame",
+    "criteria.safety.manipulability.singular_values J_v 0": "of any shape",
+    "criteria.safety.manipulability.singular_values J_v 1": "of any shape",
+    "criteria.safety.manipulability.least_value_after J 1": "of any shape",
+    "criteria.stopping.onset.accelerated qd 0": "is kept as it is",
+    "criteria.stopping.stated_acceleration.largest_gain v 1": "fewer parts",
+    "criteria.stopping.stated_acceleration.explains v 1": "fewer parts",
+    "criteria.contact.tolerances.permissible_while_pushed mu 0": "one may be of all regions",
+    "criteria.contact.tolerances.permissible_while_pushed k 0": "one may be of all regions",
+    "criteria.scoring.spans.between low 0": "one may be of all rows",
+    "criteria.scoring.spans.between high 0": "one may be of all rows",
+}
+"""Where fewer than there are is another question, or no figure of a robot."""
+ROWS = {"J_v", "J", "w", "gain"}
+"""Of which fewer points, axes or rows are another question."""
+FEWER = [
+    (name, argument, axis)
+    for name, arguments in CALLS.items()
+    for argument, value in arguments.items()
+    for axis in range(np.ndim(value))
+    if np.shape(value)[axis] > 1 and f"{name} {argument} {axis}" not in FREE
+    if len(arguments) > 1 and not (axis == 0 and argument in ROWS)
+]
+
+
+@pytest.mark.parametrize(("name", "argument", "axis"), FEWER)
+def test_arrays_that_do_not_fit_are_refused_not_stretched(name, argument, axis):
+    """One joint's or one instant's figure never stands for all, and no kernel reads beyond an array."""
+    one = np.take(np.asarray(CALLS[name][argument], float), [0], axis=axis)
+    with pytest.raises((ValueError, SeerobError, np.linalg.LinAlgError, IndexError)):
+        called(name, {**CALLS[name], argument: one})
+
+
+GROWING = {
+    "criteria.safety.kinetic_energy.kinetic_energy": "M qd",
+    "criteria.safety.separation.separation_bound": "v_r v_h T_r T_s xi",
+    "criteria.safety.joint_torque.shares": "torques uncertainty",
+    "criteria.stopping.onset.accelerated": "v T_r a",
+    "criteria.stopping.terms.course": "v_r T_r T_s",
+    "criteria.stopping.terms.way_of_person": "v_h T_r T_s",
+}
+
+
+@pytest.mark.parametrize("name", GROWING)
+def test_what_is_infinite_makes_no_figure_smaller(name):
+    good = figures(called(name, CALLS[name]))
+    for argument in GROWING[name].split():
+        told = figures(called(name, {**CALLS[name], argument: spoiled(CALLS[name][argument], math.inf)}))
+        assert all(b >= a or math.isnan(b) for a, b in zip(good, told, strict=True)), argument
+        assert not np.isfinite(told).all(), argument
+
+
+def test_scores_of_an_author_are_whole_numbers():
+    for score in (math.nan, math.inf, 1.5, -math.inf, [1, math.nan]):
+        for made in (spans.exactly, lambda x: spans.between(x, 9), lambda x: spans.between(0, x)):
+            with pytest.raises(ValueError, match="score"):
+                made(score)
+    with pytest.raises(ValueError, match="at least more"):
+        spans.between(3, 2)

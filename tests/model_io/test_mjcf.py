@@ -275,3 +275,45 @@ def test_what_an_attached_model_names_is_looked_at_too(tmp_path):
     )
     assert set(made.files) == {"m.xml", "hand.xml"}
     assert "h_a" in {link.name for link in made.links}
+
+
+TENDON = '<tendon><fixed name="t" {}><joint joint="a" coef="1"/><joint joint="c" coef="{}"/></fixed></tendon>'
+ROTORS = {
+    "a motor": '<actuator><motor joint="c" gear="10" armature="0.002"/></actuator>',
+    "a motor in its parent": '<actuator><motor jointinparent="d" gear="3" armature="0.1"/></actuator>',
+    "a tendon of one joint": TENDON.format('armature="0.7"', 0),
+    "a tendon of two": TENDON.format('armature="0.7"', 2),
+    "a motor on a tendon": TENDON.format("", 2) + '<actuator><motor tendon="t" armature="0.5"/></actuator>',
+}
+
+
+@pytest.mark.parametrize("what", ROTORS)
+def test_every_inertia_that_mujoco_has_is_in_the_description_or_said_to_be_left_out(tmp_path, what):
+    """Joints, actuators and tendons have rotors: what is one joint's is in it, what is not is told."""
+    text = arm(one_ref=False).replace("</mujoco>", ROTORS[what] + "</mujoco>")
+    made = read(tmp_path, text)
+    model = mujoco.MjModel.from_xml_string(text)
+    data, M = mujoco.MjData(model), np.zeros((4, 4))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, M)
+    bodies = numpy_dynamics.mass_matrix(made, np.zeros(4))
+    rotors = [joint.armature.value if joint.armature else 0.0 for joint in made.joints()]
+    same = np.allclose(M, bodies + np.diag(rotors), rtol=1e-9, atol=1e-12)
+    assert same != bool(made.left_out)
+    assert same == ("two" not in what and "on a tendon" not in what)
+
+
+@pytest.mark.parametrize(
+    "option",
+    ['boundmass="1.5"', 'boundinertia="0.02"', 'settotalmass="3"', 'balanceinertia="true"'],
+)
+def test_masses_that_mujoco_changes_are_nobodys(tmp_path, option):
+    """They are not what the file gives; who is as given stays as given."""
+    text = arm(one_ref=False).replace('angle="degree"', f'angle="degree" {option}')
+    if "balance" in option:
+        text = text.replace('diaginertia="0.01 0.01 0.005"', 'diaginertia="0.01 0.01 0.03"')
+    made = read(tmp_path, text)
+    assert made.link("fore").inertial is None
+    assert option.partition("=")[0] in made.link("fore").refused_mass
+    if "boundmass" in option:
+        assert made.link("upper").inertial is not None

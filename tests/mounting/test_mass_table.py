@@ -62,8 +62,21 @@ def rows(cell):
         (INERTIAL.replace('izz="0.01"', 'izz="1"') + BOX.format(0.1), "break A \\+ B"),
         (INERTIAL.replace('izz="0.01"', 'izz="1"'), "break A \\+ B"),
         (INERTIAL.replace('"3"', '"0.001"') + BOX.format(0.2), "lighter than any foam"),
+        (f'<inertial><mass value="3"/>{SIX.format(1e-6)}</inertial>{BOX.format(0.1)}', "radius of gyration"),
+        (INERTIAL.replace("<mass", '<origin xyz="3 0 0"/><mass') + BOX.format(0.1), "outside all that moves"),
     ],
-    ids=["none", "shown only", "zero", "no mass", "no inertia", "refused", "refused, no shape", "foam"],
+    ids=[
+        "none",
+        "shown only",
+        "zero",
+        "no mass",
+        "no inertia",
+        "refused",
+        "refused, no shape",
+        "foam",
+        "a point",
+        "beside",
+    ],
 )
 def test_what_nobody_weighed_behind_a_fixed_joint_leaves_it_undecided(tmp_path, inside, said):
     cell = station(tmp_path, gripper(inside))
@@ -151,7 +164,7 @@ def test_a_joint_that_moves_nothing_is_a_body_that_nobody_weighed(tmp_path):
 
 
 def test_placeholder_inertias_are_guesses(tmp_path):
-    same = re.sub(r"1e-12", "0.1", two_r(masses=(1.0, 2.0))).replace(
+    same = re.sub(r"(i(xx|yy|zz))=.[^ ]*[0-9].", r"\1='0.1'", two_r(masses=(1.0, 2.0))).replace(
         '<link name="tip"/>', f'<link name="tip">{INERTIAL.replace("0.01", "0.1")}</link>'
     )
     cell = station(tmp_path, same)

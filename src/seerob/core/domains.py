@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +49,17 @@ def at_least(name: str, value: ArrayLike, low: float = 0.0, unit: str = "") -> A
     if (found < low).any():
         number(name, found[found < low], low, unit=unit)
     return found
+
+
+def agree(**lengths: Sequence[int]) -> None:
+    """Raise ValueError where arrays do not fit each other.
+
+    Args:
+        lengths: All lengths of a dimension, by its name in the docstring: ``n=(J.shape[-1], *M.shape)``.
+    """
+    for name, found in lengths.items():
+        if len(set(found)) > 1:
+            raise ValueError(f"{name} is {' and '.join(map(str, found))} in the shapes of what is given")
 
 
 def whole(name: str, value: ArrayLike, low: int, high: int) -> NDArray[np.int64]:

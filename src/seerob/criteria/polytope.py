@@ -21,6 +21,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.core.domains import agree
 from seerob.core.transforms import Array
 from seerob.kernels import polytope as kernel
 from seerob.kernels.contact_forces import zero_moment_set
@@ -78,6 +79,7 @@ def zero_moment(J_v: Array, low: Array, high: Array) -> Polytope:
     """
     J_v = np.ascontiguousarray(J_v, float)
     bounds = np.asarray(low, float), np.asarray(high, float)
+    agree(n=(J_v.shape[-1], *bounds[0].shape, *bounds[1].shape))
     proper, V, triangles, free, inscribed = zero_moment_set(J_v, *bounds, SINGULAR, SAME)
     if not proper:
         _checked(J_v, *bounds)
@@ -139,6 +141,7 @@ def _checked(J: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     J, low, high = np.asarray(J, float), np.asarray(low, float), np.asarray(high, float)
     if not (np.isfinite(J).all() and np.isfinite(low).all() and np.isfinite(high).all()):
         raise ValueError("a Jacobian or torque bound is not finite")
+    agree(n=(J.shape[-1], *low.shape, *high.shape))
     if (low > high).any():
         raise ValueError(f"joint {int((low > high).argmax())}: the lower torque bound is above the upper one")
     return J, low, high

@@ -22,7 +22,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seerob.core.domains import number
+from seerob.core.domains import agree, at_least, number
 from seerob.core.transforms import Array
 from seerob.kernels.axes import mobility, reciprocals
 
@@ -70,6 +70,7 @@ def mass_of_rows(w: Array, M: Array) -> Array:
     Returns:
         Shape (b,); inf where a point cannot be pushed that way.
     """
+    agree(n=(w.shape[-1], *M.shape))
     found = np.empty((1, len(w), len(w)))
     if not mobility(np.ascontiguousarray(w)[None], np.ascontiguousarray(M)[None], found):
         raise np.linalg.LinAlgError("a mass matrix is not positive definite")
@@ -78,7 +79,7 @@ def mass_of_rows(w: Array, M: Array) -> Array:
 
 def spring_energy(F: ArrayLike, k: ArrayLike) -> Array:
     """Energy in the spring at a force, A.1 [J]. F [N], k [N/m]."""
-    return np.asarray(np.square(F) / (2 * number("k", k, LEAST, unit="N/m")))
+    return np.asarray(np.square(at_least("F", F, unit="N")) / (2 * number("k", k, LEAST, unit="N/m")))
 
 
 def speed_at_force(F: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:

@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.domains import number
+from seerob.core.domains import at_least, number
 from seerob.core.snapshot import Verdict
 from seerob.core.tolerances import Shifts, Spread, Tolerance, spread
 from seerob.core.transforms import Array
@@ -168,7 +168,7 @@ def permissible_while_pushed(v: Array, mu: Array, k: Array, F: float) -> Array:
         0 where the drive alone may reach it.
     """
     number("F", F, 0.0, unit="N")
-    root = np.sqrt(mu * k)
+    v, root = at_least("v", v, unit="m/s"), np.sqrt(mu * k)
     return np.asarray(np.sqrt(np.maximum(v * (v - 2 * F / root), 0.0)))
 
 

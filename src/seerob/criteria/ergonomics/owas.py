@@ -120,7 +120,7 @@ def settled(codes: Mapping[str, Possible], around: Mapping[str, Possible]) -> di
 
 def only(code: int, of: int) -> Possible:
     """The set of one code."""
-    return np.asarray(np.arange(1, of + 1) == whole("code", code, 1, of))
+    return np.asarray(np.arange(1, int(whole("of", of, 1, 99)) + 1) == whole("code", code, 1, of))
 
 
 def load_codes(kg: float | None) -> Possible:

@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
+from seerob.core.domains import agree
 from seerob.core.markers import Marker, drawn
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
@@ -50,6 +51,7 @@ def inverse_effective_mass(J_v: Array, M: Array) -> Array:
     """
     J_v, M = np.asarray(J_v, float), np.asarray(M, float)
     rows, n = J_v.shape[-2:]
+    agree(n=(n, *M.shape[-2:]))
     if batch := np.broadcast_shapes(J_v.shape[:-2], M.shape[:-2]):
         J_v, M = np.broadcast_to(J_v, (*batch, rows, n)), np.broadcast_to(M, (*batch, n, n))
     points, masses = np.array(J_v).reshape(-1, rows, n), np.array(M).reshape(-1, n, n)
@@ -89,7 +91,7 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     values, axes = np.empty((len(used_up), 3)), np.empty_like(used_up)
     # Of a symmetric matrix without negative eigenvalues they are its singular values.
     principal_axes(used_up, values, axes)
-    values[np.isnan(values).any(axis=-1)] = np.nan
+    values[~np.isfinite(values).all(axis=-1)] = np.nan
     return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
 
 

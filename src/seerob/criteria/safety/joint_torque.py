@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from seerob.core.domains import at_least
+from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
@@ -40,6 +40,7 @@ def shares(torques: Array, limits: Array, uncertainty: Array) -> tuple[Array, Ar
         Share, lowest, highest, NaN without a limit, shape (..., n) each.
     """
     limits, uncertainty = at_least("limits", limits), at_least("uncertainty", uncertainty)
+    agree(n=(torques.shape[-1], *limits.shape, *uncertainty.shape))
     size = np.abs(torques)
     low = np.maximum(size - uncertainty, 0.0)
     return size / limits, low / limits, (size + uncertainty) / limits

@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
-from seerob.core.domains import at_least, number
+from seerob.core.domains import agree, at_least, number
 from seerob.core.errors import InputError, Undecided
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere, Verdict
@@ -72,6 +72,7 @@ def wrench_from_torques(J: Array, tau: Array, *, damped_below: float) -> Wrench:
     J, tau = number("J", J), np.asarray(tau, float)
     number("damped_below", damped_below, 0.0, LARGEST, "m/rad")
     rows, n = J.shape[-2:]
+    agree(n=(n, tau.shape[-1]))
     axes, sigma, Vt = np.linalg.svd(J, full_matrices=True)
     sigma = np.concatenate([sigma, np.zeros((*sigma.shape[:-1], rows - sigma.shape[-1]))], axis=-1)
     squares = np.maximum(sigma**2, damped_below**2)

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
-from seerob.core.domains import at_least
+from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError
 from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
@@ -57,6 +57,7 @@ def speed_noise(J: Array, error: Array) -> Array:
         [m/s], shape (...).
     """
     error = at_least("error", error, unit="rad/s or m/s")
+    agree(n=(J.shape[-1], *error.shape))
     return np.asarray(np.sqrt(((J * error) ** 2).sum(axis=(-2, -1))))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict
 
+from seerob.core.domains import number
 from seerob.core.transforms import Array
 from seerob.criteria.scoring.published import Ints
 from seerob.criteria.scoring.spans import ROUNDING, Span, any_of, beyond, graded
@@ -146,6 +147,7 @@ class Measured:
 
 def turned(accuracy: float, lever: Array) -> Array | float:
     """How far an error turns a direction that is seen under a shortened lever [rad]."""
+    number("accuracy", accuracy, 0.0, unit="rad")
     if not accuracy:
         return 0.0
     sine = np.minimum(np.sin(min(accuracy, np.pi / 2)) / np.maximum(np.abs(lever), 1e-12), 1.0)

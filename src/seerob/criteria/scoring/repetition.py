@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seerob.core.domains import number
+from seerob.core.domains import agree, number
 from seerob.core.transforms import Array
 from seerob.criteria.scoring.published import Ints
 
@@ -33,8 +33,10 @@ def static(t: ArrayLike, scores: ArrayLike, hold: float, *, gap: float = GAP) ->
     Returns:
         Shape (n,); the interruptions within a held posture belong to it.
     """
-    instants, vectors = _increasing(t), np.asarray(scores)
+    instants, vectors = _increasing(t), number("a score", scores)
+    agree(n=(len(instants), len(vectors)))
     number("hold", hold, 0, unit="s")
+    number("gap", gap, 0, unit="s")
     found = np.zeros(len(instants), bool)
     if len(instants) < 2:
         return found
@@ -61,7 +63,8 @@ def repetitions(t: ArrayLike, scores: ArrayLike, *, window: float = WINDOW) -> I
     Returns:
         Counts, shape (n,); 4 or more per minute is repeated work in RULA's worksheet, more than 4 in REBA.
     """
-    instants, values = _increasing(t), np.asarray(scores)
+    instants, values = _increasing(t), number("a score", scores)
+    agree(n=(*instants.shape, *values.shape))
     number("window", window, 0, unit="s")
     rises = instants[1:][np.diff(values) > 0]
     first = np.searchsorted(rises, instants - window + _ROUNDING, side="right")

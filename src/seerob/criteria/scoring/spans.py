@@ -18,9 +18,12 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.core.domains import whole
 from seerob.core.transforms import Array
 from seerob.criteria.scoring.published import Ints
 
+LARGEST = 10**9
+"""No method has a score beyond."""
 ROUNDING = 1e-6
 """Angles that differ by less [rad] are the same: no device is as good, and no rounding of ours as bad."""
 
@@ -83,14 +86,24 @@ class Span(NamedTuple):
 
 
 def exactly(score: ArrayLike) -> Span:
-    """A score that is known."""
-    array = np.asarray(score, np.int64)
+    """A score that is known, a whole number; ValueError for what is none."""
+    array = _scores(score)
     return Span(array, array)
 
 
 def between(low: ArrayLike, high: ArrayLike) -> Span:
-    """A score of which the ends are known."""
-    return Span(np.asarray(low, np.int64), np.asarray(high, np.int64))
+    """A score of which the ends are known, whole numbers; ValueError for what are none, or fall."""
+    span = Span(_scores(low), _scores(high))
+    if (span.low > span.high).any():
+        raise ValueError("a score is at least more than it is at most")
+    return span
+
+
+def _scores(given: ArrayLike) -> Ints:
+    found = np.asarray(given)
+    if found.dtype.kind in "iub":
+        return found.astype(np.int64, copy=False)
+    return whole("score", found, -LARGEST, LARGEST)
 
 
 def answer(yes: bool | None) -> Span:

@@ -31,7 +31,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from seerob.core.domains import number
+from seerob.core.domains import agree, number
 from seerob.core.transforms import Array
 from seerob.kernels import ahead as kernel
 from seerob.kernels.ahead import joint_speeds, kept, part_speeds
@@ -445,6 +445,7 @@ def largest_between(t: Array, q: Array, qd: Array) -> Array:
         q: Positions there [rad or m], shape (k, j).
         qd: Velocities there, shape (k, j).
     """
+    agree(k=(len(t), len(q), len(qd)), j=(q.shape[1], qd.shape[1]))
     bounds = np.empty((len(t) - 1, 2, q.shape[1]))
     joint_speeds(t, np.ascontiguousarray(q), np.ascontiguousarray(qd), bounds)
     return bounds[:, MOST]
@@ -465,6 +466,7 @@ def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tupl
     """
     number("T_r", T_r, 0.0, unit="s")
     number("lead", lead, 0.0, unit="s")
+    agree(k=(len(t), len(most) + 1), n=(most.shape[1], len(now)))
     return _farthest(np.asarray(t, float), (0.0, np.inf), most, now, T_r, lead)
 
 

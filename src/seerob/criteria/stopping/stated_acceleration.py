@@ -27,7 +27,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.domains import at_least, number
+from seerob.core.domains import agree, at_least, number
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -76,6 +76,7 @@ def largest_gain(
     _check(a=a)
     number("window", window, 0.0, unit="s")
     _check(t=t, v=v, noise=noise)
+    agree(m=(len(t), len(v)))
     if not v.size:
         return None
     left = v - np.asarray(a) * t[:, None]
@@ -109,6 +110,7 @@ def _least_since(x: Array, first: NDArray[np.int64]) -> Array:
 def explains(t: Array, v: Array, window: float, noise: Array | float = 0.0) -> float:
     """The least acceleration that leaves no gain beyond it [m/s²], from above; as `largest_gain`."""
     _check(t=t, v=v, noise=noise)
+    agree(m=(len(t), len(v)))
     low, high = 0.0, float((np.diff(v, axis=0) / np.diff(t)[:, None]).max(initial=0.0))
     while high - low > CLOSE * high:
         middle = (low + high) / 2

@@ -242,7 +242,7 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
     links = _without_empty_world(links)
     links += _sites(model, names, {link.name for link in links})
     reader.raise_problems()
-    left_out: list[str] = []
+    left_out = ["a rotor inertia (armature) that joints share"] if model.coupled else []
     made = flattened(reader, tuple(_mimicking(model, links, left_out)))
     for each in left_out:
         reader.finding("warning", "", f"{each} cannot be carried over: left out")
@@ -301,12 +301,9 @@ def _remarks(reader: Reader, model: Compiled) -> None:
     for what, count in left_out.items():
         if count:
             reader.finding("warning" if what == "tendons" else "note", "", f"{count} {what} left out")
-    for option in ("balanceinertia", "settotalmass"):
-        if model.compiler[option]:
-            reader.finding("warning", "", f"the file asks MuJoCo to change masses ({option}): as changed")
     if model.nu:
         reader.finding(
-            "note", "", f"{model.nu} actuators: only their force limits are taken over, the gains are not"
+            "note", "", f"{model.nu} actuators: only their force limits and rotors are taken over, the gains are not"
         )
     if np.any(model.jnt_stiffness):
         reader.finding("note", "", "springs in joints are left out")
@@ -359,7 +356,7 @@ def _joint(reader: Reader, model: Compiled, joint: int) -> Joint | None:
         return None
     dof = int(model.jnt_dofadr[joint])
     limited = bool(model.jnt_limited[joint])
-    armature = float(model.dof_armature[dof])
+    armature = model.rotors[dof]
     effort = min(_force_limits(model, joint), default=None)
     value, text = lint.plausible_limit("effort", effort)
     if text:
@@ -426,6 +423,11 @@ def _inertial(
     rotation = rotation_from_wxyz(model.body_iquat[body])
     inertia = rotation @ np.diag(model.body_inertia[body].astype(float)) @ rotation.T
     origin, source = Origin.STATED, f"{reader.file}: body {name}"
+    options, changed = model.changed
+    if body in changed:
+        text = f"{mass:.4g} kg are not what the file gives: it asks MuJoCo to change masses ({options})"
+        reader.finding("warning", name, f"{text}: mass and inertia unknown")
+        return None, text
     own, geoms = model.written[body]
     low, high = model.compiler["inertiagrouprange"]
     if not own or model.compiler["inertiafromgeom"] == 1:

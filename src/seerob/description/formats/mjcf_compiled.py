@@ -68,6 +68,9 @@ class Compiled:
         names: Of bodies, geoms, joints, sites and meshes, empty where there is none.
         bodies: Whether a body has an ``<inertial>`` of its own, and its geoms, as written.
         compiler: Options of it as they hold.
+        rotors: Inertia that a degree of freedom has besides the bodies it moves [kg·m² or kg], shape (nv,).
+        coupled: Whether there is more of it, which several of them share.
+        changed: Options that change masses, and bodies that have others for them than the file gives.
         warned: What MuJoCo warned of.
     """
 
@@ -78,9 +81,13 @@ class Compiled:
         names: dict[str, list[str]],
         bodies: list[tuple[bool, list[tuple[float, float, int]]]],
         compiler: dict[str, Any],
+        rotors: list[float],
+        coupled: bool,
+        changed: tuple[str, list[int]],
         warned: list[str],
     ) -> None:
         self.names, self.compiler, self.warned = names, compiler, warned
+        self.rotors, self.coupled, self.changed = rotors, coupled, changed
         self.written = [(own, [WrittenGeom(*geom) for geom in geoms]) for own, geoms in bodies]
         self._of: dict[str, Any] = dict(counts)
         for name, (kind, shape, data) in arrays.items():
@@ -162,10 +169,69 @@ def _compile(path: Path, file: str) -> tuple[Any, ...]:
             for body in spec.bodies
         ],
         {
-            "balanceinertia": bool(compiler.balanceinertia),
-            "settotalmass": bool(compiler.settotalmass > 0),
             "inertiagrouprange": tuple(int(group) for group in compiler.inertiagrouprange),
             "inertiafromgeom": int(compiler.inertiafromgeom),
         },
+        *_rotors(model),
+        _changed(path, model, compiler),
         [str(warning.message) for warning in said_of_it],
     )
+
+
+def _rotors(model: Any) -> tuple[list[float], bool]:
+    """What MuJoCo's mass matrix has besides bodies: joints, actuators and tendons have a part in it.
+
+    With R the difference, R 1 is its diagonal where it has nothing else, whatever the posture.
+    """
+    import mujoco
+
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    weights, found = np.ones(model.nv), []
+    for _ in range(4):
+        for step in (
+            mujoco.mj_kinematics,
+            mujoco.mj_comPos,
+            mujoco.mj_tendon,
+            mujoco.mj_transmission,
+            mujoco.mj_makeM,
+            mujoco.mj_comVel,
+        ):
+            step(model, data)
+        every, moved, held = np.zeros((3, model.nv))
+        mujoco.mj_mulM(model, data, every, weights)
+        data.qacc[:] = weights
+        mujoco.mj_rne(model, data, 1, moved)
+        mujoco.mj_rne(model, data, 0, held)
+        found.append((every - moved + held) / weights)
+        weights = rng.uniform(0.5, 1.5, model.nv)
+        mujoco.mj_integratePos(model, data.qpos, rng.uniform(-1, 1, model.nv), 1.0)
+    least = 1e-9 * max(float(np.abs(every).max(initial=0.0)), 1e-3)
+    coupled = bool((np.abs(np.subtract(found, found[0])) > least).any())
+    exact = coupled | (np.abs(found[0] - model.dof_armature) <= least)
+    rotors = np.where(exact, model.dof_armature, found[0])
+    return rotors.tolist(), coupled
+
+
+MASSES = {"boundmass": 0.0, "boundinertia": 0.0, "balanceinertia": False, "settotalmass": -1.0}
+"""Options by which MuJoCo changes masses that a file gives, and their values that change nothing."""
+
+
+def _changed(path: Path, model: Any, compiler: Any) -> tuple[str, list[int]]:
+    """Options that change masses, and bodies whose masses they change."""
+    import mujoco
+
+    options = [name for name, nothing in MASSES.items() if getattr(compiler, name) != nothing]
+    options = [name for name in options if name != "settotalmass" or compiler.settotalmass > 0]
+    if not options:
+        return "", []
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False
+    for name, nothing in MASSES.items():
+        setattr(spec.compiler, name, nothing)
+    try:
+        plain = spec.compile()
+    except ValueError:  # it cannot be without them, and which bodies that is about is not told
+        return ", ".join(options), list(range(model.nbody))
+    pairs = ((model.body_mass[:, None], plain.body_mass[:, None]), (model.body_inertia, plain.body_inertia))
+    other = np.any([~np.isclose(a, b, rtol=1e-9, atol=0).all(axis=1) for a, b in pairs], axis=0)
+    return ", ".join(options), np.flatnonzero(other).tolist()

@@ -11,7 +11,7 @@ from seerob.core.shapes import Solid
 from seerob.core.snapshot import Finding, LinkMass, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Description, Inertial, Joint, Link, base_from_links, groups
-from seerob.description.lint import DENSITIES, FLANGES, LIGHT, TIPS, too_light
+from seerob.description.lint import DENSITIES, FLANGES, LIGHT, TIPS, misfit, too_light
 from seerob.model.model import Mechanism
 from seerob.model.mounting.specification import extreme_points
 
@@ -66,11 +66,14 @@ def weighed(description: Description, *, carried: bool) -> tuple[LinkMass, ...]:
     carrying = _joints_without_body(description)
     spare = LIGHT
     moving: set[str] = set()
+    poses = base_from_links(description, {})
     for group in groups(description.links):
         for link in group:
             if carried or link.joints or link.parent in moving:
                 moving.add(link.name)
             row = _weighed(description.name, link, bodiless=link.name in carrying)
+            if row.mass and (why := misfit(link, group, poses)):
+                row = LinkMass(name=row.name, origin=Origin.MISSING, note=why)
             silent = link.inertial is None and not link.refused_mass and not link.joints
             bound = _heaviest(link) if silent and row.mass is None else 0.0
             if 0 < bound < spare:

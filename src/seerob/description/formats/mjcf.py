@@ -303,7 +303,9 @@ def _remarks(reader: Reader, model: Compiled) -> None:
             reader.finding("warning" if what == "tendons" else "note", "", f"{count} {what} left out")
     if model.nu:
         reader.finding(
-            "note", "", f"{model.nu} actuators: only their force limits and rotors are taken over, the gains are not"
+            "note",
+            "",
+            f"{model.nu} actuators: only their force limits and rotors are taken over, the gains are not",
         )
     if np.any(model.jnt_stiffness):
         reader.finding("note", "", "springs in joints are left out")

@@ -16,6 +16,7 @@ from seerob.criteria.judging import Judge, contradiction, declared, needed
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.velocity import Velocity
 from seerob.session.run import bind
+from seerob.twin.authors_view import OF_AN_INSTANT
 from seerob.twin.engine import Engine
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -58,10 +59,12 @@ READS = {
     "quaternions": "return self.result(state.quaternions[0, 0])",
     "joint_positions": "return self.result(state.joint_positions(arm)[0])",
     "poses": "return self.result(len(state.poses()))",
+    "largest_speeds": "return self.result(state.largest_speeds()[0])",
     "hearings": "return self.result(len(state.hearings['arm'].heard))",
     "signals": "return self.result(state.signals.value('x', state.t))",
 }
-RAW = ("data", "positions", "rotations", "quaternions", "joint_positions", "poses", "hearings", "signals")
+RAW = ("data", "positions", "rotations", "quaternions", "joint_positions", "poses", "hearings", "signals",
+       "largest_speeds")  # fmt: skip
 OWN = '[[safety]]\nkind = "{}"\nname = "own"\n'
 
 
@@ -348,6 +351,87 @@ def test_whom_it_asked_for_once_it_rests_on_though_it_hides_that(own, body, whol
     assert any("does not declare it (depends, variables)" in reason for reason in found.reasons)
 
 
+BESIDE = {
+    "touches": "state.touches",
+    "where people were captured": "state.captured_qpos",
+    "who was asked": "state.asked.clear()",
+    "whose speeds": "state.speeds_asked.clear()",
+    "asks again itself": "state.asking().__enter__()",
+    "known masses": "state.known_masses_alone().__enter__()",
+    "another author": "state.set_apart('').__enter__()",
+    "time": "state.t = 0.0",
+    "forgets": "state.heard()",
+    "another instant": "state.refresh(0.0)",
+    "a state of before": "kept.append(state) or kept[0].q(arm)[0]",
+    "raw data of before": "kept.append(state) or kept[0].data",
+}
+
+
+@pytest.mark.parametrize("what", BESIDE)
+def test_what_is_the_judges_is_refused_whoever_is_heard(own, what):
+    text = BIND.format(f"{BESIDE[what]}; return self.result(1.0)").replace("arm, ", "kept, arm, ", 1)
+    text = text.replace('= model.mechanisms["arm"]', '= [], model.mechanisms["arm"]')
+    found = own(text + NOBODY, q="q = [0, 0]\n").run(feed=iter([()] * 3)).results["own"]
+    assert found.verdict is UNDECIDED
+    refused = "NotAsked" in found.worst().reason or "AttributeError" in found.worst().reason
+    assert refused, found.worst().reason
+
+
+def test_every_name_of_a_state_is_given_or_refused(own):
+    """What is new in `State` is refused until somebody lists it; what is listed is there."""
+    station = own(BIND.format(READS["q"]), q="q = [0, 0]\n")
+    state = state_at(station, arm=((0, 0), (0, 0)))
+    names = {name for name in dir(state) if not name.startswith("_")}
+    assert names > OF_AN_INSTANT
+    with state.asking(), state.set_apart("own") as view:
+        for name in names - OF_AN_INSTANT:
+            with pytest.raises(NotAsked):
+                getattr(view, name)
+        for name in OF_AN_INSTANT:
+            getattr(view, name)
+        with pytest.raises(AttributeError, match="State has no anything"):
+            _ = view.anything
+    with pytest.raises(NotAsked, match="a question was answered with it"):
+        _ = view.t
+
+
+OTHER = TWO_R.replace('"arm"', '"other"', 1) + "base = { position = [0, 9, 0] }\n"
+OF_OTHERS = {
+    "their joints": "d.qpos.sum()",
+    "their speeds": "d.qvel.sum()",
+    "their links": "d.xpos.sum()",
+    "how they are turned": "d.xmat.sum()",
+    "the common centre of mass": "d.subtree_com[0, 0]",
+    "their axes": "d.xanchor.sum()",
+    "their twists": "d.cvel.sum()",
+    "what follows from them": "(mujoco.mj_kinematics(state.model.mj, d), d.xpos.sum())[1]",
+}
+
+
+@pytest.mark.parametrize("what", OF_OTHERS)
+def test_mujocos_data_of_one_robot_tell_nothing_of_another(own, what):
+    text = BIND.format(f"d = state.data_of('arm'); return self.result({OF_OTHERS[what]})")
+    station = own(text, OTHER + LOG, head=HEAD.replace("import numpy", "import mujoco\nimport numpy"))
+    Path(station.model.folder, "m.csv").write_text(GAP)
+    found = station.run(feed=None).results["own"]
+    assert set(found.verdicts.tolist()) == {2}
+    assert "not a finite number" in found.worst().reason or "not heard" in found.worst().reason
+
+
+def test_mujocos_data_of_a_robot_are_its_own(own):
+    read = "float(d.qpos[:2].sum() + d.qvel[:2].sum() + np.abs(d.xpos[frame.mj]).sum())"
+    text = BIND.format(f"d = state.data_of('arm'); return self.result({read})")
+    station = own(text, OTHER + LOG)
+    Path(station.model.folder, "m.csv").write_text(GAP)
+    found = station.run().results["own"]
+    assert found.verdicts[20] == 0
+    assert found.values[20] == pytest.approx(0.02 + 0.04 + 0.1 + 0.2 + np.abs(tip(0.02, 0.04)).sum())
+
+
+def tip(a, b):
+    return np.cos(a) + np.cos(a + b), np.sin(a) + np.sin(a + b)
+
+
 ALTERED = {
     "masses": "state.mass_matrix(arm)[:] *= 1e-6",
     "ellipsoid": "state.mass_ellipsoid(frame, arm).masses[:] = 0",
@@ -357,6 +441,9 @@ ALTERED = {
     "pose": "[a.fill(0) for a in state.pose(frame)]",
     "speeds": "[a.fill(0) for a in (*state.body_velocities(bodies), *state.fastest_points(bodies))]",
     "data": "d = state.data_of('arm'); d.qvel[:] = 0; d.qpos[:] = 0; d.xpos[:] = 0; d.cvel[:] = 0",
+    "what was heard": "h = state.hearing('arm'); h.timeout = 9.0; h.heard.clear(); h.given = True",
+    "who rides on whom": "state.attachments.ids[:] = 0; state.attachments.roots[:] = 0",
+    "columns": "state.columns['arm'].own_v[:] = 0",
     "distances": "c = state.closest_per_body(gap); c.distance[:] = 9; c.point_a[:] = 0",
     "the model": "state.model.mj.body_mass[:] = 0; state.model.mechanisms['arm'].coupling[:] = 0",
     "what was bound": "model.mj.body_mass[:] = 0; arm.coupling[:] = 0; frame.body_from_frame[:] = 0; "
@@ -414,3 +501,76 @@ def test_every_method_of_ones_own_is_given_a_model_of_its_own(own, method):
 def test_every_method_that_takes_a_model_gives_ones_own_its_own():
     named = {name for name, f in vars(Criterion).items() if "model" in getattr(f, "__annotations__", {})}
     assert named == GIVEN_A_MODEL
+
+
+# -- of many instants ----------------------------------------------------------------------------
+
+MANY = (
+    BIND.format("return self.result(1.0)")
+    + """
+    def batch(self, model):
+        from seerob.api import Answers
+        arm, bodies = model.mechanisms["arm"], model.select("arm")
+        def many(states):
+            {}
+        return many
+"""
+)
+ALONE = "x = {}; return Answers.against(np.full(len(states), x), self.limit, at_most=True)"
+RAW_OF_MANY = (
+    "states.motion.q[0, 0]",
+    "states.everywhere()[1][0, 0, 0]",
+    "states.largest_speeds()[0, 0]",
+    "len(states.doubts)",
+    "states.asked.clear() or 1.0",
+    "states.elsewhere(None) and 1.0",
+    "len(kept[0]) if kept else kept.append(states) or 1.0",
+)
+
+
+@pytest.mark.parametrize("read", RAW_OF_MANY)
+def test_of_many_instants_nothing_is_read_that_does_not_say_whether_it_may_be_relied_on(own, read):
+    text = (
+        MANY.format(ALONE.format(read))
+        .replace("arm, ", "kept, arm, ")
+        .replace("model.mechanisms", "[], model.mechanisms")
+    )
+    station = own(text + NOBODY, q="q = [0, 0]\n")
+    for threads in (1, 2):
+        found = station.batch({"arm": np.zeros((600, 2))}, {"arm": np.zeros((600, 2))}, threads=threads)[
+            "own"
+        ]
+        assert found.verdict is UNDECIDED
+        assert found.note == ""
+
+
+SPOILS = (
+    "states.mass_matrix(arm)[:] *= 1e-6",
+    "states.fastest_points(bodies)[0][:] = 0; states.qd(arm)[:] = 0",
+    "[body.corners.fill(0) for body in states.model.bodies]; states.model.mj.body_mass[:] = 0",
+    "states.closest_per_body(gap).distance[:] = 9",
+)
+
+
+@pytest.mark.parametrize("spoil", SPOILS)
+def test_what_is_written_into_arrays_of_many_instants_changes_no_other(own, spoil):
+    found = []
+    for body in ("", f"{spoil}; "):
+        more = person("op", 2.3, 0.3, 0)
+        for kind, said in (
+            ("kinetic_energy", 'robot = "arm"\nlimit = 0.5'),
+            ("velocity", 'of = "arm"\nlimit = 0.2'),
+            ("minimum_distance", 'between = ["arm", "op"]\nlimit = 0.3'),
+        ):
+            more += f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{said}\n'
+        text = MANY.format(body + ALONE.format("1.0")).replace(
+            "        def many", "        gap = model.gap(model.select('op'), bodies)\n        def many"
+        )
+        station = own(text, more, q="q = [0, 0]\n")
+        q = np.linspace(0, 0.5, 40)[:, None] * np.ones(2)
+        found.append(station.batch({"arm": q}, {"arm": np.ones((40, 2))}))
+    one, other = found
+    assert one["own"].verdict is WITHIN is other["own"].verdict
+    for name in one:
+        assert one[name].note == ""
+        np.testing.assert_array_equal(one[name].value, other[name].value, name)

@@ -7,7 +7,7 @@ import math
 import traceback
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -349,6 +349,12 @@ class _Question:
     """Why nothing that it said last is within."""
 
 
+def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
+    """What one's own says of a state, of which it is given the accessors, and nothing that others read."""
+    with state.set_apart(bound.criterion.name) as own:
+        return evaluate(own)
+
+
 def _question(bound: Bound, model: Model) -> _Question:
     names, bodies = needed(bound.criterion, model)
     declared = _all_declared(bound.criterion, model)
@@ -486,11 +492,7 @@ class Judge:
             state.require(*question.names)
         if question.bodies:
             state.require_bodies(question.bodies)
-        if bound.own:
-            with state.set_apart(bound.criterion.name):
-                result = evaluate(state)
-        else:
-            result = evaluate(state)
+        result = _asked_alone(bound, evaluate, state) if bound.own else evaluate(state)
         if question.undeclared or not state.asked <= question.declared:
             self._rely_on_undeclared(question, state)
         if type(result) is not Result:
@@ -538,7 +540,10 @@ class Judge:
         criterion = question.criterion
         if question.again is None:
             question.again = (None if criterion.remembers(state.model) else criterion.bind(state.model),)
-        noise = shaken(result, criterion, *question.again, state)
+        (again,) = question.again
+        if again is not None and question.bound.own:
+            again = partial(_asked_alone, question.bound, again)
+        noise = shaken(result, criterion, again, state)
         if noise.off and result.value is not None:
             low, high = result.interval or (result.value, result.value)
             result = replace(result, interval=(low - noise.off, high + noise.off))

@@ -242,7 +242,10 @@ class Model:
         mj, bodies, frames, mechanisms = self._owned[author]
         if any(piece.rest is not None for piece in self.workstation.workpieces):
             mj = copy(self.mj)  # what is picked up changes masses from tick to tick
-        return replace(self, mj=mj, bodies=bodies, frames=frames, mechanisms=mechanisms)
+        dictionary = {**self.dictionary}
+        return replace(
+            self, mj=mj, bodies=bodies, frames=frames, mechanisms=mechanisms, dictionary=dictionary
+        )
 
     @property
     def estimate_uncertainty(self) -> dict[str, float]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 
 import mujoco
@@ -334,6 +334,11 @@ class _Able:
     needs: tuple[str, ...]
     """Who must be where the motion says, whatever it asks (`seerob.criteria.judging.needed`)."""
 
+    @cached_property
+    def own(self) -> bool:
+        """Whether its function is one of the user's, which does not ship."""
+        return not type(self.criterion).batch.__module__.startswith("seerob.")
+
 
 def _movers(criterion: Criterion, model: Model) -> tuple[str, ...]:
     """Robots, people and machines that a criterion needs, and whoever moves the bodies that it needs."""
@@ -392,7 +397,11 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
     states.require(*one.needs)
     reasons = np.full(n, "", object)
     try:
-        answers = one.many(states)
+        if one.own:
+            with states.set_apart(criterion.name) as own:
+                answers = one.many(own)
+        else:
+            answers = one.many(states)
         why = _misshapen(answers, n)
     except Undecided as reason:
         why = str(reason)

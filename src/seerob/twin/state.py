@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy, deepcopy
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -30,6 +30,7 @@ from seerob.kernels.chain import along, at_point
 from seerob.kernels.spans import greatest
 from seerob.kernels.speed import carried, fastest, in_body, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
+from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
@@ -49,6 +50,13 @@ MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
 WRITTEN = ("placed", "velocities of")
 """What is kept of them lies in buffers."""
+
+
+OF_DOFS = ("qvel", "qacc", "qacc_warmstart", "qfrc_applied", "qfrc_bias", "qfrc_passive", "qfrc_actuator",
+           "qfrc_constraint", "qfrc_smooth", "qfrc_inverse", "cdof", "cdof_dot")  # fmt: skip
+OF_BODIES = ("xpos", "xquat", "xmat", "xipos", "ximat", "cvel", "cacc", "cfrc_int", "cfrc_ext", "cinert")
+OF_SUBTREES = ("subtree_com", "subtree_linvel", "subtree_angmom", "crb")
+"""Arrays of `mujoco.MjData` by degree of freedom, by body, and by body with all that it carries."""
 
 
 class MassEllipsoid(NamedTuple):
@@ -101,6 +109,7 @@ class State(Validity):
         self._alone = [(i,) for i in range(n)]
         """Each body by itself, as it is asked for."""
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
+        self._others_of: dict[tuple[str, ...], tuple[Indices, Indices, Indices]] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
         self.captured_qpos: Array | None = None
         """Of an instant between two ticks: ``qpos`` with people where they were captured; None at a tick,
@@ -355,29 +364,73 @@ class State(Validity):
     def data_of(self, *names: str) -> Any:
         """MuJoCo's data, of which only what these robots, people and machines decide may be used.
 
-        For what has no accessor of its own; `seerob.testing` moves everybody else and compares.
+        For what has no accessor of its own. Of one's own criteria it is a copy, in which everybody else and
+        all that they move is not a number.
 
         Raises:
             Undecided: One of them was not heard.
         """
         self.require(*names)
         self.speeds_asked.update(names)
-        return copy(self._data) if self._author else self._data
+        return self._data_without(self._others(names)) if self._author else self._data
+
+    def _others(self, names: tuple[str, ...]) -> tuple[Indices, Indices, Indices]:
+        """Positions, velocities and bodies of MuJoCo on which others than these have an influence."""
+        if names not in self._others_of:
+            model = self._model
+            known = {each for name in names for each in (name, *model.carriers_of(name))}
+            others = [m for m in model.mechanisms.values() if m.name not in known]
+            q, v = (np.concatenate([np.zeros(0, np.int64), *rows]) for rows in (
+                [m.q_address for m in others], [m.v_address for m in others]
+            ))  # fmt: skip
+            moved = [i for i in range(model.mj.nbody) if moving_dofs(model.mj, i)[v].any()]
+            self._others_of[names] = q, v, np.array(moved, np.int64)
+        return self._others_of[names]
+
+    def _data_without(self, others: tuple[Indices, Indices, Indices]) -> Any:
+        """A copy of MuJoCo's data in which some positions, velocities and bodies are not numbers."""
+        mj, data, (q, v, bodies) = self._model.mj, copy(self._data), others
+        if not len(v):
+            return data
+        data.qpos[q] = np.nan
+        for name in OF_DOFS:
+            getattr(data, name)[v] = np.nan
+        for name in OF_BODIES:
+            getattr(data, name)[bodies] = np.nan
+        for name in OF_SUBTREES:
+            # What a body carries is in it: of the world, everybody.
+            above = {0, *bodies.tolist()}
+            for body in bodies.tolist():
+                while body:
+                    above.add(body := int(mj.body_parentid[body]))
+            getattr(data, name)[sorted(above)] = np.nan
+        for kind in ("geom", "site", "cam"):
+            rows = np.isin(getattr(mj, f"{kind}_bodyid"), bodies)
+            for name in (f"{kind}_xpos", f"{kind}_xmat"):
+                getattr(data, name)[rows] = np.nan
+        joints = np.isin(mj.jnt_dofadr, v)
+        data.xanchor[joints], data.xaxis[joints] = np.nan, np.nan
+        return data
 
     @contextmanager
-    def set_apart(self, author: str) -> Iterator[None]:
+    def set_apart(self, author: str) -> Iterator[State]:
         """While a criterion of one's own is asked: what it is given is its own, and nobody else reads it.
 
         For the judge: whatever an author writes into an array changes no other criterion and no motion.
 
         Args:
             author: Name of that criterion.
+
+        Yields:
+            What it is asked with: the accessors of this state, until it has answered.
         """
         kept = self._cache, self._places
         self._cache, self._places, self._author = {}, {}, author
+        view = AuthorsView(self, OF_AN_INSTANT)
         try:
-            yield
+            yield cast("State", view)
         finally:
+            view.answered()
             self._cache, self._places = kept
             self._author = ""
 

@@ -10,10 +10,11 @@ Their motion may be said by arrays instead of sources (`motion_of`).
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -27,6 +28,7 @@ from seerob.kernels.speed import fastest_many, stacked, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
 from seerob.twin.attachments import untold
+from seerob.twin.authors_view import OF_MANY, AuthorsView
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path, Ways
 from seerob.twin.trees import Followed, Tree
@@ -176,6 +178,19 @@ class States:
     def elsewhere(self, motion: Motion) -> States:
         """Return the twin at other instants."""
         return States(self._bench, motion)
+
+    @contextmanager
+    def set_apart(self, author: str) -> Iterator[States]:
+        """While a criterion of one's own is asked: as `seerob.twin.state.State.set_apart`."""
+        apart = States(self._bench, self._motion)
+        apart.model = self.model.own_of(author)
+        view = AuthorsView(apart, OF_MANY)
+        try:
+            yield cast("States", view)
+        finally:
+            view.answered()
+            self.asked |= apart.asked
+            self.speeds_asked |= apart.speeds_asked
 
     # Each is found when it is asked first: what only a robot's own tree says does not follow the others.
 

@@ -6,7 +6,8 @@ Which bones of people a question is about, and what is said of those that nobody
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -143,6 +144,17 @@ class Hearing:
     """How long after its newest sample it may be late all the same [s]."""
     coarse: str = ""
     """Why what is heard is too coarse for energies and forces; empty when it is not."""
+
+    def copied(self) -> Hearing:
+        """Copy it: what is written into the copy changes nothing that is known."""
+        return replace(
+            self,
+            heard=deepcopy(self.heard),
+            bones_heard=[*self.bones_heard],
+            captured=None if self.captured is None else self.captured.copy(),
+            bones={**self.bones},
+            residual={**self.residual},
+        )
 
     def take(self, said: Heard) -> None:
         """Take what one sample said.

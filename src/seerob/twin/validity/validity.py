@@ -239,11 +239,12 @@ class Validity:
             Undecided: Nothing of it may be relied on.
         """
         self.asked.add(name)
-        if name in (self._sound or self._find_sound()):
-            return self._hearings[name]
-        if (reason := self.invalid_place_reason(name)) and not (strayed and reason == self.stray(name)):
+        sound = name in (self._sound or self._find_sound())
+        reason = "" if sound else self.invalid_place_reason(name)
+        if reason and not (strayed and reason == self.stray(name)):
             raise Undecided(reason)
-        return self._hearings[name]
+        hearing = self._hearings[name]
+        return hearing.copied() if self._author else hearing
 
     def signal(self, name: str) -> Value:
         """The value of a variable of the dictionary now, in SI.

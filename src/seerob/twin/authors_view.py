@@ -1,0 +1,74 @@
+"""What criteria of one's own are given instead of `State` and `States`: accessors, for one question.
+
+Whatever is not listed here is the engine's or the judge's, and raises `NotAsked`. So does everything once the
+question is answered: what is kept, in a closure or for a thread, says nothing of another instant.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+from seerob.core.errors import NotAsked
+
+OF_AN_INSTANT = frozenset(
+    {
+        "along", "attachments", "body_velocities", "bones_in_doubt", "bones_turned_in_doubt",
+        "captured", "closest", "closest_per_body", "columns", "contact_forces", "data_of", "distances",
+        "drawn_point", "fastest_point", "fastest_points", "fastest_speed", "fastest_speeds", "foresee",
+        "heard_doubt", "hearing", "in_body", "input_reason", "invalid_bodies", "invalid_place_reason",
+        "invalid_reason", "jacobian", "joint_noise", "joint_positions", "knots", "largest_speeds",
+        "mass_ellipsoid", "mass_matrix", "measured_torques", "model", "moved", "once", "placed", "pose",
+        "poses", "q", "qd", "require", "require_bodies", "signal", "signals_meanwhile", "speed_error",
+        "speed_errors", "speed_noise", "stray", "strayed", "strays", "t", "torques_within", "velocity",
+        "velocity_ellipsoid", "weigh",
+    }
+)  # fmt: skip
+"""Names of `seerob.twin.state.State` that a criterion of one's own may ask; some say what to ask instead."""
+SHARED = frozenset({"attachments", "columns"})
+"""Those of the names that give what everybody uses: copies of it."""
+OF_MANY = frozenset(
+    {
+        "closest", "closest_per_body", "fastest_points", "held", "jacobian", "mass_matrix", "model",
+        "placed", "qd", "require",
+    }
+)  # fmt: skip
+"""Names of `seerob.twin.states.States`, likewise."""
+
+
+class AuthorsView:
+    """One of both, as whoever wrote a criterion of their own may use it.
+
+    Args:
+        of: A `State` or `States`.
+        given: Names that may be asked.
+    """
+
+    __slots__ = ("_answered", "_given", "_of")
+
+    def __init__(self, of: Any, given: frozenset[str]) -> None:
+        self._of, self._given, self._answered = of, given, False
+
+    def __getattr__(self, name: str) -> Any:
+        kind = self._kind(name)
+        if name not in self._given:
+            if not hasattr(self._of, name):
+                raise AttributeError(f"{kind} has no {name}")
+            getattr(self._of, name)  # what is closed says what to ask instead
+            raise NotAsked(f"{kind}.{name} is for the engine and the judge, so no criterion may use it")
+        found = getattr(self._of, name)
+        return deepcopy(found) if name in SHARED else found
+
+    def __len__(self) -> int:
+        self._kind("__len__")
+        return len(self._of)
+
+    def _kind(self, name: str) -> str:
+        kind = type(self._of).__name__
+        if self._answered:
+            raise NotAsked(f"{kind}.{name}: a question was answered with it; ask the one of this instant")
+        return kind
+
+    def answered(self) -> None:
+        """Close it: the question is answered."""
+        self._answered = True

@@ -13,7 +13,7 @@ from seerob.core.errors import NotAsked
 
 OF_AN_INSTANT = frozenset(
     {
-        "along", "attachments", "body_velocities", "bones_in_doubt", "bones_turned_in_doubt",
+        "along", "asked", "attachments", "body_velocities", "bones_in_doubt", "bones_turned_in_doubt",
         "captured", "closest", "closest_per_body", "columns", "contact_forces", "data_of", "distances",
         "drawn_point", "fastest_point", "fastest_points", "fastest_speed", "fastest_speeds", "foresee",
         "heard_doubt", "hearing", "in_body", "input_reason", "invalid_bodies", "invalid_place_reason",
@@ -25,11 +25,11 @@ OF_AN_INSTANT = frozenset(
     }
 )  # fmt: skip
 """Names of `seerob.twin.state.State` that a criterion of one's own may ask; some say what to ask instead."""
-SHARED = frozenset({"attachments", "columns"})
+SHARED = frozenset({"asked", "attachments", "columns"})
 """Those of the names that give what everybody uses: copies of it."""
 OF_MANY = frozenset(
     {
-        "closest", "closest_per_body", "fastest_points", "held", "jacobian", "mass_matrix", "model",
+        "asked", "closest", "closest_per_body", "fastest_points", "held", "jacobian", "mass_matrix", "model",
         "placed", "qd", "require",
     }
 )  # fmt: skip

@@ -150,7 +150,7 @@ class Own(Criterion, frozen=True, kw_only=True):
 """
 GOOD = "value, markers = float(state.q(arm)[0]), ()"
 FORGETS = {
-    "peeks": ("value, markers = float(state._data.qpos[-1]), ()", "it changes when other moves"),
+    "peeks": ("value, markers = float(state.q.__self__._data.qpos[-1]), ()", "it changes when other moves"),
     "undeclared": ("value, markers = float(state.q(arm)[0] + state.q(other)[0]), ()", "it depends on other"),
     "raw": ("value, markers = float(state.data.qpos[0]), ()", "State.data does not say whether"),
     "catches": (
@@ -221,8 +221,14 @@ def test_one_that_forgets_fails(own, how):
 def test_one_that_says_that_it_judges_parts_and_asks_nothing_fails(own):
     """What it found when it could is worth nothing once nobody is heard."""
     line = "kept.append(1.0) if kept else kept.append(float(state.q(arm)[0])); value, markers = kept[0], ()"
-    with pytest.raises(AssertionError, match=r"it is within at tick \d+ although arm is stale"):
+    with pytest.raises(AssertionError, match="it hangs on earlier instants, and does not say so"):
         never_within(own(line, "    whole = False\n"))
+
+
+def test_one_that_remembers_and_judges_parts_is_not_within_once_nobody_is_heard(own):
+    """The judge sees to it."""
+    line = "kept.append(1.0) if kept else kept.append(float(state.q(arm)[0])); value, markers = kept[0], ()"
+    never_within(own(line, "    whole = False\n    def remembers(self, model): return True\n"))
 
 
 def test_a_basis_that_is_missing_fails(own):
@@ -238,3 +244,99 @@ def test_a_workstation_is_enough_for_pytest(own, tmp_path):
     file = str(tmp_path / "cell" / "workstation.toml")
     done = subprocess.run([*asked, file], capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
     assert (done.returncode, "1 passed" in done.stdout) == (0, True), done.stdout
+
+
+# -- rules about postures that forget ----------------------------------------------------------------
+
+RULE = """
+import random, time
+import numpy as np
+from seerob.api import Basis, Model, Result, Rule, State, Undecided, Verdict, beyond, bind_posture, judge
+
+class Own(Rule, frozen=True, kw_only=True):
+    '''Points of a posture.'''
+    limit: float = 2.5
+    def basis(self, model): return Basis(formula="as below", source="ACME")
+    def bind(self, model):
+        read, other = bind_posture(model, self.human), bind_posture(model, "other")
+        op = model.mechanisms[self.human]
+        bone = {b.name.partition("/")[2]: b.index for b in model.bodies if b.owner == self.human}
+        head, hand, thorax = (bone[name] for name in ("head", "right_hand", "thorax"))
+        kept = []
+        def evaluate(state):
+            BODY
+            if np.isnan(value):
+                return Result(name=self.name, limit=self.limit, verdict=Verdict.UNDECIDED, reason="not seen")
+            return Result(name=self.name, value=value, limit=self.limit, verdict=judge(value, self.limit))
+        return evaluate
+"""
+GOOD_RULE = "value = float(read(state).elbow_flexion[0])"
+BAD_RULES = {
+    "keeps its first answer": (
+        "kept.append(float(read(state).elbow_flexion[0])) if not kept else None; value = kept[0]",
+        "hangs on earlier instants",
+    ),
+    "keeps its last answer where it knows none": (
+        "try: kept.append(float(read(state).elbow_flexion[0]))\n            except Undecided: pass\n"
+        "            value = kept[-1]",
+        "",  # the judge takes it back, whatever it says
+    ),
+    "answers by chance": ("read(state); value = random.random()", "when the same is said again"),
+    "answers by the clock": ("read(state); value = time.perf_counter() % 1", "when the same is said again"),
+    "judges somebody else": (
+        "value = float(read(state).elbow_flexion[0] + other(state).elbow_flexion[0])",
+        "it depends on other",
+    ),
+    "swallows that somebody else is not known": (
+        "value = float(read(state).elbow_flexion[0])\n"
+        "            try: value += float(other(state).trunk_flexion)\n            except Undecided: pass",
+        "it depends on other",
+    ),
+    "takes what is not seen for straight": (
+        "value = float(np.nan_to_num(read(state).elbow_flexion[0])) + 0 * float(read(state).trunk_flexion)",
+        "it is within although right_(upper_arm|forearm) of op is not sure, and exceeded with right_elbow",
+    ),
+    "takes the arm that is seen for both": (
+        "angles = read(state); value = float(np.nanmax(angles.elbow_flexion))",
+        "it is within although right_(upper_arm|forearm) of op is not sure, and exceeded with right_elbow",
+    ),
+    "judges what is known of a span": (
+        "angles = read(state); bent = beyond(angles.elbow_flexion[0], 1.5)\n"
+        "            value = 3.0 * float(bent.low) + 0 * float(angles.trunk_flexion)",
+        "it is within although right_(upper_arm|forearm) of op is not sure",
+    ),
+    "writes what is no limit": (
+        "read(state); return Result(name=self.name, value=1.0, limit=float('inf'), verdict=Verdict.WITHIN)",
+        "its limit is inf",
+    ),
+}
+
+
+@pytest.fixture
+def own_rule(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def write(body):
+        package = f"rules_{tmp_path.name}"
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").touch()
+        (tmp_path / package / "rule.py").write_text(RULE.replace("BODY", body))
+        rule = f'[[ergonomics]]\nkind = "{package}.rule"\nname = "own"\nhuman = "op"\n'
+        return made(tmp_path / "cell", person("op") + person("other", 3, 0, 0) + rule)
+
+    return write
+
+
+def test_a_rule_that_asks_what_it_declares_passes(own_rule):
+    never_within(own_rule(GOOD_RULE))
+
+
+@pytest.mark.parametrize("how", BAD_RULES)
+def test_a_rule_that_forgets_fails_or_is_taken_back(own_rule, how):
+    body, words = BAD_RULES[how]
+    station = own_rule(body)
+    if not words:
+        never_within(station)
+        return
+    with pytest.raises(AssertionError, match=words):
+        never_within(station)

@@ -104,6 +104,23 @@ def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[i
     return tuple(names), tuple(bodies)
 
 
+def _relied_on(criterion: Criterion, model: Model) -> tuple[str, ...]:
+    """Of whom something must be heard for one's own to be within that judges bone by bone, or part by part.
+
+    One that ships raises `Undecided` itself, or finds that what is known suffices.
+    """
+    if criterion.whole or type(criterion).__module__.startswith("seerob."):
+        return ()
+    found: dict[str, None] = {}
+    for name in criterion.depends(model):
+        if name in model.mechanisms:
+            found[name] = None
+        else:
+            found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in _meant(model, name))))
+            found |= dict.fromkeys(_of_link(model, name))
+    return tuple(found)
+
+
 def _of_link(model: Model, name: str) -> tuple[str, ...]:
     """Robot, person or machine that has a link without a shape; none where the name means none."""
     link = model.frames.get(name)
@@ -338,6 +355,8 @@ class _Question:
     """Whom it says that it rests on, and the variables."""
     unmentioned: dict[str, str]
     """By robot that no subject means, what no shape shows of it."""
+    relied_on: tuple[str, ...] = ()
+    """Of whom something must be heard where it is within."""
     held: str = ""
     """Why nothing that it says of its subjects is within."""
     undeclared: set[str] = field(default_factory=set)
@@ -358,7 +377,8 @@ def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
 def _question(bound: Bound, model: Model) -> _Question:
     names, bodies = needed(bound.criterion, model)
     declared = _all_declared(bound.criterion, model)
-    return _Question(bound, bound.criterion, names, bodies, declared, unmentioned(bound.criterion, model))
+    shapeless, relied_on = unmentioned(bound.criterion, model), _relied_on(bound.criterion, model)
+    return _Question(bound, bound.criterion, names, bodies, declared, shapeless, relied_on)
 
 
 class Judge:
@@ -517,6 +537,10 @@ class Judge:
             raise Undecided(f"the value is {value}, not a finite number")
         if result.verdict is _WITHIN and state.speeds_asked and (still := unmoved(state)):
             return undecided(result, f"{still}: no source says how it moves, and how fast it is was asked")
+        if question.relied_on and (
+            doubt := next(filter(None, map(state.heard_doubt, question.relied_on)), "")
+        ):
+            return undecided(result, doubt)
         if not criterion.by_speed and state.speed_errors:
             return self._shaken(question, result, state)
         return result

@@ -4,7 +4,8 @@
 everybody is, and then spoils what is said: of each robot, person and machine that a criterion depends on,
 and of its variables. A criterion fails when it, a part, a row or a marker of it is within all the same; when
 it rests on somebody whom it does not declare (`Criterion.depends`), on chance, on the time of day, or on what
-was before without saying so (`Criterion.remembers`); or when it is no criterion (no basis, a result that
+was before without saying so (`Criterion.remembers`); when limbs that nobody is sure of could be where it is
+exceeded; or when it is no criterion (no basis, a result that
 contradicts itself).
 
 ``sources_never_within("my_cell")`` takes one in which every criterion is within while its files are played,
@@ -31,7 +32,7 @@ from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import Judge, bound_to, declared
-from seerob.description.humans.skeleton import BONES
+from seerob.description.humans.skeleton import BONES, PARENTS, ROOT
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.live.looked_at import LookedAt
 from seerob.model.model import Mechanism, Model
@@ -50,9 +51,11 @@ TIMEOUT = 4
 SPOILED = 8
 """Tick from which what is said is spoiled."""
 SWING = 1e-3
-"""Amplitude of the motion of every joint of a robot [rad or m]."""
+"""Amplitude of the motion of every joint of a robot or person [rad or m]."""
 ELSEWHERE = 0.2
 """By how much joints of those who must not matter are moved [rad or m]."""
+SETTLED = 2
+"""Tick at which somebody in a posture of their own is asked."""
 MUTE = "seerob.testing/asked"
 
 Said = Callable[[JointSample, int], JointSample | None]
@@ -351,10 +354,49 @@ class _Harness:
             if concerned and self.model.mechanisms[name].role == "human":
                 hidden = self._run(hidden=name)
                 told += self._green(hidden, concerned, f"no bone of {name} is sure")
+                told += self._blind(name, concerned)
         asking = [i for i, names in enumerate(variables) if names]
         told += self._green(self._run(quiet=True), asking, "no variable was heard")
         told += self._green(self._run(muted=True), range(len(criteria)), "it is muted")
         return told
+
+    def _blind(self, name: str, concerned: Sequence[int]) -> list[str]:
+        """Who is within while limbs of a person are not sure, that could be where it is exceeded."""
+        human, mj, told = self.model.mechanisms[name], self.model.mj, list[str]()
+        bone_of = {b.mj: b.name.removeprefix(f"{name}/") for b in self.model.bodies if b.owner == name}
+        moved = [bone_of.get(int(mj.dof_bodyid[v]), "") for v in human.v_address[human.own]]
+        for limb in PARENTS:
+            joints = [j for j, bone in enumerate(moved) if bone == limb]
+            if PARENTS[limb] == ROOT or not joints:
+                continue
+            bones = tuple(bone for bone in PARENTS if _hangs_on(bone, limb))
+            seen = self._posed(concerned, name, human.home, bones)
+            within = [i for i in concerned if seen[i].verdict is Verdict.WITHIN]
+            ends = [(j, float(end[j])) for j in joints for end in (human.lower, human.upper)]
+            for j, end in ends if within else ():
+                q = human.home.copy()
+                q[j] = end
+                if not math.isfinite(end):
+                    continue
+                there = self._posed(within, name, q, ())
+                for i in [i for i in within if there[i].verdict is Verdict.EXCEEDED]:
+                    within.remove(i)
+                    what = f"it is within although {limb} of {name} is not sure"
+                    at = f"{human.joints[j].name} at {end:.3g} rad"
+                    told.append(f"{self._asked[i][0].name}: {what}, and exceeded with {at}")
+        return told
+
+    def _posed(self, which: Iterable[int], name: str, q: Array, hidden: tuple[str, ...]) -> dict[int, Result]:
+        """What some say of a person in a posture, of whom some bones are not sure."""
+
+        def posed(sample: JointSample, k: int) -> JointSample:
+            return changed(sample, q=tuple(q.tolist()))
+
+        run = self._run(spoil={name: posed}, hidden=name if hidden else "", bones=hidden, only=tuple(which))
+        for k, said in run:
+            if k == SETTLED:
+                return dict(zip(which, (result for result, _ in said), strict=True))
+        raise AssertionError
 
     def _unsteady(self, clean: Sequence[tuple[int, list[tuple[Result, set[str]]]]]) -> list[str]:
         """Who says another thing of what was said before, or hangs on earlier instants without saying so."""
@@ -395,6 +437,8 @@ class _Harness:
         elsewhere: str = "",
         findings: Sequence[Finding] = (),
         hidden: str = "",
+        bones: Sequence[str] = BONES,
+        only: Sequence[int] | None = None,
         quiet: bool = False,
         muted: bool = False,
         anew: bool = False,
@@ -406,7 +450,8 @@ class _Harness:
         engine = Engine(model, driven=driven, live=driven, signals=sources)
 
         def bound() -> list[Judge]:
-            asked = ((changed(c, active=MUTE) if muted else c, group) for c, group in self._asked)
+            which = self._asked if only is None else [self._asked[i] for i in only]
+            asked = ((changed(c, active=MUTE) if muted else c, group) for c, group in which)
             return [Judge([bound_to(model, c, group)], findings) for c, group in asked]
 
         judges = bound()
@@ -422,7 +467,7 @@ class _Harness:
                 engine.take([*self._signals(k, values)])
             state: State = engine.tick() if k else engine.start()
             if hidden:
-                doubt = "seerob.testing", tuple(BONES)
+                doubt = "seerob.testing", tuple(bones)
                 state.hearings[hidden].bones_heard = [BonesHeard(state.t, parts=(doubt,))]
             if anew and k == TICKS - 1:
                 judges = bound()
@@ -439,9 +484,9 @@ class _Harness:
 
 
 def _sample(mechanism: Mechanism, k: int, elsewhere: float) -> JointSample:
-    """Where somebody is at a tick: about their home, robots in motion."""
+    """Where somebody is at a tick: about their home, robots and people in motion."""
     t = k * _PERIOD
-    swing = SWING if mechanism.role == "robot" else 0.0
+    swing = 0.0 if mechanism.role == "machine" else SWING
     q: Array = mechanism.home + swing * np.sin(2 * np.pi * t) + elsewhere
     qd = np.full(len(q), 2 * np.pi * swing * math.cos(2 * np.pi * t))
     return JointSample(
@@ -453,6 +498,13 @@ def _sample(mechanism: Mechanism, k: int, elsewhere: float) -> JointSample:
         qd=tuple(qd.tolist()),
         tau=(0.0,) * len(q) if mechanism.role == "robot" else None,
     )
+
+
+def _hangs_on(bone: str, limb: str) -> bool:
+    """Whether a bone is a limb's, or moves with it."""
+    while bone in PARENTS and bone != limb:
+        bone = PARENTS[bone]
+    return bone == limb
 
 
 def _usual(variable: Variable) -> Value:

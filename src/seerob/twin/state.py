@@ -198,7 +198,7 @@ class State(Validity):
 
     # -- people as they were captured -------------------------------------------------------
 
-    def captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+    def captured(self, name: str, bodies: tuple[int, ...], *, posture: bool = False) -> tuple[Array, Array]:
         """Where bones of a person were captured, wherever the physics lets the twin be.
 
         A hand that lies on a table, or that a robot pushes, is stopped there in the twin; what was captured
@@ -207,10 +207,13 @@ class State(Validity):
         Args:
             name: Of the person.
             bodies: Its bones, by index.
+            posture: Whether only where bones are to one another is asked, which is known where nobody says
+                where the person is.
 
         Returns:
             World from bone, shape (n, 3, 3), and the bones' origins in the world [m], (n, 3), in the order of
-            ``bodies``.
+            ``bodies``. For one's own criteria what is in doubt is NaN, and the origin of a posture is that of
+            the first bone.
 
         Raises:
             Undecided: What was heard of the person may not be relied on.
@@ -218,7 +221,15 @@ class State(Validity):
         self.asked.add(name)
         if reason := self.heard_doubt(name):
             raise Undecided(reason)
-        return self._captured(name, bodies)
+        R, x = self._captured(name, bodies)
+        if not self._author:
+            return R, x
+        names = [self._model.bodies[i].name.removeprefix(f"{name}/") for i in bodies]
+        R[np.isin(names, self.bones_turned_in_doubt(name))] = np.nan
+        if posture:
+            return R, x - x[0]
+        x[np.isin(names, self._bones_in_doubt(name))] = np.nan
+        return R, x
 
     def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         rows, q = self._rows_of(bodies), self._hearings[name].captured
@@ -308,7 +319,7 @@ class State(Validity):
             bodies: By index.
             allow_estimated: As in `require_bodies`.
             doubted: Also bones in doubt of people of whom the others may be relied on, as they are shown: for
-                whoever judges bone by bone (`bones_in_doubt`).
+                whoever judges bone by bone (`bones_in_doubt`). For one's own criteria they are NaN.
             strayed: As in `require_bodies`.
 
         Returns:
@@ -337,6 +348,9 @@ class State(Validity):
         if key not in self._cache:
             rows = self._rows_of(bodies)
             R[rows], x[rows] = self._rotations[rows], self._positions[rows]
+            if doubted and self._author:
+                lost = list(self.invalid_bodies(bodies))
+                R[lost], x[lost] = np.nan, np.nan
             self._cache[key] = True
         return R, x
 

@@ -77,7 +77,7 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
         # How a hand is turned of which only the wrist is seen is a guess, too.
         doubted = (*doubted, *hearing.unaimed(state.t))
         # What was captured, not where a table or a robot stops the twin.
-        found = angles(*state.captured(human.name, bones))
+        found = angles(*state.captured(human.name, bones, posture=True))
         # What devices see changes with time: of a leg that nobody sees no score is made.
         lost = (*unmeasured, *doubted) if doubted else unmeasured
         found = found.without(lost) if lost else found

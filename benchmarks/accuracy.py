@@ -32,9 +32,8 @@ from seerob.criteria.safety.kinetic_energy import kinetic_energy
 from seerob.description.robots import library
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
-from seerob.session.recorded_station import load_recorded
 from seerob.session.run import pump
-from seerob.session.station import Station, load
+from seerob.session.station import Station, load, load_recorded
 from seerob.twin.engine import Engine
 from seerob.twin.state import State
 from seerob.workstation.source import Opened, Source

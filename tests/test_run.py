@@ -19,8 +19,8 @@ from seerob.core.errors import InputError
 from seerob.core.markers import plain
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
-from seerob.session.recorded_station import load_recorded
 from seerob.session.run import Clock, Judge, bind, pump, ticks
+from seerob.session.station import load_recorded
 from seerob.twin.engine import Engine, last_tick
 from seerob.workstation.source import Opened, Source
 
@@ -91,7 +91,7 @@ def test_replay_of_the_demo_is_the_run(demo):
 AGAIN = """
 import sys, hashlib, msgspec
 from seerob.recording.recording import Recording
-from seerob.session.recorded_station import load_recorded
+from seerob.session.station import load_recorded
 sys.path.insert(0, sys.argv[2])
 from test_run import encoded, replayed
 recording = Recording.open(sys.argv[1])

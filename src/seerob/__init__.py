@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from seerob.recording.recording import Recording
     from seerob.recording.result_log import ResultLog, Series
     from seerob.session.reading import read
-    from seerob.session.recorded_station import load_recorded
     from seerob.session.run import Summary
-    from seerob.session.station import Station, load
+    from seerob.session.station import Station, load, load_recorded
     from seerob.workstation.workstation import Workstation
 
 _HOMES = {

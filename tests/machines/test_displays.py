@@ -8,7 +8,7 @@ from kept_run import Kept
 from seerob import load
 from seerob.core.errors import InputError
 from seerob.core.samples import SignalSample
-from seerob.session.displays import UNKNOWN, Looks
+from seerob.session.scene import UNKNOWN, Looks
 from seerob.twin.engine import Engine
 
 STATION = """

@@ -11,8 +11,8 @@ from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError, Undecided, UnknownName
 from seerob.session.permissible.between_samples import BetweenSamples
-from seerob.session.permissible.given_motion import GivenMotion
 from seerob.session.permissible.moving_joints import MovingJoints, chains_of
+from seerob.session.permissible.path import GivenMotion
 
 POST = '[[parts]]\nname = "post"\nshape = {{ box = [0.2, 0.3, 0.2] }}\nat = {{ position = [{x}, 0.4, 0] }}\n'
 SLIDING = (

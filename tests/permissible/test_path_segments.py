@@ -20,7 +20,7 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.safety.path_speed import passed
 from seerob.files.trajectories.path_map import Place, path_markers, read_map
 from seerob.session.permissible.evaluation import Wish
-from seerob.session.permissible.given_motion import solved
+from seerob.session.permissible.path import solved
 from seerob.session.permissible.speed_map import segments
 from seerob.session.permissible.tables import SEGMENT_HEAD, csv_bytes, map_head, map_rows, segment_rows
 

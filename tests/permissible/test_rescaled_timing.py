@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError
-from seerob.session.permissible.given_motion import GivenMotion, largest_hermite, largest_on
 from seerob.session.permissible.joint_limits import JointLimits
-from seerob.session.permissible.path import path_of
+from seerob.session.permissible.path import GivenMotion, largest_hermite, largest_on, path_of
 from seerob.session.permissible.timing import Parabolas, Profile, timed
 
 

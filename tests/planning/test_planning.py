@@ -8,8 +8,7 @@ import pytest
 import seerob
 from seerob.core.errors import InputError
 from seerob.session.planning.clearance import Clearance
-from seerob.session.planning.plan import plan
-from seerob.session.planning.search import NoPath, Stopped
+from seerob.session.planning.plan import NoPath, Stopped, plan
 
 LINK = """
 <link name="{0}"><inertial><mass value="1"/>

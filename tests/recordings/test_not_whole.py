@@ -20,8 +20,7 @@ from seerob.recording.format import END_METADATA, SAMPLES, Tick
 from seerob.recording.mcap_index import scan
 from seerob.recording.recording import Recording
 from seerob.session import run, scene
-from seerob.session.recorded_station import load_recorded
-from seerob.session.station import load
+from seerob.session.station import load, load_recorded
 
 CELL = (
     "[engine]\nphysics = false\n"

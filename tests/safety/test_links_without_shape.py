@@ -17,7 +17,7 @@ from seerob.criteria.criterion import Criterion
 from seerob.model.mounting.mechanisms import stands_out
 from seerob.session.permissible.between_samples import BetweenSamples
 from seerob.session.permissible.ceilings import ceilings_of
-from seerob.session.permissible.given_motion import GivenMotion
+from seerob.session.permissible.path import GivenMotion
 from seerob.session.planning.clearance import Clearance
 from seerob.session.run import Bound, Judge
 

@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, two_r
 from seerob.core.snapshot import Verdict
-from seerob.session.permissible.bounds import motions_of, wanted_bounds
+from seerob.session.permissible.between_samples import motions_of, wanted_bounds
 from seerob.twin.engine import Engine
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [7, 0, 0] }\n'

@@ -25,7 +25,7 @@ from seerob.outputs.sinks.recorder import Recorder
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots.rtde import RobotMode, SafetyStatus, quality
 from seerob.recording.recording import Recording
-from seerob.session.recorded_station import load_recorded
+from seerob.session.station import load_recorded
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
 FASTEST = 1.5

@@ -7,8 +7,8 @@ import numpy as np
 from made_cell import FLOATING, TWO_R, heard, made, state_at, two_r
 from seerob.core.errors import Undecided
 from seerob.description.humans.skeleton import BONES
-from seerob.session.displays import invalid_reasons
 from seerob.session.run import Judge, bind, ticks
+from seerob.session.scene import invalid_reasons
 from seerob.twin.engine import Engine
 from seerob.twin.validity.hearing import BonesHeard
 

@@ -18,7 +18,7 @@ from seerob.core.samples import PoseSample, Quality
 from seerob.core.snapshot import Snapshot
 from seerob.core.transforms import rotation_from_wxyz, transform
 from seerob.protocols.ros.ros_messages import Edition
-from seerob.session.writing.cartesian_targets import CartesianTargets, message, serialised, targets_allowed
+from seerob.session.writing import CartesianTargets, message, serialised, targets_allowed
 from seerob.workstation.tables.writing import CartesianTarget, TargetMessage, TargetWire
 
 HALF = math.sqrt(0.5)

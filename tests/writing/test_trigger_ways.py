@@ -18,13 +18,13 @@ from in_a_loop import in_a_loop
 from live_story import wait_for
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
-from seerob.session.writing.triggers import Triggers, allowed
+from seerob.session.writing import Triggers, allowed
 
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """A machine under load answers late."""
-    monkeypatch.setattr("seerob.session.writing.triggers.WITHIN", 20.0)
+    monkeypatch.setattr("seerob.session.writing.WITHIN", 20.0)
 
 
 def edges(station, *verdicts):

@@ -15,7 +15,7 @@ from seerob.app.emulators.siemens_web import SiemensWebServer
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
 from seerob.protocols import ProtocolError
-from seerob.session.writing.triggers import Triggers, allowed
+from seerob.session.writing import Triggers, allowed
 
 SOURCE = 'kind = "siemens_web"\nurl = "URL"\nuser = "twin"\npassword_env = "SEEROB_PLC_PASSWORD"'
 

@@ -26,8 +26,8 @@ from seerob.model.model import Model
 from seerob.outputs.notebook import results_html
 from seerob.outputs.sink import KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
-from seerob.session.displays import Looks, invalid_reasons
 from seerob.session.opening import coarse, signal_timeouts, untimed
+from seerob.session.scene import Looks, invalid_reasons
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
 from seerob.twin.state import State

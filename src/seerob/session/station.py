@@ -1,4 +1,4 @@
-"""The Python API: a workstation that has been read and compiled, and its runs."""
+"""The Python API: a workstation that has been read and compiled, its runs, and that of a recording."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from contextlib import ExitStack
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
-from seerob.core.errors import InputError
+from seerob.core.errors import InputError, Problem
+from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.criteria.contact.measured import curves
 from seerob.criteria.criterion import Criterion
@@ -30,7 +32,7 @@ from seerob.model.mounting.things import MadeArea
 from seerob.outputs.notebook import criteria_html
 from seerob.outputs.sentences import counted
 from seerob.outputs.sink import Sink, Writer
-from seerob.recording.format import source_files
+from seerob.recording.format import SOURCES, source_files
 from seerob.recording.recording import Recording
 from seerob.session import run as road
 from seerob.session.opening import open_sources, reached, source_target
@@ -41,7 +43,7 @@ from seerob.twin.own_words import said_by
 from seerob.twin.states import motion_of
 from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
-from seerob.workstation.workstation import Workstation
+from seerob.workstation.workstation import Workstation, file_among
 
 if TYPE_CHECKING:
     from seerob.session.batch import Batch
@@ -518,3 +520,68 @@ def load(
         InputError: With every mistake in the file and in the files it names.
     """
     return Station(read(path, Allowed(allow_plugins, allow_outside)), cache=cache)
+
+
+_REMEDY = "give the workstation that it was made with (--workstation)"
+
+
+def load_recorded(
+    recording: Recording,
+    *,
+    cache: Path | None = None,
+    allow_plugins: bool = False,
+    allow_outside: bool = False,
+) -> Station:
+    """The workstation that a recording was made with, from the files inside it.
+
+    Args:
+        recording: The recording.
+        cache: Folder that keeps what takes long to make between starts.
+        allow_plugins: Whether dotted kinds that no installed package offers are imported by their names.
+        allow_outside: Whether descriptions that it names outside its folder are read from this machine.
+
+    Raises:
+        InputError: It needs files that the recording does not carry, or that have changed since.
+    """
+    with TemporaryDirectory(prefix="seerob-") as folder:
+        recording.extract(Path(folder))
+        allowed = Allowed(allow_plugins, allow_outside, replayed=True)
+        try:
+            file = Path(folder) / file_among(recording.files)
+            station = Station(read(file, allowed), cache=cache)
+        except InputError as error:
+            problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
+            raise InputError(
+                [*problems, Problem(str(recording.path), "", "cannot be computed from itself", _REMEDY)]
+            ) from error
+        # Read while the folder is there.
+        now, then = station.files, recording.files
+        _ = station.bound
+    compared = (name for name in {*now, *then} if not name.startswith(SOURCES))
+    changed = sorted(name for name in compared if now.get(name) != then.get(name))
+    if changed:
+        what = f"was made with other files than are found now: {', '.join(changed[:6])}"
+        raise InputError.at(recording.path, "", what, _REMEDY)
+    return station
+
+
+def recorded_sources(
+    sources: Iterable[Source], samples: Iterable[Sample], duration: float
+) -> tuple[tuple[Source, Opened], ...]:
+    """Every source with its recorded samples; rounds of a loop follow each other as they were played.
+
+    Args:
+        sources: Of the workstation.
+        samples: Of the recording, in order.
+        duration: Of the recording [s].
+    """
+    heard: dict[str, list[Sample]] = {}
+    for sample in samples:
+        own = heard.setdefault(sample.source, [])
+        # A sample that speaks of no later instant says nothing new.
+        if not own or sample.t > own[-1].t:
+            own.append(sample)
+    return tuple(
+        (replace(source, loop=False), Opened(samples=heard.get(source.name, []), duration=duration))
+        for source in sources
+    )

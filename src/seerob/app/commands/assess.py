@@ -106,7 +106,7 @@ def _bounds(station: Station) -> list[Bound]:
     Raises:
         InputError: Somebody moves by anything but joint positions, or nobody moves.
     """
-    from seerob.session.permissible.bounds import MOST, motions_of, wanted_bounds
+    from seerob.session.permissible.between_samples import MOST, motions_of, wanted_bounds
 
     motions = motions_of(station.sources)
     if not motions:

@@ -190,7 +190,7 @@ def _each(values: list[float] | None) -> list[float] | float | None:
 
 def _bounds(station: Station, found: PermissibleSpeed, tolerance: float) -> list[Bound]:
     """Distances that the criteria ask about, and the robot's speed, over the motion that is judged."""
-    from seerob.session.permissible.bounds import MOST, motions_of, wanted_bounds
+    from seerob.session.permissible.between_samples import MOST, motions_of, wanted_bounds
 
     motions = motions_of(station.sources, found)
     return wanted_bounds(station.model, motions, tolerance=tolerance, most=MOST)

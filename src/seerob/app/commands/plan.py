@@ -82,7 +82,7 @@ def around(
         Stopped: ``stopped`` said so.
     """
     from seerob.session.planning.others import Witness, alone, made_for, movers, with_sweeps
-    from seerob.session.planning.search import Stopped
+    from seerob.session.planning.plan import Stopped
     from seerob.session.station import Station
 
     def tell(text: str) -> None:
@@ -188,8 +188,7 @@ def run(options: argparse.Namespace) -> int:
     station = compiled(options.workstation, allowed(options), sources=False)
     from seerob.app.console.interruption import Stopped as Asked
     from seerob.outputs.sinks.dossier import write_whole
-    from seerob.session.planning.plan import plan
-    from seerob.session.planning.search import NoPath, Stopped
+    from seerob.session.planning.plan import NoPath, Stopped, plan
 
     names = [robot.name for robot in station.workstation.robots]
     if options.robot is None and len(names) != 1:

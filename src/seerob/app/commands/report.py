@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         station = compiled(options.workstation, allowed(options), quiet=options.json, sources=False)
     else:
         compile_loops()
-        from seerob.session.recorded_station import load_recorded
+        from seerob.session.station import load_recorded
 
         station = load_recorded(
             recording,
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_existing(sinks, folder)
     every = []
     if options.permissible:
-        from seerob.session.recorded_station import recorded_sources
+        from seerob.session.station import recorded_sources
 
         samples = (sample for tick in recording.ticks() for sample in tick.samples)
         sources = recorded_sources(station.workstation.sources, samples, recording.duration)

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from seerob.core.snapshot import Scene
     from seerob.outputs.sink import Writer
     from seerob.session.station import Station
-    from seerob.session.writing.cartesian_targets import CartesianTargets
-    from seerob.session.writing.triggers import Triggers
+    from seerob.session.writing import CartesianTargets, Triggers
 
 HELP = "run a workstation live: sources connect, the page opens, recording starts"
 EXAMPLE = "seerob run my_cell            (then open the address it prints; Ctrl-C ends the run)"
@@ -148,7 +147,7 @@ def _tell_ends(station: Station) -> None:
 
 def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
     """What writes to machines; nothing unless file and command line both allow it, which is said."""
-    from seerob.session.writing.triggers import Triggers, allowed
+    from seerob.session.writing import Triggers, allowed
 
     names = ", ".join(trigger.variable for trigger in station.workstation.triggers)
     if allowed(station.model, on_command_line=allow):
@@ -163,7 +162,7 @@ def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
 
 def _targets(station: Station, *, allow: bool) -> list[CartesianTargets]:
     """What publishes Cartesian targets; nothing unless file and command line both allow it, which is said."""
-    from seerob.session.writing.cartesian_targets import CartesianTargets, targets_allowed
+    from seerob.session.writing import CartesianTargets, targets_allowed
 
     topics = ", ".join(f"{target.topic} ({target.host})" for target in station.workstation.targets)
     if targets_allowed(station.model, on_command_line=allow):

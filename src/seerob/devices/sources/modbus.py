@@ -95,7 +95,7 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
                 await asyncio.sleep(due - clock.time())
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
-        """Write one coil; called by `seerob.session.writing.triggers` alone."""
+        """Write one coil; called by `seerob.session.writing` alone."""
         place = msgspec.convert(variable.address, Place)
         async with connect(self.host, self.port, self.device) as device:
             await device.write_coil(place.at, raw)

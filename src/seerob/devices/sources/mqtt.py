@@ -211,7 +211,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
                     yield _standing(wanted, metrics)
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
-        """Publish ``true`` or ``false``; called by `seerob.session.writing.triggers` alone."""
+        """Publish ``true`` or ``false``; called by `seerob.session.writing` alone."""
         where = address(variable)
         if not isinstance(where, Plain):
             raise ProtocolError("a metric of Sparkplug is not written")

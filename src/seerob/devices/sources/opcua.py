@@ -131,7 +131,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
                 )
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
-        """Write one bool; called by `seerob.session.writing.triggers` alone."""
+        """Write one bool; called by `seerob.session.writing` alone."""
         async with connect(self.way(), folder) as client:
             await write_bool(await find(client, address(variable.address)), raw)
 

@@ -140,7 +140,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
                         yield Node(below, str(entry.get("datatype", "")), "", "")
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
-        """Write one bool; called by `seerob.session.writing.triggers` alone."""
+        """Write one bool; called by `seerob.session.writing` alone."""
         async with self._session(folder) as session:
             s7_web.result(await session.post(s7_web.writing(variable.address, raw)))
 

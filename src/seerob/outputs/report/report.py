@@ -1,4 +1,8 @@
-"""What a report is made from, how the run was driven, and the words and cells that all sections share."""
+"""What a report is made from, how the run was driven, and the words and cells that all sections share.
+
+A recording is reported on where its sources are not: of the workstation file only the text is used, and what
+it leaves out is what each kind says of itself. What cannot be read is said to be unknown.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Text tables that are written row by row to disk, whose columns may become more, and folders of them.
 
-Such a folder is there when the run is over, with all of its tables, or not at all.
+What a table has at its head (the number of rows, the names of columns that turned up late) is known only
+at the end: the rows wait in a file of their own, and are put below the head when the run is over. Memory
+does not grow with the length of the run. A folder of them is there with all of its tables, or not at all.
 """
 
 from __future__ import annotations

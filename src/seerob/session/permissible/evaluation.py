@@ -16,13 +16,11 @@ from seerob.model.model import Model
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import worst_verdict
 from seerob.session.permissible.ceilings import By
-from seerob.session.permissible.given_motion import GivenMotion, solved
 from seerob.session.permissible.joint_limits import JointLimits
-from seerob.session.permissible.path import Path, path_of
+from seerob.session.permissible.path import GivenMotion, Path, path_of, solved
 from seerob.session.permissible.rescaled import Check, Rescaled, Spent, check, rescale, spent
 from seerob.session.permissible.speed_map import SpeedMap, Stations
-from seerob.session.permissible.survey import SPACING, Survey
-from seerob.session.permissible.verification import Verified, verify
+from seerob.session.permissible.survey import SPACING, Survey, Verified, verify
 from seerob.session.permissible.witness import Clock, Witness
 from seerob.session.run import Bound, Feed, Judge, Summary, ends_at, engine_of, looks_ahead, pump, ticks
 from seerob.workstation.source import HOLD, Opened, Source

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from seerob.core.transforms import Array
 from seerob.model.model import Model
 from seerob.model.volumes.moving import Joints, chain_of
-from seerob.session.permissible.given_motion import GivenMotion, largest_on
+from seerob.session.permissible.path import GivenMotion, largest_on
 
 
 @dataclass(frozen=True, eq=False)

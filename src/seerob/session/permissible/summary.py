@@ -21,8 +21,8 @@ from seerob.session.permissible.between_samples import METHOD, Bound
 from seerob.session.permissible.ceilings import BY, EITHER_NEEDS, By, Ceiling
 from seerob.session.permissible.evaluation import PermissibleSpeed
 from seerob.session.permissible.speed_map import PathSegment, SpeedMap
+from seerob.session.permissible.survey import Verified
 from seerob.session.permissible.tables import COST_HEAD, Cell, cost_rows, least_by_region
-from seerob.session.permissible.verification import Verified
 
 
 @dataclass(frozen=True, eq=False)

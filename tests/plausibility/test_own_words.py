@@ -26,7 +26,15 @@ from seerob.protocols.robots.fri import Edition, Monitoring, decode_monitoring, 
 from seerob.session.run import Judge, bind, engine_of
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
-from seerob.twin.own_words import LiveWords, fixed_offset, heavier, rigid_error, sign_or_unit
+from seerob.twin.own_words import (
+    LiveWords,
+    compared,
+    fixed_offset,
+    heavier,
+    rigid_error,
+    said_by,
+    sign_or_unit,
+)
 
 DH = {
     # a2, a3, d1, d4, d5, d6 [m]: Universal Robots, "DH Parameters for calculations of kinematics"
@@ -485,3 +493,24 @@ def test_what_a_log_has_at_the_flange_and_the_twin_has_not(tmp_path, payload, sh
     assert all(
         "kg at its flange, and the twin carries 1.5 kg" in reasons[k] for k in np.flatnonzero(undecided)
     )
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "ur10e"])
+def test_a_source_that_says_where_its_tool_is_now_and_then_is_compared_then(
+    tmp_path: Path, robot: str
+) -> None:
+    """As registers do, while the robot stands: the first sample and the last say nothing."""
+    log_of(tmp_path, MOVING, None)
+    model = station(tmp_path).model
+    said = [
+        JointSample(
+            source="s", seq=i, t=t, target="arm", q=tuple(q), qd=(0.0,) * 6,
+            **({"tcp": tuple(tcp), "tcp_speed": 0.0} if i % 3 == 1 else {}),
+        )
+        for i, (t, q, tcp) in enumerate(zip(T.tolist(), MOVING.tolist(), dh_tcp(robot, MOVING), strict=True))
+    ]  # fmt: skip
+    words = said_by(said, "run.mcap")
+    assert words is not None
+    (found,) = compared(model, "arm", words)
+    assert found.holds == (() if robot == "ur5e" else ("arm",))
+    assert said_by(said[:1], "run.mcap") is None

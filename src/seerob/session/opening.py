@@ -218,7 +218,8 @@ def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
         if motion.qd is None or opened.samples.qd is not motion.qd:
             noise = noise_of_speeds(motion, model.mechanisms[name].description, name)
             found += [] if noise is None else [noise]
-    said = said_by(opened.samples, getattr(source, "file", source.name))
+    robot = any(name == one.name for one in model.workstation.robots)
+    said = said_by(opened.samples, getattr(source, "file", source.name)) if robot else None
     if said is not None:
         found += compared(model, name, said)
     return replace(opened, findings=tuple(found))

@@ -407,7 +407,10 @@ FLANGE = "its flange"
 
 
 class Said(NamedTuple):
-    """What a file says of a robot, in its valid rows; None where it says nothing."""
+    """What a file says of a robot, in its valid rows; None where it says nothing.
+
+    Of where the TCP is, and how fast, rows in which it is not said are NaN.
+    """
 
     file: str
     t: Array
@@ -425,12 +428,15 @@ class Said(NamedTuple):
     tcp_speed: Array | None = None
     """[m/s], shape (N,)."""
 
-    def thinned(self, most: int) -> Said:
-        """At most so many rows of it, evenly."""
-        step = max(1, -(-len(self.t) // most))
-        thin = (None if x is None else x[::step] for x in (self.qd, self.tau, self.tcp, self.tcp_speed))
+    def thinned(self, most: int, said: Array | None = None) -> Said:
+        """At most so many rows of it, evenly; of those in which something is said, when it is given."""
+        rows = np.arange(len(self.t))
+        if said is not None:
+            rows = rows[np.isfinite(said.reshape(len(said), -1)).all(axis=1)]
+        rows = rows[:: max(1, -(-len(rows) // most))]
+        thin = (None if x is None else x[rows] for x in (self.qd, self.tau, self.tcp, self.tcp_speed))
         qd, tau, tcp, speed = thin
-        return self._replace(t=self.t[::step], q=self.q[::step], qd=qd, tau=tau, tcp=tcp, tcp_speed=speed)
+        return self._replace(t=self.t[rows], q=self.q[rows], qd=qd, tau=tau, tcp=tcp, tcp_speed=speed)
 
 
 def said_by(samples: Iterable[Sample], file: str) -> Said | None:
@@ -445,16 +451,17 @@ def said_by(samples: Iterable[Sample], file: str) -> Said | None:
         t = motion.t[valid] - motion.t[0]
         q = motion.q[valid]
         return Said(file, t, q, qd, tau, tcp, motion.tcp_in_base, speed) if len(t) else None
-    heard = (s for s in samples if isinstance(s, JointSample))
-    first = next(heard, None)
-    if first is None or (first.tau is None and first.tcp is None and first.tcp_speed is None):
+    rows = [s for s in samples if isinstance(s, JointSample) and s.quality is Quality.GOOD]
+    if all(s.tau is None and s.tcp is None and s.tcp_speed is None for s in rows):
         return None
-    rows = [s for s in (first, *heard) if s.quality is Quality.GOOD]
-    fields = (_table([getattr(s, field) for s in rows]) for field in ("q", "qd", "tau", "tcp"))
-    q, qd, tau, tcp = fields
-    speeds = [s.tcp_speed for s in rows if s.tcp_speed is not None]
-    speed = np.array(speeds) if len(speeds) == len(rows) else None
+    q, qd, tau = (_table([getattr(s, field) for s in rows]) for field in ("q", "qd", "tau"))
+    # Some say it only while they stand.
+    tcp = np.array([UNSAID if s.tcp is None else s.tcp for s in rows])
+    speed = np.array([np.nan if s.tcp_speed is None else s.tcp_speed for s in rows])
     return None if q is None else Said(file, np.array([s.t for s in rows]), q, qd, tau, tcp, True, speed)
+
+
+UNSAID = (math.nan, math.nan, math.nan)
 
 
 def _table(rows: Sequence[tuple[float, ...] | None]) -> Array | None:
@@ -465,11 +472,13 @@ def _table(rows: Sequence[tuple[float, ...] | None]) -> Array | None:
 def compared(model: Model, name: str, said: Said) -> Iterator[Finding]:
     """What is found when what a file says of itself is compared with the robot that it drives."""
     robot = bound(model, name)
-    if robot is not None and said.tcp is not None:
-        yield _about_tool(model, name, robot, said.thinned(MOST))
-    if robot is not None and said.tcp_speed is not None and said.qd is not None:
-        yield from _about_speed(name, robot, said.thinned(MOST))
-    if robot is not None and said.tau is not None:
+    if robot is None:
+        return
+    if said.tcp is not None and len((words := said.thinned(MOST, said.tcp)).t):
+        yield _about_tool(model, name, robot, words)
+    if said.tcp_speed is not None and said.qd is not None:
+        yield from _about_speed(name, robot, said.thinned(MOST, said.tcp_speed))
+    if said.tau is not None:
         yield from _about_torques(model, name, said.thinned(ROWS))
 
 

@@ -148,6 +148,7 @@ class Timed:
             array = getattr(self, name)
             if array is None:
                 continue
+            array = array.reshape(len(array), -1)
             bad = ~np.isfinite(array)
             if bad.any():
                 i, j = (int(k) for k in np.argwhere(bad)[0])
@@ -218,7 +219,8 @@ class Trajectory(Timed):
 
     def _value_problems(self) -> Iterator[Problem]:
         yield from self._time_problems()
-        yield from self._number_problems(("q", "qd", "tau", "tcp_position", "tcp_wxyz"))
+        every = ("q", "qd", "tau", "tcp_position", "tcp_wxyz", "tcp_speed", "payload")
+        yield from self._number_problems(every)
 
 
 @dataclass(frozen=True, eq=False)

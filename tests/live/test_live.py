@@ -15,7 +15,7 @@ import pytest
 
 from live_story import wait_for as until
 from seerob.core.errors import SeerobError
-from seerob.core.samples import JointSample, SignalSample
+from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
@@ -88,6 +88,24 @@ def test_what_is_heard_is_numbered_named_and_put_on_the_hosts_clock():
     assert [s.t for s in ears.samples] == pytest.approx([1000, 1000.1, 1000.2, 1000.3, 1000.4, 1001.0])
     found = ears.listener.statistics()
     assert (found.count, found.repeated, found.offset) == (5, 5, pytest.approx(995))
+
+
+def test_what_a_source_doubts_itself_stays_a_doubt():
+    """Also where nothing else is found, and it calls the sample good for all that."""
+    doubt = "it is another robot"
+
+    async def script():
+        for k in range(40):
+            yield msgspec.structs.replace(joint(device=5 + 0.01 * k), reason=doubt if k % 2 else "")
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(60)
+
+    with Ears(script) as ears:
+        until(lambda: len(ears.samples) == 40)
+    heard = ears.samples
+    assert all(s.reason and s.quality is not Quality.GOOD for s in heard[1::2])
+    assert any(doubt in s.reason for s in heard[1::2])
+    assert not any(doubt in s.reason for s in heard[::2])
 
 
 @pytest.mark.parametrize("error", [OSError(111, "x"), SeerobError("nonsense"), ValueError("a bug"), None])

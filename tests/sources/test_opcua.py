@@ -20,14 +20,14 @@ from made_cell import made
 from relay import Stream
 from seerob.app.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.core.errors import InputError, SeerobError
-from seerob.core.samples import JointSample, SignalSample
+from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.opcua import Opcua
-from seerob.devices.sources.opcua_robot import OpcuaRobot
+from seerob.devices.sources.opcua_robot import OpcuaRobot, another_robot
 from seerob.devices.variables.live_source import Change, Picture
 from seerob.protocols.plc.opcua_address import Address, address, browse_name, node_name, number, unit, written
 from seerob.protocols.plc.opcua_client import Security
-from seerob.protocols.plc.opcua_robotics import natural
+from seerob.protocols.plc.opcua_robotics import Robot, natural
 from seerob.workstation.source import Target
 from seerob.workstation.variables import UNITS, Kind, Variable
 
@@ -65,7 +65,9 @@ def patience(monkeypatch):
 @pytest.fixture(scope="module")
 def server():
     """A PLC with a robot: starting one takes seconds."""
-    with OpcuaServer(PLC, {"R1": motion, "R2": motion}, outputs=("Twin/fast",)) as found:
+    found = OpcuaServer(PLC, {"R1": motion, "R2": motion}, outputs=("Twin/fast",))
+    found.load, found.model = 0.0, "emulated UR10"
+    with found:
         yield found
 
 
@@ -175,7 +177,7 @@ def cell(folder, server, more="", robot="ur10"):
 def test_a_robot_is_bound_without_a_dictionary(tmp_path, server):
     station = asked(cell(tmp_path, server, 'device = "R1"\n'))
     said = " ".join(f.text for f in station.scene().findings)
-    assert "R1, seerob, emulated; axes Axis_1" in said
+    assert "R1, seerob, emulated UR10; axes Axis_1" in said
     story = lived(station, Story(150))
     joints = [s for s in story.joints() if s.qd is not None]
     assert len(joints) > 10
@@ -187,6 +189,44 @@ def test_a_robot_is_bound_without_a_dictionary(tmp_path, server):
     assert (np.diff(t) > 0).mean() > 0.9
     signals = [s for samples in story.heard for s in samples if isinstance(s, SignalSample)]
     assert {"emergency_stop": False, "operational_mode": "AUTOMATIC"}.items() <= signals[-1].values.items()
+
+
+def test_what_a_controller_has_at_its_flange_and_which_robot_it_is_are_said(server):
+    """4 kg that it has picked up; and the twin of another robot."""
+    axes = {"joints": tuple("abcdef"), "units": ("rad",) * 6}
+    source = OpcuaRobot(robot="arm", url=server.url, device="R1")
+    with listening(source, Target(name="arm", model="library:ur5e", **axes)) as heard:
+
+        def joints():
+            return [s for s in tuple(heard) if isinstance(s, JointSample)]
+
+        wait_for(lambda: joints() and joints()[-1].payload == 0.0)
+        server.load = 4.0
+        wait_for(lambda: joints()[-1].payload == 4.0)
+        server.load = 0.0
+    said = "the server says that its robot is emulated UR10, and the twin is library:ur5e"
+    assert all(s.reason and s.quality is not Quality.GOOD for s in joints())
+    assert any(said in s.reason for s in joints())
+
+
+@pytest.mark.parametrize(
+    ("said", "own", "told"),
+    [
+        ("UR10e", "library:ur10e", False),
+        ("UR10e", "library:ur10", True),
+        ("LBR iiwa 14 R820", "library:iiwa14", False),
+        ("LBR iiwa 7 R800", "library:iiwa14", True),
+        ("M1013", "library:doosan_m1013", False),
+        ("Niryo One", "library:niryo_one", False),
+        ("Milestone 3", "library:ur5e", False),  # of another maker: nothing is known
+        ("", "library:ur5e", False),
+        ("UR5e", "own.urdf", False),
+    ],
+)
+def test_the_model_that_a_server_names(said, own, told):
+    robot = Robot("R1", "Cell", (), {"Model": said})
+    assert bool(another_robot(robot, Target(name="arm", model=own))) is told
+    assert another_robot(robot, None) == ""
 
 
 def test_units_are_required_and_never_guessed(tmp_path):

@@ -9,8 +9,8 @@ from seerob.devices.sources.opcua_robot import OpcuaRobot
 from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SYSTEM
 from sources.listening import heard
 
-UNIT_DEG = 17476
-"""UnitId of the degree, UNECE's DD."""
+UNIT_DEG, UNIT_GRAM = 17476, 4674125
+"""UnitIds of the degree and the gram, UNECE's DD and GRM."""
 Q = (0.1, -0.2, 0.3)
 
 
@@ -32,7 +32,10 @@ def made(server):
     devices = cell.add_object(robotics, "MotionDevices")
     devices.add_object(own, "<MotionDeviceIdentifier>", objecttype=device)
     devices.add_object(own, "Camera")
-    axes = devices.add_object(own, "ARM-7", objecttype=device).add_object(robotics, "Axes")
+    arm = devices.add_object(own, "ARM-7", objecttype=device)
+    mass = arm.add_object(robotics, "FlangeLoad").add_variable(robotics, "Mass", 2500.0)
+    mass.add_property(0, "EngineeringUnits", ua.EUInformation("", UNIT_GRAM))
+    axes = arm.add_object(robotics, "Axes")
     for name, q in (("<AxisIdentifier>", 0.0), *((f"A{k}", q) for k, q in enumerate(Q))):
         parameters = axes.add_object(own, name, objecttype=axis).add_object(di, "ParameterSet")
         position = parameters.add_variable(robotics, "ActualPosition", math.degrees(q))
@@ -41,5 +44,7 @@ def made(server):
 
 def test_types_that_a_maker_derived_are_those_of_the_standard_and_templates_are_nobody():
     with foreign_opcua({}, more=made) as (url, _):
-        samples = heard(OpcuaRobot(robot="arm", url=url), lambda said: len(said) > 2)
+        source = OpcuaRobot(robot="arm", url=url)
+        samples = heard(source, lambda said: len(said) > 2 and said[-1].payload is not None)
+    assert samples[-1].payload == 2.5
     assert samples[-1].q == tuple(math.radians(math.degrees(q)) for q in Q)

@@ -266,6 +266,7 @@ def target(model: Model, name: str) -> Target | None:
     table = next((r for r in model.workstation.robots if r.name == name), None)
     return Target(
         name=name,
+        model="" if table is None else table.model,
         joints=tuple(joint.name for joint in mechanism.joints),
         units=mechanism.units,
         lower=tuple(mechanism.lower.tolist()),

@@ -32,6 +32,8 @@ class Target(Struct, frozen=True, kw_only=True):
 
     name: str = ""
     """Empty for a source of variables, which drives nothing."""
+    model: str = ""
+    """Of a robot as the file names it: ``library:ur5e``."""
     joints: tuple[str, ...] = ()
     """Joint names in order."""
     units: tuple[str, ...] = ()

@@ -75,6 +75,11 @@ class OpcuaServer(LoopEmulator):
         self.safety = {"EmergencyStop": False, "ProtectiveStop": False, "OperationalMode": 3}
         """May be changed while it runs."""
         self.written: dict[str, list[bool]] = {path: [] for path in outputs}
+        self.model = "emulated"
+        """What its robots are, as it says; may be changed before it starts."""
+        self.load: float | None = None
+        """What it has at their flanges [kg], not said when None at start; may be changed while it
+        runs."""
         self.bad: set[str] = set()
         """Paths of variables that are called bad; may be changed while it runs."""
         self.clock: Callable[[], float] = time.time
@@ -187,6 +192,7 @@ class _Cell:
         self._outputs: dict[str, Node] = {}
         self._axes: dict[str, list[tuple[Node, Node]]] = {}
         self._safety: dict[str, Node] = {}
+        self._loads: list[Node] = []
 
     async def build(self) -> None:
         """Make the address space."""
@@ -237,7 +243,11 @@ class _Cell:
         for name in self._emulator.robots:
             device = await devices.add_object(own, name, objecttype=device_type)
             await device.add_property(di, "Manufacturer", ua.LocalizedText("seerob"))
-            await device.add_property(di, "Model", ua.LocalizedText("emulated"))
+            await device.add_property(di, "Model", ua.LocalizedText(self._emulator.model))
+            if self._emulator.load is not None:
+                load = await device.add_object(robotics, "FlangeLoad")
+                self._loads.append(await load.add_variable(robotics, "Mass", self._emulator.load))
+                await self._state_unit(self._loads[-1], "kg")
             axes = await device.add_object(robotics, "Axes")
             q, _ = self._emulator.motion(name)(0.0)
             made = []
@@ -287,6 +297,8 @@ class _Cell:
             for (position, speed), q, qd in zip(nodes, *self._emulator.motion(name)(t), strict=True):
                 await self._write(position, degrees * q)
                 await self._write(speed, degrees * qd)
+        for node in self._loads:
+            await self._write(node, self._emulator.load)
         for key, node in self._safety.items():
             await self._write(node, self._emulator.safety[key])
 

@@ -350,6 +350,7 @@ class Listener:
             reason = distrusted
         if sample.t_device is None and not self._source.asked and self._source.delay is None:
             reason = reason or UNTIMED
+        reason = reason or sample.reason
         quality = sample.quality
         if late > self._bound and sample.t_device is not None:
             reason = f"heard {late:.2f} s later than at its best (bound {self._bound:g} s)"

@@ -17,6 +17,7 @@ from seerob.core.extras import need
 from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
+from seerob.description.robots import library
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.variables.access import at_home, missing
 from seerob.devices.variables.live_source import PULSES
@@ -29,6 +30,8 @@ from seerob.workstation.variables import unit
 
 SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""
+LOAD = "load"
+"""The mass at the flange among the nodes that are watched."""
 
 
 class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
@@ -115,6 +118,8 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
                     "load at the flange as the controller has it: "
                     + ", ".join(f"{k} {v:g} {'kg' if k == 'mass' else 'm'}" for k, v in found.load.items())
                 )
+            if other := another_robot(found, target):
+                said.append(other)
             if any(axis.speed is None for axis in found.axes):
                 said.append("no measured joint speeds: derived from the positions")
             said.append("OPC 40010 has no joint torques")
@@ -135,6 +140,9 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             if speeds is not None:
                 nodes |= {f"v{k}": axis.speed for k, axis in enumerate(found.axes) if axis.speed is not None}
             nodes |= found.safety
+            if found.mass is not None:
+                nodes[LOAD] = found.mass[0]
+            reason = another_robot(found, target)
             changes = Changes()
             if refused := await changes.watch(client, nodes, self.interval):
                 raise ProtocolError(f"the server refuses to watch {', '.join(refused)}")
@@ -148,12 +156,14 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
                 states = _states(newest)
                 if states and (states != signals or now >= due):
                     signals, due = states, now + SIGNAL_PERIOD
-                    yield SignalSample(source="", seq=0, t=now, values=states | _load(found))
+                    yield SignalSample(source="", seq=0, t=now, values=states | _load(found, newest))
                 moved = any(name[0] in "qv" and name[1:].isdecimal() for name in changed)
                 last = now if moved else last
                 if moved or (not changed and shown >= last + within):
                     sample = joint_sample(newest, positions, speeds, target=self.robot, arrived=now)
                     if sample is not None:
+                        hangs = _mass(found, newest)
+                        sample = msgspec.structs.replace(sample, payload=hangs, reason=reason)
                         # Of a robot that stands still a server says nothing but that it is there.
                         # It stood when it was asked.
                         yield sample if moved else msgspec.structs.replace(sample, t=shown, t_device=None)
@@ -270,5 +280,34 @@ def _states(newest: dict[str, Said]) -> dict[str, float | bool | str]:
     return found
 
 
-def _load(robot: Robot) -> dict[str, float | bool | str]:
-    return {f"flange_load.{key}": value for key, value in robot.load.items()}
+def _mass(robot: Robot, newest: dict[str, Said]) -> float | None:
+    """What the controller has at the flange [kg]; None where it does not say, or doubts it."""
+    said = newest.get(LOAD)
+    if robot.mass is None or said is None or said.invalid_reason or not isinstance(said.value, int | float):
+        return None
+    return robot.mass[1] * float(said.value)
+
+
+def _load(robot: Robot, newest: dict[str, Said]) -> dict[str, float | bool | str]:
+    mass = _mass(robot, newest)
+    load = {key: value for key, value in robot.load.items() if key != "mass"}
+    return {
+        f"flange_load.{key}": value
+        for key, value in (load | ({} if mass is None else {"mass": mass})).items()
+    }
+
+
+def another_robot(robot: Robot, target: Target | None) -> str:
+    """Why a server speaks of another robot of the library than the twin; empty where it may be that one."""
+    prefix, _, own = ("" if target is None else target.model).partition(":")
+    said = robot.about.get("Model", "")
+    names = {_spelt(name): name for name in library.names() if _spelt(name) in _spelt(said)}
+    if prefix != "library" or not names or names[max(names, key=len)] == own:
+        return ""
+    return f"the server says that its robot is {said}, and the twin is library:{own}"
+
+
+def _spelt(name: str) -> str:
+    """Letters and digits alone, without the maker (``doosan_m1013``), whom a server names apart."""
+    last = name.rpartition("_")[2]
+    return "".join(c for c in (last if any(map(str.isdigit, last)) else name).casefold() if c.isalnum())

@@ -56,6 +56,8 @@ class Robot:
     """Manufacturer, model, serial number, as the server says."""
     load: dict[str, float] = field(default_factory=dict)
     """``mass`` [kg] and ``x``, ``y``, ``z`` of its centre [m] at the flange, where the server says so."""
+    mass: tuple[Node, float] | None = None
+    """Where it says that mass, and what its unit is in kg; None where it has none, or no unit of mass."""
     safety: dict[str, Node] = field(default_factory=dict)
     """``emergency_stop``, ``protective_stop``, ``operational_mode``."""
 
@@ -98,9 +100,10 @@ async def _robot(device: Node, system: str, own: int, di: int, safety: dict[str,
         if (said := await _child(device, di, key)) is not None:
             value = await _value(said)
             about[key] = str(getattr(value, "Text", value) or "")[:80]
-    load = await _load(await _child(device, own, "FlangeLoad"), own)
+    load, mass = await _load(await _child(device, own, "FlangeLoad"), own)
     name = (await device.read_browse_name()).Name
-    return Robot(name, system, tuple(sorted(axes, key=lambda a: natural(a.name))), about, load, safety)
+    ordered = tuple(sorted(axes, key=lambda a: natural(a.name)))
+    return Robot(name, system, ordered, about, load, mass, safety)
 
 
 async def _axis(node: Node, own: int, di: int) -> Axis | None:
@@ -114,23 +117,22 @@ async def _axis(node: Node, own: int, di: int) -> Axis | None:
     return Axis(name, position, await stated_unit(position), speed, speed_unit)
 
 
-async def _load(node: Node | None, own: int) -> dict[str, float]:
+async def _load(node: Node | None, own: int) -> tuple[dict[str, float], tuple[Node, float] | None]:
+    """What hangs at the flange now, and where its mass is said."""
     if node is None:
-        return {}
+        return {}, None
     found: dict[str, float] = {}
-    mass = await _child(node, own, "Mass")
-    if (
-        mass is not None
-        and await stated_unit(mass) == "kg"
-        and isinstance(value := await _value(mass), float)
-    ):
-        found["mass"] = value
+    said = await _child(node, own, "Mass")
+    stated = None if said is None else unit(await stated_unit(said))
+    mass = None if said is None or stated is None or stated.si != "kg" else (said, stated.factor)
+    if mass is not None and isinstance(value := await _value(mass[0]), int | float):
+        found["mass"] = mass[1] * value
     center = await _child(node, own, "CenterOfMass")
     point = getattr(None if center is None else await _value(center), "CartesianCoordinates", None)
     known = None if point is None or center is None else await _length_unit(center)
     if known is not None:
         found |= {axis: known * float(getattr(point, axis.upper())) for axis in ("x", "y", "z")}
-    return found
+    return found, mass
 
 
 async def _length_unit(frame: Node) -> float | None:

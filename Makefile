@@ -35,7 +35,7 @@ demo-plc: $(DEV) $(PAGE)
 
 # Either keeps one core busy; the others want both.
 test: setup
-	$(MAKE) --no-print-directory -j2 compiled package
+	$(MAKE) --no-print-directory -j2 check package
 	$(MAKE) --no-print-directory unit web-test
 
 # -- set-up -------------------------------------------------------------------------------------
@@ -82,9 +82,9 @@ types: $(DEV)
 imports: $(DEV)
 	$(BIN)/lint-imports
 
-# After the checks, what the two workers of `unit` would both compile at the same time: modules and inner loops.
+# What the workers of `unit` would all compile at the same time: modules and inner loops.
 compiled: export PYTHONDONTWRITEBYTECODE :=
-compiled: check
+compiled: $(DEV)
 	said=$$($(BIN)/pytest --collect-only -qq) || { echo "$$said"; exit 1; }
 	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && $(BIN)/seerob new "$$folder/cell" >/dev/null && \
 	{ $(BIN)/seerob assess "$$folder/cell" -o "$$folder/out" >/dev/null || [ $$? -le 2 ]; }
@@ -97,7 +97,7 @@ unit: $(DEV) $(PAGE)
 web-test: $(DEV) $(PAGE)
 	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && cd web && ../scripts/npm run check && ../scripts/npm run lint && ../scripts/npm test
 
-package: $(DEV) $(PAGE)
+package: compiled $(PAGE)
 	scripts/test-wheel $(BIN)/python
 
 # -- other work ---------------------------------------------------------------------------------

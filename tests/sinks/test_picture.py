@@ -6,7 +6,7 @@ from io import BytesIO
 import made_run
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from seerob.core.errors import InputError
 from seerob.core.shapes import Mesh
@@ -25,6 +25,7 @@ from seerob.core.snapshot import (
 from seerob.description.shapes.glb import glb_bytes
 from seerob.kernels.paint import raster
 from seerob.outputs.palette import FILL
+from seerob.outputs.picture import lettering
 from seerob.outputs.picture.canvas import in_front, look_along
 from seerob.outputs.picture.picture import Stage
 from seerob.outputs.picture.stage_bodies import creases, read_glb, tone
@@ -229,6 +230,44 @@ def test_every_marker_and_every_odd_pose_gives_a_picture():
         assert image.shape == (150, 200, 3)
     empty = Stage(made_run.scene(nodes=()), {})
     assert pixels(empty.picture(Snapshot(seq=0, t=0.0, poses=b""), size=SIZE)).shape == (150, 200, 3)
+
+
+@pytest.mark.parametrize("size", [12, 19, 40])
+@pytest.mark.parametrize("text", ["separation 0.123 m", "✓ ✕ ↔ äöéÅŁß", "Ωμ Жд", "x", " ", "\U0001f600", ""])
+def test_words_are_those_that_pillow_writes(text, size):
+    path = lettering.__file__.replace("lettering.py", "DejaVuSans-Bold.ttf")
+    peer = ImageFont.truetype(path, size, layout_engine=ImageFont.Layout.BASIC)
+    # Its hinting sets letters on whole pixels.
+    assert lettering.width(text, size) == pytest.approx(peer.getlength(text), abs=0.51 * max(len(text), 1))
+    ours = np.full((80, 700, 3), 255, np.uint8)
+    lettering.write(ours, (350, 40), text, (0.0, 0.0, 0.0), size)
+    image = Image.new("RGB", (700, 80), "white")
+    ImageDraw.Draw(image).text((350, 40), text, fill="black", font=peer, anchor="mm")
+    ink, other = 1 - ours[..., 0] / 255, 1 - np.asarray(image)[..., 0] / 255
+    assert ink.sum() == pytest.approx(other.sum(), rel=0.12)
+    if other.any():
+        middle, peers = ((np.argwhere(i > 0.3)).mean(axis=0) for i in (ink, other))
+        np.testing.assert_allclose(middle, peers, atol=0.15 * size)
+
+
+def test_words_have_a_light_rim_and_are_cut_off_at_the_edge():
+    dark = np.zeros((60, 200, 3), np.uint8)
+    lettering.write(dark, (100, 30), "I", (1.0, 0.0, 0.0), 30)
+    row = dark[30]
+    red = np.flatnonzero((row[:, 0] > 250) & (row[:, 1] < 5))
+    white = np.flatnonzero((row > 250).all(axis=1))
+    assert len(red) >= 4
+    assert {red[0] - 2, red[-1] + 2} <= set(white.tolist())
+    assert not row[red[0] - 6].any()
+    for at in ((0, 0), (199, 59), (-900, 30), (100, 900)):
+        lettering.write(dark, at, "words", (1.0, 1.0, 1.0), 30)
+
+
+def test_a_picture_is_read_back_pixel_by_pixel():
+    rng = np.random.default_rng(1)
+    for shape in ((1, 1, 3), (7, 5, 3), (40, 60, 3)):
+        made = rng.integers(0, 256, shape).astype(np.uint8)
+        np.testing.assert_array_equal(np.asarray(Image.open(BytesIO(lettering.png(made)))), made)
 
 
 def area(alpha=0.25, size=(1, 1, 1)):

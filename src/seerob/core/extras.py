@@ -15,6 +15,7 @@ EXTRAS = {
     "cbor2": "ros",
     "ruckig": "waypoints",
     "ruamel.yaml": "waypoints",
+    "scipy": "waypoints",
     "toppra": "permissible",
     "matplotlib": "permissible",
     "coacd": "contacts",

@@ -76,6 +76,32 @@ def wxyz_from(convention: str, values: Array) -> Array:
     return np.where(q[:, :1] < 0, -q, q)
 
 
+def angles_from_rotation(order: str, rotation: ArrayLike) -> Array:
+    """Angles of three successive turns about turned axes, the inverse of ``wxyz_from`` with capitals.
+
+    Args:
+        order: Three different axes: ``"ZYX"`` for ``Rz(a) Ry(b) Rx(c)``.
+        rotation: Shape (..., 3, 3).
+
+    Returns:
+        a, b, c [rad], b within a quarter turn, shape (..., 3). Where b is a quarter turn only a + c or
+        a - c is known, and c is 0.
+    """
+    R = np.asarray(rotation, float)
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    cosine = np.hypot(R[..., i, i], R[..., i, j])
+    locked = cosine < 1e-7
+    a = np.where(
+        locked,
+        np.arctan2(sign * R[..., k, j], R[..., j, j]),
+        np.arctan2(-sign * R[..., j, k], R[..., k, k]),
+    )
+    b = np.arctan2(sign * R[..., i, k], cosine)
+    c = np.where(locked, 0.0, np.arctan2(-sign * R[..., i, j], R[..., i, i]))
+    return np.stack([a, b, c], axis=-1)
+
+
 def about(axis: str, angle: Array) -> Array:
     """Quaternions (n, 4) of turns (n,) [rad] about ``x``, ``y`` or ``z``."""
     q = np.zeros((len(angle), 4))

@@ -22,7 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.domains import agree
+from seerob.core.shapes import Faces
 from seerob.core.transforms import Array
+from seerob.description.shapes.hull import convex_hull
 from seerob.kernels import polytope as kernel
 from seerob.kernels.contact_forces import zero_moment_set
 
@@ -193,12 +195,29 @@ def _hull(points: Array, free: Array) -> Polytope:
     flat = np.linalg.matrix_rank(V - V[0], tol=SINGULAR * size) < 3
     if flat:
         return Polytope(V, np.zeros((0, 3), np.int64), free, 0.0 if free.shape[1] == 0 else float("nan"))
-    from scipy.spatial import ConvexHull
+    V, faces, normal = _cornered(V)
+    least = float(np.einsum("ij,ij->i", normal, V[faces[:, 0]]).min(where=normal.any(axis=1), initial=np.inf))
+    return Polytope(V, faces.astype(np.int64), free, least)
 
-    hull = ConvexHull(V)
-    a, b, c = (V[hull.simplices[:, i]] for i in range(3))
-    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) > 0
-    triangles = np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1])
-    number = np.empty(len(V), np.int64)
-    number[hull.vertices] = np.arange(len(hull.vertices))
-    return Polytope(V[hull.vertices], number[triangles], free, float(-hull.equations[:, 3].max()))
+
+def _cornered(V: Array) -> tuple[Array, Faces, Array]:
+    """Corners (k, 3) of a cloud's hull, its triangles (m, 3), and their normals, 0 of slivers.
+
+    What only rounding makes a corner, a point in a facet or on an edge, is left out.
+    """
+    while True:
+        faces = convex_hull(V)
+        if faces is None:
+            raise ValueError("the polytope is too flat for its hull")
+        a, b, c = (V[faces[:, i]] for i in range(3))
+        normal = np.cross(b - a, c - a)
+        area = np.linalg.norm(normal, axis=1)
+        # The direction of a sliver is rounding; the facets beside it bound the same place.
+        sure = area > SINGULAR * np.linalg.norm([b - a, c - a], axis=2).prod(axis=0)
+        normal = np.where(sure[:, None], normal / np.where(sure, area, 1.0)[:, None], 0.0)
+        around = [normal[(faces == k).any(axis=1)] for k in range(len(V))]
+        turns = [np.linalg.svd(n, compute_uv=False) for n in around]
+        corner = np.array([len(s) == 3 and s[2] > SINGULAR for s in turns])
+        if corner.all():
+            return V, faces, normal
+        V = V[corner]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from seerob.core.errors import InputError
 from seerob.core.shapes import Faces, Mesh
 from seerob.core.transforms import Array
+from seerob.description.shapes.hull import convex_hull
 from seerob.kernels import surface_nets as nets
 from seerob.kernels.fields import Cells
 from seerob.kernels.voxels import TOP
@@ -27,18 +28,14 @@ Triangles = tuple[tuple[int, int, int], ...]
 @cache
 def _directions() -> tuple[Array, Triangles]:
     """Corners of an icosahedron whose edges are halved, as unit vectors (42, 3), and its 80 triangles."""
-    from scipy.spatial import ConvexHull
-
     g = (1 + 5**0.5) / 2
     twelve = np.array([np.roll([0.0, a, b], k) for k in range(3) for a in (-1, 1) for b in (-g, g)])
     apart = np.linalg.norm(twelve[:, None] - twelve, axis=2)
     i, j = np.nonzero(np.triu(np.isclose(apart, 2.0)))
     u = np.vstack([twelve, twelve[i] + twelve[j]])
     u /= np.linalg.norm(u, axis=1, keepdims=True)
-    faces: NDArray[np.int32] = ConvexHull(u).simplices
-    a, b, c = (u[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
-    faces[inward] = faces[inward][:, ::-1]
+    faces = convex_hull(u)
+    assert faces is not None
     return u, tuple((int(p), int(q), int(r)) for p, q, r in faces)
 
 
@@ -58,6 +55,27 @@ def offset_shell(points: Array, distance: float) -> tuple[Array, Triangles]:
     u, faces = _directions()
     farthest = points[np.argmax(points @ u.T, axis=0)]
     return farthest + distance * u, faces
+
+
+def dilated(cells: Cells, radius: float) -> NDArray[np.bool_]:
+    """The cells of a grid whose centre is within a radius of that of a marked one.
+
+    Args:
+        cells: Marked where not 0, shape (a, b, c).
+        radius: [cells], finite.
+    """
+    far = np.iinfo(np.int32).max // 4
+    reach = math.floor(radius)
+    squared: NDArray[np.int32] = np.where(cells != 0, 0, far).astype(np.int32)
+    for axis in range(3):
+        # Of the nearest marked cell by axes so far, the least over all steps along one axis more.
+        lines = np.moveaxis(squared, axis, 0)
+        nearest = lines.copy()
+        for step in range(1, min(reach, len(lines) - 1) + 1):
+            np.minimum(nearest[step:], lines[:-step] + step * step, out=nearest[step:])
+            np.minimum(nearest[:-step], lines[step:] + step * step, out=nearest[:-step])
+        squared = np.moveaxis(nearest, 0, axis)
+    return np.asarray(np.sqrt(squared) <= radius)
 
 
 SMOOTHING = 20

@@ -20,6 +20,7 @@ LOOPS = {
     ),
     "tree build_tree": "(f8[:,::1], i4[:,::1])",
     "tree component_of": "(i8[:,::1], i8)",
+    "hull quickhull": "(f8[:,::1], i8[::1], f8)",
     "wide widen": "(f8[:,::1], i4[:,::1], f8[:,::1])",
     "axes felt": "",
     "chain at_point": "",

@@ -30,7 +30,12 @@ def braked(M: Array, b: Array, v: Array, B: Array, h: float, out: Array) -> bool
         out: Filled.
     """
     n = len(v)
-    wanted = M @ v - h * b
+    wanted = np.empty(n)
+    for j in range(n):
+        impulse = 0.0
+        for k in range(n):
+            impulse += M[j, k] * v[k]
+        wanted[j] = impulse - h * b[j]
     out[:] = v
     for _ in range(2000):
         change, largest = 0.0, 0.0

@@ -98,7 +98,10 @@ def forward(
 @njit(cache=True, nogil=True, error_model="numpy")
 def logarithm(R: Array, S: Array, out: Array) -> None:
     """Axis times angle [rad] of ``R S^T`` for rotations (3, 3), into ``out`` (3,)."""
-    m = R @ S.T
+    m = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            m[i, j] = R[i, 0] * S[j, 0] + R[i, 1] * S[j, 1] + R[i, 2] * S[j, 2]
     x, y, z = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)
     cosine = 0.5 * (m[0, 0] + m[1, 1] + m[2, 2] - 1.0)

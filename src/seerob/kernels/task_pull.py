@@ -49,19 +49,19 @@ def torques(
     """
     count = len(bodies)
     force, moment = np.zeros((count, 3)), np.zeros((count, 3))
-    turned = np.empty(3)
+    turned, own = np.empty(3), np.empty(3)
     for k in range(count):
         body = bodies[k]
         here, there = R[body].copy().reshape(3, 3), wanted_R[body].copy().reshape(3, 3)
         logarithm(there, here, turned)
-        own = here.T @ turned
         for i in range(3):
+            own[i] = here[0, i] * turned[0] + here[1, i] * turned[1] + here[2, i] * turned[2]
             force[k, i] = mass[k] * omega * omega * (wanted_x[body, i] - x[body, i])
             own[i] *= inertia[k, i] * omega * omega
-        own = here @ own
         for i in range(3):
             j, h = (i + 1) % 3, (i + 2) % 3
-            moment[k, i] = own[i] + x[body, j] * force[k, h] - x[body, h] * force[k, j]
+            asked = here[i, 0] * own[0] + here[i, 1] * own[1] + here[i, 2] * own[2]
+            moment[k, i] = asked + x[body, j] * force[k, h] - x[body, h] * force[k, j]
     for k in range(count - 1, -1, -1):
         if up[k] >= 0:
             for i in range(3):

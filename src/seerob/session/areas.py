@@ -18,7 +18,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding, Origin, Result, Snapshot
 from seerob.core.transforms import Array
 from seerob.criteria.safety.separation import MORE
-from seerob.distance.voxels import check_room
+from seerob.distance.voxels import check_room, dilated
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import Progress
 from seerob.model.mounting.things import MadeArea
@@ -325,14 +325,11 @@ def _wider(found: Swept, margin: float) -> Swept:
     """The voxels dilated by a margin: every voxel within it of a marked one is marked."""
     if margin <= 0:
         return found
-    from scipy.ndimage import distance_transform_edt
-
     grid = found.grid
     low, high = grid.bounds()
     grid.cover(low * grid.pitch - margin, (high + 1) * grid.pitch + margin)
     # From centre to centre a gap may be longer than between cubes by a diagonal.
-    gap = distance_transform_edt(grid.cells == 0) * grid.pitch
-    grid.cells[:] = gap <= margin + np.sqrt(3) * grid.pitch
+    grid.cells[:] = dilated(grid.cells, margin / grid.pitch + np.sqrt(3))
     grid.count = int(grid.cells.sum())
     return found
 

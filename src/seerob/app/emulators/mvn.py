@@ -14,7 +14,7 @@ import numpy as np
 from seerob.app.emulation.background import Emulator
 from seerob.app.emulation.mvn_person import Person, Pose
 from seerob.app.emulation.options import PersonOptions, Ready, To, option, port
-from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.core.transforms import Array, angles_from_rotation, rotation_from_wxyz, wxyz_from_rotation
 from seerob.devices.capture.xsens import anatomical, joint_angles
 from seerob.protocols.tracking import mvn
 from seerob.protocols.tracking.mvn import Header, Kind, ScalePoint, encode, pack_items, pack_scale, pack_tags
@@ -109,21 +109,16 @@ def datagrams(
 
 def _euler(wxyz: Array) -> Array:
     """Turns about the fixed axes x, y, z with y up [deg]."""
-    from scipy.spatial.transform import Rotation
-
-    turned = wxyz[:, [0, 2, 3, 1]]
-    angles = Rotation.from_quat(turned[:, [1, 2, 3, 0]]).as_euler("xyz", degrees=True)
-    return np.asarray(angles)
+    angles = angles_from_rotation("ZYX", rotation_from_wxyz(wxyz[:, [0, 2, 3, 1]]))
+    return np.rad2deg(angles[:, ::-1])
 
 
 def _unity(pose: Pose) -> Array:
     """Offsets and turns against the parents, y up, left-handed."""
-    from scipy.spatial.transform import Rotation
-
     offsets, turns = _against_parents(pose)
-    q = Rotation.from_matrix(turns).as_quat()  # x, y, z, w
+    q = np.array([wxyz_from_rotation(turn) for turn in turns])
     left = np.stack([-offsets[:, 1], offsets[:, 2], offsets[:, 0]], axis=1)
-    quaternions = np.stack([q[:, 3], q[:, 1], -q[:, 2], -q[:, 0]], axis=1)
+    quaternions = np.stack([q[:, 0], q[:, 2], -q[:, 3], -q[:, 1]], axis=1)
     return np.asarray(np.hstack([left, quaternions])[_UNITY_ROWS])
 
 

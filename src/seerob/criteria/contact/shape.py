@@ -26,6 +26,7 @@ from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
+from seerob.description.shapes.mesh_bodies import components
 from seerob.model.model import Mechanism, Model
 
 SMOOTH = math.radians(30.0)
@@ -266,9 +267,6 @@ def _edges(vertices: Array, faces: Indices) -> _Edges:
 
 def _facets(vertices: Array, faces: Indices, normals: Array, edges: _Edges, turn: Array) -> Indices:
     """Facet of each triangle. A group that turns out to be curved stays single triangles."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     n = len(faces)
     apex = np.zeros(len(turn))
     base = vertices[edges.start]
@@ -276,8 +274,7 @@ def _facets(vertices: Array, faces: Indices, normals: Array, edges: _Edges, turn
         height = np.einsum("eij,ej->ei", vertices[faces[far]] - base[:, None], normals[near])
         apex = np.maximum(apex, np.abs(height).max(axis=1))
     same = (apex < FLAT) & (np.abs(turn) < FLAT_TURN)
-    graph = coo_array((np.ones(int(same.sum())), (edges.left[same], edges.right[same])), shape=(n, n))
-    count, label = connected_components(graph, directed=False)
+    count, label = components(n, np.column_stack([edges.left[same], edges.right[same]]))
     seed = np.full(count, n)
     np.minimum.at(seed, label, np.arange(n))
     offset = np.einsum(

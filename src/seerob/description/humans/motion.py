@@ -70,18 +70,33 @@ class Motion:
 
 def interpolated(keys_t: Array, keys_q: Array, t: Array) -> tuple[Array, Array]:
     """Values and velocities, each (n, m), of keys (k,), (k, m) at instants (n,) within their span."""
-    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
-
     if len(keys_t) == 1:
         return np.repeat(keys_q, len(t), axis=0), np.zeros((len(t), keys_q.shape[1]))
-    slopes = np.asarray(PchipInterpolator(keys_t, keys_q, axis=0).derivative()(keys_t))
-    slopes[0] = slopes[-1] = 0.0
-    spline = CubicHermiteSpline(keys_t, keys_q, slopes, axis=0)
+    width = np.diff(keys_t)[:, None]
+    chord = np.diff(keys_q, axis=0) / width
+    slopes = np.zeros_like(keys_q)
+    slopes[1:-1] = _between(width, chord)
+    bend = (slopes[:-1] + slopes[1:] - 2 * chord) / width
+    cubic = (keys_q[:-1], slopes[:-1], (chord - slopes[:-1]) / width - bend, bend / width)
     # Rounding may leave the range of the keys by the last bit; a limit is a limit.
     after = np.clip(np.searchsorted(keys_t, t, side="right"), 1, len(keys_t) - 1)
     low = np.minimum(keys_q[after - 1], keys_q[after])
     high = np.maximum(keys_q[after - 1], keys_q[after])
-    return np.clip(spline(t), low, high), np.asarray(spline(t, 1))
+    x = (t - keys_t[after - 1])[:, None]
+    a, b, c, d = (each[after - 1] for each in cubic)
+    return np.clip(a + b * x + c * (x * x) + d * (x * x * x), low, high), b + c * x * 2 + d * (x * x) * 3
+
+
+def _between(width: Array, chord: Array) -> Array:
+    """Slopes at the inner keys (k - 2, m) of chords (k - 1, m), with which nothing is passed beyond a key.
+
+    The weighted harmonic mean of both chords (Fritsch and Butland 1984), 0 where they differ in sign.
+    """
+    before, after = chord[:-1], chord[1:]
+    w1, w2 = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
+    onward = np.sign(before) * np.sign(after) > 0
+    mean = (w1 / np.where(onward, before, 1.0) + w2 / np.where(onward, after, 1.0)) / (w1 + w2)
+    return np.where(onward, 1.0 / np.where(onward, mean, 1.0), 0.0)
 
 
 def sample(motion: Motion, description: Description, rate: float) -> Sampled:

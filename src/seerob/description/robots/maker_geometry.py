@@ -18,6 +18,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, inverse
 from seerob.description.description import Description, Link, base_from_links, groups
 from seerob.description.formats.urdf_geometry import moved
+from seerob.description.shapes.mesh_bodies import components
 from seerob.kernels.signed_distance import outside
 from seerob.kernels.tree_file import tree_of
 
@@ -197,15 +198,11 @@ def without_crumbs(mesh: Mesh) -> tuple[Array, int]:
     Makers' display meshes carry stray triangles far from the surface; one of 5 mm² would otherwise
     make every distance of its link uncertain by centimetres.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     _, place = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
     faces = place.ravel()[mesh.faces]
     n = int(place.max()) + 1
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n))
-    count, piece = connected_components(graph, directed=False)
+    count, piece = components(n, ends)
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     area = np.bincount(piece[faces[:, 0]], np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, count)
     triangles = np.bincount(piece[faces[:, 0]], minlength=count)

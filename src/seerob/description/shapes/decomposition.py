@@ -19,7 +19,9 @@ from seerob.core.errors import InputError
 from seerob.core.extras import need
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Mesh
+from seerob.core.transforms import Array
 from seerob.description.shapes.detail import display_mesh, manifold
+from seerob.description.shapes.hull import convex_hull
 from seerob.description.shapes.moments import signed_volume
 from seerob.description.shapes.tidy import tidied
 
@@ -93,18 +95,9 @@ def _hull(mesh: Mesh) -> Mesh:
     return hull
 
 
-def _hull_of(points: Any, color: tuple[float, float, float, float]) -> Mesh | None:
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
-        return None
-    faces = hull.simplices.astype(np.int32)
-    a, b, c = np.moveaxis(hull.points[faces], 1, 0)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    return tidied(Mesh(hull.points, faces, color))[0]
+def _hull_of(points: Array, color: tuple[float, float, float, float]) -> Mesh | None:
+    faces = convex_hull(points)
+    return None if faces is None else tidied(Mesh(points, faces, color))[0]
 
 
 def _cut(mesh: Mesh, threshold: float, max_parts: int | None, max_triangles: int) -> Iterator[Mesh]:

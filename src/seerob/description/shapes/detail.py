@@ -12,6 +12,8 @@ from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.description.shapes.mesh_bodies import bodies, joined_unmerged
 from seerob.description.shapes.tidy import tidied
+from seerob.kernels.signed_distance import outside
+from seerob.kernels.tree import build_tree
 
 LOSSLESS = 1e-6
 """Tolerance of the simplification for distances [m]."""
@@ -122,8 +124,6 @@ def _clustered(mesh: Mesh, cell: float) -> tuple[Mesh, float]:
 
 def _lost(vertices: Array, faces: NDArray[np.int64]) -> float:
     """How far triangles that shrank to an edge or a point may be from those that remain [m]."""
-    from scipy.spatial import cKDTree
-
     count = len(vertices)
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 3, 2), axis=2)
     keys = edges[..., 0] * count + edges[..., 1]
@@ -133,6 +133,8 @@ def _lost(vertices: Array, faces: NDArray[np.int64]) -> float:
     if not len(lost):
         return 0.0
     ends = vertices[np.column_stack([lost // count, lost % count])]
-    remaining = cKDTree(vertices[np.unique(faces[~flat])])
-    away = remaining.query(ends.reshape(-1, 3))[0].reshape(-1, 2).max(axis=1)
+    kept = np.unique(faces[~flat])
+    # The distance to triangles that are points is that to the points.
+    nodes, links, T = build_tree(vertices, np.column_stack([kept, kept, kept]).astype(np.int32))
+    away = outside(nodes, links, T, np.ascontiguousarray(ends.reshape(-1, 3))).reshape(-1, 2).max(axis=1)
     return float((away + np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) / 2).max())

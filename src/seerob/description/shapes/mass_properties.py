@@ -22,7 +22,16 @@ from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Inertial
 from seerob.description.shapes.detail import from_manifold, manifold
-from seerob.description.shapes.mesh_bodies import bodies, flipped, is_closed, joined, joined_unmerged, outward
+from seerob.description.shapes.hull import convex_hull
+from seerob.description.shapes.mesh_bodies import (
+    bodies,
+    components,
+    flipped,
+    is_closed,
+    joined,
+    joined_unmerged,
+    outward,
+)
 from seerob.description.shapes.mesh_mending import Mended, mended, one_sided
 from seerob.description.shapes.moments import (
     Moments,
@@ -45,8 +54,6 @@ class Filled(NamedTuple):
 
 def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
     """Flood-filled moments with ``cells`` voxels along the longest side; None when nothing is inside."""
-    from scipy.ndimage import label
-
     low = mesh.vertices.min(axis=0)
     extent = np.ptp(mesh.vertices, axis=0)
     h = float(extent.max()) / cells
@@ -56,8 +63,7 @@ def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
     # An odd offset keeps faces that lie on round coordinates off the voxels' faces.
     origin = low - 1.37 * h
     surface = _touched((mesh.vertices[mesh.faces] - origin) / h, shape)
-    regions, _ = label(~surface)
-    inside = ~surface & (regions != regions[0, 0, 0])
+    inside = ~surface & ~_around(~surface)
     if not inside.any():
         return None
     weight = inside + 0.5 * surface
@@ -71,6 +77,18 @@ def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
     inertia = np.trace(second) * np.eye(3) - second
     low_volume = float(inside.sum()) * h**3
     return Filled(Moments(volume, com, inertia), low_volume, low_volume + float(surface.sum()) * h**3)
+
+
+def _around(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The cells of a grid that are connected through their faces with its first one, which is free."""
+    index = np.arange(free.size).reshape(free.shape)
+    pairs = []
+    for axis in range(3):
+        low, high = np.moveaxis(index, axis, 0)[:-1], np.moveaxis(index, axis, 0)[1:]
+        both = np.moveaxis(free, axis, 0)[:-1] & np.moveaxis(free, axis, 0)[1:]
+        pairs.append(np.column_stack([low[both], high[both]]))
+    _, region = components(free.size, np.concatenate(pairs))
+    return np.asarray(region == region[0]).reshape(free.shape)
 
 
 def _touched(corners: Array, shape: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -248,16 +266,9 @@ def _is_credible(estimate: _Estimate, hull: Moments) -> bool:
 
 
 def _hull(mesh: Mesh) -> Moments | None:
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        hull = ConvexHull(mesh.vertices)
-    except (QhullError, ValueError):
+    faces = convex_hull(mesh.vertices)
+    if faces is None:
         return None
-    faces = hull.simplices.astype(np.int32)
-    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
     moments = of_closed_mesh(Mesh(mesh.vertices, faces))
     size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     return moments if moments.volume > 1e-9 * size**3 else None

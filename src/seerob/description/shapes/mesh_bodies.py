@@ -11,6 +11,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.description.shapes.moments import signed_volume
 from seerob.description.shapes.tidy import tidied
+from seerob.kernels.tree import component_of
 
 Indices = NDArray[np.int64]
 
@@ -53,19 +54,28 @@ def is_closed(mesh: Mesh) -> bool:
 
 def bodies(mesh: Mesh) -> tuple[Mesh, ...]:
     """The parts of a mesh whose faces share edges, largest first."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = adjacent_faces(mesh.faces)
-    count = len(mesh.faces)
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    number, label = connected_components(graph, directed=False)
+    number, label = components(len(mesh.faces), adjacent_faces(mesh.faces))
     if number == 1:
         return (mesh,)
     order = np.argsort(label, kind="stable")
     groups = np.split(mesh.faces[order], np.flatnonzero(np.diff(label[order])) + 1)
     parts = [_only(mesh, faces) for faces in groups]
     return tuple(sorted(parts, key=lambda m: -float(np.prod(np.ptp(m.vertices, axis=0) + 1e-12))))
+
+
+def components(count: int, pairs: NDArray[np.integer]) -> tuple[int, Indices]:
+    """Connected components of an undirected graph, numbered by their first node.
+
+    Args:
+        count: Of nodes.
+        pairs: Nodes that are connected, shape (k, 2).
+
+    Returns:
+        How many there are, and the component of each node, shape (count,).
+    """
+    root = component_of(np.ascontiguousarray(pairs[:, [0, 1, 1]], np.int64), count)
+    first, label = np.unique(root, return_inverse=True)
+    return len(first), label.astype(np.int64)
 
 
 def _only(mesh: Mesh, faces: NDArray[np.int32]) -> Mesh:

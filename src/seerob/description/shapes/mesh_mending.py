@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,10 @@ from numpy.typing import NDArray
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.detail import physics_mesh
+from seerob.description.shapes.hull import hull_volume
 from seerob.description.shapes.mesh_bodies import (
     bodies,
+    components,
     edge_balance,
     is_closed,
     joined,
@@ -87,8 +90,6 @@ def _contradictions(mesh: Mesh) -> int:
 
 SEAM = 1e-6
 """How far apart corners of two pieces may be that are the same one, rounded differently [m]."""
-MEET = 6
-"""Pieces that may meet in one corner."""
 
 
 def enclosing(meshes: Sequence[Mesh]) -> Mesh | None:
@@ -120,21 +121,12 @@ def with_insides(solids: Sequence[Solid]) -> tuple[Solid, ...]:
 
 def _sewn(mesh: Mesh) -> Mesh:
     """Corners on open edges that are within `SEAM` of each other merged."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     edges, _, uses = edge_balance(mesh.faces)
     seam = np.unique(edges[uses == 1])
     if len(seam) < 2:
         return mesh
     corners = mesh.vertices[seam]
-    k = min(MEET, len(seam))
-    _, other = cKDTree(corners).query(corners, k=k, distance_upper_bound=SEAM)
-    here, there = np.repeat(np.arange(len(seam)), k), other.ravel()
-    near = there < len(seam)
-    pairs = coo_matrix((np.ones(near.sum(), bool), (here[near], there[near])), shape=(len(seam),) * 2)
-    _, label = connected_components(pairs, directed=False)
+    _, label = components(len(seam), near_pairs(corners, SEAM))
     _, first = np.unique(label, return_index=True)
     vertices = mesh.vertices.copy()
     vertices[seam] = corners[first[label]]
@@ -177,10 +169,45 @@ def mended(mesh: Mesh) -> Mended:
     if len(loops) > MAX_HOLES:
         return Mended(mesh, (*steps, f"{len(loops)} holes"), np.inf, 1.0)
     before = _area(mesh)
-    slack = sum(_hull_volume(mesh.vertices[loop]) for loop in loops)
+    slack = sum(hull_volume(mesh.vertices[loop]) for loop in loops)
     mesh = _spanned(mesh, loops)
     steps.append(f"{len(loops)} holes spanned")
     return Mended(mesh, tuple(steps), slack, 1 - before / _area(mesh))
+
+
+CROWD = 64
+"""Points in a cube with which each point around it is compared, lest a heap is compared with itself."""
+
+
+def near_pairs(points: Array, distance: float) -> NDArray[np.int64]:
+    """Pairs of points (n, 3) that are within a distance of each other.
+
+    Returns:
+        Rows of ``points``, shape (k, 2): every pair within the distance, where no more than `CROWD` points
+        lie in a cube of that size; of a crowd, pairs with its first.
+    """
+    low = points.min(axis=0, initial=np.inf)
+    # Cells no smaller than what the numbers below can count.
+    cell = max(distance, float((points.max(axis=0, initial=-np.inf) - low).max(initial=0.0)) / 2**20, 1e-300)
+    x, y, z = np.floor((points - low) / cell).astype(np.int64).T + 1
+    key = (x << 42) + (y << 21) + z
+    order = np.argsort(key, kind="stable")
+    sorted_keys = key[order]
+    found = [np.zeros((0, 2), np.int64)]
+    for i, j, k in product((-1, 0, 1), repeat=3):
+        step = (i << 42) + (j << 21) + k
+        if step < 0:
+            continue
+        first = np.searchsorted(sorted_keys, key + step, side="left")
+        count = np.searchsorted(sorted_keys, key + step, side="right") - first
+        count = np.minimum(count, CROWD)
+        here = np.repeat(np.arange(len(points)), count)
+        place = np.arange(len(here)) - np.repeat(np.cumsum(count) - count, count)
+        there = order[np.repeat(first, count) + place]
+        near = np.linalg.norm(points[here] - points[there], axis=1) <= distance
+        near &= (here < there) | (step > 0)
+        found.append(np.column_stack([here[near], there[near]]))
+    return np.concatenate(found)
 
 
 def one_sided(mesh: Mesh) -> Mesh:
@@ -196,16 +223,10 @@ def _area(mesh: Mesh) -> float:
 
 def _welded(mesh: Mesh) -> Mesh:
     """Vertices on open edges merged when closer than 1e-5 of the size: writers round and split."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     edges, balance, _ = edge_balance(mesh.faces)
     rim = np.unique(edges[balance != 0])
     tolerance = 1e-5 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    pairs = cKDTree(mesh.vertices[rim]).query_pairs(tolerance, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(rim), len(rim)))
-    _, label = connected_components(graph, directed=False)
+    _, label = components(len(rim), near_pairs(mesh.vertices[rim], tolerance))
     _, first = np.unique(label, return_index=True)
     target = np.arange(len(mesh.vertices))
     target[rim] = rim[first[label]]
@@ -214,9 +235,6 @@ def _welded(mesh: Mesh) -> Mesh:
 
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Neighbours turned to agree, spreading from the first triangle of each body."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
     key = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
     _, inverse, uses = np.unique(key, return_inverse=True, return_counts=True)
@@ -227,9 +245,7 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     disagree = upward[pairs[:, 0]] == upward[pairs[:, 1]]
     pairs //= 3
     # Most triangles agree already: what agrees is turned together. Regions are numbered by first triangle.
-    a, b = pairs[~disagree].T
-    graph = coo_matrix((np.ones(len(a), bool), (a, b)), shape=(len(mesh.faces), len(mesh.faces)))
-    regions, region = connected_components(graph, directed=False)
+    regions, region = components(len(mesh.faces), pairs[~disagree])
     turned = _turned(regions, np.bincount(region), region[pairs[disagree]])[region]
     faces = np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces)
     return Mesh(mesh.vertices, faces, mesh.color), int(turned.sum())
@@ -300,12 +316,3 @@ def _spanned(mesh: Mesh, loops: list[NDArray[np.int64]]) -> Mesh:
         vertices.append(mesh.vertices[loop].mean(axis=0)[None])
         faces.append(np.column_stack([loop, np.roll(loop, -1), tip]))
     return Mesh(np.vstack(vertices), np.vstack(faces).astype(np.int32), mesh.color)
-
-
-def _hull_volume(points: Array) -> float:
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return float(ConvexHull(points).volume)
-    except QhullError:
-        return 0.0

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.transforms import Array
+from seerob.description.shapes.hull import convex_hull
 
 Color = tuple[float, float, float, float]
 GREY: Color = (0.7, 0.72, 0.75, 1.0)
@@ -144,13 +145,9 @@ def cylinder_solid(start: ArrayLike, end: ArrayLike, radius: float, *, name: str
 
 def hull_mesh(meshes: Sequence[Mesh], color: Color = GREY) -> Mesh:
     """The convex hull of meshes: closed, counter-clockwise from outside."""
-    from scipy.spatial import ConvexHull
-
     points = np.concatenate([mesh.vertices for mesh in meshes])
-    hull = ConvexHull(points)
-    faces = hull.simplices
-    a, b, c = (points[faces[:, i]] for i in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces = np.where(inward[:, None], faces[:, ::-1], faces)
+    faces = convex_hull(points)
+    if faces is None:
+        raise ValueError("these meshes are flat and have no hull")
     used, index = np.unique(faces, return_inverse=True)
     return Mesh(points[used], index.reshape(faces.shape).astype(np.int32), color)

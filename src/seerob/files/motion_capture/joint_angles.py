@@ -26,7 +26,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, about, angles_from_rotation, product, rotation_from_wxyz
 from seerob.description.humans.skeleton import JOINTS, resolve
 from seerob.files.motion_capture import storage
 from seerob.files.motion_capture.body_table import Commas
@@ -97,17 +97,17 @@ def from_joints(q: Array, pelvis: Array) -> Array:
         order of `coordinates`.
     """
     found: dict[str, Array] = {}
-    turn = _turn("YXZ", q[:, _places("pelvis_turn_left", "pelvis_list_right", "pelvis_tilt_back")])
+    turn = _turned("YXZ", q[:, _places("pelvis_turn_left", "pelvis_list_right", "pelvis_tilt_back")])
     found |= zip(PELVIS, _angles("ZXY", turn).T, strict=True)
     found |= zip(PLACE, in_its_world(pelvis).T, strict=True)
-    back = _turn("ZXY", q[:, _spine("lumbar")]) * _turn("ZXY", q[:, _spine("thorax")])
+    back = product(_turned("ZXY", q[:, _spine("lumbar")]), _turned("ZXY", q[:, _spine("thorax")]))
     found |= zip(BACK, _angles("ZXY", back).T, strict=True)
     for side in SIDES:
         for ours, theirs, sign in _STRAIGHT:
             place, own = _index(side, ours)
             found[f"{theirs}_{side}"] = sign * own * q[:, place]
         mirror = _mirror(side)
-        arm = _turn("ZYX", q[:, _arm(side)])
+        arm = _turned("ZYX", q[:, _arm(side)])
         for name, values in zip(ARM, (_angles("ZXY", arm) * mirror[[0, 1, 2]]).T, strict=True):
             found[f"{name}_{side}"] = values
     return np.stack([found[name] for name in coordinates()], axis=1)
@@ -135,9 +135,10 @@ def to_joints(
         return np.stack([known.get(name, zero) for name in wanted], axis=1)
 
     places = _places("pelvis_turn_left", "pelvis_list_right", "pelvis_tilt_back")
-    q[:, places] = _angles("YXZ", _turn("ZXY", block(PELVIS)))
-    half = _turn("ZXY", block(BACK))
-    angles = _angles("ZXY", type(half).from_rotvec(half.as_rotvec() / 2))
+    q[:, places] = _angles("YXZ", _turned("ZXY", block(PELVIS)))
+    half = _turned("ZXY", block(BACK))
+    half = np.where(half[:, :1] < 0, -half, half) + np.array([1.0, 0.0, 0.0, 0.0])
+    angles = _angles("ZXY", half)
     q[:, _spine("lumbar")] = q[:, _spine("thorax")] = angles
     for side in SIDES:
         for ours, theirs, sign in _STRAIGHT:
@@ -145,7 +146,7 @@ def to_joints(
             factor = knee if theirs == "knee_angle" else sign
             q[:, place] = factor * own * known.get(f"{theirs}_{side}", zero)
         arm = block([f"{name}_{side}" for name in ARM]) * _mirror(side)
-        q[:, _arm(side)] = _angles("ZYX", _turn("ZXY", arm))
+        q[:, _arm(side)] = _angles("ZYX", _turned("ZXY", arm))
     at = block(PLACE) if set(PLACE) <= set(known) else np.full((len(values), 3), np.nan)
     pelvis = np.stack([at[:, 0], -at[:, 2], at[:, 1]], axis=1)
     return q, pelvis, tuple(name for name in coordinates() if name in known)
@@ -186,19 +187,14 @@ def _mirror(side: str) -> Array:
     return np.array([1.0, 1.0, 1.0] if side == "r" else [1.0, -1.0, -1.0])
 
 
-def _turn(order: str, angles: Array):  # type: ignore[no-untyped-def]  # scipy has no types
-    from scipy.spatial.transform import Rotation
+def _turned(order: str, angles: Array) -> Array:
+    """Quaternions (n, 4) of three turns (n, 3) [rad] about turned axes."""
+    first, second, third = (about(axis, angles[:, k]) for k, axis in enumerate(order.lower()))
+    return product(product(first, second), third)
 
-    return Rotation.from_euler(order, angles)
 
-
-def _angles(order: str, turn) -> Array:  # type: ignore[no-untyped-def]
-    import warnings
-
-    with warnings.catch_warnings():
-        # At a singular pose the sum of two angles is right, and which is which does not matter.
-        warnings.filterwarnings("ignore", message="Gimbal lock")
-        return np.asarray(turn.as_euler(order))
+def _angles(order: str, wxyz: Array) -> Array:
+    return angles_from_rotation(order, rotation_from_wxyz(wxyz))
 
 
 def read_columns(path: Path, *, file: str) -> tuple[list[str], Array, Array]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 from seerob.core.transforms import Array, rotation_from_axis_angle
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.inverse import factors, follow, is_classic, rotation_vectors, solutions, why_not
@@ -104,6 +105,7 @@ def joint_line(a: Array, b: Array) -> Piece | None:
 
 
 def _curve(s: Array, q: Array) -> Any:
+    need("scipy")
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(s, q)
@@ -242,6 +244,7 @@ def rounding(before: Piece, after: Piece, cut_before: float, cut_after: float, s
         cut_after: Place of ``after`` where it is entered.
         slope: Of it at its ends, per way that is cut off.
     """
+    need("scipy")
     from scipy.interpolate import BPoly
 
     enter, leave = slope * (before.length - cut_before), slope * cut_after

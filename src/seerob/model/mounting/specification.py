@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +16,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.description.description import Inertial, Joint, JointKind, Quantity
 from seerob.description.shapes import glb
+from seerob.description.shapes.hull import convex_hull
 
 TINY = 2e-15
 """MuJoCo wants more than 1e-15 kg on a body with a joint; this changes no digit of a mass matrix."""
@@ -153,8 +153,6 @@ def extreme_points(solids: Sequence[Solid]) -> tuple[Array, float]:
     Returns:
         Points, shape (k, 3) [m], and radius [m].
     """
-    from scipy.spatial import ConvexHull, QhullError
-
     points: list[Array] = []
     radius = 0.0
     for solid in solids:
@@ -168,7 +166,6 @@ def extreme_points(solids: Sequence[Solid]) -> tuple[Array, float]:
             continue
         vertices = solid.mesh.vertices[np.unique(solid.mesh.faces)]
         # Flat or too few points: all of them are as good.
-        with contextlib.suppress(QhullError, ValueError):
-            vertices = vertices[ConvexHull(vertices).vertices]
-        points.append(vertices)
+        faces = convex_hull(vertices)
+        points.append(vertices if faces is None else vertices[np.unique(faces)])
     return (np.vstack(points), radius) if points else (np.zeros((0, 3)), 0.0)

@@ -16,6 +16,7 @@ from seerob.description import lint
 from seerob.description.description import Inertial, Link
 from seerob.description.mesh import load_meshes
 from seerob.description.shapes import detail, mass_properties, shapes
+from seerob.description.shapes.hull import hull_volume
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.mesh_mending import enclosing
 from seerob.description.shapes.moments import signed_volume
@@ -253,21 +254,11 @@ def _odd_mass(mass: float, thing: Thing, meshes: list[Mesh]) -> str:
     if rounded is not None:
         return lint.odd_mass(mass, _capsule(*rounded)[0], exact=True)
     mesh, _ = joined([m for m in meshes if len(m.faces)])
-    hull = _hull_volume(mesh)
+    hull = hull_volume(mesh.vertices)
     volume = signed_volume(mesh) if is_closed(mesh) else 0.0
     if 1e-9 * hull < volume <= hull * (1 + 1e-9):
         return lint.odd_mass(mass, volume, exact=True)
     return lint.odd_mass(mass, hull, exact=False)
-
-
-def _hull_volume(mesh: Mesh) -> float:
-    """[m³]; 0 when the mesh is flat."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return float(ConvexHull(mesh.vertices).volume)
-    except (QhullError, ValueError):
-        return 0.0
 
 
 Spread = Callable[[], tuple[Inertial, tuple[Finding, ...]]]

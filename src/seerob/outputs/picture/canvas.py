@@ -1,4 +1,4 @@
-"""A picture being drawn: opaque bodies first, then what lies over them, then words.
+"""A picture being drawn: opaque bodies first, then what lies over them.
 
 Where to look from: a pinhole camera, and the distance from which everything named fits.
 """
@@ -6,19 +6,13 @@ Where to look from: a pinhole camera, and the distance from which everything nam
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.paint import averaged, cover, darken, glaze, outline, raster, solid, stroke
-
-if TYPE_CHECKING:
-    from PIL.ImageDraw import ImageDraw
-    from PIL.ImageFont import FreeTypeFont
 
 FIELD_OF_VIEW = np.deg2rad(32.0)
 """Vertical [rad]."""
@@ -265,28 +259,3 @@ def in_front(camera: Camera, corners: Array) -> Array:
                 kept.append(triangle[k] + a / (a - b) * (triangle[k - 2] - triangle[k]))
         made += [[kept[0], kept[k], kept[k + 1]] for k in range(1, len(kept) - 1)]
     return np.concatenate([whole, np.array(made, float).reshape(-1, 3, 3)])
-
-
-@cache
-def font(size: int) -> FreeTypeFont:
-    """A font that has ✓, ✕ and ↔: DejaVu Sans, whose licence lies beside it."""
-    from pathlib import Path
-
-    from PIL import ImageFont
-
-    return ImageFont.truetype(Path(__file__).with_name("DejaVuSans-Bold.ttf"), size)
-
-
-def words(draw: ImageDraw, at: tuple[float, float], text: str, color: Color, type_: FreeTypeFont) -> None:
-    """Text centred at a pixel, with a light rim that keeps it readable on anything."""
-    fill = tuple(round(255 * c) for c in color)
-    draw.text(at, text, fill=fill, font=type_, anchor="mm", stroke_width=3, stroke_fill=(255, 255, 255))
-
-
-def png(pixels: NDArray[np.uint8]) -> bytes:
-    """PNG of an image (height, width, 3)."""
-    from PIL import Image
-
-    out = BytesIO()
-    Image.fromarray(pixels).save(out, "PNG", compress_level=6)
-    return out.getvalue()

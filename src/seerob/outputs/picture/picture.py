@@ -16,16 +16,14 @@ from seerob.core.snapshot import Arrow, Finding, Highlight, Marker, Result, Scen
 from seerob.core.transforms import Array
 from seerob.kernels.paint import nearest_of
 from seerob.outputs.palette import DARK, FILL
+from seerob.outputs.picture import lettering
 from seerob.outputs.picture.canvas import (
     OVERSAMPLING,
     Camera,
     Canvas,
     Color,
     Room,
-    font,
     look_along,
-    png,
-    words,
 )
 from seerob.outputs.picture.marker_shapes import draw_marker, label_of, points_of
 from seerob.outputs.picture.stage_bodies import MOVERS, poses, read_bodies
@@ -232,7 +230,7 @@ class Stage:
         if near is not None:
             image = inset(image, canvas, self._drawn(near, placed, snapshot, result, Room()).pixels())
         self._rooms.append(room)
-        return png(image)
+        return lettering.png(image)
 
     def _drawn(
         self,
@@ -329,15 +327,11 @@ class Stage:
     # -- words ----------------------------------------------------------------------------------
 
     def _with_labels(self, canvas: Canvas, result: Result | None) -> NDArray[np.uint8]:
-        from PIL import Image, ImageDraw
-
         pixels = canvas.pixels()
         if result is None:
             return pixels
-        image = Image.fromarray(pixels)
         camera = canvas.camera
         height = max(12, round(camera.height / 38))
-        draw, type_ = ImageDraw.Draw(image), font(height)
         taken: list[tuple[float, float, float]] = []
         for marker in result.markers:
             text, at = label_of(marker)
@@ -345,7 +339,7 @@ class Stage:
             if not text or inverse[0] <= 0:
                 continue
             text = shortened(text, _LONGEST)
-            half = draw.textlength(text, type_) / 2 + 6
+            half = lettering.width(text, height) / 2 + 6
             # Above a line, not on it.
             top = screen[inverse > 0, 1].min() if isinstance(marker, Segment) else screen[0, 1]
             x = float(np.clip(screen[0, 0], half, max(half, camera.width - half)))
@@ -355,5 +349,5 @@ class Stage:
             ):
                 y -= 1.3 * height
             taken.append((x, y, half))
-            words(draw, (x, y), text, DARK[marker.verdict], type_)
-        return np.asarray(image)
+            lettering.write(pixels, (x, y), text, DARK[marker.verdict], height)
+        return pixels

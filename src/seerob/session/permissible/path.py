@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 from seerob.core.samples import LARGEST_SPEED, JointSample, PoseSample, Quality
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.files.trajectories.trajectory import derive_velocities
@@ -183,6 +184,7 @@ def _smooth(q: Array, a: int, b: int) -> Iterator[tuple[int, int]]:
 
 
 def _piece(t: Array, q: Array, qd: Array, tolerance: float) -> Piece:
+    need("toppra")  # which brings it
     from scipy.interpolate import CubicSpline
 
     steps = np.linalg.norm(np.diff(q, axis=0), axis=1)

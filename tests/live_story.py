@@ -13,7 +13,7 @@ import numpy as np
 from kept_run import Kept
 from seerob.core.samples import JointSample
 from seerob.devices.live.listening import Listener
-from seerob.devices.live.real_time import SETTLE
+from seerob.devices.live.receivers import SETTLE
 
 
 class Story(Kept):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from seerob.core.samples import JointSample, Mailbox
-from seerob.devices.live import real_time
+from seerob.devices.live import receivers
 from seerob.devices.live.listening import Listener, delay_of
-from seerob.devices.live.real_time import Clock, hear
+from seerob.devices.live.receivers import Clock, hear
 from seerob.session.run import Judge, bind, engine_of
 
 BEGIN = 1000.0
@@ -36,7 +36,7 @@ class Stream:
 
     def __init__(self, station, patch, target, packets, *, pauses=None, again=()):
         self.now = BEGIN
-        patch.setattr(real_time, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
+        patch.setattr(receivers, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
         (source,) = station.workstation.sources
         self.box = Mailbox()
         self.ears = Listener(source, None, self.box.post)

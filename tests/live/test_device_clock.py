@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.devices.live import device_clock
-from seerob.devices.live.arrivals import Arrivals
 from seerob.devices.live.device_clock import (
     AGAIN,
     DRIFT,
@@ -24,6 +23,7 @@ from seerob.devices.live.device_clock import (
     DeviceClock,
     Known,
 )
+from seerob.devices.live.listening import Arrivals
 
 PERIOD = 0.008
 

@@ -25,8 +25,7 @@ from seerob.devices.live.listening import (
     delay_of,
     say_once,
 )
-from seerob.devices.live.real_time import Clock, hear
-from seerob.devices.live.receivers import PROMPT, Receivers
+from seerob.devices.live.receivers import PROMPT, Clock, Receivers, hear
 from seerob.workstation.source import Source
 
 

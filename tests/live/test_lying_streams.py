@@ -20,9 +20,9 @@ from seerob.core.errors import SeerobError
 from seerob.core.samples import JointSample, Mailbox, SignalSample
 from seerob.devices.capture.options import person as described
 from seerob.devices.capture.stream_source import _Hearing
-from seerob.devices.live import real_time
+from seerob.devices.live import receivers
 from seerob.devices.live.listening import Listener, delay_of
-from seerob.devices.live.real_time import Clock, hear
+from seerob.devices.live.receivers import Clock, hear
 from seerob.devices.sources.kinect import LAYOUT, frame
 from seerob.session.opening import source_target
 from seerob.session.run import Judge, bind, engine_of, ticks
@@ -114,7 +114,7 @@ class Stream:
 
     def __init__(self, station, said, patch, lie):
         self.now = BEGIN
-        patch.setattr(real_time, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
+        patch.setattr(receivers, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
         (self.source,) = station.workstation.sources
         self.box, self.station = Mailbox(), station
         self.ears = Listener(self.source, source_target(station.model, self.source), self.box.post)

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, SignalSample
-from seerob.devices.live.real_time import Clock, hear, require_recorded
+from seerob.devices.live.receivers import Clock, hear, require_recorded
 from seerob.devices.sources.rtde import Rtde
 from seerob.workstation.source import Source
 from seerob.workstation.workstation import Workstation
@@ -80,8 +80,8 @@ def test_a_pause_of_the_run_itself_is_a_slip_before_anything_is_made_of_it(monke
     def sleep(seconds):
         now[0] += seconds + pauses.pop("asleep", 0.0)
 
-    monkeypatch.setattr("seerob.devices.live.real_time.time.monotonic", lambda: now[0])
-    monkeypatch.setattr("seerob.devices.live.real_time.time.sleep", sleep)
+    monkeypatch.setattr("seerob.devices.live.receivers.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("seerob.devices.live.receivers.time.sleep", sleep)
 
     class Real(Said):
         def take(self):
@@ -111,7 +111,7 @@ def test_a_pause_of_the_run_itself_is_a_slip_before_anything_is_made_of_it(monke
 def test_a_computer_that_was_suspended_has_slipped(monkeypatch):
     """Its monotonic clock stood still; the robot's did not."""
     clock, slept = Clock(), [0.0]
-    monkeypatch.setattr("seerob.devices.live.real_time._asleep", lambda: clock._asleep + slept[0])
+    monkeypatch.setattr("seerob.devices.live.receivers._asleep", lambda: clock._asleep + slept[0])
     clock.look()
     assert clock.slipped == 0.0
     slept[0] = 3600.0

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from seerob.core.errors import SeerobError
 from seerob.core.samples import BodyPoint, BodySample, JointSample, Mailbox, PoseSample, Quality, SignalSample
-from seerob.devices.live import shared_mailbox
-from seerob.devices.live.shared_mailbox import SharedMailbox, memory
+from seerob.devices.live import source_process
+from seerob.devices.live.source_process import SharedMailbox, memory
 
 
 @pytest.fixture(name="ends", params=["memory", "file"])
@@ -86,8 +86,8 @@ def test_what_has_no_room_is_refused_and_the_rest_stays(ends, monkeypatch):
     small = JointSample(source="s", seq=0, t=0.0, target="0", q=(0.0,))
     here.post(small)
     with pytest.raises(SeerobError, match=r"a sample of \d+ bytes; the most is 131072"):
-        here.post(SignalSample(source="s", seq=1, t=0.0, values={"text": "x" * shared_mailbox.LARGEST}))
-    for k in range(1, shared_mailbox.SLOTS):
+        here.post(SignalSample(source="s", seq=1, t=0.0, values={"text": "x" * source_process.LARGEST}))
+    for k in range(1, source_process.SLOTS):
         here.post(JointSample(source="s", seq=k, t=0.0, target=str(k), q=(0.0,)))
     with pytest.raises(SeerobError, match="more than 256 different things"):
         here.post(JointSample(source="s", seq=999, t=0.0, target="one more", q=(0.0,)))
@@ -105,7 +105,7 @@ def test_what_is_no_sample_is_a_mistake_of_who_says_it(ends):
 
 WRITER = """
 import sys
-from seerob.devices.live.shared_mailbox import SharedMailbox
+from seerob.devices.live.source_process import SharedMailbox
 from seerob.core.samples import SignalSample
 box = SharedMailbox(int(sys.argv[1]))
 for k in range(int(sys.argv[2])):
@@ -134,8 +134,8 @@ def test_what_is_being_written_is_read_the_next_time(ends):
     here, there = ends
     here.post(JointSample(source="s", seq=0, t=0.0, target="a", q=(0.0,)))
     here.post(JointSample(source="s", seq=1, t=0.0, target="a", q=(0.0,)))
-    start = shared_mailbox._HEAD
-    half = start + shared_mailbox._HEAD
+    start = source_process._HEAD
+    half = start + source_process._HEAD
     for place in (half, half + 8, half + 12, half + 16):  # number, length, checksum, the sample itself
         kept = here._memory[place]
         here._memory[place] = kept ^ 0xFF

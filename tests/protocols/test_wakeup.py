@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from seerob.protocols.links.wakeup import Wakeup
+from seerob.protocols.links.reception import Wakeup
 
 
 async def turns(count=3):

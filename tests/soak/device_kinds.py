@@ -115,7 +115,7 @@ def ros_tcp_endpoint(patch):
     from seerob.app.emulators.ros_tcp import UnityProject
     from seerob.devices.sources.ros_tcp import RosTcp, Side
 
-    patch.setattr("seerob.devices.ros.live_source.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.ros.SILENCE", SILENCE)
     port = free_port(socket.SOCK_STREAM)
     server = UnityProject(swing((0.0, 0.0)), ("a", "b"), port=port, rate=250.0).start()
     return Made(server, RosTcp(robot="arm", side=Side.ENDPOINT, port=port))

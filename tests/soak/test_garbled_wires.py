@@ -98,7 +98,7 @@ def test_where_packets_end_does_not_matter(monkeypatch, kind, how):
 
 
 def test_what_is_cut_or_damaged_is_a_loss_and_no_mistake(monkeypatch):
-    monkeypatch.setattr("seerob.protocols.plc.modbus_client.PATIENCE", 0.3)
+    monkeypatch.setattr("seerob.protocols.plc.modbus.PATIENCE", 0.3)
     with heard_through(monkeypatch, "modbus") as (wire, good):
         for how in (Garbled.CUT, Garbled.NOISE):
             garble(wire, good, how, 5)

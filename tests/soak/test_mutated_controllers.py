@@ -16,8 +16,7 @@ from seerob.devices.sources.mqtt import Plain, plain_change
 from seerob.devices.sources.rtde import FIELDS
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc import s7_web, sparkplug
-from seerob.protocols.plc.modbus import Block, Place, Table, Type, Words
-from seerob.protocols.plc.modbus_client import Device, take
+from seerob.protocols.plc.modbus import Block, Device, Place, Table, Type, Words, take
 from seerob.protocols.robots import doosan_drfl, fri, rtde, ur_primary
 from soak.mutations import refusals
 

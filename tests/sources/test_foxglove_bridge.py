@@ -154,7 +154,7 @@ def test_the_tool_comes_out_of_transforms(make):
     ],
 )
 def test_what_is_not_offered_is_said(monkeypatch, caplog, topic, said):
-    monkeypatch.setattr("seerob.devices.ros.live_source.SILENCE", 0.5)
+    monkeypatch.setattr("seerob.devices.ros.SILENCE", 0.5)
     with serving(protobuf) as port:
         content = Content.JOINT_STATE if topic == "/nobody" else Content.TF
         listener = Listener(source(port, topic=topic, content=content), None, lambda _: None)

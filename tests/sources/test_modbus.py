@@ -183,7 +183,7 @@ def test_nobody_can_ask_a_device_what_it_has():
 
 @pytest.mark.parametrize("answer", [b"", b"\x00" * 7, b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\xff" * 300])
 def test_an_answer_that_is_no_modbus_ends_the_connection_and_not_the_source(answer, monkeypatch):
-    monkeypatch.setattr("seerob.protocols.plc.modbus_client.PATIENCE", 0.2)
+    monkeypatch.setattr("seerob.protocols.plc.modbus.PATIENCE", 0.2)
 
     def serve():
         link, _ = server.accept()

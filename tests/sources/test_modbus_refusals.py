@@ -14,7 +14,7 @@ from live_story import wait_for
 from seerob.core.samples import JointSample
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.modbus_robot import ModbusRobot
-from seerob.protocols.plc.modbus_client import TRIES
+from seerob.protocols.plc.modbus import TRIES
 
 POSITION, VELOCITY = 270, 280
 REGISTERS = {259: 2, 260: 1} | {POSITION + k: 100 * k for k in range(6)}
@@ -96,7 +96,7 @@ def test_who_is_busy_is_asked_again():
 
 def test_who_stays_busy_is_one_line_of_the_log(monkeypatch, caplog):
     monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
-    monkeypatch.setattr("seerob.protocols.plc.modbus_client.PAUSE", 0.001)
+    monkeypatch.setattr("seerob.protocols.plc.modbus.PAUSE", 0.001)
     with controller(busy=lambda question: True) as (port, asked):
         listener = Listener(robot(port), None, lambda sample: pytest.fail("nothing was said"))
         listener.start()

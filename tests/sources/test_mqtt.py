@@ -156,7 +156,7 @@ def test_why_a_broker_left_is_no_riddle_in_the_log(port, caplog):
 
 def test_a_broker_that_falls_over_again_and_again_is_tried_again_and_again(port, monkeypatch):
     monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.01)
-    monkeypatch.setattr("seerob.protocols.plc.broker_pulse.PATIENCE", 0.1)
+    monkeypatch.setattr("seerob.devices.sources.mqtt.PATIENCE", 0.1)
 
     async def wait():
         async with rude(port) as clients:

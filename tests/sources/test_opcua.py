@@ -25,8 +25,16 @@ from seerob.devices.live.listening import Listener
 from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.opcua_robot import OpcuaRobot, another_robot
 from seerob.devices.variables.live_source import Change, Picture
-from seerob.protocols.plc.opcua_address import Address, address, browse_name, node_name, number, unit, written
-from seerob.protocols.plc.opcua_client import Security
+from seerob.protocols.plc.opcua_client import (
+    Address,
+    Security,
+    address,
+    browse_name,
+    node_name,
+    number,
+    unit,
+    written,
+)
 from seerob.protocols.plc.opcua_robotics import Robot, natural
 from seerob.workstation.source import Target
 from seerob.workstation.variables import UNITS, Kind, Variable

@@ -17,8 +17,8 @@ from made_cell import made
 from seerob.app.emulators.rosbridge import RosbridgeServer
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, PoseSample, Quality
+from seerob.devices import ros as _ros
 from seerob.devices.live.listening import Listener
-from seerob.devices.ros import live_source as _ros
 from seerob.devices.sources.rosbridge import Rosbridge
 from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Plan, Point, Transform
 from seerob.protocols.ros.rosbridge import Compression
@@ -43,7 +43,7 @@ def sorted_motion(t):
 def _patient(monkeypatch):
     """A busy machine may take its time to answer at start."""
     monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.devices.ros.live_source.ASKED", 20.0)
+    monkeypatch.setattr("seerob.devices.ros.ASKED", 20.0)
 
 
 def cell(folder, server, more="", timeout=0.2):
@@ -82,7 +82,7 @@ def test_joints_come_by_name_in_every_form(edition, compression, caplog):
 
 
 def test_a_server_of_ros_1_that_fails_at_cbor_is_asked_for_json(monkeypatch, caplog):
-    monkeypatch.setattr("seerob.devices.ros.live_source.SILENCE", 0.3)
+    monkeypatch.setattr("seerob.devices.ros.SILENCE", 0.3)
     with RosbridgeServer(motion, NAMES, edition=Edition.ROS1) as server:
         said = source(server, edition=Edition.ROS1, compression=Compression.CBOR)
         assert len(heard(said, lambda s: len(s) > 5)) > 5

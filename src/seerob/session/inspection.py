@@ -17,8 +17,7 @@ from seerob.core import plugin
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.files.bounded import leads_outside
 from seerob.core.files.toml_file import parsed_toml, read_toml
-from seerob.devices.live.contact import SECRETS, Contact
-from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.listening import SECRETS, Contact, LiveSource
 from seerob.recording.recording import Recording
 from seerob.workstation.allowed import Named, named_outside, texts
 from seerob.workstation.conversion import convert

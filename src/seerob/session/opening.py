@@ -16,8 +16,8 @@ from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.criteria.judging import worded
+from seerob.devices.live.contradictions import looked_at
 from seerob.devices.live.listening import LiveSource, delay_of
-from seerob.devices.live.looked_at import looked_at
 from seerob.devices.variables.live_source import VariablesSource
 from seerob.files.plausible import noise_of_speeds, quantities
 from seerob.files.trajectories.checks import STARTS

@@ -21,7 +21,7 @@ from seerob.criteria.judging import Bound as Bound  # noqa: PLC0414
 from seerob.criteria.judging import Judge as Judge  # noqa: PLC0414
 from seerob.criteria.judging import bound_to, undecided
 from seerob.devices.live.listening import LiveSource, delay_of
-from seerob.devices.live.real_time import Clock
+from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model
 from seerob.outputs.notebook import results_html
 from seerob.outputs.sink import KeepsResults, Writer

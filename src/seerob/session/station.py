@@ -20,11 +20,9 @@ from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.criteria.contact.measured import curves
 from seerob.criteria.criterion import Criterion
-from seerob.devices.live.contact import Contact
 from seerob.devices.live.headset_offers import HasOffers
-from seerob.devices.live.listening import LiveSource, name_of
-from seerob.devices.live.real_time import Clock, hear, require_recorded
-from seerob.devices.live.receivers import Receivers
+from seerob.devices.live.listening import Contact, LiveSource, name_of
+from seerob.devices.live.receivers import Clock, Receivers, hear, require_recorded
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import Progress, compile_workstation
 from seerob.model.mounting.in_place import implausible

@@ -33,8 +33,8 @@ from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import Judge, bound_to, declared
 from seerob.description.humans.skeleton import BONES, PARENTS, ROOT
+from seerob.devices.live.contradictions import LookedAt
 from seerob.devices.live.listening import LiveSource
-from seerob.devices.live.looked_at import LookedAt
 from seerob.model.model import Mechanism, Model
 from seerob.session.opening import source_target
 from seerob.session.run import engine_of, pump, ticks

@@ -54,7 +54,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Evaluate, print, and return the exit code of the verdict."""
     station = compiled(options.workstation, allowed(options), quiet=options.json)
-    from seerob.devices.live.real_time import require_recorded
+    from seerob.devices.live.receivers import require_recorded
 
     require_recorded(station.workstation)
     folder = run_folder(station.model.folder, options.output)

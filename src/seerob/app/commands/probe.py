@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import OUT, Exit, add_allowed, allowed, line, port, seconds
 from seerob.core.errors import InputError, SeerobError
-from seerob.devices.live.arrivals import Arrivals
+from seerob.devices.live.listening import Arrivals
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.workstation.variables import Kind, Variable
 

@@ -21,8 +21,7 @@ from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion, swing
 from seerob.app.emulation.options import EmulatorOptions, Ready, port
 from seerob.core.extras import need
-from seerob.protocols.plc.opcua_address import CODES, NAMESPACE, number
-from seerob.protocols.plc.opcua_client import SILENT, content
+from seerob.protocols.plc.opcua_client import CODES, NAMESPACE, SILENT, content, number
 from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SAFETY, SYSTEM
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ REORDERED = 0.25
 """A stamp that lies back by less was overtaken on the way, or sent twice [s]; it is no news."""
 HOLD = 0.5
 """Nothing is relied on for so long after a clock stepped or went back [s]: the twin swings to where the
-device is, as after a slip (`seerob.devices.live.real_time.SETTLE`)."""
+device is, as after a slip (`seerob.devices.live.receivers.SETTLE`)."""
 RESTART_HOLD = 2.5
 """Nothing is relied on for so long after a device started again [s]. A recording that starts again and
 repeats what it said in the last seconds goes back once more within it; a device that was switched on does

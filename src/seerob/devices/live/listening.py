@@ -20,10 +20,12 @@ import time
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
+from urllib.parse import urlsplit
 
 from msgspec import Meta
 from msgspec.structs import replace
@@ -35,12 +37,143 @@ from seerob.core.printable import printable
 from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding
 from seerob.description.capture.frozen import Frozen
-from seerob.devices.live.arrivals import Arrivals, Statistics
-from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """What arrived so far."""
+
+    count: int = 0
+    """Samples with news."""
+    repeated: int = 0
+    """Samples that were not newer than the one before."""
+    rate: float | None = None
+    """Mean rate while heard [1/s]; None below two samples."""
+    jitter: float | None = None
+    """Standard deviation of the interval between arrivals [s]."""
+    longest_gap: float | None = None
+    """Longest interval between arrivals, losses left out [s]."""
+    missed: int = 0
+    """Samples that the device's own time says are missing."""
+    losses: int = 0
+    """Times it was lost after it had been heard."""
+    offset: float | None = None
+    """Host's monotonic time less device time [s]."""
+
+    def __str__(self) -> str:
+        if self.rate is None or self.jitter is None or self.longest_gap is None:
+            return f"{self.count} samples"
+        return (
+            f"{self.count} samples at {self.rate:.1f}/s, jitter {1e3 * self.jitter:.2f} ms, "
+            f"longest gap {1e3 * self.longest_gap:.1f} ms, {self.missed} missed, "
+            f"{self.repeated} repeated, {self.losses} losses"
+        )
+
+
+class Arrivals:
+    """Counts what arrives; Welford's running mean and variance of the intervals.
+
+    Args:
+        period: Expected period of the source [s], to tell what is missing.
+    """
+
+    def __init__(self, period: float | None = None) -> None:
+        self._period = period
+        self._count = self._repeated = self._missed = self._losses = 0
+        self._intervals, self._mean, self._squares, self._longest = 0, 0.0, 0.0, 0.0
+        self._last: float | None = None
+        self._last_device: float | None = None
+
+    def add(self, host: float, device: float | None) -> None:
+        """News arrived at ``host`` [s], stamped ``device`` [s]."""
+        self._count += 1
+        if self._last is not None:
+            interval = host - self._last
+            self._intervals += 1
+            change = interval - self._mean
+            self._mean += change / self._intervals
+            self._squares += change * (interval - self._mean)
+            self._longest = max(self._longest, interval)
+        if device is not None and self._last_device is not None and self._period is not None:
+            # Rounded: a device's clock has ticks of its own.
+            self._missed += max(0, round((device - self._last_device) / self._period) - 1)
+        self._last, self._last_device = host, device
+
+    def repeat(self) -> None:
+        """Something arrived that was not new."""
+        self._repeated += 1
+
+    def lose(self) -> None:
+        """The source was lost: the silence until it returns is no interval."""
+        self._losses += self._last is not None
+        self._last = self._last_device = None
+
+    def statistics(self, offset: float | None = None) -> Statistics:
+        """What arrived so far."""
+        known = self._intervals > 0 and self._mean > 0
+        return Statistics(
+            count=self._count,
+            repeated=self._repeated,
+            rate=1 / self._mean if known else None,
+            jitter=math.sqrt(self._squares / self._intervals) if known else None,
+            longest_gap=self._longest if known else None,
+            missed=self._missed,
+            losses=self._losses,
+            offset=offset,
+        )
+
+
+SECRETS = ("password_env", "token_env")
+"""Options that name a secret."""
+ENCRYPTED = ("https", "wss")
+
+
+class Contact(NamedTuple):
+    """The other end of a live source."""
+
+    where: str
+    """``connects to 192.168.0.7:30004``, ``listens on 0.0.0.0:9763``."""
+    user: str = ""
+    """As whom; empty for nobody."""
+    secret: str = ""
+    """Name of the secret that is sent; empty for none."""
+    encrypted: bool = False
+
+    def __str__(self) -> str:
+        """One line."""
+        who = f" as {self.user!r}" if self.user else ""
+        what = f" with the secret {self.secret}" if self.secret else ""
+        return f"{self.where}{who}{what}, {'encrypted' if self.encrypted else 'not encrypted'}"
+
+
+def contact_of(source: Any, *, listens: bool) -> Contact:
+    """The other end by the options of a source.
+
+    Args:
+        source: With ``url``, or with ``host``, ``bind`` and ``port``.
+        listens: Whether it waits on ``bind`` for what is sent, instead of connecting to ``host``.
+    """
+    url, port = getattr(source, "url", ""), getattr(source, "port", "")
+    host = getattr(source, "host", "") or getattr(source, "sender", "")
+    if url:
+        where = f"connects to {url}"
+    elif listens:
+        where = f"listens on {source.bind}:{port}" + (f" for {host}" if host else " for anybody")
+    else:
+        where = f"connects to {host}:{port}"
+    secrets = (getattr(source, key, None) for key in SECRETS)
+    security = str(getattr(source, "security", "none"))
+    return Contact(
+        where,
+        getattr(source, "user", None) or "",
+        next(filter(None, secrets), ""),
+        getattr(source, "tls", False) or security != "none" or urlsplit(url).scheme in ENCRYPTED,
+    )
+
 
 _log = logging.getLogger(__name__)
 T = TypeVar("T")

@@ -21,8 +21,7 @@ from typing import BinaryIO
 import msgspec
 
 from seerob.devices.live.listening import Listener, LiveSource, stop
-from seerob.devices.live.shared_mailbox import SharedMailbox
-from seerob.devices.live.source_process import Order, Said
+from seerob.devices.live.source_process import Order, Said, SharedMailbox
 from seerob.workstation.source import Target
 
 SLICE = 100_000

@@ -15,8 +15,7 @@ from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.devices.motion_files import PoseFrame, TrajectoryFile
-from seerob.devices.ros.frames import STATIC, FrameTree, driven, world_from_parent
-from seerob.devices.ros.joints import JointGather
+from seerob.devices.ros import STATIC, FrameTree, JointGather, driven, world_from_parent
 from seerob.files.motion_capture import ros_bag
 from seerob.files.motion_capture.ros_bag import Recorded, TimeBase
 from seerob.files.trajectories.checks import sampling_findings

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from seerob.devices.ros.live_source import RosSource
+from seerob.devices.ros import RosSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.websocket_link import Link, linked
 from seerob.protocols.ros import foxglove

@@ -22,10 +22,9 @@ from seerob.core.snapshot import Finding
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.description.capture.mapping import conventions, plain
 from seerob.devices.capture.stream_source import CaptureStream
-from seerob.devices.live.contact import Contact
 from seerob.devices.live.headset_offers import Offer, Offers
-from seerob.devices.live.listening import LiveSource, say_once
-from seerob.protocols.tracking.xr_axes import world_positions, world_turns
+from seerob.devices.live.listening import Contact, LiveSource, say_once
+from seerob.protocols.tracking.vive import world_positions, world_turns
 
 _log = logging.getLogger(__name__)
 

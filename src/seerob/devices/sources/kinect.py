@@ -25,7 +25,7 @@ from seerob.core.transforms import Array
 from seerob.description.capture.captured import CaptureFrame, Layout
 from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
-from seerob.devices.live.contact import Contact, contact_of
+from seerob.devices.live.listening import Contact, contact_of
 from seerob.files.motion_capture.persons import Follower, numbers
 from seerob.files.motion_capture.upright import camera_upright, upright_rotation
 from seerob.protocols.tracking.kinect import LAYOUT, PORT, Body, Picture, from_datagrams, from_websocket

@@ -16,8 +16,7 @@ from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols.plc import modbus
-from seerob.protocols.plc.modbus import Place, Table
-from seerob.protocols.plc.modbus_client import Refused, connect
+from seerob.protocols.plc.modbus import Place, Refused, Table, connect
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables import Variable
 

@@ -24,8 +24,18 @@ from seerob.devices.live.listening import LiveSource
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc import modbus
-from seerob.protocols.plc.modbus import SUFFIX, Block, Joints, RegisterMap, blocks, load
-from seerob.protocols.plc.modbus_client import Device, Refused, connect, take
+from seerob.protocols.plc.modbus import (
+    SUFFIX,
+    Block,
+    Device,
+    Joints,
+    Refused,
+    RegisterMap,
+    blocks,
+    connect,
+    load,
+    take,
+)
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables import BadValue
 

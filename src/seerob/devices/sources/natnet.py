@@ -15,7 +15,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_wxyz, turned, wxyz_from_rotation
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.devices.capture.stream_source import CaptureStream
-from seerob.devices.live.contact import Contact, contact_of
+from seerob.devices.live.listening import Contact, contact_of
 from seerob.files.motion_capture.upright import Up, world_from_file
 from seerob.protocols.tracking import natnet
 from seerob.protocols.tracking.natnet import Body, BoneModel, Heard, Models, SkeletonModel, frames

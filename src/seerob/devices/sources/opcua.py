@@ -16,16 +16,17 @@ from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing
 from seerob.devices.variables.live_source import LONGEST_PULSE, PULSES, Change, Node, Shown, VariablesSource
 from seerob.protocols import ProtocolError
-from seerob.protocols.plc.opcua_address import address, written
 from seerob.protocols.plc.opcua_client import (
     Changes,
     Security,
     Way,
+    address,
     connect,
     find,
     said_unit,
     stated_unit,
     write_bool,
+    written,
 )
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables import Kind, Variable, unit

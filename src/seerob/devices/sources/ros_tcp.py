@@ -18,8 +18,8 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from seerob.core.errors import InputError
-from seerob.devices.live.contact import Contact, contact_of
-from seerob.devices.ros.live_source import RosSource
+from seerob.devices.live.listening import Contact, contact_of
+from seerob.devices.ros import RosSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.connection import Connection, connected
 from seerob.protocols.links.tcp_server import tcp_server

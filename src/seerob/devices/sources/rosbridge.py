@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from seerob.devices.ros.live_source import RosSource
+from seerob.devices.ros import RosSource
 from seerob.protocols.links.websocket_link import linked
 from seerob.protocols.ros import rosbridge
 from seerob.protocols.ros.ros_messages import Edition, ros1_name

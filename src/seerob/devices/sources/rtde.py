@@ -20,8 +20,7 @@ from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.description.robots.calibration import Calibration, off_by
-from seerob.devices.live.contact import Contact
-from seerob.devices.live.listening import LiveSource, at_start, because
+from seerob.devices.live.listening import Contact, LiveSource, at_start, because
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots import rtde, ur_primary

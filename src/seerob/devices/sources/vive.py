@@ -26,8 +26,7 @@ from seerob.description.capture.captured import CaptureFrame, Layout
 from seerob.devices.capture import worn_trackers as _worn_trackers
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.capture.worn_trackers import Names, OriginWatch, remarks
-from seerob.devices.live.contact import Contact, contact_of
-from seerob.devices.live.listening import say_once
+from seerob.devices.live.listening import Contact, contact_of, say_once
 from seerob.protocols.links.live_messages import Sieve, from_datagrams, from_websocket
 from seerob.protocols.tracking.vive import PORT, Device, Devices, decode
 from seerob.workstation.source import Opened, Target

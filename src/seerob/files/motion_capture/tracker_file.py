@@ -20,8 +20,16 @@ from seerob.core.errors import InputError
 from seerob.core.files.bounded import regular
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.live_messages import MAX_MESSAGE
-from seerob.protocols.tracking.vive import MOST_DEVICES, Device, Devices, decode, device, encode
-from seerob.protocols.tracking.xr_axes import xr_positions, xr_turns
+from seerob.protocols.tracking.vive import (
+    MOST_DEVICES,
+    Device,
+    Devices,
+    decode,
+    device,
+    encode,
+    xr_positions,
+    xr_turns,
+)
 
 HEADER = ("t [s]", "serial", "role", "tracking", "x [m]", "y [m]", "z [m]", "qw", "qx", "qy", "qz")
 LARGEST = 2 << 30

@@ -9,8 +9,7 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
-from seerob.protocols.links.reception import Received, Reception
-from seerob.protocols.links.wakeup import Wakeup
+from seerob.protocols.links.reception import Received, Reception, Wakeup
 
 CHUNK = 1 << 16
 """Read at once [byte]."""

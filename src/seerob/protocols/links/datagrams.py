@@ -12,8 +12,7 @@ from contextlib import asynccontextmanager
 from contextvars import ContextVar
 from typing import Any, NamedTuple
 
-from seerob.protocols.links.reception import Reception
-from seerob.protocols.links.wakeup import Wakeup
+from seerob.protocols.links.reception import Reception, Wakeup
 
 WAITING = 512
 """Datagrams that wait for whoever reads; after that the oldest is dropped."""

@@ -1,19 +1,24 @@
-"""When bytes arrived, as the kernel says: whoever reads them late does not make them look late.
+"""When bytes arrived, as the kernel says, and waking whoever waits for them in the call that brings them.
 
 Linux stamps each packet as it comes in (``SO_TIMESTAMPNS``, socket(7)), datagrams and streams alike. Its
 stamps are of the wall clock, which may be set while a packet waits; they are put on the monotonic clock and
 never before an instant at which nothing was waiting, nor after that of reading. Elsewhere, what arrived
 is stamped when it is read.
+
+What asyncio's events and futures wake is run in the next turn of the loop, which asks the kernel for news
+before: there a thread gives up the interpreter's lock and waits for it anew, behind one that computes.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import socket
 import struct
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextvars import Context
 from typing import Any, NamedTuple
 
 _NANOSECONDS = getattr(socket, "SO_TIMESTAMPNS", 35) if sys.platform == "linux" else None
@@ -95,3 +100,94 @@ def instant(stamped: int | None, *, now: float, wall: int, empty: float) -> floa
     if stamped is None:
         return now
     return min(max(now - 1e-9 * (wall - stamped), empty), now)
+
+
+class _Wait(asyncio.Future[None]):
+    """What one task awaits; it goes on within `end`, unless another task calls that."""
+
+    _then: Callable[[Any], object] | None = None
+    _context: Context | None = None
+
+    def add_done_callback(self, fn: Callable[[Any], object], /, *, context: Context | None = None) -> None:
+        """Called by the task that awaits it, and by no one else."""
+        self._then, self._context = fn, context
+
+    def cancel(self, msg: Any | None = None) -> bool:
+        """Called by whoever cancels the task, from within a task of their own."""
+        if not super().cancel(msg):
+            return False
+        self._go_on_later()
+        return True
+
+    def end(self, error: BaseException | None = None) -> None:
+        """Nothing is waited for any more."""
+        if self.done():
+            return
+        if error is None:
+            self.set_result(None)
+        else:
+            self.set_exception(error)
+        if asyncio.current_task(self.get_loop()) is not None:
+            self._go_on_later()  # a task does not run within another
+        elif self._then is not None:
+            then, self._then = self._then, None
+            if self._context is None:
+                then(self)
+            else:
+                self._context.run(then, self)
+
+    def _go_on_later(self) -> None:
+        if self._then is not None:
+            then, self._then = self._then, None
+            self.get_loop().call_soon(then, self, context=self._context)
+
+
+class Wakeup:
+    """Rung by callbacks of the running loop; one task at a time waits for it.
+
+    It remembers nothing: whoever waits looks first whether something is there.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._wait: _Wait | None = None
+        self._due = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+
+    def wake(self) -> None:
+        """Whoever waits goes on, and has done with what there is when this returns."""
+        if self._wait is not None:
+            self._wait.end()
+
+    async def wait(self, patience: float) -> None:
+        """Until it rings.
+
+        Args:
+            patience: Longest time that takes [s].
+
+        Raises:
+            TimeoutError: It took longer.
+        """
+        # One timer for many waits: packets come hundreds of times in the time of one.
+        self._due = self._loop.time() + patience
+        if self._timer is None or self._timer.when() > self._due:
+            self._set()
+        self._wait = _Wait(loop=self._loop)
+        try:
+            await self._wait
+        finally:
+            self._wait = None
+
+    def _set(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_at(self._due, self._look)
+
+    def _look(self) -> None:
+        self._timer = None
+        if self._wait is None:
+            return
+        if self._loop.time() < self._due:
+            self._set()
+        else:
+            self._wait.end(TimeoutError())

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.plc import opcua_address
+from seerob.protocols.plc import opcua_client
 from seerob.protocols.plc.opcua_client import stated_unit
 from seerob.workstation.variables import unit
 
@@ -140,7 +140,7 @@ async def _length_unit(frame: Node) -> float | None:
     for owner in (await _child(frame, 0, "CartesianCoordinates"), frame):
         said = None if owner is None else await _child(owner, 0, "LengthUnit")
         stated = (
-            None if said is None else unit(opcua_address.unit(getattr(await _value(said), "UnitId", 0) or 0))
+            None if said is None else unit(opcua_client.unit(getattr(await _value(said), "UnitId", 0) or 0))
         )
         if stated is not None and stated.si == "m":
             return stated.factor

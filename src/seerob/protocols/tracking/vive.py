@@ -15,10 +15,33 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, turned
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.live_messages import MAX_MESSAGE
-from seerob.protocols.tracking.xr_axes import world_positions, world_turns, xr_positions, xr_turns
+
+WORLD_FROM_XR = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""x forward, y left, z up from x right, y up, z backward; a rotation."""
+
+
+def world_positions(positions: Array) -> Array:
+    """Positions with z up [m], shape (..., 3), of a headset's [m]."""
+    return np.asarray(positions @ WORLD_FROM_XR.T)
+
+
+def world_turns(wxyz: Array) -> Array:
+    """World (z up) from device, w first, shape (..., 4), of a headset's rotations w first."""
+    return turned(WORLD_FROM_XR, wxyz)
+
+
+def xr_positions(positions: Array) -> Array:
+    """Inverse of `world_positions`."""
+    return np.asarray(positions @ WORLD_FROM_XR)
+
+
+def xr_turns(wxyz: Array) -> Array:
+    """Inverse of `world_turns`."""
+    return turned(WORLD_FROM_XR.T, wxyz)
+
 
 PORT = 9872
 """Of our live message, UDP and WebSocket alike; not taken by anybody we know."""

@@ -1,31 +1,283 @@
-"""What every live source of ROS has in common: options, checks, and the way from messages to samples."""
+"""What the sources of ROS share: joints by name, transforms, and the way from live messages to samples."""
 
 from __future__ import annotations
 
 import asyncio
+import math
 import time
+from bisect import bisect_right
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from msgspec import Meta
 from msgspec.structs import replace
 
-from seerob.core.errors import InputError
+from seerob.core.errors import InputError, suggestion
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.core.transforms import Array, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.devices.live.listening import LiveSource
-from seerob.devices.motion_files import PoseFrame
-from seerob.devices.ros.frames import STATIC, FrameTree, driven, world_from_parent
-from seerob.devices.ros.joints import JointGather, PlayedPlan
+from seerob.devices.motion_files import PoseFrame, fixed_links
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
-from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Said
+from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Said, Transform
 from seerob.protocols.ros.rosbridge import SILENCE, Heard
 from seerob.workstation.source import Opened, Target
+
+STATIC = "/tf_static"
+"""Where frames are said that never change."""
+LONGEST = 64
+"""Edges of a chain."""
+MOST_FRAMES = 4096
+UNIT = 1e-2
+"""A quaternion whose length is off by more is none."""
+
+
+class FrameTree:
+    """What is known of the frames.
+
+    Args:
+        parent: Frame that is wanted as parent.
+        child: Frame whose pose is wanted.
+    """
+
+    def __init__(self, parent: str, child: str) -> None:
+        self._parent, self._child = parent, child
+        self._edges: dict[str, tuple[str, float | None, Array, bool]] = {}
+
+    def take(self, transforms: tuple[Transform, ...], *, fixed: bool) -> bool:
+        """Note them; whether one of the chain is among them.
+
+        Args:
+            transforms: What a message says.
+            fixed: Whether they never change (``/tf_static``).
+        """
+        for said in transforms:
+            if said.child in self._edges or len(self._edges) < MOST_FRAMES:
+                self._edges[said.child] = (said.parent, said.stamp, _matrix(said), fixed)
+        on = {child for child, _ in self._chain()}
+        return any(said.child in on for said in transforms)
+
+    def pose(self) -> tuple[Array, float | None] | None:
+        """Parent from child (4, 4), NaN where one edge is none, and the stamp of the oldest moving edge [s].
+
+        None when the chain is not known, or nothing in it moves and nobody says when that was.
+        """
+        chain = self._chain()
+        if not chain or self._edges[chain[-1][0]][0] != self._parent:
+            return None
+        matrix = np.eye(4)
+        stamps: list[float | None] = []
+        for child, _ in reversed(chain):
+            _, stamp, edge, fixed = self._edges[child]
+            matrix = matrix @ edge
+            if not fixed:
+                stamps.append(stamp)
+        known = [s for s in stamps if s is not None]
+        return matrix, min(known) if known and len(known) == len(stamps) else None
+
+    def lacking(self) -> str:
+        """Why there is no pose, for a message."""
+        frames = sorted({*self._edges, *(e[0] for e in self._edges.values())})
+        shown = ", ".join(frames[:16]) or "none"
+        return f"nothing leads from {self._parent!r} to {self._child!r}; frames that are heard: {shown}"
+
+    def _chain(self) -> list[tuple[str, str]]:
+        """Child and parent of each edge, from the child upwards, as far as the parent or as is known."""
+        found: list[tuple[str, str]] = []
+        frame = self._child
+        while frame in self._edges and frame != self._parent and len(found) < LONGEST:
+            found.append((frame, self._edges[frame][0]))
+            frame = self._edges[frame][0]
+        return found
+
+
+def _matrix(said: Transform) -> Array:
+    length = math.hypot(*said.wxyz)
+    if not (math.isfinite(length) and abs(length - 1) < UNIT):
+        return np.full((4, 4), np.nan)
+    return transform(rotation_from_wxyz(np.array(said.wxyz) / length), said.position)
+
+
+def world_from_parent(target: Target, parent: str, frame: PoseFrame, where: str) -> Array:
+    """Where the parent stands in the workstation, (4, 4).
+
+    Args:
+        target: The robot.
+        parent: Frame of ROS, which is a link of the robot of the same name or the workstation's origin.
+        frame: Which of both.
+        where: The other end or the file, for messages.
+
+    Raises:
+        InputError: The robot has no such link that stands still.
+    """
+    if frame is PoseFrame.WORLD:
+        return np.eye(4)
+    fixed = fixed_links(target)
+    name = f"{target.name}/{parent}"
+    if name not in fixed or target.world_from_base is None:
+        what = f"no link {name!r} that stands still with {target.name}"
+        remedy = f'{suggestion(name, fixed)}; or frame = "world" when {parent!r} is its origin'
+        raise InputError.at(where, "parent", what, remedy)
+    return np.array(target.world_from_base) @ fixed[name]
+
+
+def driven(target: Target, at: str, where: str) -> str:
+    """Full name of what a pose drives.
+
+    Args:
+        target: The robot.
+        at: What it should be.
+        where: The other end or the file, for messages.
+
+    Raises:
+        InputError: The robot does not move it.
+    """
+    if target.frames and at not in (*target.frames, target.name):
+        what = f"no link or tool {at!r} that {target.name} moves"
+        raise InputError.at(where, "at", what, suggestion(at, target.frames))
+    return at
+
+
+APART = 2.0
+"""Periods by which the joints of one sample may be apart before it is no longer judged."""
+
+
+class _Last(NamedTuple):
+    arrived: float
+    stamp: float | None
+    q: float
+    qd: float | None
+    tau: float | None
+
+
+class JointGather:
+    """Puts together what is said of a robot's joints.
+
+    Several publishers may share a topic, an arm and a gripper for instance, and no message need have all
+    joints: there is a sample whenever each joint was heard since the last one. It speaks of the instant of
+    the oldest of them.
+
+    Args:
+        target: The robot.
+        names: Its joints as ROS calls them, in the robot's order; those of the first message when empty.
+        period: Expected between messages [s].
+    """
+
+    def __init__(self, target: str, names: tuple[str, ...], period: float) -> None:
+        self._target, self._names, self._period = target, names, period
+        self._last: dict[str, _Last] = {}
+        self._others: dict[str, None] = {}
+
+    def take(self, arrived: float, said: Joints) -> JointSample | None:
+        """A sample, when a message completes one.
+
+        Args:
+            arrived: Host's monotonic time [s].
+            said: The message.
+        """
+        if not said.position:
+            return None
+        names = self._names = self._names or said.names
+        for k, name in enumerate(said.names):
+            if name in names:
+                self._last[name] = _Last(
+                    arrived,
+                    said.stamp,
+                    said.position[k],
+                    said.velocity[k] if said.velocity else None,
+                    said.effort[k] if said.effort else None,
+                )
+            elif len(self._others) < 16:
+                self._others[name] = None
+        if len(self._last) < len(names):
+            return None
+        every = [self._last[name] for name in names]
+        self._last.clear()
+        stamps = [last.stamp for last in every if last.stamp is not None]
+        stamped = len(stamps) == len(every)
+        instants = stamps if stamped else [last.arrived for last in every]
+        q = tuple(last.q for last in every)
+        quality = Quality.GOOD
+        if max(instants) - min(instants) > APART * self._period:
+            quality = Quality.DEGRADED
+        if not all(map(math.isfinite, q)):
+            quality = Quality.INVALID
+        return JointSample(
+            source="",
+            seq=0,
+            t=arrived,
+            t_device=min(stamps) if stamped else None,
+            target=self._target,
+            q=q,
+            qd=_all([last.qd for last in every]),
+            tau=_all([last.tau for last in every]),
+            quality=quality,
+        )
+
+    def lacking(self) -> str:
+        """Why there is no sample, for a message."""
+        lost = [name for name in self._names if name not in self._last]
+        others = ", ".join(self._others) or "none"
+        return f"nothing is said of {', '.join(lost[:12]) or 'any joint'}; other joints that are: {others}"
+
+
+def _all(values: list[float | None]) -> tuple[float, ...] | None:
+    """None when one is not known: half of the speeds are no speeds."""
+    known = tuple(v for v in values if v is not None and math.isfinite(v))
+    return known if len(known) == len(values) else None
+
+
+class PlayedPlan:
+    """A trajectory that somebody commanded, as if a robot followed it exactly.
+
+    Between points it is the cubic with their positions and speeds, or a straight line when there are none.
+
+    Args:
+        plan: The trajectory.
+        names: The robot's joints as ROS calls them, in its order; those of the plan when empty.
+
+    Raises:
+        ProtocolError: It has no points, not all joints, or values that are not finite.
+    """
+
+    def __init__(self, plan: Plan, names: tuple[str, ...]) -> None:
+        names = names or plan.names
+        lost = [name for name in names if name not in plan.names]
+        if lost or not plan.points:
+            raise ProtocolError(f"a trajectory without {', '.join(lost[:12]) or 'points'}")
+        order = [plan.names.index(name) for name in names]
+        self.times = [p.t for p in plan.points]
+        self._q = [tuple(p.position[k] for k in order) for p in plan.points]
+        self._qd = [tuple(p.velocity[k] for k in order) if p.velocity else None for p in plan.points]
+        if not all(math.isfinite(x) for row in [*self._q, *(v for v in self._qd if v)] for x in row):
+            raise ProtocolError("a trajectory with values that are not finite")
+
+    def at(self, t: float) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """Positions and speeds at a time since its start [s]; None before its first point."""
+        if t < self.times[0]:
+            return None
+        if t >= self.times[-1]:
+            return self._q[-1], (0.0,) * len(self._q[-1])
+        k = bisect_right(self.times, t) - 1
+        T = self.times[k + 1] - self.times[k]
+        s = (t - self.times[k]) / T
+        a, b, va, vb = self._q[k], self._q[k + 1], self._qd[k], self._qd[k + 1]
+        if va is None or vb is None:
+            q = tuple(x + s * (y - x) for x, y in zip(a, b, strict=True))
+            return q, tuple((y - x) / T for x, y in zip(a, b, strict=True))
+        # Cubic Hermite polynomial.
+        h = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, T * s * (1 - s) ** 2, T * s**2 * (s - 1))
+        d = (6 * s * (s - 1) / T, 6 * s * (1 - s) / T, (1 - s) * (1 - 3 * s), s * (3 * s - 2))
+        rows = list(zip(a, b, va, vb, strict=True))
+        return (
+            tuple(sum(w * x for w, x in zip(h, row, strict=True)) for row in rows),
+            tuple(sum(w * x for w, x in zip(d, row, strict=True)) for row in rows),
+        )
+
 
 ASKED = 1.2
 """How long the first message is waited for at start [s]."""

@@ -202,6 +202,7 @@ def test_the_fastest_gap_that_clamps_counts_for_both_of_its_sides_but_not_those_
     # Gaps of b and c to the floor a, of both to d, which moves, and between them.
     pairs = pinch_pairs(Shapes.build(bodies), [1, 2], [0], frozenset(), others=[3], cap=1.0)
     assert pairs.across.tolist() == [-1, -1, 3, 3, 2]
+    assert pairs.second.tolist() == [-1, -1, -1, -1, 1]
     assert pairs.inner.tolist() == [False] * 4 + [True]
     speed = np.array([9.0, 9.0, 0.2, 0.3, 0.7])
     clamped = np.array([[1, 1], [1, 1], [1, 0], [1, 0], [0, 1]], bool)
@@ -218,6 +219,12 @@ def test_the_fastest_gap_that_clamps_counts_for_both_of_its_sides_but_not_those_
 
 
 FOLDED = ((-0.4, 1.2), (2.4, 3.0), (-0.2, 0.2))
+
+
+DOOR = (
+    '[[machines]]\nname = "door"\nshape = { box = [0.1, 0.1, 0.1] }\nat = { position = [0, 3, 0] }\n'
+    "mass = 5\nslide = { along = [1, 0, 0], lower = 0, upper = 0.5 }\n"
+)
 
 
 def folded(folder: Path, more: str = "") -> Model:
@@ -243,7 +250,9 @@ def folded(folder: Path, more: str = "") -> Model:
         '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [4, 0, 0] }\n'
         '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'
     )
-    return made(folder, text + more, {"arm.urdf": f'<robot name="r">{"".join(links + joints)}</robot>'}).model
+    return made(
+        folder, text + DOOR + more, {"arm.urdf": f'<robot name="r">{"".join(links + joints)}</robot>'}
+    ).model
 
 
 def gaps_of(model: Model, enough: float) -> tuple[dict[tuple[str, str], float], set[frozenset[str]]]:
@@ -266,7 +275,7 @@ def test_own_parts_open_as_wide_as_any_place_gets_from_the_other_part(tmp_path: 
     model = folded(tmp_path)
     found, places = gaps_of(model, 9.0)
     assert places == {frozenset(pair) for pair in (("base", "l0"), ("l0", "l1"), ("l1", "l2"))}
-    around = {(f"l{k}", "around") for k in range(3)}
+    around = {(f"l{k}", each) for k in range(3) for each in ("around", "door/body")}
     assert {*found} == around | {("l1", "arm/base"), ("l2", "arm/base"), ("l0", "arm/l2")}
     assert all(np.isinf(found[gap]) for gap in around)
     index, rng = {body.name: body.index for body in model.bodies}, np.random.default_rng(5)
@@ -305,7 +314,7 @@ def test_fingers_without_ends_clamp_wherever_they_are_near_and_others_by_their_s
     fingers = {frozenset(("l2", "left")), frozenset(("l2", "right")), frozenset(("left", "right"))}
     assert (fingers <= places) is not endless
     assert not (fingers & places) or not endless
-    inner = {gap: width for gap, width in found.items() if gap[1] != "around"}
+    inner = {gap: width for gap, width in found.items() if gap[1] not in ("around", "door/body")}
     by_fingers = {
         gap: width for gap, width in inner.items() if {"left", "right"} & {gap[0], gap[1].split("/")[1]}
     }

@@ -6,18 +6,25 @@ import mujoco
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, heard, made, two_r
+from made_cell import FLOATING, TWO_R, heard, made, person, two_r
+from seerob.core.samples import Quality
 from seerob.core.transforms import transform
+from seerob.files.trajectories.trajectory import Trajectory, TrajectorySamples
 from seerob.twin.own_words import (
     LiveWords,
+    Said,
     SaidTool,
     _bias,
     _differ,
     _past,
     _Ways,
     bound,
+    compared,
     fixed_offset,
+    heavier,
     other_speed,
+    rigid_error,
+    said_by,
     sign_or_unit,
 )
 
@@ -235,3 +242,224 @@ def test_torques_of_a_joint_that_follows_another_with_an_offset(tmp_path) -> Non
     found = _bias(model, mujoco.MjData(model.mj), model.mechanisms["arm"], np.array([0.3]), None)
     expected = 9.81 * (2 * np.cos(0.3) + np.cos(1.1) + np.cos(1.1))
     np.testing.assert_allclose(found, [expected], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("twin", "most"), [(0.0, 0.15), (1.0, 1.15), (1.5, 1.65), (5.0, 5.5), (20.0, 22.0)])
+def test_a_controller_may_have_a_tenth_or_150_grams_more_at_its_flange_than_the_twin(
+    twin: float, most: float
+) -> None:
+    assert heavier(most - 1e-6, twin) == heavier(0.0, twin) == ""
+    assert f"has {most + 0.01:.4g} kg at its flange, and the twin carries {twin:.4g} kg" in heavier(
+        most + 0.01, twin
+    )
+    assert heavier(0.15, 0.0) == ""
+    assert heavier(22.0, 20.0) == ""
+
+
+def test_at_exactly_the_thresholds_speeds_are_of_one_motion() -> None:
+    """Of binary fractions and of what a float makes of a fifth."""
+    a = next(a for a in np.arange(0.5, 2.0, 1e-3) if a - (a - (0.02 + 0.2 * a)) == 0.02 + 0.2 * a)
+    assert other_speed(np.full(8, a), np.full(8, a - (0.02 + 0.2 * a))) == ""
+    assert other_speed(np.full(8, a), np.full(8, a - (0.021 + 0.2 * a))) != ""
+    assert other_speed(np.zeros(9), np.full(9, 0.05)) == ""
+    # Too fast and too slow do not cancel.
+    assert other_speed(np.tile([0.5, 1.5], 5), np.ones(10)) != ""
+
+
+def test_points_are_laid_on_others_as_one_rigid_body() -> None:
+    """Turned and shifted nothing is left; of a mirror image, and of one place that is off, something is."""
+    rng = np.random.default_rng(2)
+    a = rng.normal(size=(7, 3)) + np.array([5.0, -3.0, 2.0])
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    b = a @ turn.T + [1.0, 2.0, 3.0]
+    assert rigid_error(a, b) == pytest.approx(0.0, abs=1e-12)
+    assert rigid_error(a, b * [1, 1, -1]) > 0.5
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 0]])
+    # The tallest side is longer by 0.2 m: at both of its ends a tenth, at the others, too.
+    assert rigid_error(flat, flat * [1.0, 1.1, 1.0]) == pytest.approx(0.1)
+    off = b.copy()
+    off[3] += [0.0, 0.0, 0.7]
+    assert 0.3 < rigid_error(a, off) < 0.7
+
+
+def log(samples: int = 4, **words: object) -> TrajectorySamples:
+    """Rows of a file from 2 s on, of which the second is invalid."""
+    t = 2.0 + 0.1 * np.arange(samples)
+    q = np.stack([np.arange(samples), -np.arange(samples)], axis=1).astype(float)
+    motion = Trajectory(file="log.csv", t=t, q=q, **words)
+    return TrajectorySamples(motion, "s", "arm", qd=10 * q)
+
+
+WORDS = {
+    "tau": np.arange(8.0).reshape(4, 2),
+    "tcp_position": np.arange(12.0).reshape(4, 3),
+    "tcp_speed": np.arange(4.0),
+}
+
+
+@pytest.mark.parametrize("which", [*WORDS, ""])
+@pytest.mark.parametrize("invalid", [None, np.array([False, True, False, False])])
+def test_of_a_file_its_valid_rows_are_compared(which: str, invalid: np.ndarray | None) -> None:
+    words = {which: WORDS[which]} if which else {}
+    said = said_by(log(**words, invalid=invalid, tcp_in_base=True), "log.csv")
+    if not which:
+        assert said is None
+        return
+    rows = [0, 1, 2, 3] if invalid is None else [0, 2, 3]
+    assert said is not None
+    np.testing.assert_allclose(said.t, 0.1 * np.array(rows))
+    np.testing.assert_array_equal(said.q[:, 0], rows)
+    np.testing.assert_array_equal(said.qd, 10 * said.q)
+    for name, field in (("tau", "tau"), ("tcp_position", "tcp"), ("tcp_speed", "tcp_speed")):
+        found = getattr(said, field)
+        if name == which:
+            np.testing.assert_array_equal(found, WORDS[name][rows])
+        else:
+            assert found is None
+    assert said.frame_known
+    assert said_by(log(**words, invalid=np.ones(4, bool)), "log.csv") is None
+
+
+@pytest.mark.parametrize("which", ["tau", "tcp", "tcp_speed", ""])
+def test_of_samples_one_by_one_the_good_ones_are_compared(which: str) -> None:
+    words = {"tau": (1.0, 2.0), "tcp": (0.1, 0.2, 0.3), "tcp_speed": 0.4}
+    word = {which: words[which]} if which else {}
+    qualities = (Quality.GOOD, Quality.DEGRADED, Quality.GOOD)
+    samples = [
+        heard("arm", 0.1 * k, (0.0, float(k)), (1.0, 2.0), quality=quality, **word)
+        for k, quality in enumerate(qualities)
+    ]
+    said = said_by(samples, "its stream")
+    if not which:
+        assert said is None
+        assert said_by([], "its stream") is None
+        return
+    assert said is not None
+    np.testing.assert_allclose(said.t, [0.0, 0.2])
+    np.testing.assert_array_equal(said.q, [[0.0, 0.0], [0.0, 2.0]])
+    np.testing.assert_array_equal(said.qd, [[1.0, 2.0]] * 2)
+    for field in words:
+        found = getattr(said, field)
+        assert found is None if field != which else (np.array(found) == np.array([words[which]] * 2)).all()
+    assert said.frame_known
+    # A word that one of them does not say is compared of none; who says none at all has nothing to say.
+    mute = heard("arm", 0.3, (0.0, 3.0))
+    partly = said_by([*samples, mute], "its stream")
+    assert partly is not None
+    assert (partly.qd, getattr(partly, which)) == (None, None)
+    bad = [heard("arm", 0.0, (0.0, 0.0), quality=Quality.DEGRADED, **word)]
+    assert said_by(bad, "its stream") is None
+
+
+def test_of_a_long_file_rows_are_looked_at_evenly() -> None:
+    t = np.arange(10.0)
+    said = Said("f", t, t[:, None], None, t[:, None], None, True, t)
+    for most, rows in (
+        (10, range(10)),
+        (20, range(10)),
+        (9, range(0, 10, 2)),
+        (5, range(0, 10, 2)),
+        (4, range(0, 10, 3)),
+    ):
+        thin = said.thinned(most)
+        for part in (thin.t, thin.q[:, 0], thin.tau[:, 0], thin.tcp_speed):
+            np.testing.assert_array_equal(part, [*rows])
+        assert (thin.qd, thin.tcp) == (None, None)
+
+
+def told_by(folder, text: str = "", **words: object) -> list[str]:
+    """What is found of a planar arm whose source says something of itself."""
+    model = made(folder, DOWN + TWO_R + text, {"arm.urdf": two_r()}).model
+    t = np.arange(8.0)
+    q = np.stack([0.3 + 0.2 * t, 0.1 * t], axis=1)
+    a, b = q[:, 0], q.sum(axis=1)
+    tip = np.stack([np.cos(a) + np.cos(b), np.sin(a) + np.sin(b), 0 * a], 1)
+    qd = np.tile([0.2, 0.1], (8, 1))
+    speed = np.hypot(0.2 * np.sin(a) + 0.3 * np.sin(b), 0.2 * np.cos(a) + 0.3 * np.cos(b))
+    weight = 9.81 * np.stack([2 * np.cos(a) + np.cos(b), np.cos(b)], axis=1)
+    said = Said("f", t, q, qd, None, None, True)
+    for name, of in words.items():
+        said = said._replace(**{name: of({"tcp": tip, "tcp_speed": speed, "tau": weight, "qd": qd}[name])})
+    return [f.text for f in compared(model, "arm", said)]
+
+
+def test_each_word_that_a_file_says_is_compared_by_itself(tmp_path) -> None:
+    twice, same = (lambda x: 2 * x), (lambda x: x)
+    assert told_by(tmp_path) == []
+    (right,) = told_by(tmp_path, tcp=same)
+    assert right == "f: its own tool centre point is where the twin has its flange, to 0.0 mm"
+    (wrong,) = told_by(
+        tmp_path, tcp=lambda x: np.where(np.arange(8)[:, None] == 5, x + np.array([0, 0, 0.05]), x)
+    )
+    assert "50 mm from its flange in the twin at 5.000 s, more than 10 mm" in wrong
+    assert told_by(tmp_path, tcp_speed=same) == []
+    (wrong,) = told_by(tmp_path, tcp_speed=twice)
+    assert "its own tool centre point moves at" in wrong
+    assert told_by(tmp_path, tcp_speed=twice, qd=lambda _: None) == []
+    assert told_by(tmp_path, tau=same) == []
+    (wrong,) = told_by(tmp_path, tau=lambda x: -x)
+    assert "the opposite sign" in wrong
+    # Without speeds gravity alone is compared.
+    assert told_by(tmp_path, tau=same, qd=lambda _: None) == []
+    (wrong,) = told_by(tmp_path, tau=lambda x: -x, qd=lambda _: None)
+    assert "the opposite sign" in wrong
+    assert len(told_by(tmp_path, tcp=same, tcp_speed=twice, tau=lambda x: -x)) == 3
+
+
+@pytest.mark.parametrize(("off", "told"), [(0.0099, False), (0.0101, True)])
+def test_a_tool_centre_point_may_be_ten_millimetres_off(tmp_path, off: float, told: bool) -> None:
+    (found,) = told_by(tmp_path, tcp=lambda x: x + np.array([0, 0, off]))
+    assert ("more than 10 mm" in found) is told
+
+
+def test_who_is_no_robot_says_nothing(tmp_path) -> None:
+    model = made(tmp_path, FLOATING + TWO_R + person("op", 3, 0, 0), {"arm.urdf": two_r()}).model
+    words = Said(
+        "f",
+        np.zeros(9),
+        np.zeros((9, 2)),
+        np.ones((9, 2)),
+        -np.ones((9, 2)),
+        np.ones((9, 3)),
+        True,
+        np.ones(9),
+    )
+    assert [*compared(model, "op", words)] == []
+    assert bound(model, "op") is None
+    words = LiveWords(model, "op")
+    assert words.invalid_reason(heard("op", 0.0, (0.0,), (0.0,), tcp_speed=9.0)) == ""
+
+
+def test_live_words_are_looked_at_ten_times_a_second_and_place_and_speed_by_themselves(tmp_path) -> None:
+    """A stretched arm whose source has its tool 50 mm beside the tip, and then says which tool would fit."""
+    model = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model
+    words, found = LiveWords(model, "arm"), []
+    for k in range(12):
+        a = 0.05 * k
+        place = (2 * np.cos(a) - 0.05 * np.sin(a), 2 * np.sin(a) + 0.05 * np.cos(a), 0.0)
+        found.append(words.invalid_reason(heard("arm", 0.05 * k, (a, 0.0), (1.0, 0.0), tcp=place)))
+        assert "50 mm from the twin's, more than 10 mm (tcp_tolerance)" in found[-1]
+    # Every second one is kept: five at 0.4 s, of which the flange has turned by 0.4 rad.
+    fits = ["a tool centre point at [0, 50, 0] mm" in why for why in found]
+    assert fits == [k >= 8 for k in range(12)]
+    assert all("another robot, tool or calibration" in why for why in found[:8])
+    right = LiveWords(model, "arm")
+    assert right.invalid_reason(heard("arm", 0.0, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0, 0.0))) == ""
+    assert right.invalid_reason(heard("arm", 0.1, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0099, 0.0))) == ""
+    assert right.invalid_reason(heard("arm", 0.2, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0101, 0.0))) != ""
+    assert right.invalid_reason(heard("arm", 0.3, (0.0, 0.0), (1.0, 0.0))) == ""
+
+
+@pytest.mark.parametrize(
+    ("turned", "off", "fits"), [(0.13, 0.0, False), (0.16, 0.0, True), (0.5, 0.03, False)]
+)
+def test_a_tool_is_told_of_a_flange_that_turned_and_of_places_that_fit(
+    tmp_path, turned: float, off: float, fits: bool
+) -> None:
+    """0.2 of the norm is √8 sin(α/2): 0.1415 rad."""
+    words = LiveWords(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
+    for k in range(5):
+        a = turned * k / 4
+        place = (2 * np.cos(a) - 0.05 * np.sin(a), 2 * np.sin(a) + 0.05 * np.cos(a), off * (k == 2))
+        why = words.invalid_reason(heard("arm", 0.11 * k, (a, 0.0), (1.0, 0.0), tcp=place))
+    assert ("would fit" in why) is fits

@@ -52,6 +52,23 @@ def test_no_pose_within_the_span_has_a_longer_lever():
     assert tightest > 0.6
 
 
+def test_the_flange_is_as_far_from_an_axis_as_from_its_line_and_from_a_slide_as_from_its_anchor(tmp_path):
+    """A second link that is lowered by 1 rad."""
+    lowered = two_r()
+    at = lowered.rindex('<axis xyz="0 0 1"/>')
+    lowered = lowered[:at] + '<axis xyz="0 1 0"/>' + lowered[at + len('<axis xyz="0 0 1"/>') :]
+    slides = lowered.replace('type="continuous"', 'type="prismatic"', 1).replace(
+        "<limit", '<limit lower="-1" upper="1"', 1
+    )
+    expected = (1 + np.cos(1.0), np.hypot(1 + np.cos(1.0), np.sin(1.0)))
+    for name, urdf, far in zip("ab", (lowered, slides), expected, strict=True):
+        station = made(tmp_path / name, FLOATING + TWO_R, {"arm.urdf": urdf})
+        robot, data = station.model.robot("arm"), mujoco.MjData(station.model.mj)
+        data.qpos[robot.q_address] = (0.0, 1.0)
+        mujoco.mj_kinematics(station.model.mj, data)
+        assert reach_of(data, station.model, robot) == pytest.approx(far, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("q", "expected"), [((0.0, 0.0), 2.0), ((0.7, np.pi / 2), np.sqrt(2.0)), ((0.3, np.pi), 0.0)]
 )
@@ -237,6 +254,9 @@ def test_no_reaction_on_a_known_motion_within_a_span_is_faster_or_longer_than_it
     assert at[0] == pytest.approx(0.04)
     assert end + T_r + PERIOD - 1e-9 <= at[-1] < end + T_r + 2 * PERIOD
     assert {x for x in knots if x < at[-1]} <= {*at.tolist()}
+    ticks = PERIOD * np.arange(4, 100)
+    expected = sorted([*ticks[ticks <= at[-1] + 1e-9].tolist(), *(x for x in knots if x < at[-1])])
+    np.testing.assert_allclose(at, expected, atol=1e-9)
     np.testing.assert_array_equal(q, swing(at)[0])
     fine = np.linspace(begin, end + T_r + PERIOD, 20_001)
     rate = np.abs(swing(fine)[1])
@@ -267,12 +287,107 @@ def test_a_motion_that_stops_at_once_bounds_no_less_than_the_speed_within_the_sp
     span = asked.span((0.3, 0.4), (0.8, -0.5), 0.0, 0.01)
     span.foresee = lambda name, t: (np.tile([0.308, 0.395], (len(t), 1)), np.zeros((len(t), 2)), "")
     own = np.asarray(asked.robot.v_address)[asked.robot.own]
-    speeds, ways, *_ = known_in_span(span, "arm", 0.1, PERIOD, own)
+    speeds, ways, whole, _ = known_in_span(span, "arm", 0.1, PERIOD, own)
     np.testing.assert_allclose(speeds, [0.8, 0.5], rtol=1e-9)
     np.testing.assert_allclose(ways, [0.08, 0.05], rtol=1e-9)
+    # Within the span, and, as nobody knows better, until the next tick.
+    np.testing.assert_allclose(whole, [0.016, 0.01], rtol=1e-9)
     for answer in (None, (np.zeros((1, 2)), np.zeros((1, 2)), "nobody knows its end")):
         span.foresee = lambda name, t, answer=answer: answer
         assert known_in_span(span, "arm", 0.1, PERIOD, own) is None
+
+
+@pytest.mark.parametrize(("before", "after"), [(1.0, 0.0), (0.0, 1.0)])
+def test_what_brakes_to_a_tick_or_begins_at_it_is_bounded_on_both_sides_of_it(tmp_path, before, after):
+    """Within 10 ms from one speed to the other; before and after these it keeps them."""
+    asked = Asked(tmp_path, T_r=0.1, held=False)
+    t = np.array([0.03, 0.04])
+    q, v = np.array([[0.0, 0.0], [0.005, 0.0]]), np.array([[before, 0.0], [after, 0.0]])
+    ids = np.array([body.mj for body in asked.model.bodies], np.int64)
+    span = asked.points.span(Path(t, q, v), 0.03, 0.04, ids, asked.model.mj)
+    go = np.array([1.0, 0.0])
+    span.foresee = lambda name, t: (
+        0.005 * go + after * (t[:, None] - 0.04) * go,
+        np.full((len(t), 1), after) * go,
+        "",
+    )
+    own = np.asarray(asked.robot.v_address)[asked.robot.own]
+    speeds, ways, whole, _ = known_in_span(span, "arm", 0.1, PERIOD, own)
+    assert speeds[0] == pytest.approx(1.0)
+    assert whole[0] == pytest.approx(0.01 + after * 0.11)
+    assert ways[0] >= 0.1
+
+
+def test_what_stands_for_a_tick_takes_nothing_off_the_way_after_it(tmp_path):
+    """A reaction that begins at the next tick goes all the way."""
+    asked = Asked(tmp_path, T_r=0.1, held=False)
+    span = asked.span((0.0, 0.0), (0.0, 0.0), 0.01 - 1e-9, 0.01)
+
+    def foresee(name, t):
+        go = np.clip((t - 0.02) / 0.01, 0.0, 1.0)
+        q = np.where(t < 0.03, 0.005 * go**2, t - 0.025)
+        return np.outer(q, [1.0, 0.0]), np.outer(go, [1.0, 0.0]), ""
+
+    span.foresee = foresee
+    own = np.asarray(asked.robot.v_address)[asked.robot.own]
+    _, ways, *_ = known_in_span(span, "arm", 0.1, PERIOD, own)
+    assert 0.095 <= ways[0] <= 0.1001
+
+
+def by_pieces(knots, rates):
+    """What a joint does that has these speeds at these instants and ramps between; a second one stands."""
+    way = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (np.array(rates[1:]) + rates[:-1]) / 2)])
+
+    def foresee(name, t):
+        k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
+        share = (t - np.array(knots)[k]) / np.diff(knots)[k]
+        rate = np.array(rates)[k] + share * np.diff(rates)[k]
+        q = way[k] + (t - np.array(knots)[k]) * (np.array(rates)[k] + rate) / 2
+        return np.outer(q, [1.0, 0.0]), np.outer(rate, [1.0, 0.0]), ""
+
+    return foresee
+
+
+@pytest.mark.parametrize(
+    ("knots", "rates", "bound"),
+    [
+        # Faster at once, and it stands just when the first reaction is over: all of that counts.
+        ([0.0, 0.01, 0.0101, 0.1099, 0.11, 0.2], [0.5, 0.5, 1.0, 1.0, 0.0, 0.0], 0.0999),
+        # It stands for a while meanwhile: no reason to take less off than a tick at the speed of its begin.
+        (
+            [0.0, 0.01, 0.0101, 0.0599, 0.06, 0.07, 0.0701, 0.2],
+            [0.5, 0.5, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0],
+            0.1 - 0.005,
+        ),
+    ],
+)
+def test_of_the_way_until_the_last_reaction_ends_what_lies_outside_of_each_is_taken_off(
+    tmp_path, knots, rates, bound
+):
+    asked = Asked(tmp_path, T_r=0.1, held=False)
+    span = asked.span((0.0, 0.0), (rates[0], 0.0), 0.01 - 1e-9, 0.01)
+    span.foresee = by_pieces(knots, rates)
+    span.knots = lambda name, a, b: [x for x in knots if a < x < b]
+    own = np.asarray(asked.robot.v_address)[asked.robot.own]
+    _, ways, *_ = known_in_span(span, "arm", 0.1, PERIOD, own)
+    assert ways[0] == pytest.approx(bound, abs=3e-4)
+
+
+@pytest.mark.parametrize("shift", [0.7, -0.7])
+def test_a_twin_that_lags_behind_what_is_known_is_as_far_from_it_as_it_is(tmp_path, shift):
+    """Levers are those where it is; until it is where the motion has it, parts may be anywhere between."""
+    asked = Asked(tmp_path, T_r=0.2, held=False)
+    span = asked.span((0.0, 0.1), (0.01, 0.02), 0.0, 0.01)
+    goes = np.array([0.01, 0.02])
+    span.foresee = lambda name, t: (
+        np.array([shift, 0.1]) + t[:, None] * goes,
+        np.tile(goes, (len(t), 1)),
+        "",
+    )
+    assert asked.at_most(span) is not None
+    far = {len(chain.rows): S for chain, S in zip(asked.chains, asked.onset.S_r.tolist(), strict=True)}
+    assert abs(shift) <= far[1] <= 1.02 * abs(shift)
+    assert 2 * abs(shift) - 0.01 <= far[2] <= 2.1 * abs(shift)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
-from seerob.core.snapshot import Finding, Verdict
-from seerob.criteria.between_ticks import Told
+from seerob.core.snapshot import Basis, Finding, Result, Verdict
+from seerob.criteria.between_ticks import Told, watched
 from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.criterion import Criterion, judge_interval
+from seerob.criteria.judging import bound_to
 from seerob.criteria.safety.power_and_force import Contacts
 from seerob.description.humans.skeleton import BONES
 from seerob.session.run import Judge, engine_of, pump, ticks
 from seerob.twin.engine import Engine
-from seerob.twin.spans import ROUNDING, AllFalls, Fall, Span, approaching, speeding
+from seerob.twin.spans import ROUNDING, AllFalls, Fall, Points, Span, approaching, speeding
 from worst_between import worst_found
 
 STICK = (
@@ -675,3 +677,184 @@ def test_the_falls_of_all_in_one_call_are_those_of_each_by_itself():
         assert found[every[1]] == Fall(*fast)
     span.fast[rows[0][0]] = np.nan
     assert np.isnan(AllFalls(every).of(span)[every[0]].fall)
+
+
+# -- criteria in closed form --------------------------------------------------------------------
+
+
+class Turned(Criterion, frozen=True, kw_only=True):
+    """How far joints of an arm are turned: of a motion in cubics that is known at every instant."""
+
+    limit: float
+    spread: float = 0.0
+    """How far it may be off [rad]."""
+    each: bool = False
+    """Whether of both joints, each with its own margin; else of the first."""
+    bends: bool = True
+    """Whether its bound says how far it gets from a straight line."""
+    bounds_itself: bool = False
+    """Whether it is bounded by `lowest`."""
+    idle_below: float = -np.inf
+    """Below it there is nothing to judge [rad]."""
+
+    def subjects(self):
+        return ("arm",)
+
+    def basis(self, model):
+        return Basis(formula="q", source="made", inputs=(), not_modelled=())
+
+    def bind(self, model):
+        robot = model.robot("arm")
+
+        def evaluate(state):
+            q = state.q(robot) if self.each else state.q(robot)[:1]
+            value = float(q.max())
+            if value < self.idle_below:
+                return Result(name=self.name, nothing=True, reason="nothing there")
+            ends = value - self.spread, value + self.spread
+            return Result(
+                name=self.name,
+                value=value,
+                unit="rad",
+                limit=self.limit,
+                interval=ends,
+                verdict=judge_interval(ends, self.limit),
+                parts=tuple(Result(name=str(k), value=float(x), unit="rad") for k, x in enumerate(q)),
+            )
+
+        return evaluate
+
+    def margin(self, result):
+        far = self.limit - np.array([part.value for part in result.parts])
+        return (far, np.full(len(far), self.spread)) if self.each else (float(far[0]), self.spread)
+
+    def falls(self, model, points):
+        if self.bounds_itself:
+            return None
+        rows = np.asarray(model.robot("arm").v_address)
+
+        def falls(span, least):
+            fall, bend = span.qd[rows] * span.T + ROUNDING, span.qdd[rows] * span.T**2 / 8 + ROUNDING
+            if not self.bends:
+                bend = np.full(2, np.inf)
+            return Fall(fall, bend) if self.each else Fall(float(fall[0]), float(bend[0]))
+
+        return falls
+
+    def lowest(self, model, points):
+        if not self.bounds_itself:
+            return None
+        robot = model.robot("arm")
+
+        def lowest(state, span):
+            rows = np.asarray(robot.v_address)[: 1 + self.each]
+            q = state.q(robot)[: 1 + self.each]
+            return self.limit - self.spread - float((q + span.qd[rows] * span.T).max())
+
+        return lowest
+
+
+def leaping(t):
+    """A joint that turns to and fro within each tick, and one behind it."""
+    t = np.asarray(t)
+    q = np.stack([0.2 * np.sin(17 * t) + 0.004 * np.sin(600 * t), 0.15 * np.cos(11 * t)], axis=-1)
+    qd = np.stack([3.4 * np.cos(17 * t) + 2.4 * np.cos(600 * t), -1.65 * np.sin(11 * t)], axis=-1)
+    return q, qd
+
+
+SWITCHED = [(0.0, 1), (0.0537, 0), (0.0682, 1), (0.1035, 0), (0.1068, 1), (0.15, 0), (0.16, 1), (0.3, 1)]
+
+
+def leaps(folder):
+    """The arm, its ticks, and where its joints are in between, from tick to tick."""
+    t = np.arange(0, 0.2001, 0.01)
+    files = {
+        "arm.urdf": two_r(),
+        "motion.csv": rows(lambda at: tuple(map(tuple, leaping(at))), t.tolist()),
+        "v.toml": DOOR,
+        "s.csv": "t,x\n" + "".join(f"{at},{x}\n" for at, x in SWITCHED),
+    }
+    engine = 'variables = "v.toml"\nengine = { gravity = [0, 0, 0], physics = false }\n'
+    station = made(folder, engine + TWO_R + SOURCE + PLC, files)
+    q, qd = leaping(t)
+    s = np.linspace(0, 1, 401)[:, None]
+    cubics = [
+        (2 * s**3 - 3 * s**2 + 1) * q[k]
+        + (s**3 - 2 * s**2 + s) * 0.01 * qd[k]
+        + (3 * s**2 - 2 * s**3) * q[k + 1]
+        + (s**3 - s**2) * 0.01 * qd[k + 1]
+        for k in range(len(t) - 1)
+    ]
+    return station, t, s[:, 0], cubics
+
+
+def judged_by(station, criteria):
+    """What each says at each tick, and how often it was asked."""
+    model, points, asked = station.model, Points(station.model), [0] * len(criteria)
+    bound = []
+    for k, criterion in enumerate(criteria):
+        one = bound_to(model, criterion, "safety")
+
+        def counted(state, k=k, evaluate=one.evaluate):
+            asked[k] += 1
+            return evaluate(state)
+
+        bound.append(replace(one, evaluate=counted, watch=watched(criterion, model, points)))
+    judge, feed = Judge(bound), pump(station.sources, station.workstation.engine.tick)
+    found = [out.results for out, _ in ticks(engine_of(model), judge, feed)]
+    return [[results[k] for results in found] for k in range(len(criteria))], asked
+
+
+HOWS = {
+    "plain": {},
+    "each": {"each": True},
+    "spread": {"spread": 0.01},
+    "each with a spread": {"each": True, "spread": 0.01},
+    "without a bend": {"bends": False},
+    "each without a bend": {"bends": False, "each": True},
+    "by a period": {"every": 0.05},
+    "each by a period": {"every": 0.05, "each": True, "spread": 0.003},
+    "bounded by itself": {"bounds_itself": True},
+    "both bounded by itself": {"bounds_itself": True, "each": True, "spread": 0.002},
+    "nothing there at times": {"bounds_itself": True, "idle_below": -0.05},
+    "bounded by itself in a period": {"bounds_itself": True, "every": 0.04},
+    "while it applies": {"active": "door"},
+    "each while it applies": {"active": "door", "each": True, "spread": 0.002},
+    "while it applies, by a period": {"active": "door", "every": 0.05},
+    "while it applies, bounded by itself": {"active": "door", "bounds_itself": True},
+}
+LIMITS = [0.0, 0.1, 0.15, 0.19, 0.2, 0.202, 0.2035, 0.25]
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_at_each_tick_what_is_said_is_true_of_all_the_time_since_the_last(tmp_path, how):
+    """Against the cubics themselves, but where one end exceeds already, which is said there."""
+    station, t, s, cubics = leaps(tmp_path)
+    criteria = [Turned(name=f"at most {limit}", limit=limit, **HOWS[how]) for limit in LIMITS]
+    every, _ = judged_by(station, criteria)
+    switches, seen = np.array([at for at, _ in SWITCHED]), set()
+    for criterion, results in zip(criteria, every, strict=True):
+        for k, q in enumerate(cubics, 1):
+            at = t[k - 1] + 0.01 * s
+            applies = np.ones(len(s), bool)
+            if criterion.active:
+                applies = np.array(SWITCHED)[np.searchsorted(switches, at, side="right") - 1, 1] == 1
+            most, off = q.max(axis=1) if criterion.each else q[:, 0], criterion.spread
+            if max(most[0], most[-1]) - off > criterion.limit:
+                continue
+            top, result = most[applies].max(initial=-np.inf), results[k]
+            verdict, where = result.verdict, (criterion.name, k, result)
+            green = verdict is Verdict.WITHIN or result.muted or result.nothing
+            if top + off > criterion.limit + 2e-5:
+                assert not green, where
+            if verdict is Verdict.EXCEEDED and not criterion.every:  # with a period what was is said again
+                assert top - off > criterion.limit - 2e-5, where
+            # With room enough it is decided, where the bound gets sharper in parts of the way.
+            if not criterion.bounds_itself and not criterion.every:
+                if top + off < criterion.limit - 0.002:
+                    assert green, where
+                if top - off > criterion.limit + 0.002:
+                    assert verdict is Verdict.EXCEEDED, where
+            seen.add(verdict)
+    assert Verdict.WITHIN in seen
+    assert {Verdict.EXCEEDED, Verdict.UNDECIDED} & seen

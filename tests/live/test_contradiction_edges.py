@@ -451,3 +451,50 @@ def test_what_is_not_compared_anchor_by_anchor_is_where_nothing_is_found(monkeyp
         every = Contradictions(target)
         assert found == [every.find(sample) for sample in said_]
         monkeypatch.undo()
+
+
+def limited(unit, limit=1.0):
+    return Target(name="arm", joints=("a",), units=(unit,), velocity=(3.2,), acceleration=(limit,))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("unit", "noise"), [("rad", 0.02), ("m", 0.005)])
+def test_speeds_may_rise_by_a_fifth_more_than_the_limit_and_their_noise(unit, noise, way):
+    def found(gained):
+        q = 0.05 * (0.5 + 0.5 + gained)
+        return last(
+            [said(0.0, (0.0,), (way * 0.5,)), said(0.1, (way * q,), (way * (0.5 + gained),))], limited(unit)
+        )
+
+    most = 1.2 * 0.1 + noise
+    assert found(most - 2e-4) == ""
+    assert "gets faster with" in found(most + 2e-4)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("unit", "noise"), [("rad", 40 * 5e-4 + 0.02), ("m", 40 * 1e-4 + 0.005)])
+@pytest.mark.parametrize(("device", "jitter"), [(True, 0.0), (False, 0.05)])
+def test_positions_alone_may_gain_that_and_the_noise_of_both_ways(unit, noise, device, jitter, way):
+    def found(gained):
+        places = (0.0, 0.1 * 0.2, 0.1 * (0.4 + gained))
+        return last([said(0.1 * k, (way * q,), None, device) for k, q in enumerate(places)], limited(unit))
+
+    # Jitter of both ways, of 0.2 and of what it is now.
+    most = (1.2 * 0.1 + noise + jitter * 10 * 0.4) / (1 - jitter * 10)
+    assert found(most - 2e-4) == ""
+    assert "by its positions" in found(most + 2e-4)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("unit", "hardest"), [("rad", 300.0), ("m", 100.0)])
+def test_what_stands_to_the_last_bit_may_have_braked_so_hard_and_no_harder(unit, hardest, way):
+    """From 0.3 rad/s, within twice the difference of the last two steps, which is the finest that it says."""
+
+    def found(braking):
+        finer = 0.3**2 / (4 * braking)
+        places = (0.0, 0.003, 0.006 - finer, *[0.006 - finer] * 3)
+        samples = [said(0.01 * k, (way * q,)) for k, q in enumerate(places)]
+        return last(samples, Target(name="arm", joints=("a",), units=(unit,), velocity=(3.2,)))
+
+    assert found(0.97 * hardest) == ""
+    assert "stands to the last bit right after 0.3" in found(1.03 * hardest)

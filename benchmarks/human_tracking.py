@@ -26,7 +26,7 @@ from msgspec.structs import replace
 
 from seerob.core.samples import BodyPoint, BodySample
 from seerob.core.transforms import wxyz_from_rotation
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.session.reading import convert_workstation
 from seerob.session.station import Station
@@ -43,7 +43,7 @@ TABLE = {
 def samples(seconds: float) -> list[BodySample]:
     """What a device says of a person who walks, in time order, the same walk again and again."""
     person = manikin.build(name="operator", stature=1.75, mass=75, sex="male")
-    walk = motion.sample(keyframes.read("library:walk", person, folder=Path()), person, RATE)
+    walk = keyframes.sample(keyframes.read("library:walk", person, folder=Path()), person, RATE)
     made = []
     for seq in range(round(seconds * RATE) + 2):
         # There and back, so that it goes on without a jump.

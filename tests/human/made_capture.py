@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from seerob.core.transforms import wxyz_from_rotation
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.capture.file_source import CaptureFile
 from seerob.session import run as road
@@ -29,7 +29,7 @@ RATE = 60.0
 def walking(seconds: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] (n,) and joint values (n, 53) of a walk."""
     played = keyframes.read("library:walk", PERSON, folder=Path())
-    sampled = motion.sample(played, PERSON, RATE)
+    sampled = keyframes.sample(played, PERSON, RATE)
     n = round(seconds * RATE)
     return sampled.t[:n], sampled.q[:n]
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError
-from seerob.description.humans import keyframes, manikin, motion
-from seerob.description.humans.motion import Motion, Travel, interpolated, sample
+from seerob.description.humans import keyframes, manikin
+from seerob.description.humans.keyframes import Motion, Travel, interpolated, sample
 from seerob.description.humans.posture import HEIGHT, lowest_sole, posture, sole_corners
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 
@@ -260,8 +260,8 @@ def test_feet_travel_is_on_top_of_the_keys_positions():
     moved = played.q.copy()
     moved[:, JOINTS.index("pelvis_y")] += 2.0
     there = Motion(played.title, played.note, played.t, moved, travel=Travel.FEET)
-    _, a, _ = motion.sample(played, PERSON, 30.0)
-    _, b, _ = motion.sample(there, PERSON, 30.0)
+    _, a, _ = keyframes.sample(played, PERSON, 30.0)
+    _, b, _ = keyframes.sample(there, PERSON, 30.0)
     assert b[:, 0] == pytest.approx(a[:, 0], abs=1e-12)
     assert b[:, 1] == pytest.approx(a[:, 1] + 2.0, abs=1e-12)
 

@@ -12,7 +12,7 @@ from seerob.description.capture.captured import Captured, CaptureFrame, Layout, 
 from seerob.description.capture.fit_check import marker_stature
 from seerob.description.capture.mapping import conventions, places, plain
 from seerob.description.capture.observing import bind
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.skeleton import BONES, bone_poses
 
 PAIRS = ("ASI", "PSI", "FHD", "BHD", "SHO", "ELB", "WRA", "KNE", "ANK", "HEE", "TOE")
@@ -22,7 +22,7 @@ MARKERS = conventions()["markers"]
 
 def told(stature, names=EVERY):
     person = manikin.build(name="p", stature=stature, mass=70, sex="male")
-    q = motion.sample(keyframes.read("library:reach", person, folder=Path()), person, 15.0).q
+    q = keyframes.sample(keyframes.read("library:reach", person, folder=Path()), person, 15.0).q
     R, p = bone_poses(person, q)
     random = np.random.default_rng(1)
     seen = []

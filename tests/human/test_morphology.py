@@ -12,8 +12,7 @@ from seerob.description.capture.mapping import choose, places
 from seerob.description.capture.morphology import measure
 from seerob.description.capture.observing import bind
 from seerob.description.humans import manikin
-from seerob.description.humans.anthropometry import body
-from seerob.description.humans.overrides import CHAIN
+from seerob.description.humans.anthropometry import CHAIN, body
 from seerob.description.humans.skeleton import BONES, bone_poses
 
 GIVEN = {"thigh": 0.40, "shank": 0.44, "upper_arm": 0.30, "forearm": 0.27, "hip_centres": 0.19}

@@ -10,8 +10,7 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.description.capture.observing import stature as vertex
 from seerob.description.humans import manikin
-from seerob.description.humans.anthropometry import body
-from seerob.description.humans.overrides import BESIDE, CHAIN, LENGTHS
+from seerob.description.humans.anthropometry import BESIDE, CHAIN, LENGTHS, body
 from seerob.description.humans.skeleton import BONES, bone_poses
 
 PERSON = {"name": "p", "stature": 1.75, "mass": 75.0, "sex": "male"}

@@ -4,7 +4,7 @@ import ezc3d
 import numpy as np
 
 from seerob.description.capture.mapping import conventions, plain
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.skeleton import BONES, bone_poses
 
 PERSON = manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
@@ -35,7 +35,7 @@ MARKERS = ["C7", "T10", "CLAV", "STRN", *(side + name for name in PAIRS for side
 
 def reaching(count):
     """Rotations and positions of the bones of `PERSON`."""
-    played = motion.sample(keyframes.read("library:reach", PERSON), PERSON, RATE)
+    played = keyframes.sample(keyframes.read("library:reach", PERSON), PERSON, RATE)
     return bone_poses(PERSON, played.q[:count])
 
 

@@ -17,8 +17,7 @@ from seerob.criteria.judging import Judge
 from seerob.outputs.sinks import recorder
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.format import END_METADATA, SAMPLES, Tick
-from seerob.recording.mcap_index import scan
-from seerob.recording.recording import Recording
+from seerob.recording.recording import Recording, scan
 from seerob.session import run, scene
 from seerob.session.station import load, load_recorded
 

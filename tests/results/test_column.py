@@ -9,9 +9,9 @@ import pytest
 
 from seerob.core.snapshot import Result, Snapshot, Verdict
 from seerob.outputs.sink import KeepsResults
-from seerob.recording import column
-from seerob.recording.column import BLOCK, Column, Spill
+from seerob.recording import series
 from seerob.recording.result_log import ResultLog, log_of
+from seerob.recording.series import BLOCK, Column, Spill
 
 
 def ticks(count):
@@ -45,7 +45,7 @@ def test_a_disk_that_is_full_is_said_once_and_nothing_is_lost(monkeypatch, caplo
     def full(**_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(column.tempfile, "TemporaryFile", full)
+    monkeypatch.setattr(series.tempfile, "TemporaryFile", full)
     numbers = Column("d", Spill())
     for k in range(3 * BLOCK):
         numbers.append(k)

@@ -9,7 +9,7 @@ import pytest
 from seerob.app.emulators.kinect import CAMERA, animated
 from seerob.core.samples import Quality
 from seerob.core.transforms import wxyz_from_rotation
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 from seerob.devices.sources.body_csv import BodyCsv
 from seerob.devices.sources.joint_angles import JointAngleFile
@@ -37,7 +37,7 @@ AT = Pose(position=tuple(CAMERA[:3, 3]), wxyz=tuple(wxyz_from_rotation(CAMERA[:3
 
 
 def walk():
-    return motion.sample(keyframes.read("library:walk", PERSON), PERSON, 30.0)
+    return keyframes.sample(keyframes.read("library:walk", PERSON), PERSON, 30.0)
 
 
 def test_a_recorded_camera_at_its_place_sees_the_person_in_the_world(tmp_path):

@@ -11,9 +11,8 @@ from kept_run import Kept
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Polyline, Sphere
-from seerob.devices.sources.waypoints import Waypoints
+from seerob.devices.sources.waypoints import Waypoints, reduced
 from seerob.files.trajectories.trajectory import Trajectory
-from seerob.files.waypoints.reduction import reduced
 
 GIVEN = {"joint_speed": 1.0, "joint_acceleration": 2.0, "joint_jerk": 20.0}
 

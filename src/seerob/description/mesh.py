@@ -18,8 +18,8 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.mesh_files import MeshSource, RawFile, RawMesh, apart
 from seerob.description.meshes import collada, gltf, obj, off, ply, stl, threemf
+from seerob.description.shapes.mesh_bodies import tidied
 from seerob.description.shapes.mesh_mending import sided
-from seerob.description.shapes.tidy import tidied
 
 MAX_BYTES = 512 * 2**20
 """Largest mesh file that is read unless the caller says otherwise [bytes]."""

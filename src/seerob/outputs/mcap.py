@@ -68,7 +68,6 @@ from seerob.core.snapshot import (
 from seerob.core.transforms import Array, cross
 from seerob.outputs.picture.marker_shapes import prism
 from seerob.outputs.picture.stage_bodies import read_glb
-from seerob.recording.column import Column, Spill
 from seerob.recording.format import (
     DIGEST,
     END_METADATA,
@@ -90,6 +89,7 @@ from seerob.recording.format import (
     nanoseconds,
     versions,
 )
+from seerob.recording.series import Column, Spill
 
 ROOT = "world"
 """Frame that every other hangs on."""

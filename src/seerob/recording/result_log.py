@@ -14,8 +14,7 @@ from typing import NamedTuple
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import CriterionInfo, CriterionSoFar, History, Result, Snapshot, SoFar, Verdict
 from seerob.recording.bone_errors import BoneErrors
-from seerob.recording.column import Spill
-from seerob.recording.series import Series, Spread, Worst, WorstTracker, worst_verdict
+from seerob.recording.series import Series, Spill, Spread, Worst, WorstTracker, worst_verdict
 
 __all__ = ["JointLog", "ResultLog", "Series", "Spread", "Worst"]
 

@@ -13,7 +13,7 @@ from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.description.capture.captured import Captured
 from seerob.description.capture.fitting import Fitter, pulls
 from seerob.description.description import Description
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.sources import bvh, mvnx
@@ -109,7 +109,7 @@ def animated(file: str, *, folder: Path = Path(), person: Description | None = N
         InputError: The file is missing or wrong.
     """
     someone = person or manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
-    played = motion.sample(keyframes.read(file, someone, folder=folder), someone, RATE)
+    played = keyframes.sample(keyframes.read(file, someone, folder=folder), someone, RATE)
     return _of_postures(someone, played.t, played.q)
 
 

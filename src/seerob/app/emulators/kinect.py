@@ -14,7 +14,7 @@ from seerob.app.emulation.options import LIBRARY, NOISE, EmulatorOptions, Noise,
 from seerob.core.transforms import Array, inverse, rotation_from_rpy, transform
 from seerob.description.capture.mapping import conventions, plain
 from seerob.description.description import Description
-from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans import keyframes, manikin
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.protocols.tracking.kinect import JOINTS, PORT, Body, Picture, encode_message
 
@@ -61,7 +61,7 @@ def animated(file: str, *, camera: Array = CAMERA, folder: Path = Path()) -> Sce
         InputError: The file is missing or wrong.
     """
     person = manikin.build(name="person", stature=STATURE, mass=75.0, sex="male")
-    played = motion.sample(keyframes.read(file, person, folder=folder), person, RATE)
+    played = keyframes.sample(keyframes.read(file, person, folder=folder), person, RATE)
     camera_from_world = inverse(camera)
     seen = joints(person, played.q, stature=STATURE) @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
     sure = np.ones(len(JOINTS))

@@ -19,8 +19,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import CaptureFrame
 from seerob.description.capture.observing import Observer
-from seerob.description.humans.anthropometry import STATURE_RANGE, body
-from seerob.description.humans.overrides import CHAIN
+from seerob.description.humans.anthropometry import CHAIN, STATURE_RANGE, body
 from seerob.description.humans.skeleton import SIDES
 
 FEWEST = 30

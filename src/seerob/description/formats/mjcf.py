@@ -35,7 +35,7 @@ from seerob.description.description import (
 from seerob.description.formats.mimic import flattened
 from seerob.description.formats.mjcf_compiled import Compiled, compiled
 from seerob.description.formats.resolve import Resolver
-from seerob.description.formats.urdf_geometry import moved
+from seerob.description.formats.urdf import moved
 from seerob.description.mesh import MAX_BYTES as MAX_MESH_BYTES
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh

@@ -228,7 +228,7 @@ def build(
         sex: ``male`` or ``female``: which published table of segments.
         lengths: ``drillis`` (fractions of the stature) or ``deleva`` (distances of joint centres).
         masses: ``deleva`` or, for men, ``zatsiorsky``: segments' masses and moments of inertia.
-        own_lengths: Lengths by hand [m], names of `seerob.description.humans.overrides.LENGTHS`.
+        own_lengths: Lengths by hand [m], names of `seerob.description.humans.anthropometry.LENGTHS`.
         own_masses: Masses by hand [kg], by bone, or without side for both.
         hand: Dominant side, ``right`` or ``left``; its hand is the description's tip.
 

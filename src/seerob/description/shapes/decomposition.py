@@ -22,8 +22,8 @@ from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.description.shapes.detail import display_mesh, manifold
 from seerob.description.shapes.hull import convex_hull
+from seerob.description.shapes.mesh_bodies import tidied
 from seerob.description.shapes.moments import signed_volume
-from seerob.description.shapes.tidy import tidied
 
 _CONVEX = 1e-6
 _VERSION = 1

@@ -22,7 +22,7 @@ from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
-from seerob.description.shapes.tidy import tidied
+from seerob.description.shapes.mesh_bodies import tidied
 
 _ROUND = 20
 """Segments of a full circle; a multiple of four."""

@@ -35,9 +35,9 @@ from seerob.description.shapes.mesh_bodies import (
     joined,
     joined_unmerged,
     outward,
+    tidied,
 )
 from seerob.description.shapes.moments import signed_volume
-from seerob.description.shapes.tidy import tidied
 
 MOST_BODIES = 300
 """Of one mesh, whose sides are compared: the time grows with the square."""

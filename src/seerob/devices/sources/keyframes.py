@@ -9,8 +9,8 @@ from pathlib import Path
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding
-from seerob.description.humans import keyframes, motion
-from seerob.description.humans.motion import Sampled
+from seerob.description.humans import keyframes
+from seerob.description.humans.keyframes import Sampled
 from seerob.workstation.source import Opened, Source, Target
 
 MAX_RATE = 1000.0
@@ -58,7 +58,7 @@ class Keyframes(Source, frozen=True, kw_only=True):
         if not 1.0 <= self.rate <= MAX_RATE:
             raise InputError.at(self.file, "rate", f"{self.rate:g} 1/s", f"give 1…{MAX_RATE:g} per second")
         played = keyframes.read(self.file, target.description, folder=folder)
-        sampled = motion.sample(played, target.description, self.rate)
+        sampled = keyframes.sample(played, target.description, self.rate)
         text = f"motion {played.title or self.file}: {played.note or 'made by hand, not captured'}"
         return Opened(
             samples=_Samples(sampled, self.name or f"keyframes {self.human}", target.name),

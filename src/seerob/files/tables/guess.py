@@ -18,8 +18,7 @@ from msgspec import convert, structs
 from seerob.core.errors import InputError, Problem
 from seerob.core.transforms import CONVENTIONS, Array, columns_of, is_convention
 from seerob.files.tables.grid import blank, number
-from seerob.files.tables.headers import ROTATION_VECTOR, UR_POSE, Role
-from seerob.files.tables.layout import Layout, find_layout
+from seerob.files.tables.headers import ROTATION_VECTOR, UR_POSE, Layout, Role, find_layout
 from seerob.files.tables.mapping import Mapping, Motion
 from seerob.files.tables.table_files import candidates
 from seerob.workstation.source import Target

@@ -12,7 +12,7 @@ from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.transforms import Array, wxyz_from
 from seerob.files.tables.grid import Numbers, place, read_numbers
 from seerob.files.tables.guess import Guess, guess
-from seerob.files.tables.layout import Layout
+from seerob.files.tables.headers import Layout
 from seerob.files.tables.mapping import SI, Mapping, Motion
 from seerob.files.trajectories.tool_trajectory import ToolTrajectory
 from seerob.files.trajectories.trajectory import Trajectory

@@ -6,6 +6,7 @@ import logging
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.errors import InputError, Problem, SeerobError, UnknownName
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.description import Inertial, Link, Quantity
@@ -25,13 +26,12 @@ from seerob.description.robots.calibration import calibrated_by
 from seerob.distance.least import Shapes
 from seerob.model.model import Body, Frame, Mechanism, Model
 from seerob.model.mounting import machines as machine_mounting
-from seerob.model.mounting.areas import mount_sensor, mount_swept
 from seerob.model.mounting.chains import assumed, payload, placeholder
 from seerob.model.mounting.contacts import add_contacts
 from seerob.model.mounting.in_place import implausible
+from seerob.model.mounting.machines import picked_up
 from seerob.model.mounting.mechanisms import MechanismDraft, Riders, mechanism
 from seerob.model.mounting.overrides import describe, home, overridden
-from seerob.model.mounting.picked_up import picked_up
 from seerob.model.mounting.specification import Mounting, extreme_points
 from seerob.model.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
 from seerob.model.mounting.things import (
@@ -41,8 +41,9 @@ from seerob.model.mounting.things import (
     WORKPIECE_COLOR,
     MadeArea,
     load_thing,
+    mount_sensor,
+    mount_swept,
 )
-from seerob.model.mounting.unasked import unasked
 from seerob.model.variables import Bound, bound
 from seerob.recording.format import filed
 from seerob.workstation.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
@@ -457,3 +458,61 @@ def _weight(inertial: Inertial) -> Quantity:
 
 def _body_id(mj: mujoco.MjModel, name: str) -> int:
     return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))
+
+
+def unasked(model: Model) -> Iterator[Finding]:
+    """Robots and machines that move and are judged by nobody, and people whom nobody asks about.
+
+    One that carries a robot which somebody asks about holds that robot: nothing said of an arm is within
+    while what moves it is not looked at.
+    """
+    station = model.workstation
+    if not station.humans or not station.safety:
+        return
+    judged: set[int] = set()
+    for criterion in station.safety:
+        # A name that does not exist is told where the criterion is bound.
+        with suppress(SeerobError):
+            judged |= criterion.judged(model)
+    named = {name for criterion in station.safety for name in criterion.subjects()}
+    yield from _people(model)
+    for moving in model.mechanisms.values():
+        own = {i for i in moving.moving if model.bodies[i].carrier == moving.name}
+        if not own or not own.isdisjoint(judged) or not _moves(model, moving):
+            continue
+        carried = tuple(
+            m.name
+            for m in model.mechanisms.values()
+            if moving.name in model.carriers_of(m.name)
+            and (m.name in named or not judged.isdisjoint(m.bodies))
+        )
+        remedy = f'name it in one, such as separation between = ["{moving.name}", "{station.humans[0].name}"]'
+        what = f"not evaluated: {moving.name} moves"
+        if carried:
+            what += f" and carries {', '.join(carried)}"
+        text = f"{what}, and no criterion asks about it: {remedy}"
+        yield Finding(level="warning", subject=moving.name, text=text, holds=carried)
+
+
+def _people(model: Model) -> Iterator[Finding]:
+    """People whom no criterion of safety asks about, while it asks about others."""
+    asked: set[str] = set()
+    for criterion in model.workstation.safety:
+        with suppress(SeerobError):
+            asked |= {*criterion.subjects(), *criterion.depends(model)}
+    humans = {human.name for human in model.workstation.humans}
+    for name in [human.name for human in model.workstation.humans] if humans & asked else []:
+        if name not in asked:
+            others = ", ".join(sorted(humans & asked))
+            text = (
+                f"not evaluated: criteria ask about {others}, and none about {name}: name {name} in one, too"
+            )
+            yield Finding(level="warning", subject=name, text=text)
+
+
+def _moves(model: Model, mechanism: Mechanism) -> bool:
+    """Whether a source or variables drive it."""
+    station = model.workstation
+    if mechanism.name in {source.target() for source in station.sources}:
+        return mechanism.role != "human"
+    return any(m.name == mechanism.name and m.motion.variables() for m in station.machines)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from seerob.core.errors import InputError
 from seerob.core.transforms import Array
 from seerob.description.description import Description, Joint, JointKind, Link, Mimic
-from seerob.model.mounting.specification import extreme_points
+from seerob.model.mounting.specification import Mounting, extreme_points
 from seerob.model.mounting.things import Color, LoadedThing, load_thing
 from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn
-from seerob.workstation.workstation import Machine
+from seerob.workstation.workstation import Machine, Workpiece
 
 MACHINE_COLOR: Color = (0.47, 0.55, 0.50, 1.0)
 BODY = "body"
@@ -117,3 +118,44 @@ def home(motion: Motion) -> Array:
 
 def _unit(axis: tuple[float, float, float]) -> Array:
     return np.array(axis) / math.hypot(*axis)
+
+
+RESTING = "resting"
+"""The workpiece where it lies: ``crate/resting``; a part of the environment."""
+AWAY = "away"
+"""Where the one is put that is not there."""
+NOWHERE = 1000.0
+"""How high that is above the world [m]: nearer than this nothing is away."""
+
+
+def picked_up(
+    mounting: Mounting, piece: Workpiece, holder: Machine | None, world_from_piece: Array, *, file: str
+) -> None:
+    """Add what lies in the world while the workpiece, which is mounted, is not held.
+
+    Args:
+        mounting: With the workpiece in the hand.
+        piece: Its table.
+        holder: The machine that it is on; None when it is on none.
+        world_from_piece: Where it lies first, shape (4, 4).
+        file: The workstation file, for messages.
+
+    Raises:
+        InputError: It is on what has no fingers.
+    """
+    if holder is None or holder.grip is None:
+        what = f"{piece.on} has no fingers to pick {piece.name} up with"
+        raise InputError.at(file, "on", what, "name a machine with grip, or leave rest out")
+    away = np.eye(4)
+    away[2, 3] = NOWHERE
+    mounting.body(f"{piece.name}/{AWAY}", None, away)
+    mounting.body(f"{piece.name}/{RESTING}", None, world_from_piece)
+    held = [entry for entry in mounting.entries if entry.owner == piece.name]
+    for entry in held:
+        entry.holder = holder.name
+        name = f"{piece.name}/{RESTING}{entry.name.removeprefix(piece.name)}"
+        if entry.name != piece.name:
+            mounting.body(name, f"{piece.name}/{RESTING}", np.eye(4))
+        mounting.entries.append(
+            replace(entry, name=name, role="part", owner=piece.name, carrier="", mass=None)
+        )

@@ -19,10 +19,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import seerob as sr
-from seerob.app.server.access import Tokens
+from seerob.app.server.access import Tokens, Visits
 from seerob.app.server.allowance import Allowance
 from seerob.app.server.live import Live
-from seerob.app.server.visits import Visits
 from seerob.core.snapshot import Snapshot
 from seerob.twin.validity.hearing import Heard, Hearing
 

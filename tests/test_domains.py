@@ -20,7 +20,7 @@ from seerob.criteria.contact import collision
 from seerob.criteria.ergonomics import eaws_posture, niosh, owas, reba, rula
 from seerob.criteria.ergonomics.eaws_posture import PostureTime
 from seerob.criteria.safety.separation import separation_bound
-from seerob.criteria.scoring import repetition, spans
+from seerob.criteria.scoring import held_work, spans
 from seerob.criteria.stopping import terms
 from seerob.description.norms import iso_13855
 
@@ -54,8 +54,8 @@ REFUSES = {
     "owas load": owas.load_codes,
     "eaws share": lambda x: eaws_posture.line_points("2", x),
     "eaws asymmetry": lambda x: eaws_posture.asymmetry_points((0.5, 0.2, x)),
-    "hold": lambda x: repetition.static([0.0, 1.0], [1, 1], x),
-    "window": lambda x: repetition.repetitions([0.0, 1.0], [1, 2], window=x),
+    "hold": lambda x: held_work.static([0.0, 1.0], [1, 1], x),
+    "window": lambda x: held_work.repetitions([0.0, 1.0], [1, 2], window=x),
     "iso 13855 over": lambda x: minimum(over=x, supplement=0.1),
     "iso 13855 supplement": lambda x: minimum(supplement=x),
     "iso 13855 time": lambda x: minimum(time=x, supplement=0.1),
@@ -141,7 +141,7 @@ def test_no_speed_is_permitted_by_what_is_not_a_number_but_where_the_area_is_unk
 def test_instants_increase_and_are_numbers():
     for t in ([0.0, 0.0], [1.0, 0.5], [0.0, math.nan]):
         with pytest.raises(ValueError, match="instant"):
-            repetition.static(t, [1, 1], 1.0)
+            held_work.static(t, [1, 1], 1.0)
     with pytest.raises(ValueError, match="instant"):
         PostureTime(1.0).add(math.nan, "x")
 

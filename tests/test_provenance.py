@@ -4,7 +4,7 @@ import pytest
 
 import seerob as sr
 from seerob.core.snapshot import Origin
-from seerob.outputs.report.evidence import setup
+from seerob.outputs.report.report import setup
 
 PERSON = """
 [[humans]]

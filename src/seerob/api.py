@@ -26,9 +26,9 @@ from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sa
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Result, Row, Scene, Snapshot
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval, worst
-from seerob.criteria.postures.rule import PostureRule as Rule
-from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.scoring.phases import Phase, phase_at, shared_phases
+from seerob.criteria.scoring.rule import PostureRule as Rule
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.criteria.scoring.spans import Span, between, beyond, exactly
 from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from seerob.app.cli import main
-from seerob.app.console.loops import COMPILING
+from seerob.app.console.progress import COMPILING
 
 ROBOT = '[[robots]]\nname = "ur5e"\nmodel = "library:ur5e"\n'
 SOURCE = '[[sources]]\nkind = "csv"\nrobot = "ur5e"\nfile = "motion.csv"\n'

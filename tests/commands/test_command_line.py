@@ -204,21 +204,21 @@ def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, comm
 
 
 def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(capsys, tmp_path, monkeypatch):
-    from seerob.app.console import loops
+    from seerob.app.console import progress
     from seerob.kernels import _beforehand
 
     names = ["paint averaged", "paint darken", "pull along"]
     monkeypatch.setattr(_beforehand, "LOOPS", {name: _beforehand.LOOPS[name] for name in names})
     monkeypatch.setattr("seerob.app.console.progress.EVERY", 0.0)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    (folder,) = loops.cache_folders()
+    (folder,) = progress.cache_folders()
     folder.mkdir()
     (folder / "paint.averaged-1-0123456789abcdef.py311.nbi").write_bytes(b"")  # of another source
-    assert loops.missing_loops() == names
-    loops.compile_loops()
-    assert capsys.readouterr() == ("", "".join(f"{loops.COMPILING}: {k} of 3\n" for k in range(4)))
-    assert loops.missing_loops() == []
-    loops.compile_loops()
+    assert progress.missing_loops() == names
+    progress.compile_loops()
+    assert capsys.readouterr() == ("", "".join(f"{progress.COMPILING}: {k} of 3\n" for k in range(4)))
+    assert progress.missing_loops() == []
+    progress.compile_loops()
     assert capsys.readouterr() == ("", "")
 
 
@@ -237,26 +237,26 @@ def test_long_work_says_where_it_is_also_without_a_terminal(capsys, tmp_path, re
 
 
 def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, tmp_path):
-    from seerob.app.console import loops
+    from seerob.app.console import progress
 
     started = []
-    begin = loops._worker
-    monkeypatch.setattr(loops, "_worker", lambda: started.append(begin()) or started[-1])
+    begin = progress._worker
+    monkeypatch.setattr(progress, "_worker", lambda: started.append(begin()) or started[-1])
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(loops.Queue, "get", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(progress.Queue, "get", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
-        loops.compile_loops()
+        progress.compile_loops()
     assert started
     assert all(worker.returncode is not None for worker in started)
 
 
 def test_where_no_process_can_be_started_loops_are_compiled_when_they_are_called(monkeypatch, tmp_path):
-    from seerob.app.console import loops
+    from seerob.app.console import progress
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
-    loops.compile_loops()
-    assert loops.missing_loops()
+    progress.compile_loops()
+    assert progress.missing_loops()
 
 
 @pytest.mark.parametrize("command", ["check-file", "assess", "report", "swept"])
@@ -278,10 +278,10 @@ def test_the_wait_begins_with_the_announcement(tmp_path, recorded, command):
 def test_numba_keeps_what_it_compiles_where_it_is_looked_for(tmp_path):
     """Asked of Numba itself, in a process that may keep it nowhere else."""
     script = (
-        "from pathlib import Path\nfrom seerob.app.console import loops\n"
+        "from pathlib import Path\nfrom seerob.app.console import progress\n"
         "from seerob.kernels import boxes\n"
         "kept = boxes._spread._cache.cache_path\n"
-        "assert [Path(kept)] == loops.cache_folders(), (kept, loops.cache_folders())"
+        "assert [Path(kept)] == progress.cache_folders(), (kept, progress.cache_folders())"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     subprocess.run([sys.executable, "-c", script], env=environment, check=True)

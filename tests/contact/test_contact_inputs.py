@@ -10,9 +10,14 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.core.tolerances import Tolerance
 from seerob.criteria.contact.impact_mass import simplified_mass
-from seerob.criteria.contact.limits import RegionArrays, contact_input, credited_input
+from seerob.criteria.contact.limits import (
+    ContactEnds,
+    RegionArrays,
+    contact_input,
+    credited_input,
+    robot_masses,
+)
 from seerob.criteria.contact.shape import ContactShape, round_shape
-from seerob.criteria.contact.tolerances import ContactEnds, robot_masses
 from seerob.description.norms.body_limits import shipped
 
 BOX = ContactShape(np.zeros((0, 3)), np.zeros((0, 2)), "edges")

@@ -17,7 +17,7 @@ from seerob.criteria.ergonomics.eaws_posture import (
     lines,
     possible_lines,
 )
-from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.spans import published
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import JOINTS
 from seerob.recording.result_log import ResultLog

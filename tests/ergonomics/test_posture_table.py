@@ -10,7 +10,7 @@ from made_postures import PERSON
 from made_cell import judged, made, state_at
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, RowState, Verdict
-from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.spans import published
 from seerob.criteria.scoring.zones import read_zones
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import JOINTS

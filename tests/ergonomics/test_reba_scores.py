@@ -16,8 +16,7 @@ from seerob.criteria.ergonomics.reba import (
     upper_arm,
     wrist,
 )
-from seerob.criteria.scoring.spans import ROUNDING, exactly
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import ROUNDING, Thresholds, exactly
 
 SIX = ("neck", "trunk", "legs", "upper arm", "lower arm", "wrist")
 

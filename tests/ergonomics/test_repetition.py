@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seerob.criteria.scoring.repetition import repetitions, static
+from seerob.criteria.scoring.held_work import repetitions, static
 
 
 def signal(duration, rate=10.0):

@@ -10,9 +10,7 @@ from made_postures import PERSON, UNSUPPORTED, posed, random_q
 
 from seerob.criteria.ergonomics import eaws_posture, owas, reba, rula
 from seerob.criteria.scoring.measured import ArmPolicy
-from seerob.criteria.scoring.published import published
-from seerob.criteria.scoring.spans import ROUNDING, exactly, fallen, reached
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import ROUNDING, Thresholds, exactly, fallen, published, reached
 from seerob.criteria.scoring.zones import ZoneRow, ZoneWatch, zones_of
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored

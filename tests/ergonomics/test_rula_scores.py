@@ -19,8 +19,7 @@ from seerob.criteria.ergonomics.rula import (
     wrist,
 )
 from seerob.criteria.scoring.measured import ArmPolicy
-from seerob.criteria.scoring.spans import ROUNDING, exactly
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import ROUNDING, Thresholds, exactly
 
 SEVEN = list(LEAST)[:7]
 

@@ -11,7 +11,7 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, RowState, Verdict
 from seerob.criteria.ergonomics import reba, rula
 from seerob.criteria.ergonomics.owas import Legs
-from seerob.criteria.postures.rule import posture as angles_of
+from seerob.criteria.scoring.rule import posture as angles_of
 from seerob.criteria.scoring.score_rows import band_of
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.posture import posture

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from seerob.criteria.scoring.published import cells, published
+from seerob.criteria.scoring.spans import cells, published
 
 
 def digest(value):

@@ -17,8 +17,7 @@ from seerob.criteria.ergonomics.owas import (
     owas,
 )
 from seerob.criteria.scoring.measured import ArmPolicy, Measured, arm_score
-from seerob.criteria.scoring.spans import Span, beyond, exactly, graded
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import Span, Thresholds, beyond, exactly, graded
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import bone_poses, mirrored
 

@@ -13,9 +13,7 @@ from made_postures import UNSUPPORTED, known, made_angles
 
 from seerob.criteria.ergonomics import reba, rula
 from seerob.criteria.ergonomics.owas import owas
-from seerob.criteria.scoring.published import cells, published
-from seerob.criteria.scoring.spans import exactly
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import Thresholds, cells, exactly, published
 
 USUAL = Thresholds()
 CARTON = "https://studylib.es/doc/9445509/rula"

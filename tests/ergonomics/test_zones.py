@@ -7,7 +7,7 @@ import pytest
 from made_postures import PERSON, made_angles, random_q
 
 from seerob.core.errors import InputError
-from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.spans import published
 from seerob.criteria.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of, zones_of
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored

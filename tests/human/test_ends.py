@@ -7,7 +7,7 @@ import pytest
 from made_capture import PERSON, captured, frames_of, source, walking, workstation
 
 from seerob.core.samples import BodyPoint
-from seerob.criteria.postures.rule import bind_posture
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.capture.estimated import ENDS, aimed, bare, swing, turned, untold
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import AXES, BONES, bone_poses

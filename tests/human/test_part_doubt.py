@@ -7,7 +7,7 @@ import pytest
 from made_capture import captured, frames_of, play, source, walking, workstation
 
 from seerob.core.errors import Undecided
-from seerob.criteria.postures.rule import bind_posture
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.capture.estimated import in_doubt_with
 from seerob.description.humans.skeleton import BONES
 from seerob.session import run as road

@@ -10,8 +10,8 @@ from msgspec.structs import replace
 from seerob.core.samples import BodyPoint, BodySample
 from seerob.core.snapshot import Verdict
 from seerob.core.transforms import wxyz_from_rotation
-from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.capture.estimated import located
 from seerob.description.capture.following import HELD_SPEED, Following
 from seerob.description.capture.mapping import conventions

@@ -13,9 +13,9 @@ from seerob.core.errors import Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
 from seerob.criteria.between_ticks import Told
-from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation, Stop
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.session import run as road

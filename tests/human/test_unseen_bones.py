@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Verdict
-from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.capture.estimated import estimated
 from seerob.description.humans.skeleton import BONES, PARENTS
 from seerob.devices.capture.options import Weights

@@ -8,7 +8,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, judged, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.verdict import Verdict
-from seerob.criteria.contact.tolerances import permissible_while_pushed
+from seerob.criteria.contact.limits import permissible_while_pushed
 
 CART = """
 [[machines]]

@@ -11,9 +11,8 @@ import httpx
 import pytest
 from mcap.reader import make_reader
 
-from seerob.app.server.access import FREE, read_tokens
+from seerob.app.server.access import FREE, MOST_STRANGERS, WAITING, Visits, read_tokens
 from seerob.app.server.live import LiveView
-from seerob.app.server.visits import MOST_STRANGERS, WAITING, Visits
 from seerob.core.snapshot import Hello, Snapshot, Transport
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob.criteria.stopping.in_span import bind_in_span, grown, known_in_span, reach_of
+from seerob.criteria.stopping.by_table import bind_in_span, grown, known_in_span, reach_of
 from seerob.criteria.stopping.onset import KinematicChain, Onset
 from seerob.criteria.stopping.terms import Course
 from seerob.twin.spans import Path, Points, Span

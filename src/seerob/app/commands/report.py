@@ -16,8 +16,7 @@ from seerob.app.commands.permissible_result import (
     work_progress,
 )
 from seerob.app.console.loading import compiled
-from seerob.app.console.loops import compile_loops
-from seerob.app.console.progress import progress
+from seerob.app.console.progress import compile_loops, progress
 from seerob.app.console.sinks import refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
     OUT,

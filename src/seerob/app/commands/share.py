@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: It is no whole recording, or would be judged otherwise.
     """
-    from seerob.app.console.loops import compile_loops
+    from seerob.app.console.progress import compile_loops
     from seerob.recording.recording import Recording
 
     to = options.output or options.recording.with_suffix(".shared.mcap")

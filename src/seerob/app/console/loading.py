@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
-from seerob.app.console.loops import compile_loops
-from seerob.app.console.progress import spinner
+from seerob.app.console.progress import compile_loops, spinner
 from seerob.app.console.terminal import cache_folder
 from seerob.core.errors import InputError, Problem
 from seerob.core.files.parser_process import begin

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from seerob.app.emulation import motions
-from seerob.app.emulation.http import HttpEmulator
+from seerob.app.emulation.background import HttpEmulator
 from seerob.app.emulation.options import EmulatorOptions, Ready, option, port
 from seerob.protocols.plc import s7_web
 

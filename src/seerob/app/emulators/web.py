@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from seerob.app.emulation import motions
-from seerob.app.emulation.http import HttpEmulator
+from seerob.app.emulation.background import HttpEmulator
 from seerob.app.emulation.options import EmulatorOptions, Ready, port
 
 Document = Callable[[float], Mapping[str, Any]]

@@ -18,9 +18,8 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.utils import ClientDisconnected
 
-from seerob.app.server.access import EVERYTHING, Guesses, Role, Tokens, matching, neighbourhood
+from seerob.app.server.access import EVERYTHING, Guesses, Role, Tokens, Visits, matching, neighbourhood
 from seerob.app.server.allowance import Allowances
-from seerob.app.server.visits import Visits
 from seerob.core.host_name import is_address
 
 HEADERS = {

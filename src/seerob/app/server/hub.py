@@ -13,11 +13,10 @@ import msgspec
 from msgspec.structs import replace
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from seerob.app.server.access import Role
+from seerob.app.server.access import Role, Visit, Visits
 from seerob.app.server.allowance import Allowance
 from seerob.app.server.client import Client, Closing
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
-from seerob.app.server.visits import Visit, Visits
 from seerob.app.wire import schema
 from seerob.core.markers import plain
 from seerob.core.snapshot import (

@@ -29,14 +29,13 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
-from seerob.app.server.access import Role, Tokens
+from seerob.app.server.access import Role, Tokens, Visits
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
 from seerob.app.server.connection import Doorstep, PromptLoop, PromptRequests, WholeBinaryFrames
 from seerob.app.server.door import Door
 from seerob.app.server.feed import Feed
 from seerob.app.server.hub import PATIENCE, Hub
-from seerob.app.server.visits import Visits
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene

@@ -21,15 +21,13 @@ from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
 from seerob.criteria.criterion import Evaluate, judge_interval
-from seerob.criteria.postures.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.basis import chosen, entered, posture_quality
+from seerob.criteria.scoring.held_work import GAP
 from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.phases import Period, Phase, Seconds, phase_at, shared_phases
-from seerob.criteria.scoring.published import published
-from seerob.criteria.scoring.repetition import GAP
+from seerob.criteria.scoring.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.score_rows import total_row
-from seerob.criteria.scoring.spans import ROUNDING, Span, reached
-from seerob.criteria.scoring.thresholds import Angle
+from seerob.criteria.scoring.spans import ROUNDING, Angle, Span, published, reached
 from seerob.description.humans.angles import Angles
 from seerob.model import provenance
 from seerob.model.model import Model

@@ -10,8 +10,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.core.snapshot import Level
-from seerob.criteria.postures.zone_rule import ZoneRule
-from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.spans import published
+from seerob.criteria.scoring.zone_rule import ZoneRule
 from seerob.criteria.scoring.zones import ZoneTable, read_zones, zones_of
 from seerob.model.model import Model
 

@@ -23,7 +23,7 @@ from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, judge
 from seerob.criteria.scoring.phases import Kilograms, Seconds
-from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.spans import published
 from seerob.model.model import Model
 from seerob.model.provenance import given, limit
 from seerob.twin.state import State

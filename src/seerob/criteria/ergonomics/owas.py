@@ -20,14 +20,12 @@ from seerob.core.domains import number, whole
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
 from seerob.criteria.criterion import Evaluate, judge, judge_interval
-from seerob.criteria.postures.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
 from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, shared_phases
-from seerob.criteria.scoring.published import Ints, cells, published
+from seerob.criteria.scoring.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.score_rows import aspects, total_row
-from seerob.criteria.scoring.spans import ROUNDING, Span, either
-from seerob.criteria.scoring.thresholds import Angle
+from seerob.criteria.scoring.spans import ROUNDING, Angle, Ints, Span, cells, either, published
 from seerob.description.humans.angles import Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.model import provenance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from seerob.criteria.postures.zone_rule import ZoneRule
+from seerob.criteria.scoring.zone_rule import ZoneRule
 from seerob.criteria.scoring.zones import ZoneTable, read_zones
 from seerob.model.model import Model
 

@@ -17,15 +17,26 @@ from numpy.typing import ArrayLike
 from seerob.core.domains import number, whole
 from seerob.core.snapshot import Basis
 from seerob.core.transforms import Array
-from seerob.criteria.postures.rule import ScoredPosture
 from seerob.criteria.scoring.held_work import Watch, activity
 from seerob.criteria.scoring.judgement import Method
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, Measured, arm_score, one_foot_up
 from seerob.criteria.scoring.phases import Kilograms, Phase, Sides, Stance, TaskPhase, on_sides
-from seerob.criteria.scoring.published import Ints, cells, published
+from seerob.criteria.scoring.rule import ScoredPosture
 from seerob.criteria.scoring.score_rows import Edges, degrees, modifier_edges
-from seerob.criteria.scoring.spans import Span, answer, between, either, exactly, fallen, graded, reached
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import (
+    Ints,
+    Span,
+    Thresholds,
+    answer,
+    between,
+    cells,
+    either,
+    exactly,
+    fallen,
+    graded,
+    published,
+    reached,
+)
 from seerob.description.humans.angles import Angles
 from seerob.model.model import Model
 

@@ -18,15 +18,26 @@ from numpy.typing import ArrayLike
 from seerob.core.domains import number, whole
 from seerob.core.snapshot import Basis, Input, Origin
 from seerob.core.transforms import Array
-from seerob.criteria.postures.rule import ScoredPosture
 from seerob.criteria.scoring.held_work import Watch, muscle_use
 from seerob.criteria.scoring.judgement import Method
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, Measured, arm_score, one_foot_up
 from seerob.criteria.scoring.phases import Kilograms, Phase, Sides, TaskPhase, on_sides
-from seerob.criteria.scoring.published import Ints, cells, published
+from seerob.criteria.scoring.rule import ScoredPosture
 from seerob.criteria.scoring.score_rows import Edges, degrees, modifier_edges
-from seerob.criteria.scoring.spans import Span, answer, between, beyond, either, exactly, fallen, reached
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import (
+    Ints,
+    Span,
+    Thresholds,
+    answer,
+    between,
+    beyond,
+    cells,
+    either,
+    exactly,
+    fallen,
+    published,
+    reached,
+)
 from seerob.description.humans.angles import Angles
 from seerob.model.model import Model
 

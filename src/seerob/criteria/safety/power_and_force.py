@@ -22,14 +22,12 @@ from seerob.criteria.contact import limits as contact_limits
 from seerob.criteria.contact import shape as contact_shape
 from seerob.criteria.contact.clamped_regions import Clamping, floor_input
 from seerob.criteria.contact.clamping import STILL
-from seerob.criteria.contact.drawn import ContactMarkers
 from seerob.criteria.contact.impact_mass import Behind, moving_masses, train
-from seerob.criteria.contact.limits import Judged
+from seerob.criteria.contact.limits import NOT_GIVEN, ContactEnds, Judged, pushed, ranks, robot_masses
 from seerob.criteria.contact.measured import Measurements, with_measured
 from seerob.criteria.contact.regions import REGIONS, HeightReach, Person, reach_inputs, without_limit
-from seerob.criteria.contact.rows import NOT_MODELLED, ContactRows, area_results, margin
+from seerob.criteria.contact.rows import NOT_MODELLED, ContactMarkers, ContactRows, area_results, margin
 from seerob.criteria.contact.shape import given_contacts
-from seerob.criteria.contact.tolerances import NOT_GIVEN, ContactEnds, pushed, ranks, robot_masses
 from seerob.criteria.criterion import Criterion, Evaluate, Lowest, worst
 from seerob.criteria.partly_seen import seen_first
 from seerob.description.humans.anthropometry import STATURE_RANGE

@@ -12,7 +12,7 @@ from seerob.core.snapshot import Input, Origin
 from seerob.criteria.scoring.held_work import WorkDetection
 from seerob.criteria.scoring.measured import ArmPolicy, JointAccuracy
 from seerob.criteria.scoring.phases import Phase
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import Thresholds
 
 PROJECTION_NOTE = "sideways angles are taken out of the sagittal plane, not projected on the frontal one"
 ACCURACY_NOTE = "errors of the angles that depend on each other: each angle is varied on its own"

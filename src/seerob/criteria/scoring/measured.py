@@ -14,9 +14,7 @@ from msgspec.structs import asdict
 
 from seerob.core.domains import number
 from seerob.core.transforms import Array
-from seerob.criteria.scoring.published import Ints
-from seerob.criteria.scoring.spans import ROUNDING, Span, any_of, beyond, graded
-from seerob.criteria.scoring.thresholds import Angle, Thresholds
+from seerob.criteria.scoring.spans import ROUNDING, Angle, Ints, Span, Thresholds, any_of, beyond, graded
 from seerob.description.humans.angles import Angles
 
 Accuracy = float | Mapping[str, float]

@@ -11,8 +11,7 @@ from functools import cache
 from itertools import pairwise
 
 from seerob.core.snapshot import Aspect, Row, RowState, Verdict
-from seerob.criteria.scoring.spans import Span, fallen, reached
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import Span, Thresholds, fallen, reached
 from seerob.description.humans.angles import SIDED, Angles
 from seerob.description.humans.skeleton import SIDES
 

@@ -20,8 +20,8 @@ from msgspec import Meta, Struct
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
 from seerob.core.files.toml_file import read_toml
+from seerob.criteria.scoring.held_work import GAP, WINDOW
 from seerob.criteria.scoring.measured import Accuracy, Measured
-from seerob.criteria.scoring.repetition import GAP, WINDOW
 from seerob.criteria.scoring.spans import ROUNDING
 from seerob.description.humans.angles import NEEDS, SIDED, Angles
 from seerob.files.tables.grid import Cell, Grid, blank, number, place

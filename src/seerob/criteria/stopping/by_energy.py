@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from seerob.core.transforms import Array
-from seerob.criteria.stopping.in_span import InSpan, known_in_span
+from seerob.criteria.stopping.by_table import InSpan, known_in_span
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.simulated import STEP
 from seerob.criteria.stopping.terms import Course

@@ -17,8 +17,7 @@ from seerob.core.tolerances import Shifts
 from seerob.core.transforms import Array
 from seerob.criteria.stopping import table as stopping_table
 from seerob.criteria.stopping.by_energy import bind_braked_in_span
-from seerob.criteria.stopping.by_table import bind_table, not_its_own
-from seerob.criteria.stopping.in_span import InSpan, Stopping, bind_in_span
+from seerob.criteria.stopping.by_table import InSpan, Stopping, bind_in_span, bind_table, not_its_own
 from seerob.criteria.stopping.onset import At as OnsetAt
 from seerob.criteria.stopping.onset import Onset, by_speed
 from seerob.criteria.stopping.reaction import Reactions, bind_reaction, joint_limits

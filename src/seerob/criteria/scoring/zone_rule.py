@@ -10,9 +10,9 @@ from msgspec import Meta
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Aspect, Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
 from seerob.criteria.criterion import Evaluate, judge, judge_interval
-from seerob.criteria.postures.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, entered, posture_quality
 from seerob.criteria.scoring.phases import Phase, Sides, on_sides, phase_at, shared_phases
+from seerob.criteria.scoring.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.score_rows import total_row
 from seerob.criteria.scoring.zones import DERIVED, ZoneRow, ZoneTable, ZoneWatch, sided, value_of
 from seerob.description.humans.angles import NEEDS, Angles

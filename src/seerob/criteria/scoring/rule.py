@@ -22,13 +22,11 @@ from seerob.criteria.scoring.basis import (
     posture_quality,
     watched,
 )
-from seerob.criteria.scoring.held_work import Watch, WorkDetection
+from seerob.criteria.scoring.held_work import GAP, Watch, WorkDetection
 from seerob.criteria.scoring.judgement import Method, judged
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, JointAccuracy, accuracy_of
 from seerob.criteria.scoring.phases import Phase, check_order, phase_at, shared_phases
-from seerob.criteria.scoring.repetition import GAP
-from seerob.criteria.scoring.spans import Span
-from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import Span, Thresholds
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.skeleton import BONES
 from seerob.model import provenance

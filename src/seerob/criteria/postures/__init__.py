@@ -1,1 +1,0 @@
-"""What rules about postures share: the angles of the twin, zones, phases of the task."""

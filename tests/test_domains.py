@@ -253,7 +253,7 @@ CALLS = {
     "criteria.contact.collision.permissible_speed": {"v_F": 1.0, "v_P": 1.0, "v_E": 1.0},
     "criteria.contact.measured.peaks": {"t": TWO - 1, "force": TWO},
     "criteria.contact.measured.risen": {"force": TWO},
-    "criteria.contact.tolerances.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
+    "criteria.contact.limits.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
     "criteria.contact.shape.round_shape": {"radius": 0.01},
     "core.transforms.apply": {"a_from_b": POSE, "points_in_b": np.ones(3)},
     "core.transforms.cross": {"a": np.ones(3), "b": np.array([1.0, 2, 4])},
@@ -277,8 +277,8 @@ CALLS = {
     "criteria.polytope.zero_moment": BOXED,
     "criteria.polytope.free_moment": {"J": np.eye(6), "low": -np.ones(6), "high": np.ones(6)},
     "criteria.scoring.measured.turned": {"accuracy": 0.1, "lever": HALF},
-    "criteria.scoring.repetition.repetitions": {"t": TWO, "scores": np.array([1, 2]), "window": 60.0},
-    "criteria.scoring.repetition.static": {"t": TWO, "scores": np.ones(2), "hold": 0.5, "gap": 2.0},
+    "criteria.scoring.held_work.repetitions": {"t": TWO, "scores": np.array([1, 2]), "window": 60.0},
+    "criteria.scoring.held_work.static": {"t": TWO, "scores": np.ones(2), "hold": 0.5, "gap": 2.0},
     "criteria.scoring.spans.between": {"low": TWO, "high": TWO},
     "criteria.scoring.spans.exactly": {"score": TWO},
 }
@@ -329,7 +329,7 @@ BELOW = {
     "criteria.contact.collision.spring_energy": "k",
     "criteria.contact.collision.speed_at_force": "k",
     "criteria.contact.collision.speed_at_pressure": "k",
-    "criteria.contact.tolerances.permissible_while_pushed": "F",
+    "criteria.contact.limits.permissible_while_pushed": "F",
     "criteria.contact.shape.round_shape": "radius",
 }
 """What is refused below 0."""
@@ -419,8 +419,8 @@ FREE = {
     "criteria.stopping.onset.accelerated qd 0": "is kept as it is",
     "criteria.stopping.stated_acceleration.largest_gain v 1": "fewer parts",
     "criteria.stopping.stated_acceleration.explains v 1": "fewer parts",
-    "criteria.contact.tolerances.permissible_while_pushed mu 0": "one may be of all regions",
-    "criteria.contact.tolerances.permissible_while_pushed k 0": "one may be of all regions",
+    "criteria.contact.limits.permissible_while_pushed mu 0": "one may be of all regions",
+    "criteria.contact.limits.permissible_while_pushed k 0": "one may be of all regions",
     "criteria.scoring.spans.between low 0": "one may be of all rows",
     "criteria.scoring.spans.between high 0": "one may be of all rows",
 }

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.transform import Rotation
 
 from seerob.core.transforms import angles_from_rotation
-from seerob.description.humans.motion import interpolated
+from seerob.description.humans.keyframes import interpolated
 from seerob.description.shapes import mass_properties
 from seerob.description.shapes.detail import _lost
 from seerob.description.shapes.hull import convex_hull, hull_volume

@@ -17,8 +17,8 @@ from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, inverse
 from seerob.description.description import Description, Link, base_from_links, groups
-from seerob.description.shapes.mesh_bodies import components
 from seerob.description.formats.urdf import moved
+from seerob.description.shapes.mesh_bodies import components
 from seerob.kernels.signed_distance import outside
 from seerob.kernels.tree_file import tree_of
 

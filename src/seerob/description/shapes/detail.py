@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
-from seerob.description.shapes.mesh_bodies import bodies, joined_unmerged
+from seerob.description.shapes.mesh_bodies import bodies, joined_unmerged, tidied
 from seerob.kernels.signed_distance import outside
 from seerob.kernels.tree import build_tree
-from seerob.description.shapes.mesh_bodies import bodies, joined_unmerged, tidied
 
 LOSSLESS = 1e-6
 """Tolerance of the simplification for distances [m]."""

@@ -16,8 +16,8 @@ from seerob.description import lint
 from seerob.description.description import Inertial, Link
 from seerob.description.mesh import load_meshes
 from seerob.description.shapes import detail, mass_properties, shapes
-from seerob.description.shapes.hull import hull_volume
 from seerob.description.shapes.detail import display_mesh
+from seerob.description.shapes.hull import hull_volume
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.mesh_mending import enclosing
 from seerob.description.shapes.moments import signed_volume

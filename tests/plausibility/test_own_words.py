@@ -23,6 +23,8 @@ from seerob.devices.sources.rtde import joint_sample as rtde_sample
 from seerob.files.trajectories.trajectory import position_noise
 from seerob.protocols.plc.modbus import load as load_map
 from seerob.protocols.robots.fri import Edition, Monitoring, decode_monitoring, encode_monitoring
+from seerob.protocols.ros.ros_messages import Content, Joints, Transform, encode, store
+from seerob.protocols.ros.ros_messages import Edition as RosEdition
 from seerob.session.run import Judge, bind, engine_of
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
@@ -514,3 +516,46 @@ def test_a_source_that_says_where_its_tool_is_now_and_then_is_compared_then(
     (found,) = compared(model, "arm", words)
     assert found.holds == (() if robot == "ur5e" else ("arm",))
     assert said_by(said[:1], "run.mcap") is None
+
+
+@pytest.mark.parametrize(("recorded", "apart"), [("ur5e", 0.0), ("ur10e", 0.0), ("ur10e", 0.003)])
+def test_transforms_of_a_bag_tell_another_robot(tmp_path: Path, recorded: str, apart: float) -> None:
+    """Whoever recorded them had a robot_description of their own; by Pinocchio. Joint names are the same.
+
+    Edges of two instants are of no pose.
+    """
+    from rosbags.rosbag1 import Writer
+
+    robot = pinocchio_model(library.load(recorded))
+    data, types = robot.createData(), {"typestore": store(RosEdition.ROS1)}
+    names = tuple(robot.names)[1:]
+    with Writer(tmp_path / "log.bag") as writer:
+        every = {
+            topic: (writer.add_connection(topic, content.message_type, **types), content)
+            for topic, content in (("/joint_states", Content.JOINT_STATE), ("/tf", Content.TF))
+        }
+        for t, q in zip(T.tolist(), MOVING, strict=True):
+            pin.framesForwardKinematics(robot, data, q)
+            elbow, tool = (data.oMf[robot.getFrameId(name)] for name in ("forearm_link", "tool0"))
+            edges = []
+            for parent, child, pose, stamp in (
+                ("base_link", "forearm_link", elbow, t - apart),
+                ("forearm_link", "tool0", elbow.actInv(tool), t),
+            ):
+                x, y, z, w = pin.Quaternion(pose.rotation).coeffs().tolist()
+                edges.append(Transform(100 + stamp, parent, child, tuple(pose.translation), (w, x, y, z)))
+            said = {
+                "/joint_states": Joints(100 + t, names, tuple(q), (), ()),
+                "/tf": tuple(edges),
+            }
+            for topic, (connection, content) in every.items():
+                writer.write(
+                    connection, round(1e9 * (100 + t)), encode(content, said[topic], RosEdition.ROS1)
+                )
+    (tmp_path / "workstation.toml").write_text(
+        '[[robots]]\nname = "arm"\nmodel = "library:ur5e"\n'
+        '[[sources]]\nkind = "bag"\nrobot = "arm"\nfile = "log.bag"\n'
+    )
+    found = [f for _, o in load(tmp_path).sources for f in o.findings if "tool centre point" in f.text]
+    assert [f.holds for f in found] == ([] if apart else [() if recorded == "ur5e" else ("arm",)])
+    assert all("library:ur10e would fit" in f.text for f in found if f.holds)

@@ -79,6 +79,11 @@ class FrameTree:
         known = [s for s in stamps if s is not None]
         return matrix, min(known) if known and len(known) == len(stamps) else None
 
+    def at_once(self) -> bool:
+        """Whether what moves in the chain was last said of one instant."""
+        edges = [self._edges[child] for child, _ in self._chain()]
+        return len({stamp for _, stamp, _, fixed in edges if not fixed}) == 1
+
     def lacking(self) -> str:
         """Why there is no pose, for a message."""
         frames = sorted({*self._edges, *(e[0] for e in self._edges.values())})

@@ -448,6 +448,8 @@ def said_by(samples: Iterable[Sample], file: str) -> Said | None:
         valid = np.ones(len(motion.t), bool) if motion.invalid is None else ~motion.invalid
         every = (samples.qd, motion.tau, motion.tcp_position, motion.tcp_speed)
         qd, tau, tcp, speed = (None if x is None else x[valid] for x in every)
+        if tcp is not None and motion.tcp_said is not None:
+            tcp = np.where(motion.tcp_said[valid, None], tcp, np.nan)
         t = motion.t[valid] - motion.t[0]
         q = motion.q[valid]
         return Said(file, t, q, qd, tau, tcp, motion.tcp_in_base, speed) if len(t) else None

@@ -6,24 +6,27 @@ Joint states by name, a commanded trajectory, or the pose of the tool out of tf 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
-from seerob.devices.motion_files import PoseFrame, TrajectoryFile
+from seerob.devices.motion_files import PoseFrame, TrajectoryFile, fixed_links
 from seerob.devices.ros import STATIC, FrameTree, JointGather, driven, world_from_parent
 from seerob.files.motion_capture import ros_bag
-from seerob.files.motion_capture.ros_bag import Recorded, TimeBase
+from seerob.files.motion_capture.ros_bag import Recorded, TimeBase, topics_of
 from seerob.files.trajectories.checks import sampling_findings
 from seerob.files.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
 from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory, origin_finding
 from seerob.protocols.ros.ros_messages import Content, Joints, Plan
 from seerob.workstation.source import Opened, Target
 
+TF = Content.TF.topic
 SAME_INSTANT = 1e-6
 """Samples that are not later by more are dropped: a message that was recorded twice [s]."""
 
@@ -41,7 +44,8 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
     time_base: TimeBase = TimeBase.HEADER
     """``header``: the stamps of the messages; ``received``: when they were recorded."""
     parent: str = "base_link"
-    """With ``tf``: frame that the pose is taken in."""
+    """Frame that the pose of ``tf`` is taken in; with ``joint_state`` it is compared with the twin's, where
+    it is a link of the robot that stands still."""
     child: str = "tool0"
     """With ``tf``: frame whose pose is taken."""
     frame: PoseFrame = PoseFrame.BASE
@@ -140,12 +144,17 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
         if self.content is Content.TRAJECTORY:
             trajectory, said = self._commanded(recorded, names)
         else:
-            trajectory, said = self._measured(recorded, names, target.name)
+            trajectory, said, stamps = self._measured(recorded, names, target.name)
+            tool, more = self._tool(path, target, stamps)
+            said += more
+            if tool is not None:
+                trajectory = replace(trajectory, tcp_position=tool[0], tcp_said=tool[1], tcp_in_base=True)
         return trajectory, (note, *(Finding(level=k, subject=target.name, text=t) for k, t in said))
 
     def _measured(
         self, recorded: Iterator[Recorded], names: tuple[str, ...], robot: str
-    ) -> tuple[Trajectory, list[tuple[str, str]]]:
+    ) -> tuple[Trajectory, list[tuple[str, str]], list[float | None]]:
+        """The motion, what is said of it, and the stamps of its samples [s]."""
         # Publishers of parts of a robot are put together; how far apart they are, a recording shows itself.
         gather = JointGather(robot, names, float("inf"))
         rows: list[tuple[float, JointSample]] = []
@@ -191,7 +200,38 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
                 invalid=invalid if invalid.any() else None,
             ),
             said,
+            [s.t_device for s in samples],
         )
+
+    def _tool(
+        self, path: Path, target: Target, stamps: list[float | None]
+    ) -> tuple[tuple[Array, NDArray[np.bool_]] | None, list[tuple[str, str]]]:
+        """Where tf has the robot's last link [m], shape (n, 3), and at which samples; None where nowhere.
+
+        It is made of the same joints by whoever recorded the bag, with the robot that they had.
+        """
+        robot, fixed = target.description, fixed_links(target)
+        base = fixed.get(f"{target.name}/{self.parent}")
+        if robot is None or base is None or TF not in topics_of(path, self.file):
+            return None, []
+        tree = FrameTree(self.parent, robot.tip)
+        found: dict[int, Array] = {}
+        try:
+            for topic in (STATIC, TF):
+                for item in ros_bag.messages(path, Content.TF, (topic,), self.file):
+                    moves = isinstance(item.said, tuple) and tree.take(item.said, fixed=topic == STATIC)
+                    pose = tree.pose() if moves and topic == TF and tree.at_once() else None
+                    if pose is not None and pose[1] is not None and np.isfinite(pose[0]).all():
+                        found[round(pose[1] / SAME_INSTANT)] = (base @ pose[0])[:3, 3]
+        except InputError as error:
+            return None, [
+                ("note", f"its transforms are not compared: {error.problems[0].what}")
+            ]
+        at = [None if stamp is None else found.get(round(stamp / SAME_INSTANT)) for stamp in stamps]
+        if all(place is None for place in at):
+            return None, []
+        said = np.array([place is not None for place in at])
+        return (np.array([np.zeros(3) if place is None else place for place in at]), said), []
 
     def _commanded(
         self, recorded: Iterator[Recorded], names: tuple[str, ...]

@@ -184,6 +184,8 @@ class Trajectory(Timed):
     """Measured joint torques [N·m or N], shape (n, dof)."""
     tcp_position: Array | None = None
     """Tool centre point in whatever frame the file uses [m], shape (n, 3)."""
+    tcp_said: NDArray[np.bool_] | None = None
+    """Rows in which the file says where that is, shape (n,); all of them when not given."""
     tcp_wxyz: Array | None = None
     """Orientation of the tool in whatever frame the file uses, unit quaternions, shape (n, 4)."""
     tcp_speed: Array | None = None
@@ -327,6 +329,7 @@ class TrajectorySamples:
         motion = self.trajectory
         start = float(motion.t[0])
         tcp = motion.tcp_position if motion.tcp_in_base else None
+        said = np.ones(len(motion.t), bool) if motion.tcp_said is None else motion.tcp_said
         off = self.qd_error
         error, ends = (None if off is None else tuple((k * off).tolist()) for k in (BETWEEN, AT_END))
         last = len(motion.t) - 1
@@ -342,7 +345,7 @@ class TrajectorySamples:
                 qd=None if self.qd is None else tuple(self.qd[i].tolist()),
                 qd_error=error if 0 < i < last else ends,
                 tau=None if motion.tau is None else tuple(motion.tau[i].tolist()),
-                tcp=None if tcp is None else tuple(tcp[i].tolist()),
+                tcp=None if tcp is None or not said[i] else tuple(tcp[i].tolist()),
                 tcp_speed=None if motion.tcp_speed is None else float(motion.tcp_speed[i]),
                 payload=None if motion.payload is None else float(motion.payload[i]),
             )

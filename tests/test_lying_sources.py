@@ -181,15 +181,13 @@ class Own(Source, frozen=True, kw_only=True):
         return "arm"
 
     def open(self, folder, target):
-        def said():
+        def every():
             for k in range(round(DURATION / PERIOD)):
-                t = k * PERIOD
-                qd = 0.25 * math.cos(5 * t), -0.5 * math.cos(5 * t)
-                sample = JointSample(source="own", seq=k, t=t, target="arm", q=arm(t), qd=qd)
-                if (sample := sample if k < LIES_AT else self.lie(k, sample)) is not None:
+                sample = said(k) if k < LIES_AT else self.lie(k, said(k))
+                if sample is not None:
                     yield sample
 
-        return Opened(samples=Again(said), duration=DURATION - PERIOD)
+        return Opened(samples=Again(every), duration=DURATION - PERIOD)
 
 
 class Again:
@@ -198,6 +196,13 @@ class Again:
 
     def __iter__(self):
         return self._begin()
+
+
+def said(k):
+    """What an honest one says."""
+    t = k * PERIOD
+    qd = 0.25 * math.cos(5 * t), -0.5 * math.cos(5 * t)
+    return JointSample(source="own", seq=k, t=t, target="arm", q=arm(t), qd=qd)
 
 
 def fails(k, sample):
@@ -220,6 +225,17 @@ OWN = {
     "a text": lambda k, s: replace(s, q=("a", "b")),
     "no sample": lambda k, s: "sample",
     "a quality of its own": lambda k, s: replace(s, quality="fine"),
+    "its last sample with new times": lambda k, s: replace(said(LIES_AT - 1), t=s.t, seq=s.seq),
+    "its last third of a second again and again": lambda k, s: replace(
+        said(LIES_AT - 30 + (k - LIES_AT) % 30), t=s.t, seq=s.seq
+    ),
+    "no gap where it heard nothing": lambda k, s: replace(said(k + 30), t=s.t, seq=s.seq),
+    "nought where it has no number": lambda k, s: replace(s, q=(0.0, 0.0), qd=(0.0, 0.0)),
+    "what a joint was last where it has no number": lambda k, s: replace(s, q=(s.q[0], said(LIES_AT).q[1])),
+    "speeds in degrees": lambda k, s: replace(s, qd=(math.degrees(s.qd[0]), math.degrees(s.qd[1]))),
+    "half its motion in all its time": lambda k, s: replace(s, t=0.5 * (s.t + LIES_AT * PERIOD)),
+    "every other sample of before": lambda k, s: said(LIES_AT - 1) if k % 2 else s,
+    "new times of a clock that stands": lambda k, s: replace(said(LIES_AT), t=s.t, t_device=LIES_AT * PERIOD),
     "an error": fails,
     "nothing": lambda k, s: None,
 }  # fmt: skip

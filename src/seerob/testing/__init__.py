@@ -150,11 +150,12 @@ class Lie:
     """One way in which a source can be wrong from an instant on."""
 
     what: str
-    said: Callable[[Sample, float], Sample | None]
-    """What it yields instead of a sample from that instant on, which is given [s]; None for nothing."""
+    said: Callable[[Sample, float, Sample], Sample | None]
+    """What it yields instead of a sample from that instant on; None for nothing. It is given that instant [s]
+    and what was said last before it."""
 
 
-def _numberless(sample: Sample, since: float) -> Sample:
+def _numberless(sample: Sample, since: float, last: Sample) -> Sample:
     if isinstance(sample, JointSample):
         return changed(sample, q=(_NAN,) * len(sample.q))
     if isinstance(sample, PoseSample):
@@ -174,27 +175,38 @@ def _numberless(sample: Sample, since: float) -> Sample:
     return changed(sample, values={n: _NAN for n, v in sample.values.items() if type(v) is float})
 
 
-def _fails(sample: Sample, since: float) -> Sample:
+def _again(sample: Sample, since: float, last: Sample) -> Sample | None:
+    """What it said last, with new times, where speeds tell that it moves; who stands may say so."""
+    if not isinstance(last, JointSample) or max(map(abs, last.qd or (0.0,))) < MOVES:
+        return None
+    return changed(last, seq=sample.seq, t=sample.t)
+
+
+def _fails(sample: Sample, since: float, last: Sample) -> Sample:
     raise OSError("the disk is gone")
 
 
-def _misshapen(sample: Sample, since: float) -> Sample | None:
+def _misshapen(sample: Sample, since: float, last: Sample) -> Sample | None:
     if isinstance(sample, JointSample):
         return changed(sample, q=sample.q[:-1], qd=None)
     return changed(sample, t=None)
 
 
 LIES = (
-    Lie("stops", lambda s, t: None),
+    Lie("stops", lambda s, t, last: None),
     Lie("fails", _fails),
     Lie("says what is no number", _numberless),
-    Lie("says no time", lambda s, t: changed(s, t=_NAN)),
-    Lie("goes back in time", lambda s, t: changed(s, t=s.t - t)),
-    Lie("says everything at one instant", lambda s, t: changed(s, t=t)),
-    Lie("speaks of the future", lambda s, t: changed(s, t=s.t + 10.0)),
+    Lie("says no time", lambda s, t, last: changed(s, t=_NAN)),
+    Lie("goes back in time", lambda s, t, last: changed(s, t=s.t - t)),
+    Lie("says everything at one instant", lambda s, t, last: changed(s, t=t)),
+    Lie("says its last sample with new times", _again),
+    Lie("says an old sample in between", lambda s, t, last: last if s.seq % 2 else s),
+    Lie("speaks of the future", lambda s, t, last: changed(s, t=s.t + 10.0)),
     Lie("says what has the wrong shape", _misshapen),
-    Lie("calls it invalid", lambda s, t: changed(s, quality=Quality.INVALID)),
+    Lie("calls it invalid", lambda s, t, last: changed(s, quality=Quality.INVALID)),
 )
+MOVES = 0.1
+"""Speed of a joint that does not stand [rad/s or m/s]."""
 LIES_FROM = 0.3
 """Share of a source's duration after which it lies."""
 
@@ -292,9 +304,12 @@ class _Lying:
         self._opened, self._lie, self._since = opened, lie, since
 
     def __iter__(self) -> Iterator[Sample]:
+        last: Sample | None = None
         for sample in self._opened.samples:
-            said = self._lie.said(sample, self._since) if sample.t >= self._since else sample
-            if said is not None:
+            if sample.t < self._since or last is None:
+                last = sample
+                yield sample
+            elif (said := self._lie.said(sample, self._since, last)) is not None:
                 yield said
 
 

@@ -14,8 +14,8 @@ sample, and so is one whose velocities go on over positions that stand.
 
 A live source is looked at by who listens to it, and the shipped readers look at their files; whoever writes a
 source of their own looks at nothing. So here: what is no sample or has the wrong shape ends the run with the
-name of the source; time that goes back, values where no joint can be, and velocities that positions do not
-follow are the sample's ``reason``, and what rests on it is UNDECIDED.
+name of the source; time that goes back or stands, values where no joint can be, and velocities that positions
+do not follow are the sample's ``reason``, and what rests on it is UNDECIDED.
 """
 
 from __future__ import annotations
@@ -480,6 +480,7 @@ class LookedAt:
         looks: dict[tuple[str, ...], Contradictions] = {}
         told: dict[tuple[str, ...], tuple[str, float]] = {}
         until: dict[tuple[str, ...], float] = {}
+        clocks: dict[tuple[str, ...], float] = {}
         pending: Sample | None = None
         for sample in self._all():
             about = key(sample)
@@ -496,7 +497,13 @@ class LookedAt:
             look = looks.setdefault(about, Contradictions(self._target, live=False))
             stamped = sample if sample.t_device is not None else replace(sample, t_device=sample.t)
             reason, holds = told.get(about, ("", -math.inf))
-            if (found := look.find(stamped)) and holds < math.inf:
+            found = look.find(stamped)
+            if sample.t_device is not None:
+                clock, clocks[about] = clocks.get(about, -math.inf), sample.t_device
+                if not (again or clock < sample.t_device < math.inf):
+                    # The same sample again, or an old one, that is said to be new.
+                    found = f"its own time goes from {clock:.3f} to {sample.t_device:.3f} s"
+            if found and holds < math.inf:
                 reason, holds = told[about] = found, sample.t + HOLD
             reason = self._beyond(sample) or (reason if sample.t <= holds else "")
             if pending is not None:

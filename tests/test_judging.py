@@ -240,11 +240,26 @@ def test_how_fast_a_robot_is_that_nothing_moves_is_not_within(tmp_path, source, 
         + BETWEEN
         + 'limit = 1\n[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\nlimit = 1\n'
     )
-    found = made(tmp_path, text + source, {"arm.urdf": two_r(), "m.csv": still}).run().results
-    assert {name: str(series.verdict) for name, series in found.items()} == {
+    text += '[[safety]]\nkind = "velocity"\nname = "walked"\nof = "arm"\nlimit = 1\nactive = "on"\n'
+    dictionary = '[[variables]]\nname = "on"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
+    plc = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
+    files = {"arm.urdf": two_r(), "m.csv": still, "v.toml": dictionary, "s.csv": "t,x\n0,1\n0.1,1\n"}
+    station = made(tmp_path, 'variables = "v.toml"\n' + text + source + plc, files)
+    found = station.run().results
+    wanted = {"E": fast, "d": "within", "v": fast, "walked": fast}
+    assert {name: str(series.verdict) for name, series in found.items()} == wanted
+    if fast == "undecided":
+        assert "arm: no source says how it moves" in found["E"].worst().reason
+    # In arrays, too; of who is not named among given positions nobody says how fast they are.
+    many, zeros = station.batch(), np.zeros((3, 2))
+    assert {name: str(many[name].verdict) for name in ("E", "d", "v")} == {
         "E": fast,
         "d": "within",
         "v": fast,
     }
-    if fast == "undecided":
-        assert "arm: no source says how it moves" in found["E"].worst().reason
+    assert many["walked"].verdict != "within"
+    given = station.batch({"other": zeros}, {"other": zeros}, t=[0.0, 0.01, 0.02])
+    assert {str(given[name].verdict) for name in ("E", "v", "walked")} == {"undecided"}
+    assert "arm: no source says how it moves" in given["v"].reasons[0]
+    given = station.batch({"arm": zeros}, {"arm": zeros}, t=[0.0, 0.01, 0.02])
+    assert {str(given[name].verdict) for name in ("E", "d", "v")} == {"within"}

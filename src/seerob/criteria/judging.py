@@ -271,9 +271,10 @@ def _open(part: Result, reason: str) -> Result:
     return part if part.verdict is None and part.value is None else undecided(part, reason)
 
 
-def unmoved(state: State) -> str:
-    """Whose speeds were asked for although nothing tells them; empty when there is none."""
-    return ", ".join(sorted(name for name in state.speeds_asked if not state.moved(name)))
+def unmoved(names: Collection[str]) -> str:
+    """Why nothing is within that asked for speeds which nothing tells: whose, by name; empty for nobody's."""
+    who = ", ".join(sorted(names))
+    return f"{who}: no source says how it moves, and how fast it is was asked" if who else ""
 
 
 def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:
@@ -535,8 +536,10 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if value is not None and not math.isfinite(value):
             raise Undecided(f"the value is {value}, not a finite number")
-        if result.verdict is _WITHIN and state.speeds_asked and (still := unmoved(state)):
-            return undecided(result, f"{still}: no source says how it moves, and how fast it is was asked")
+        if result.verdict is _WITHIN and state.speeds_asked:
+            still = unmoved([name for name in state.speeds_asked if not state.moved(name)])
+            if still:
+                return undecided(result, still)
         if question.relied_on and (
             doubt := next(filter(None, map(state.heard_doubt, question.relied_on)), "")
         ):

@@ -23,7 +23,7 @@ from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, EvaluateMany
-from seerob.criteria.judging import Judge, held, held_names, needed, unmentioned, worded
+from seerob.criteria.judging import Judge, held, held_names, needed, unmentioned, unmoved, worded
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
@@ -126,8 +126,10 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     placed = changed(station, engine=changed(station.engine, physics=False))
     model = replace(model, workstation=placed)
     heard = list(feed)
-    if (known := known_motion(engine_of(model, _Whereabouts), heard, end)) is not None:
-        return known
+    engine = engine_of(model, _Whereabouts)
+    still = frozenset(name for name in model.mechanisms if not engine.state.moved(name))
+    if (known := known_motion(engine, heard, end)) is not None:
+        return replace(known, still=still)
     engine = engine_of(model, _Whereabouts)
     engine.end = end
     t, q, v = [], [], []
@@ -153,7 +155,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         if any(one is not None for one in every)
     }
     arrays = np.array(t), np.array(q), np.array(v)
-    return Motion(*arrays, reasons, ways=tuple(ways), foreseen=True, speed_errors=errors)
+    return Motion(*arrays, reasons, ways=tuple(ways), foreseen=True, speed_errors=errors, still=still)
 
 
 def judged(
@@ -380,6 +382,9 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
             if motion.doubts[who].any():
                 reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
         answers = _doubted(answers, one.criterion, reasons)
+        if still := motion.still & states.speeds_asked:
+            reasons = np.where(answers.verdict == WITHIN, unmoved(still), reasons)
+            answers = answers.open()
         if texts := [text for held_name, text in one.held.items() if held_name in states.asked]:
             reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
             answers = answers.open()
@@ -491,7 +496,10 @@ def _walked(
             nothing that counts.
     """
     # Between two instants nobody is silent, however long it is.
-    hearings = {name: Hearing(given=False, driven=True, timeout=np.inf) for name in model.mechanisms}
+    hearings = {
+        name: Hearing(given=False, driven=True, timeout=np.inf, once=name in motion.still)
+        for name in model.mechanisms
+    }
     data = mujoco.MjData(model.mj)
     state = State(model, data, hearings)
     # With criteria that were bound for another run, what they remember of it would be in the way.

@@ -60,6 +60,8 @@ class Motion:
     """The whole motion that it is a part of; None of a whole one."""
     begin: int = 0
     """Which of its instants is the first one here."""
+    still: frozenset[str] = frozenset()
+    """Robots whose speed nobody tells (`seerob.twin.validity.validity.Validity.moved`)."""
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
@@ -68,7 +70,7 @@ class Motion:
         part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
         errors = {name: found[begin:end] for name, found in self.speed_errors.items()}
         whole = self if self.of is None else self.of
-        return Motion(*part, doubts, self.foreseen, ways, errors, whole, self.begin + begin)
+        return Motion(*part, doubts, self.foreseen, ways, errors, whole, self.begin + begin, self.still)
 
 
 class Questions:
@@ -438,7 +440,9 @@ def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) ->
         doubts[name] = np.where(finite, "", f"{name}: {NOT_FINITE}").astype(object)
         if name not in given and not mechanism.home_given:
             doubts[name][:] = f"{name}: {NOWHERE}"
-    return Motion(t, q, v, doubts)
+    robots = [m.name for m in model.mechanisms.values() if m.role == "robot"]
+    still = {name for name in robots if given.keys().isdisjoint((name, *model.carriers_of(name)))}
+    return Motion(t, q, v, doubts, still=frozenset(still))
 
 
 def _at_home(mechanism: Mechanism, n: int) -> tuple[Array, Array]:

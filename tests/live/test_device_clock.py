@@ -194,6 +194,42 @@ def test_a_device_that_starts_again_and_moves_is_relied_on_though_its_stamps_wer
             assert bool(found.invalid_reason) == (run > 0 and PERIOD * k <= RESTART_HOLD)
 
 
+@pytest.mark.parametrize("forgeable", [False, True])
+@pytest.mark.parametrize("late", [0.2, 1.0, 4.0])
+def test_a_buffer_that_a_new_connection_is_served_from_is_as_late_as_it_is(late, forgeable):
+    """It begins with what was heard before, and goes on with what is new, late for good."""
+    clock = DeviceClock()
+    for k in range(1000):
+        clock.hear(PERIOD * k, 5 + PERIOD * k, k, forgeable=forgeable)
+    clock.reconnect()
+    for k in range(1000 - round(late / PERIOD), 12_000):
+        found = clock.hear(PERIOD * k, 5 + late + PERIOD * k, k, forgeable=forgeable)
+        assert found.t is None or found.invalid_reason or clock.latency > 0.9 * late, k
+        if k > 1000 + (late + 2 * AGAIN) / PERIOD:
+            assert not found.invalid_reason
+    assert found.t == pytest.approx(5 + PERIOD * k, abs=0.03)
+    assert clock.latency == pytest.approx(late, abs=0.03)
+
+
+def test_a_packet_that_a_new_connection_overtook_is_no_news_of_its_clock():
+    clock = DeviceClock()
+    heard(clock, [(PERIOD * k, 5 + PERIOD * k) for k in range(100)])
+    clock.reconnect()
+    told = heard(clock, [(PERIOD * k, 7 + PERIOD * k) for k in range(98, 500)])
+    assert [i.t is None for i in told[:3]] == [True, True, False]
+    assert clock.latency == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_device_that_starts_again_and_stands_as_before_is_relied_on():
+    """A simulator at home: the same stamps, and the same to the last bit."""
+    clock = DeviceClock()
+    for run in range(2):
+        clock.reconnect()
+        for k in range(2000):
+            found = clock.hear(PERIOD * k, 5 + 100 * run + PERIOD * k, 7)
+            assert bool(found.invalid_reason) == (run > 0 and PERIOD * k <= RESTART_HOLD)
+
+
 def test_what_is_remembered_of_a_clock_is_bounded(monkeypatch):
     monkeypatch.setattr(device_clock, "KEPT", 300)
     monkeypatch.setattr(device_clock, "MARKED", 100)

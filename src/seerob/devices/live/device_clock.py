@@ -42,6 +42,9 @@ not."""
 AGAIN = 60.0
 """A clock that starts again twice within this time is followed, and not relied on for as long [s]: no
 controller is switched on so often."""
+BUFFERED = 10.0
+"""What says again what it said, over a new connection, and is late by less, is a buffer on the way and no
+device that started again [s]: its clock is the one from before, so that it looks as late as it is."""
 KEPT = 16384
 """Stamps of which it is known what was said with them: half a minute of the fastest source."""
 MARKED, MARK_EVERY = 1 << 15, 1.0
@@ -100,6 +103,10 @@ class DeviceClock:
         """Nothing was heard since it has connected."""
         self._restarted = -math.inf
         """When it last started again."""
+        self._before: Known | None = None
+        """Its clock before that, while it may be the same one."""
+        self._content = 0
+        """What was said last."""
         self._said: dict[float, int] = {}
         self._marks: dict[float, int] = {}
         """As `_said`, of a few."""
@@ -144,8 +151,11 @@ class DeviceClock:
         self._connected = False
         self._newest, self._host = device, max(host, self._host)
         self.latency = raw - self._offset
-        if forgeable and said in (self._said.get(device), self._marks.get(device)):
+        again = said in (self._said.get(device), self._marks.get(device))
+        if again and (forgeable or (self._before is not None and said != self._content)):
+            # Of a connection that nobody forges, what stands may say the same; what moves does not.
             self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
+            self._resume(raw, host)
         self._remember(device, said)
         t = device + self._applied
         if t <= self._last:
@@ -155,8 +165,19 @@ class DeviceClock:
         self._last = max(self._last, t)
         return Instant(t, self._standing(host))
 
+    def _resume(self, raw: float, host: float) -> None:
+        """Go on by the clock from before: it has not started again, what it says comes out of a buffer."""
+        before, self._before = self._before, None
+        if before is None:
+            return
+        offset = min(raw, before.offset + DRIFT * max(0.0, host - before.host))
+        if raw - offset < BUFFERED:
+            self._offset = self._applied = offset
+            self.latency = raw - offset
+
     def _remember(self, device: float, said: int) -> None:
         """Keep what is said at a time for a while, and now and then for hours: when, no player can know."""
+        self._content = said
         _keep(self._said, KEPT, device, said)
         if device >= self._next_mark:
             _keep(self._marks, MARKED, device, said)
@@ -200,7 +221,7 @@ class DeviceClock:
     def _is_restart(self, device: float, host: float, said: int) -> bool:
         """Whether time that does not go on is that of a device which started again; else it is no news."""
         back = self._newest - device
-        if back == 0 or (not self._connected and back <= REORDERED):
+        if back <= REORDERED:
             return False
         if not self._connected and self._said.get(device) == said:
             self._hold(
@@ -213,6 +234,8 @@ class DeviceClock:
         else:
             what = f"its time went back by {back:.3g} s: it seems to have started again"
             self._hold(host, RESTART_HOLD, what)
+        if self._before is None or host - self._restarted > RESTART_HOLD:
+            self._before = Known(self._offset, self._newest, self._host)
         self._restarted = host
         self._offset = self._applied = math.inf
         self._ahead = None

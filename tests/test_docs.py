@@ -165,6 +165,15 @@ def test_every_source_is_in_the_list_and_its_page_begins_with_an_example() -> No
             assert "```toml" in "\n".join(page.read_text(encoding="utf-8").splitlines()[:8]), page.name
 
 
+@pytest.mark.parametrize("group", ["safety", "ergonomics"])
+def test_every_criterion_is_in_the_list_and_its_section_begins_with_an_example(group: str) -> None:
+    text = (ROOT / f"docs/{group}.md").read_text(encoding="utf-8")
+    listed = re.findall(rf"<!-- write-docs: list/{group} ([\w ]+) -->", text)
+    assert sorted(" ".join(listed).split()) == sorted(plugin.kinds(group))
+    begins = re.findall(rf'^##+ (\w+)\n\n```toml\n\[\[{group}\]\]\nkind = "\1"$', text, re.MULTILINE)
+    assert sorted(begins) == sorted(plugin.kinds(group))
+
+
 def test_every_cited_key_is_in_the_references() -> None:
     references = (ROOT / "docs/references.md").read_text(encoding="utf-8")
     sources = [*(ROOT / "src").rglob("*.py"), *PAGES]

@@ -67,6 +67,28 @@ def test_who_stays_elsewhere_is_believed_after_as_long_as_the_way_takes_and_put_
     assert max(speed for *_, speed, _ in told) < 15.0
 
 
+@pytest.mark.parametrize("seconds", [0.3, 0.4])
+def test_a_capture_that_drifts_is_no_motion(seconds):
+    """By 1.5 m, evenly: a person who stands would have to go at 4 and 5 m/s at once, and to stop."""
+    t, q = walking(2.0)
+    frames = frames_of(t, np.tile(q[0], (len(t), 1)))
+    for frame, way in zip(frames, 1.5 * np.clip((t - 0.6) / seconds, 0.0, 1.0), strict=True):
+        frame.positions[:, 1] += way
+    told = play(source(captured(frames)))
+    assert {doubt for t, doubt, *_ in told if t < 0.57} == {""}
+    assert all("nobody can" in doubt for t, doubt, *_ in told if 0.69 < t < 0.6 + seconds + 0.45)
+
+
+def test_a_person_who_runs_is_followed():
+    """From standing to 4 m/s with 8 m/s², and slower with as much."""
+    t, q = walking(2.0)
+    frames = frames_of(t, np.tile(q[0], (len(t), 1)))
+    speed = np.clip(8 * np.minimum(t - 0.2, 1.9 - t), 0.0, 4.0)
+    for frame, way in zip(frames, np.cumsum(speed) * (t[1] - t[0]), strict=True):
+        frame.positions[:, 1] += way
+    assert {doubt for _, doubt, *_ in play(source(captured(frames)))} == {""}
+
+
 def test_a_hand_that_jumps_is_left_out_and_named():
     frames = frames_of(*walking(), turned=False)
     for frame in frames[40:43]:

@@ -13,6 +13,7 @@ appears elsewhere is put there, not dragged. Whatever is left out or held says w
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -64,6 +65,13 @@ SWUNG_SPEED = 5.0
 """Legs that are not seen may have moved so fast meanwhile [m/s]: the foot of somebody who walks swings at up
 to 4 to 5 m/s (M)."""
 LEGS = ("thigh", "shank", "foot", "toes")
+STARTS = 20.0
+"""No waist gets faster or slower with more [m/s²]: sprinters start with some 10 m/s² (M), falls have 9.8."""
+STARTS_WITHIN, STARTS_NOISE, STARTS_HOLD = 0.1, 0.3, 0.5
+"""Mean speeds of two such times are compared [s]; by how much a waist's may be off [m/s]: 2 cm of a depth
+camera; how long what is found counts [s]."""
+WHOLE = 8
+"""Bones of which places are seen that tell where the waist is: beside a hand alone it is a guess."""
 ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
 
@@ -120,6 +128,41 @@ class _Told:
     """Something was left out because it jumped."""
 
 
+class _Waist:
+    """Whether what is seen of a waist can be its motion: a picture that drifts has no mass."""
+
+    def __init__(self) -> None:
+        self._past: deque[tuple[float, Array]] = deque()
+        self._found, self._until = "", -np.inf
+
+    def forget(self) -> None:
+        """What was seen before says nothing of what comes."""
+        self._past.clear()
+
+    def __call__(self, t: float, place: Array) -> str:
+        """Why it cannot have come here; empty when it may.
+
+        Args:
+            t: Later than before [s].
+            place: [m], shape (3,).
+        """
+        past = self._past
+        past.append((t, place))
+        while len(past) > 2 and past[1][0] <= t - 2 * STARTS_WITHIN - SLACK:
+            past.popleft()
+        middle = next((k for k in reversed(past) if k[0] <= t - STARTS_WITHIN + SLACK), past[0])
+        begin = next((k for k in reversed(past) if k[0] <= middle[0] - STARTS_WITHIN + SLACK), middle)
+        first, second = middle[0] - begin[0], t - middle[0]
+        if 0 < first <= 5 * STARTS_WITHIN and 0 < second <= 5 * STARTS_WITHIN:
+            speeds = (place - middle[1]) / second, (middle[1] - begin[1]) / first
+            gained = float(np.linalg.norm(speeds[0] - speeds[1]))
+            if gained > STARTS * 0.5 * (first + second) + STARTS_NOISE:
+                a = 2 * gained / (first + second)
+                self._found = f"the waist would change its speed with {a:.0f} m/s², as nobody can"
+                self._until = t + STARTS_HOLD
+        return self._found if t <= self._until else ""
+
+
 @dataclass
 class _Device:
     """What one source said."""
@@ -170,6 +213,7 @@ class Following:
         self._last: Followed | None = None
         self._history: list[Followed] = []
         self._handover = Handover()
+        self._waist = _Waist()
         self._waits = False
         """Nothing was believed of late: where the person is now is not known."""
 
@@ -241,10 +285,16 @@ class Following:
             joint = AXES[int((moved / reach).argmax())].name
             reasons.append(f"{joint} would move faster than a person can")
         reasons += _residual(found, error)
+        if lost:
+            self._waist.forget()
         if elsewhere:
             reasons.append("appeared elsewhere")
         observed = self._seen(t, lambda device: device.observed)
         placed = self._seen(t, lambda device: device.placed)
+        if len(placed) < WHOLE:
+            self._waist.forget()
+        elif rushed := self._waist(t, q[:3]):
+            reasons.append(rushed)
         turns = self._seen(t, lambda device: device.turned)
         open_ends = ENDS & observed.keys() - aimed(turns)
         unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}

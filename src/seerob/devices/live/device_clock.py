@@ -107,6 +107,8 @@ class DeviceClock:
         """Its clock before that, while it may be the same one."""
         self._content = 0
         """What was said last."""
+        self._repeats = False
+        """Whether it said again what it said before it started again."""
         self._said: dict[float, int] = {}
         self._marks: dict[float, int] = {}
         """As `_said`, of a few."""
@@ -148,6 +150,9 @@ class DeviceClock:
             self._offset = self._applied = raw
         elif not self._follow(raw, host, device - self._newest):
             return Instant(None, self._standing(host))
+        elif self._ahead is not None and self._before is not None and device > self._before.device:
+            # One packet that came late over a new connection looked like a restart.
+            self._resume(raw, host)
         self._connected = False
         self._newest, self._host = device, max(host, self._host)
         self.latency = raw - self._offset
@@ -155,6 +160,9 @@ class DeviceClock:
         if again and (forgeable or (self._before is not None and said != self._content)):
             # Of a connection that nobody forges, what stands may say the same; what moves does not.
             self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
+            self._resume(raw, host)
+        self._repeats = self._repeats or again
+        if self._repeats and self._before is not None and device > self._before.device:
             self._resume(raw, host)
         self._remember(device, said)
         t = device + self._applied
@@ -166,14 +174,14 @@ class DeviceClock:
         return Instant(t, self._standing(host))
 
     def _resume(self, raw: float, host: float) -> None:
-        """Go on by the clock from before: it has not started again, what it says comes out of a buffer."""
-        before, self._before = self._before, None
-        if before is None:
+        """Go on by the clock from before: it has not started again, what it says came out of a buffer."""
+        if self._before is None:
             return
-        offset = min(raw, before.offset + DRIFT * max(0.0, host - before.host))
-        if raw - offset < BUFFERED:
-            self._offset = self._applied = offset
-            self.latency = raw - offset
+        risen = self._before.offset + DRIFT * max(0.0, host - self._before.host)
+        if -STEP < raw - risen < BUFFERED:
+            self._before = None
+            self._offset = self._applied = min(raw, risen)
+            self.latency = raw - self._offset
 
     def _remember(self, device: float, said: int) -> None:
         """Keep what is said at a time for a while, and now and then for hours: when, no player can know."""
@@ -235,7 +243,7 @@ class DeviceClock:
             what = f"its time went back by {back:.3g} s: it seems to have started again"
             self._hold(host, RESTART_HOLD, what)
         if self._before is None or host - self._restarted > RESTART_HOLD:
-            self._before = Known(self._offset, self._newest, self._host)
+            self._before, self._repeats = Known(self._offset, self._newest, self._host), False
         self._restarted = host
         self._offset = self._applied = math.inf
         self._ahead = None

@@ -224,9 +224,7 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
                     if pose is not None and pose[1] is not None and np.isfinite(pose[0]).all():
                         found[round(pose[1] / SAME_INSTANT)] = (base @ pose[0])[:3, 3]
         except InputError as error:
-            return None, [
-                ("note", f"its transforms are not compared: {error.problems[0].what}")
-            ]
+            return None, [("note", f"its transforms are not compared: {error.problems[0].what}")]
         at = [None if stamp is None else found.get(round(stamp / SAME_INSTANT)) for stamp in stamps]
         if all(place is None for place in at):
             return None, []

@@ -15,7 +15,7 @@ from seerob.criteria.judging import UNBOUNDED
 from seerob.outputs.sentences import summary
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
-from seerob.recording.series import STILL
+from seerob.recording.series import INFORMS, STILL
 from seerob.session.run import pump
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
@@ -23,16 +23,17 @@ EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
 
 def told(rows, between="", limit=2.0):
-    """A log of (t, verdict); ``muted`` and ``absent`` stand for those."""
+    """A log of (t, verdict); ``muted``, ``absent`` and ``idle`` (nothing to judge) stand for those."""
     log = ResultLog([CriterionInfo(name="v", kind="k", group="safety", title="", between=between)])
     for k, (t, verdict) in enumerate(rows):
-        muted = verdict == "muted"
+        none = verdict in ("muted", "idle")
         said = Result(
             name="v",
-            value=None if muted else 1.0,
-            limit=None if muted else limit,
-            verdict=None if muted else verdict,
-            muted=muted,
+            value=None if none else 1.0,
+            limit=None if none else limit,
+            verdict=None if none else verdict,
+            muted=verdict == "muted",
+            nothing=verdict == "idle",
         )
         log.add(Snapshot(seq=k, t=t, poses=b"", results=() if verdict == "absent" else (said,)))
     return log
@@ -60,6 +61,11 @@ def test_no_headline_says_throughout_of_a_criterion_that_was_muted_for_a_while()
         ([(0, "muted"), (3, "muted"), (4, W)], "", W),
         ([(0, None), (4, None)], "", U),  # it has a limit, and never judged by it
         ([(0, W), (1, "absent"), (4, W)], "", U),
+        ([(0, "idle"), (4, "idle")], UNBOUNDED, U),  # nor who was near meanwhile
+        ([(0, "idle"), (4, "idle")], INFORMS, None),
+        ([(0, "idle"), (4, "idle")], "", None),
+        ([(0, "idle"), (4, "idle")], "accepted: slow", None),
+        ([(0, "idle"), (2, E), (4, "idle")], UNBOUNDED, E),
         ([], "", U),
     ],
 )
@@ -99,6 +105,20 @@ class Height(_WorkHeight, frozen=True, kw_only=True):
     '''Height of which nothing is known between two instants.'''
     def falls(self, model, points): return None
 """
+SOMETIMES = """
+from acme.work_height import WorkHeight as _WorkHeight
+from seerob.api import Result, judge
+
+class Height(_WorkHeight, frozen=True, kw_only=True):
+    '''Height, where the first joint has turned by 0.1 to 0.3 rad; elsewhere there is nothing to judge.'''
+    def bind(self, model):
+        robot, own = model.mover(self.at), super().bind(model)
+        def evaluate(state):
+            if 0.1 < float(state.q(robot)[0]) < 0.3:
+                return own(state)
+            return Result(name=self.name, nothing=True, reason="turned away")
+        return evaluate
+"""
 HEIGHT = '[[safety]]\nkind = "heights.unbounded"\nname = "height"\nat = "arm"\nlimit = 9\n'
 RECORD = '[[sinks]]\nkind = "recorder"\n'
 ARM = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
@@ -111,6 +131,7 @@ def heights(tmp_path_factory):
     (folder / "heights").mkdir()
     (folder / "heights" / "__init__.py").touch()
     (folder / "heights" / "unbounded.py").write_text(OWN)
+    (folder / "heights" / "sometimes.py").write_text(SOMETIMES)
     return folder
 
 
@@ -135,6 +156,18 @@ def test_what_is_asked_once_in_four_seconds_is_not_within_throughout(
     worst = found.worst()
     assert (worst.value, worst.verdict) == (0.0, verdict)
     assert ("nothing bounds it between" in worst.reason) is (verdict is U)
+
+
+@pytest.mark.parametrize("every", ["", "every = 4\n"])
+def test_that_there_was_nothing_to_judge_hides_nothing_until_it_is_asked_again(
+    tmp_path, monkeypatch, heights, every
+):
+    """It is bounded where it judges, and turned away at both ends of four seconds."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.syspath_prepend(str(heights))
+    own = HEIGHT.replace("unbounded", "sometimes").replace("limit = 9", "limit = -1") + every
+    station = made(tmp_path, FLOATING + TWO_R + ARM + own, {"m.csv": ROWS, "arm.urdf": two_r()})
+    assert station.run().verdict is E
 
 
 def test_samples_of_no_source_of_the_workstation_move_somebody(tmp_path, monkeypatch, heights):

@@ -377,7 +377,8 @@ class BetweenTicks:
         if any(state.hearings[person].bones for person in watch.people):
             return None  # how far devices are off now is not known from then
         if before.margin is None:
-            return replace(before, t=state.t, speeds=speeds)
+            # Where nothing was there to judge no margin says how long that holds.
+            return None if before.idle else replace(before, t=state.t, speeds=speeds)
         fall = self._fall(watch, path, (before, replace(before, t=state.t, speeds=speeds)), state)
         margin, off = before.margin
         end = replace(before, t=state.t, margin=(margin - fall.fall, off), speeds=speeds)

@@ -23,6 +23,7 @@ from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
 from seerob.criteria.noisy_speeds import shaken
 from seerob.model.model import Model
+from seerob.recording.series import INFORMS
 from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import SLACK
 
@@ -55,7 +56,12 @@ class Bound:
         """Say what is known of the time between instants (`seerob.core.snapshot.CriterionInfo.between`)."""
         if self.watch is not None:
             return self.watch.accepted
-        return self.criterion.between_samples or self.criterion.instants or UNBOUNDED
+        return self.criterion.between_samples or self.criterion.instants or self.unbounded
+
+    @property
+    def unbounded(self) -> str:
+        """Why the time between instants is not known, where nothing bounds it."""
+        return INFORMS if getattr(self.criterion, "limit", UNBOUNDED) is None else UNBOUNDED
 
 
 def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:

@@ -3,7 +3,8 @@
 What a run is, is said here once. It is exceeded when an instant of it is. It is within when at every instant
 at which the criterion applied it was within: also between the instants at which it was asked, as far as that
 is bounded, or accepted (`CriterionInfo.between`). It is undecided when any of that is not known, when the
-criterion never applied, or when it was never heard. Without any limit it has no verdict, and informs.
+criterion never applied, or when it was never heard. That nobody was near whenever it was asked says no more
+of the time between than that all was within. Without any limit it has no verdict, and informs.
 
 What a run of eight hours says of one criterion is 80 MB. A `Column` keeps a block of it in memory, and a
 `Spill` takes the full blocks of many columns in a file without a name; nothing is rounded or left out, and
@@ -147,6 +148,12 @@ MAX_REASONS = 4096
 
 STILL = "accepted: no source moves anybody"
 """Of `CriterionInfo.between`: one instant then is all of a run."""
+
+INFORMS = (
+    "nothing bounds it between the instants at which it was asked; between_samples can accept that where "
+    "there is a verdict"
+)
+"""Likewise, of what has no limit of its own: that there was nothing to judge says nothing green then."""
 
 ONE_INSTANT = "the run is one instant, and sources say that something moves"
 
@@ -304,6 +311,8 @@ class Series:
         self._last_verdict: Verdict | None = None
         self._said: set[int] = set()
         self._has_limit = False
+        self._unseen = False
+        """Whether nobody knows if there was something to judge between instants at which there was not."""
         # Appended last at each tick: its length is how many ticks are whole.
         self._verdicts = Column("B", spill)
 
@@ -335,9 +344,11 @@ class Series:
             state = _MUTED
         else:
             state = _STATE[result.verdict]
-            if state == _WITHIN and self.open:
-                self._instants[_WITHIN] += 1
+            idle = result.nothing and self.open != INFORMS
+            if (state == _WITHIN or idle) and self.open:
+                self._instants[state] += 1
                 self._seconds[_OPEN] += dt
+                self._unseen = self._unseen or (idle and dt > 0)
                 return
         self._seconds[state] += dt
         self._instants[state] += 1
@@ -435,7 +446,7 @@ class Series:
         if not self.known:
             return Verdict.UNDECIDED
         found = worst_verdict(v for v, code in CODES.items() if code in self._said)
-        if found is None and (self._never_judged() or self._never_applied()):
+        if found is None and (self._never_judged() or self._never_applied() or self._unseen):
             return Verdict.UNDECIDED
         open_ = self._is_open or self._is_one_instant
         return Verdict.UNDECIDED if found is Verdict.WITHIN and open_ else found
@@ -485,8 +496,8 @@ class Series:
             worst, verdict = self._tracker.worst, self.verdict
             if verdict is worst.verdict:
                 return worst
-            reason = "; ".join(filter(None, (self.gap() if worst.verdict else "", worst.reason)))
-            return worst._replace(verdict=verdict, reason=reason)
+            gap = self.gap() if worst.verdict or self._unseen else ""
+            return worst._replace(verdict=verdict, reason="; ".join(filter(None, (gap, worst.reason))))
         if not self.known:
             raise Undecided(f"{self.name} was never heard in this run")
         return self._worst_of_arrays()

@@ -27,7 +27,7 @@ from seerob.criteria.judging import Judge, held, held_names, needed, unmentioned
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
-from seerob.recording.series import CODES, ONE_INSTANT
+from seerob.recording.series import CODES, INFORMS, ONE_INSTANT
 from seerob.session.known_motion import known_motion
 from seerob.session.run import Bound, Feed, engine_of, settled
 from seerob.twin.spans import Path, Ways
@@ -72,7 +72,9 @@ class Column:
         order = (Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN)
         found = next((verdict for verdict in order if CODES[verdict] in there), None)
         known = not self.between or self.between.startswith("accepted: ")
-        return found if known or found is not Verdict.WITHIN else Verdict.UNDECIDED
+        nothing = self.answers.nothing
+        idle = found is None and self.between != INFORMS and nothing is not None and bool(nothing.any())
+        return Verdict.UNDECIDED if not known and (found is Verdict.WITHIN or idle) else found
 
     def __repr__(self) -> str:
         verdict = "no verdict" if self.verdict is None else self.verdict.value
@@ -463,6 +465,11 @@ def _nothing(criterion: Criterion, n: int) -> Answers:
     return Answers(np.full(n, np.nan), limits, np.full(n, UNDECIDED, np.uint8))
 
 
+def _idle(answers: Answers) -> Flags:
+    """Where there was nothing to judge, shape (N,)."""
+    return np.zeros(len(answers.value), bool) if answers.nothing is None else answers.nothing
+
+
 def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]:
     said = [answers for answers, _ in parts]
     ends = [answers.interval for answers in said if answers.interval is not None]
@@ -474,6 +481,7 @@ def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]
         np.concatenate([np.zeros(0), *(answers.limit for answers in said)]),
         np.concatenate([np.zeros(0, np.uint8), *(answers.verdict for answers in said)]),
         interval,
+        np.concatenate([np.zeros(0, bool), *(_idle(answers) for answers in said)]),
     )
     return joined, np.concatenate([np.zeros(0, object), *(reasons for _, reasons in parts)])
 
@@ -567,6 +575,7 @@ def _of_results(results: Sequence[Result]) -> tuple[Answers, Reasons]:
         numbers([r.value for r in results]),
         numbers([r.limit for r in results]),
         np.array([CODES[r.verdict] for r in results], np.uint8),
+        nothing=np.array([r.nothing for r in results], bool),
     )
     if any(r.interval for r in results):
         low, high = (numbers([r.interval[k] if r.interval else r.value for r in results]) for k in range(2))

@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 from seerob.core.plugin import kind_of
 from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
-from seerob.criteria.judging import UNBOUNDED, Bound
+from seerob.criteria.judging import Bound
 from seerob.description.norms.editions import headline
 from seerob.model.model import Model
 from seerob.recording.series import STILL
@@ -98,7 +98,7 @@ def _between(bound: Bound, station: Workstation, *, fed: bool) -> str:
         return STILL
     sparse = criterion.every is not None and criterion.every > 1.5 * tick
     if bound.watch is None and sparse and criterion.between_samples is None:
-        return UNBOUNDED
+        return bound.unbounded
     return bound.between
 
 

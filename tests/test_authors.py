@@ -575,3 +575,17 @@ def test_what_is_written_into_arrays_of_many_instants_changes_no_other(own, spoi
     for name in one:
         assert one[name].note == ""
         np.testing.assert_array_equal(one[name].value, other[name].value, name)
+
+
+PARTLY = MANY.replace("    def batch", "    whole = False\n    def batch")
+
+
+def test_one_that_judges_bone_by_bone_and_asks_nobody_is_not_within_while_somebody_is_not_heard(own):
+    """On the road and in arrays: it would say what it said before."""
+    text = PARTLY.format(ALONE.format("1.0"))
+    station = own(text, LOG)
+    Path(station.model.folder, "m.csv").write_text(GAP)
+    run, many = station.run().results["own"], station.batch()["own"]
+    for verdicts in (run.verdicts, many.answers.verdict):
+        assert (verdicts[20], verdicts[60]) == (0, 2)
+    assert "arm: not heard" in many.reasons[60]

@@ -8,20 +8,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as changed
 
-from made_cell import TWO_R, UR10, heard, made, meant, two_r, wave
+from made_cell import TWO_R, UR10, heard, made, meant, person, two_r, wave
+from motion_io import made_pictures
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Basis, Result, Verdict
-from seerob.criteria.criterion import Criterion
+from seerob.criteria.criterion import Criterion, judge
 from seerob.recording.answers import Answers
 from seerob.recording.series import CODES, NO_VERDICT
 from seerob.session import batch as batches
 from seerob.session.run import Judge
+from seerob.session.station import Station
 from seerob.twin.engine import Engine
 from seerob.twin.spans import Ways
 from seerob.twin.states import States
-from seerob.workstation.source import Opened, Pump
+from seerob.workstation.source import Opened, Pump, Source
 
 N = 70
 T = 0.01 * np.arange(N)
@@ -410,3 +413,72 @@ def test_names_that_do_not_exist_are_told(cell, batch):
 def test_no_instants_are_no_answers(cell):
     found = cell.batch({"arm": np.zeros((0, 6))}, {"arm": np.zeros((0, 6))})
     assert all(len(column.value) == 0 and column.verdict is None for column in found.values())
+
+
+@pytest.mark.parametrize(("height", "verdict"), [(1.0, Verdict.WITHIN), (2.5, Verdict.UNDECIDED)])
+def test_a_person_whom_a_device_saw_above_the_floor_is_held_in_arrays_too(tmp_path, height, verdict):
+    text = "[engine]\nphysics = false\n" + person("op") + TWO_R
+    text += "q = [0, 0]\nbase = { position = [4, 0, 0] }\n"
+    text += '[[sources]]\nkind = "kinect_recording"\nhuman = "op"\nfile = "p.json"\n'
+    text += f"at = {{ position = [0, 0, {height}], rpy_deg = [0, 0, 0] }}\n"
+    text += '[[safety]]\nkind = "minimum_distance"\nname = "d"\nbetween = ["arm", "op"]\nlimit = 0.1\n'
+    seen = made_pictures.offline_json(made_pictures.pictures(8))
+    station = made(tmp_path, text, {"arm.urdf": two_r(), "p.json": seen})
+    assert station.run().results["d"].verdict is verdict
+    assert station.batch()["d"].verdict is verdict
+
+
+class Rough(Source, frozen=True, kw_only=True):
+    """Says where an arm is that stands, too coarsely for energies."""
+
+    why: str = "told in whole degrees"
+
+    def target(self):
+        return "arm"
+
+    def coarse(self, folder):
+        return self.why
+
+    def open(self, folder, target):
+        samples = [heard("arm", t, (0, 0), (0, 0)) for t in (0.0, 0.05, 0.1)]
+        return Opened(samples=samples, duration=0.1)
+
+
+def test_what_is_heard_too_coarsely_for_energies_is_undecided_in_arrays_too(tmp_path):
+    text = TWO_R + '[[safety]]\nkind = "kinetic_energy"\nname = "E"\nrobot = "arm"\nlimit = 1\n'
+    cell = made(tmp_path, text, {"arm.urdf": two_r()}).workstation
+    (energy,) = cell.safety
+    for why, verdict in (("told in whole degrees", Verdict.UNDECIDED), ("", Verdict.WITHIN)):
+        for more in ({}, {"between_samples": "accepted: it stands"}):
+            criteria = (changed(energy, **more), Walked(name="walked", limit=9.0))
+            station = Station(changed(cell, sources=(Rough(name="rough", why=why),), safety=criteria))
+            run, many = station.run().results, station.batch()
+            assert run["E"].verdict is verdict is many["E"].verdict
+            assert run["walked"].verdict is verdict is many["walked"].verdict
+            assert many["walked"].note.startswith("asked instant by instant")
+
+
+class Walked(Criterion, frozen=True, kw_only=True):
+    """A mass of an arm, asked of one instant."""
+
+    limit: float
+    between_samples: str = "accepted: it stands"
+
+    def subjects(self):
+        return ("arm",)
+
+    def basis(self, model):
+        return Basis(formula="M", source="ACME")
+
+    def bind(self, model):
+        def evaluate(state):
+            value = float(state.mass_matrix(state.model.mechanisms["arm"])[1, 1])
+            return Result(name=self.name, value=value, limit=self.limit, verdict=judge(value, self.limit))
+
+        return evaluate
+
+
+def test_what_nothing_could_exceed_is_not_within():
+    for limit, at_most in ((np.inf, True), (-np.inf, False)):
+        found = Answers.against(np.ones(3), limit, at_most=at_most).contradictions(at_most=at_most)
+        assert set(found) == {"it is within, and nothing could exceed its limit"}

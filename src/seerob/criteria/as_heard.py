@@ -45,6 +45,11 @@ class AsHeard:
         self._found: tuple[Finding, ...] = ()
         self._due = 0.0
 
+    @property
+    def waits(self) -> bool:
+        """Whether there is somebody whom a device puts where they are, who was not heard yet."""
+        return bool(self._waiting)
+
     def at(self, state: State) -> tuple[Finding, ...] | None:
         """What is implausible now; None where nothing is new."""
         if not self._waiting and not self._found:

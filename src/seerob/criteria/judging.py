@@ -110,7 +110,7 @@ def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[i
     return tuple(names), tuple(bodies)
 
 
-def _relied_on(criterion: Criterion, model: Model) -> tuple[str, ...]:
+def relied_on(criterion: Criterion, model: Model) -> tuple[str, ...]:
     """Of whom something must be heard for one's own to be within that judges bone by bone, or part by part.
 
     One that ships raises `Undecided` itself, or finds that what is known suffices.
@@ -384,8 +384,8 @@ def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
 def _question(bound: Bound, model: Model) -> _Question:
     names, bodies = needed(bound.criterion, model)
     declared = _all_declared(bound.criterion, model)
-    shapeless, relied_on = unmentioned(bound.criterion, model), _relied_on(bound.criterion, model)
-    return _Question(bound, bound.criterion, names, bodies, declared, shapeless, relied_on)
+    shapeless, rests = unmentioned(bound.criterion, model), relied_on(bound.criterion, model)
+    return _Question(bound, bound.criterion, names, bodies, declared, shapeless, rests)
 
 
 class Judge:

@@ -62,9 +62,9 @@ class Answers:
         verdict = np.where(where, NO_VERDICT, self.verdict).astype(np.uint8)
         return replace(self, verdict=verdict, nothing=where if self.nothing is None else self.nothing | where)
 
-    def open(self) -> Answers:
-        """Turn WITHIN into UNDECIDED everywhere, because limits may be worse than they say."""
-        verdict = np.where(self.verdict == WITHIN, UNDECIDED, self.verdict)
+    def open(self, where: Flags | bool = True) -> Answers:
+        """Turn WITHIN into UNDECIDED where it may not be what it says: everywhere when not given."""
+        verdict = np.where((self.verdict == WITHIN) & where, UNDECIDED, self.verdict)
         return replace(self, verdict=verdict.astype(np.uint8))
 
     def contradictions(self, *, at_most: bool) -> NDArray[np.object_]:
@@ -77,11 +77,13 @@ class Answers:
         low, high = (self.value, self.value) if self.interval is None else self.interval
         ends = np.array([self.value, low, high], float)
         kept = keep_many(ends, self.limit, at_most=at_most).all(axis=0) & np.isfinite(self.value)
+        kept &= ~np.isinf(self.limit)
         if not (wordless or (within & (nothing | ~kept)).any()):
             return np.full(len(self.value), "", object)
         told = np.where(
             np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
         )
+        told = np.where(np.isinf(self.limit), "it is within, and nothing could exceed its limit", told)
         told = np.where(np.isfinite(self.value), told, "it is within, and has no value")
         told = np.where(nothing, "it is within, and says that there is nothing to judge", told)
         told = np.where(within & (nothing | ~kept), told, "")

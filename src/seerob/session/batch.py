@@ -22,13 +22,15 @@ from msgspec.structs import replace as changed
 from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
+from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.criterion import Criterion, EvaluateMany
-from seerob.criteria.judging import Judge, held, held_names, needed, unmentioned, unmoved, worded
+from seerob.criteria.judging import Judge, held, held_names, needed, relied_on, unmentioned, unmoved, worded
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, INFORMS, ONE_INSTANT
 from seerob.session.known_motion import known_motion
+from seerob.session.opening import coarse
 from seerob.session.run import Bound, Feed, engine_of, settled
 from seerob.twin.spans import Path, Ways
 from seerob.twin.state import Hearing, State
@@ -130,8 +132,9 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     heard = list(feed)
     engine = engine_of(model, _Whereabouts)
     still = frozenset(name for name in model.mechanisms if not engine.state.moved(name))
-    if (known := known_motion(engine, heard, end)) is not None:
-        return replace(known, still=still)
+    as_heard, implausible = AsHeard(model), dict[Finding, None]()
+    if not as_heard.waits and (known := known_motion(engine, heard, end)) is not None:
+        return replace(known, still=still, coarse=coarse(model))
     engine = engine_of(model, _Whereabouts)
     engine.end = end
     t, q, v = [], [], []
@@ -146,6 +149,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         v.append(state.data.qvel.copy())
         if state.path is not None:
             ways.append(state.path)
+        implausible |= dict.fromkeys(as_heard.at(state) or ())
         for name, found in doubts.items():
             found.append(state.invalid_reason(name))
             noise[name].append(state.hearings[name].speed_error(state.t))
@@ -157,7 +161,16 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         if any(one is not None for one in every)
     }
     arrays = np.array(t), np.array(q), np.array(v)
-    return Motion(*arrays, reasons, ways=tuple(ways), foreseen=True, speed_errors=errors, still=still)
+    return Motion(
+        *arrays,
+        reasons,
+        ways=tuple(ways),
+        foreseen=True,
+        speed_errors=errors,
+        still=still,
+        coarse=coarse(model),
+        implausible=tuple(implausible),
+    )
 
 
 def judged(
@@ -183,7 +196,8 @@ def judged(
         claims = (claim for one in bound for claim in one.criterion.claims(model))
         refuted = (each.of_motion(motion) for each in claims if each.holds not in {f.holds for f in findings})
         findings = (*findings, *filter(None, refuted))
-    asked, notes = _able(model, bound, findings)
+    # Whom that holds, and when, is found out on the road.
+    asked, notes = _able(model, bound, (*findings, *motion.implausible))
     length = min(max(STRETCH, -(-n // SHARES)), LONGEST)
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, length), n]) if begin < end]
     questions = Questions(model)
@@ -323,7 +337,8 @@ def _able(
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
-            able[criterion.name] = _Able(criterion, many, names, _movers(criterion, model))
+            needs, rests = _movers(criterion, model), relied_on(criterion, model)
+            able[criterion.name] = _Able(criterion, many, names, needs, rests)
     return able, notes
 
 
@@ -337,6 +352,9 @@ class _Able:
     """By name that findings hold, why nothing that depends on it is within."""
     needs: tuple[str, ...]
     """Who must be where the motion says, whatever it asks (`seerob.criteria.judging.needed`)."""
+
+    relied_on: tuple[str, ...]
+    """Of whom something must be heard where it is within."""
 
     @cached_property
     def own(self) -> bool:
@@ -384,6 +402,9 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
             if motion.doubts[who].any():
                 reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
         answers = _doubted(answers, one.criterion, reasons)
+        for who in one.relied_on:
+            reasons = np.where(answers.verdict == WITHIN, motion.doubts[who], reasons)
+            answers = answers.open(motion.doubts[who] != "")
         if still := motion.still & states.speeds_asked:
             reasons = np.where(answers.verdict == WITHIN, unmoved(still), reasons)
             answers = answers.open()
@@ -505,7 +526,13 @@ def _walked(
     """
     # Between two instants nobody is silent, however long it is.
     hearings = {
-        name: Hearing(given=False, driven=True, timeout=np.inf, once=name in motion.still)
+        name: Hearing(
+            given=False,
+            driven=True,
+            timeout=np.inf,
+            once=name in motion.still,
+            coarse=motion.coarse.get(name, ""),
+        )
         for name in model.mechanisms
     }
     data = mujoco.MjData(model.mj)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.errors import InputError, Problem, Undecided
+from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.distance.least import Closests, Per, Query, Survey
 from seerob.kernels.chain import held_many, jacobians
@@ -62,6 +63,10 @@ class Motion:
     """Which of its instants is the first one here."""
     still: frozenset[str] = frozenset()
     """Robots whose speed nobody tells (`seerob.twin.validity.validity.Validity.moved`)."""
+    coarse: Mapping[str, str] = field(default_factory=dict)
+    """Of robots and people that are heard too coarsely for energies and forces, why."""
+    implausible: tuple[Finding, ...] = ()
+    """What was found of where devices saw people, at any instant."""
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
@@ -70,7 +75,19 @@ class Motion:
         part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
         errors = {name: found[begin:end] for name, found in self.speed_errors.items()}
         whole = self if self.of is None else self.of
-        return Motion(*part, doubts, self.foreseen, ways, errors, whole, self.begin + begin, self.still)
+        begin += self.begin
+        return Motion(
+            *part,
+            doubts,
+            self.foreseen,
+            ways,
+            errors,
+            whole,
+            begin,
+            self.still,
+            self.coarse,
+            self.implausible,
+        )
 
 
 class Questions:
@@ -256,9 +273,11 @@ class States:
         """Joint-space mass matrices [kg·m², kg·m or kg], shape (N, n, n).
 
         Raises:
-            Undecided: A mass that nobody gave.
+            Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
         self._weigh(mechanism)
+        if why := self._motion.coarse.get(mechanism.name):
+            raise Undecided(f"{mechanism.name}: {why}")
         key = "M", mechanism.name
         if key not in self._cache:
             columns = self._bench.columns[mechanism.name]

@@ -191,13 +191,17 @@ def compiled(path: Path, allowed: Allowed = NOTHING, *, quiet: bool = False, sou
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """No search for garbage meanwhile: a start makes much and leaves little behind, and was a tenth of it."""
+    """No search for garbage meanwhile, nor among what was made: it was a tenth of a start.
+
+    A start makes much and leaves little behind.
+    """
     collects = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         if collects:
+            gc.freeze()
             gc.enable()
 
 

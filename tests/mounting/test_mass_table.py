@@ -63,7 +63,6 @@ def rows(cell):
         (INERTIAL.replace('izz="0.01"', 'izz="1"'), "break A \\+ B"),
         (INERTIAL.replace('"3"', '"0.001"') + BOX.format(0.2), "lighter than any foam"),
         (f'<inertial><mass value="3"/>{SIX.format(1e-6)}</inertial>{BOX.format(0.1)}', "radius of gyration"),
-        (INERTIAL.replace("<mass", '<origin xyz="3 0 0"/><mass') + BOX.format(0.1), "outside all that moves"),
     ],
     ids=[
         "none",
@@ -75,7 +74,6 @@ def rows(cell):
         "refused, no shape",
         "foam",
         "a point",
-        "beside",
     ],
 )
 def test_what_nobody_weighed_behind_a_fixed_joint_leaves_it_undecided(tmp_path, inside, said):

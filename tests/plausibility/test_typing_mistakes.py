@@ -253,6 +253,61 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "safety[3].limit",
         {"speed", "distance", "separation"},
     ),
+    "a quaternion with w last": (
+        {"base": "position = [0, 0, 0.75], wxyz = [0, 0, 0.70710678, 0.70710678]"},
+        "robots[0].base.wxyz",
+        set(),
+    ),
+    "no turn with w last": (
+        {"tool": CELL["tool"] + "\ntcp = { position = [0, 0, 0.12], wxyz = [0, 0, 0, 1] }"},
+        "tools[0].tcp.wxyz",
+        set(),
+    ),
+    "metres in offset_mm": (
+        {"limit": "limit = 1.0\noffset_mm = [0, 0, 0.13]"},
+        "safety[0].offset",
+        {"distance", "separation"},
+    ),
+    "a door's travel in milliseconds": (
+        {
+            "more": '[[machines]]\nname = "door"\nshape = { box = [0.05, 1, 2] }\n'
+            "at = { position = [-2, 0, 1] }\n"
+            'slide = { along = [0, 1, 0], open = "o", lower = 0, upper = 1, travel = 1500 }\n'
+        },
+        "machines[0].slide.travel",
+        {"speed", "distance", "separation"},
+    ),
+    "kilograms in load_g": (
+        {"more": '[[phases]]\ntitle = "lifts"\nload_g = 8\n'},
+        "phases[0].load",
+        set(),
+    ),
+    "hours of lifting as seconds": (
+        {
+            "more": '[[ergonomics]]\nkind = "niosh"\nname = "lift"\nhuman = "operator"\nwork = 4\n'
+            "recovery = 600\nexclusions = []\nlifts = [{ load = 18, heaviest = 20, per_minute = 3, "
+            'control = false, coupling = "fair", origin = { horizontal = 0.5, vertical = 0.3, '
+            "asymmetry_deg = 40 }, destination = { horizontal = 0.5, vertical = 1.2, asymmetry = 0 } }]\n"
+        },
+        "ergonomics[0].work",
+        {"speed", "distance", "separation"},
+    ),
+    "radians in a threshold in degrees": (
+        {
+            "more": '[[ergonomics]]\nkind = "rula"\nname = "posture"\nhuman = "operator"\n'
+            "thresholds = { trunk_twist_deg = 0.17 }\n"
+        },
+        "ergonomics[0].thresholds.trunk_twist",
+        {"speed", "distance", "separation"},
+    ),
+    "a radius of a body's size": (
+        {
+            "more": '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "ur5"\n'
+            'human = "operator"\ncontact_radius = { ur5 = 0.57 }\n'
+        },
+        "safety[3].contact_radius.ur5",
+        {"speed", "distance", "separation"},
+    ),
     "limit in g": (
         {"more": '[[safety]]\nkind = "effective_mass"\nat = "ur5"\nlimit = 300\n'},
         "safety[3].limit",

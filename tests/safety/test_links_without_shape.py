@@ -150,6 +150,16 @@ def test_a_body_whose_mass_nobody_knows_either_is_not_shown(tmp_path, urdf):
     assert "no shape shows" in result.reason
 
 
+def test_a_mass_in_a_point_beside_its_shape_is_not_shown(tmp_path):
+    """Nobody knows how heavy it is, but where its centre is said to be there is no shape."""
+    beside = two_r().replace('ixx="0.002" iyy="0.002"', 'ixx="1e-11" iyy="1e-11"')
+    beside = beside.replace('<box size="1 0.1 0.1"/>', '<box size="0.4 0.1 0.1"/>')
+    station = cell(tmp_path, beside)
+    assert "radius of gyration" in station.model.robot("arm").unknown_masses[0]
+    result = results_at(station, arm=((0.0, 0.0), (1.0, 0.0)))["minimum_distance"]
+    assert (result.verdict, "no shape shows" in result.reason) == ("undecided", True)
+
+
 @pytest.mark.parametrize(("first", "second", "shown"), [(5e-4, 1.0, False), (5e-4, 5e-4, True)])
 def test_what_carries_something_a_metre_ahead_is_no_frame(tmp_path, first, second, shown):
     """Half a gram between two joints 1 m apart; it is a frame where nothing hangs on it."""

@@ -17,12 +17,12 @@ INERTIA = M * L**2
 ONE = (
     f'<robot name="one"><link name="base"/><link name="l1"><inertial>'
     f'<origin xyz="{L} 0 0"/><mass value="{M}"/>'
-    '<inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
+    '<inertia ixx="4e-3" iyy="1e-11" izz="4e-3" ixy="0" ixz="0" iyz="0"/></inertial>'
     '<collision><origin xyz="0.4 0 0"/><geometry><box size="0.8 0.1 0.1"/></geometry></collision></link>'
     '<joint name="j1" type="continuous"><parent link="base"/><child link="l1"/><axis xyz="0 -1 0"/>'
     '<limit effort="100" velocity="10"/></joint></robot>'
 )
-"""A point mass on a rod; the joint angle is the rod's elevation."""
+"""A mass on a rod, a needle along the axis: a point in its plane; the angle is the rod's elevation."""
 
 
 def stop(folder, urdf, q, qd, brakes, *, gravity=True, reaction=0.1, scale=1.0):

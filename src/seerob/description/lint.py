@@ -6,7 +6,7 @@ of a whole description return findings. What cannot be used at all is the reader
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -40,8 +40,6 @@ REPAIRABLE = 0.02
 """Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
 CONCENTRATED = 0.04
 """Least radius of gyration over the diagonal of the box around a shape: a rod has 0.29, a ball 0.18."""
-BESIDE = 0.1
-"""Up to this a centre of mass may be outside of a shape [m]: makers' own files put it 0.07 m outside."""
 LIGHT = 0.05
 """Up to this what nobody weighed, and is as small in the heaviest metal, is a marker [kg]."""
 FRAME = 1e-3
@@ -197,45 +195,23 @@ def too_light(link: Link) -> str:
     return f"{link.inertial.mass:.3g} kg in {volume:.3g} m³ is lighter than any foam: give it in masses"
 
 
-def misfit(link: Link, group: Sequence[Link], poses: Mapping[str, Array]) -> str:
-    """Why the mass of a link is not where its file says; empty when it can be, or is next to nothing.
+def as_good_as_a_point(link: Link) -> str:
+    """Why the mass of a link is spread farther than its file says; empty when it need not be, or is little.
 
-    Of a body that is said to be as good as a point, or far beside all that moves with it, energies and
-    effective masses may be far too low. Spread too far it makes them too high, which is only told.
-
-    Args:
-        link: With its mass.
-        group: Every link that moves as one with it, itself among them.
-        poses: Of all of them in one frame, shape (4, 4) each.
+    Of a body that is said to be as good as a point energies and effective masses may be far too low. One that
+    is said to be spread too far has them too high, which is only told.
     """
     inertial = link.inertial
     if inertial is None or inertial.mass <= LIGHT or inertial.origin is Origin.GIVEN or not link.solids:
         return ""
-    size = float(np.linalg.norm(np.subtract(*box(link.solids))))
-    gyration = _gyration(inertial)
-    if gyration < CONCENTRATED * size:
-        return f"radius of gyration {gyration:.3g} m in a shape of {size:.3g} m: give it in masses"
-    corners = np.concatenate(
-        [
-            extreme_points(solid) @ poses[each.name][:3, :3].T + poses[each.name][:3, 3]
-            for each in group
-            for solid in (*each.solids, *(Solid(mesh=mesh) for mesh in each.visual))
-        ]
-    )
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    at = poses[link.name]
-    outside = _outside(at[:3, :3] @ inertial.com + at[:3, 3], low, high)
-    if outside > max(BESIDE, float(np.linalg.norm(high - low)) / 2):
-        return f"its centre of mass lies {outside:.3g} m outside all that moves with it: give it in masses"
-    return ""
+    size, gyration = float(np.linalg.norm(np.subtract(*box(link.solids)))), _gyration(inertial)
+    if gyration >= CONCENTRATED * size:
+        return ""
+    return f"radius of gyration {gyration:.3g} m in a shape of {size:.3g} m: give it in masses"
 
 
 def _gyration(inertial: Inertial) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(inertial.inertia).max() / inertial.mass))
-
-
-def _outside(point: Array, low: Array, high: Array) -> float:
-    return float(np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0)))
 
 
 def filled(solid: Solid) -> float:
@@ -359,7 +335,7 @@ def misplaced_mass(link: Link) -> Iterator[tuple[str, str, str]]:
     low, high = box(link.solids)
     size = float(np.linalg.norm(high - low))
     com = link.inertial.com
-    outside = _outside(com, low, high)
+    outside = float(np.linalg.norm(np.maximum(np.maximum(low - com, com - high), 0)))
     if outside > 0.25 * size:
         text = f"centre of mass {np.round(com, 4).tolist()} m lies {outside:.3g} m outside the shape's box"
         yield "warning", link.name, text

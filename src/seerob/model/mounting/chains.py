@@ -11,7 +11,7 @@ from seerob.core.shapes import Solid
 from seerob.core.snapshot import Finding, LinkMass, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Description, Inertial, Joint, Link, base_from_links, groups
-from seerob.description.lint import DENSITIES, FLANGES, LIGHT, TIPS, misfit, too_light
+from seerob.description.lint import DENSITIES, FLANGES, LIGHT, TIPS, as_good_as_a_point, too_light
 from seerob.model.model import Mechanism
 from seerob.model.mounting.specification import extreme_points
 
@@ -66,14 +66,11 @@ def weighed(description: Description, *, carried: bool) -> tuple[LinkMass, ...]:
     carrying = _joints_without_body(description)
     spare = LIGHT
     moving: set[str] = set()
-    poses = base_from_links(description, {})
     for group in groups(description.links):
         for link in group:
             if carried or link.joints or link.parent in moving:
                 moving.add(link.name)
             row = _weighed(description.name, link, bodiless=link.name in carrying)
-            if row.mass and (why := misfit(link, group, poses)):
-                row = LinkMass(name=row.name, origin=Origin.MISSING, note=why)
             silent = link.inertial is None and not link.refused_mass and not link.joints
             bound = _heaviest(link) if silent and row.mass is None else 0.0
             if 0 < bound < spare:
@@ -90,7 +87,9 @@ def _weighed(robot: str, link: Link, *, bodiless: bool) -> LinkMass:
     name, inertial = f"{robot}/{link.name}", link.inertial
     if inertial is not None:
         invalid_reason = (
-            f"it is a guess ({inertial.source})" if inertial.origin is Origin.ASSUMED else too_light(link)
+            f"it is a guess ({inertial.source})"
+            if inertial.origin is Origin.ASSUMED
+            else too_light(link) or as_good_as_a_point(link)
         )
         if invalid_reason:
             return LinkMass(name=name, origin=Origin.MISSING, note=invalid_reason)

@@ -206,6 +206,8 @@ def _unshaped(mj: mujoco.MjModel, masses: Iterable[LinkMass], bodies: Sequence[B
             near = [body.mj for body in bodies if mj.body_weldid[body.mj] == mj.body_weldid[i]]
             if i not in near and (row.note or not near):
                 yield row.name
+            elif i in near and row.note and mj.body_mass[i] > 0:  # where its centre lies is said all the same
+                groups.setdefault(int(mj.body_weldid[i]), []).append((i, row.name, 0.0))
         elif i > 0 and 0 < (row.mass or 0.0) <= FRAME:
             if not any(mj.body_weldid[body.mj] == mj.body_weldid[i] for body in bodies) and _spans(
                 mj, data, i

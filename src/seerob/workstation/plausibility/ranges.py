@@ -223,6 +223,7 @@ class Range(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     zero: bool = False
     norm: bool = False
     twice: bool = False
+    last: bool = False
     because: str
     right: str
     source: str
@@ -285,6 +286,8 @@ def implausible(values: Sequence[float], row: Range) -> float | None:
             return value
         if row.twice and converted_twice(size):
             return value
+    if row.last and turned_in_another_order(values):
+        return values[-1]
     return None
 
 
@@ -292,6 +295,12 @@ def converted_twice(angle: float) -> bool:
     """Whether an angle [rad] is a round one in radians, a multiple of 45°, that was read in degrees."""
     eighths = math.degrees(abs(angle)) / (math.pi / 4)
     return 0 < round(eighths) <= 8 and abs(eighths - round(eighths)) <= ROUND * eighths
+
+
+def turned_in_another_order(wxyz: Sequence[float]) -> bool:
+    """Whether a quaternion is one about z, or none, with w last: with w first it turns things over."""
+    w, x, _, z = wxyz
+    return w == 0 and x == 0 and z != 0
 
 
 def sentence(quantity: Quantity, value: float, row: Range) -> str:
@@ -303,6 +312,8 @@ def sentence(quantity: Quantity, value: float, row: Range) -> str:
     if row.twice and converted_twice(value):
         typed = math.degrees(value)
         beyond = f"{typed:.6g}°, which would be {math.degrees(typed):.3g}° were it in radians"
+    if row.last and turned_in_another_order(numbers):
+        beyond = f"a turn of {2 * math.degrees(math.acos(min(abs(numbers[3]), 1))):.4g}° about z with w last"
     less = "" if len(numbers) == 1 else f"{shown(value)} is "
     said = f" ({quantity.said})" if quantity.said else ""
     return (

@@ -40,7 +40,11 @@ def verdict_of(station):
 def test_it_is_said_in_a_line(station):
     run = station.run()
     assert repr(station) == "<Station 'A <b>cell</b>': one robot, two criteria>"
-    for what in (station.model, run, run.results, run.results["elsewhere"], station.batch()):
+    arm = station.model.robot("arm")  # what an author of a criterion looks at first
+    of_model = (arm, arm.description, arm.description.links[3], station.model.bodies[0])
+    shapes = (station.model.bodies[0].solids[0], *(solid.mesh for solid in station.model.bodies[0].solids))
+    said = (run, run.results, run.results["elsewhere"], station.batch(), station.scene())
+    for what in (station.model, *of_model, *shapes, *said):
         assert len(repr(what)) < 120
         assert "\n" not in repr(what)
     assert "undecided" in repr(run)

@@ -43,6 +43,9 @@ class Mesh:
     color: tuple[float, float, float, float] = (0.7, 0.72, 0.75, 1.0)
     """Red, green, blue, alpha in 0…1."""
 
+    def __repr__(self) -> str:
+        return f"<Mesh: {len(self.vertices)} vertices, {len(self.faces)} triangles>"
+
     def moved(self, a_from_b: Array) -> Mesh:
         """Return this mesh expressed in frame ``a``, given the transform (4, 4) from its own frame ``b``."""
         vertices = self.vertices @ a_from_b[:3, :3].T + a_from_b[:3, 3]
@@ -75,6 +78,10 @@ class Solid:
             raise ValueError(f"points must be (2, 3) or (3, 3), not {self.points.shape}")
         if not (np.isfinite(self.radius) and self.radius >= 0):
             raise ValueError(f"radius must be finite and at least 0 m, not {self.radius}")
+
+    def __repr__(self) -> str:
+        core = repr(self.mesh) if self.points is None else ("segment", "rectangle")[len(self.points) - 2]
+        return f"<Solid {self.name!r}: {core}, radius {self.radius:g} m>"
 
 
 def capsule(start: Array, end: Array, radius: float, *, name: str = "") -> Solid:

@@ -381,3 +381,7 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     mechanisms: tuple[MechanismInfo, ...] = ()
     criteria: tuple[CriterionInfo, ...] = ()
     findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        count = f"{len(self.nodes)} bodies, {len(self.criteria)} criteria, {len(self.findings)} findings"
+        return f"<Scene {self.title!r}: {count}>"

@@ -113,6 +113,10 @@ class Link:
     solids: tuple[Solid, ...] = ()
     """For distances and contacts, in the link's frame."""
 
+    def __repr__(self) -> str:
+        names = ", ".join(joint.name for joint in self.joints) or "fixed"
+        return f"<Link {self.name!r} on {self.parent!r}: {names}>"
+
 
 @dataclass(frozen=True, eq=False)
 class Description:
@@ -130,6 +134,10 @@ class Description:
     """Constraints between links that a tree of joints has no place for, a closed loop among them."""
     files: dict[str, bytes] = field(default_factory=dict)
     """Every file that was read (name → content), for hashes and for recordings that travel."""
+
+    def __repr__(self) -> str:
+        count = f"{len(self.links)} links, {len(self.joints())} joints"
+        return f"<Description {self.name!r}: {count}, from {self.source[:60]}>"
 
     def joints(self) -> tuple[Joint, ...]:
         """Joints that can be commanded, in order; those that mimic another are not among them."""

@@ -58,6 +58,9 @@ class Body:
     holder: str = ""
     """The gripper that picks it up and lets it go: where it is, or whether it is here, depends on it."""
 
+    def __repr__(self) -> str:
+        return f"<Body {self.index} {self.name!r}: {self.role}, {len(self.solids)} solids>"
+
     @property
     def mover(self) -> str:
         """Whoever decides where it is: the robot or the person that carries it, or a gripper; or empty."""
@@ -135,6 +138,9 @@ class Mechanism:
     """Machines among ``riders`` that pick things up: its mass depends on them."""
     unshaped: tuple[str, ...] = ()
     """Full names of links and things with a mass, part of which lies where none of their shapes is."""
+
+    def __repr__(self) -> str:
+        return f"<Mechanism {self.name!r}: {self.role}, {len(self.joints)} joints, {len(self.bodies)} bodies>"
 
     @property
     def links(self) -> frozenset[str]:

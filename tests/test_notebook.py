@@ -3,6 +3,7 @@
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from html.parser import HTMLParser
+from importlib import import_module
 from multiprocessing import get_context
 
 import pytest
@@ -48,6 +49,11 @@ def test_it_is_said_in_a_line(station):
         assert len(repr(what)) < 120
         assert "\n" not in repr(what)
     assert "undecided" in repr(run)
+
+
+@pytest.mark.parametrize("name", sr.__all__)
+def test_what_seerob_offers_is_where_it_says(name):
+    assert getattr(import_module(f"seerob.{sr._HOME[name]}"), name) is getattr(sr, name)
 
 
 class Tags(HTMLParser):

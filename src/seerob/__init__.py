@@ -34,8 +34,7 @@ _HOMES = {
     "recording.result_log": ("ResultLog", "Series"),
     "session.run": ("Summary",),
     "core.snapshot": ("Origin", "Result", "Snapshot", "Verdict"),
-    "session.recorded_station": ("load_recorded",),
-    "session.station": ("Station", "load"),
+    "session.station": ("Station", "load", "load_recorded"),
     "workstation.workstation": ("Workstation",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -103,19 +103,23 @@ def quickhull(P: Array, first: Indices, size: float) -> Indices:
         size: Largest coordinate.
 
     Returns:
-        Rows of ``P``, shape (m, 3).
+        Rows of ``P``, shape (m, 3); none where there are more than points can have.
     """
     n = len(P)
     room = 2 * n + 16
     F, N = np.empty((room, 3), np.int64), np.empty((room, 6))
     alive, sliver = np.zeros(room, np.bool_), np.zeros(room, np.bool_)
-    # Points that a facet has outside of it, as lists; facets that may have some; places to use again.
+    # Points that a facet has outside of it, as lists; places of facets to use again.
     head, following = np.full(room, -1), np.empty(n, np.int64)
-    waiting, free = np.empty(room, np.int64), np.empty(room, np.int64)
-    pool, seen, fresh = np.arange(n), np.empty(room, np.int64), np.empty(room, np.int64)
+    pool, seen, fresh, free = (
+        np.arange(n),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.arange(room),
+    )
     edges, chain = np.empty((3 * room, 2), np.int64), np.empty(3 * room, np.int64)
     leaving, stamp = np.empty(n, np.int64), np.full(n, -1)
-    top, waits, frees, pooled, made, turn = 4, 0, 0, n, 4, 0
+    top, next_, frees, pooled, made, turn = 4, 0, 0, n, 4, 0
     a, b, c, d = first
     F[0, 0], F[0, 1], F[0, 2] = a, b, c
     F[1, 0], F[1, 1], F[1, 2] = a, c, d
@@ -146,17 +150,15 @@ def quickhull(P: Array, first: Indices, size: float) -> Indices:
                             held = f
                             break
             if held >= 0:
-                if head[held] < 0:
-                    waiting[waits] = held
-                    waits += 1
                 following[p] = head[held]
                 head[held] = p
-        while waits > 0 and (not alive[waiting[waits - 1]] or head[waiting[waits - 1]] < 0):
-            waits -= 1
-        if waits == 0:
+        passed = 0
+        while passed < top and head[next_] < 0:
+            next_ = next_ + 1 if next_ + 1 < top else 0
+            passed += 1
+        if passed == top:
             break
-        f = waiting[waits - 1]
-        waits -= 1
+        f = next_
         point, farthest = -1, -np.inf
         p = head[f]
         while p >= 0:
@@ -201,9 +203,11 @@ def quickhull(P: Array, first: Indices, size: float) -> Indices:
             if frees > 0:
                 frees -= 1
                 f = free[frees]
-            else:
+            elif top < room:
                 f = top
                 top += 1
+            else:
+                return F[:0]
             F[f, 0], F[f, 1], F[f, 2] = v, w, point
             fresh[made] = f
             made += 1

@@ -30,7 +30,12 @@ def convex_hull(points: Array) -> Faces | None:
         return None
     size = float(np.abs(points).max())
     corners = _simplex(points, NOISE * size)
-    return None if corners is None else quickhull(points, np.array(corners), size).astype(np.int32)
+    if corners is None:
+        return None
+    faces = quickhull(points, np.array(corners), size)
+    if not len(faces):
+        raise ArithmeticError("a convex hull that is not closed")
+    return faces.astype(np.int32)
 
 
 def hull_volume(points: Array) -> float:

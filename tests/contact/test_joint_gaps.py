@@ -14,6 +14,7 @@ from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact import joint_gaps
 from seerob.criteria.contact.clamped_regions import Clamping
+from seerob.criteria.contact.clamping import OwnJoints
 from seerob.criteria.contact.joint_gaps import Looks, _Joint, closing, places
 from seerob.session.station import Station, load
 
@@ -86,6 +87,32 @@ def test_rates_are_kept_between_starts_and_none_that_are_damaged(tmp_path: Path,
 )
 def test_an_elbow_that_folds_clamps_a_hand(tmp_path: Path, q: float, qd: float, hand: set[str]) -> None:
     assert clamped(elbow(tmp_path), arm=((0.3, q), (0.0, qd)))[HAND] == hand
+
+
+@pytest.mark.parametrize(
+    ("joint", "q", "folds"),
+    [
+        ('type="continuous"', 5.4, True),  # the elbow at 2.7
+        ('type="continuous"', 5.4 + 4 * math.pi, True),
+        ('type="revolute"', 5.4, True),
+        ('type="revolute"', 1.0, False),
+    ],
+)
+def test_an_elbow_that_follows_by_half_a_turn_clamps_wherever_it_folds(
+    tmp_path: Path, joint: str, q: float, folds: bool
+) -> None:
+    """Without ends nobody knows how often it went round; with them all of the range is looked at."""
+    urdf = two_r(mimic='<mimic joint="j1" multiplier="0.5"/>').replace('type="continuous"', joint)
+    urdf = urdf.replace('velocity="10"', 'velocity="10" lower="-6.2" upper="6.2"') if "rev" in joint else urdf
+    station = made(tmp_path, FLOATING + ARM, {"arm.urdf": urdf})
+    assert (clamped(station, (HAND,), arm=([q], [0.6]))[HAND] == BOTH) is folds
+
+
+def test_a_turn_with_one_end_goes_round_once_from_there(tmp_path: Path) -> None:
+    text = '[[machines]]\nname = "door"\nmass = 5\nturn = { lower = -0.2 }\nshape = { box = [1, 0.1, 1] }\n'
+    joints = OwnJoints(made(tmp_path, FLOATING + text).model)
+    assert joints.range(("door", 0)) == (-0.2, -0.2 + 2 * math.pi)
+    assert not joints.endless(("door", 0))
 
 
 def test_an_elbow_that_folds_on_a_hand_is_not_within_where_a_free_hand_would_be(tmp_path: Path) -> None:

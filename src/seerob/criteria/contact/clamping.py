@@ -20,8 +20,8 @@ from the shapes and the ranges of the joints:
   double elbow are near there however wide they gape. What gets in clamps as it does at any other surface;
 - of two parts that one joint moves against each other (an elbow, two fingers), every place is looked at by
   itself; see `seerob.criteria.contact.joint_gaps`;
-- between parts one of which slides without ends, and between what a gripper picks up and whatever moves
-  against it, everything gets.
+- between parts one of which slides without ends, or follows a turn without ends by a share of it, and
+  between what a gripper picks up and whatever moves against it, everything gets.
 """
 
 from __future__ import annotations
@@ -235,20 +235,28 @@ class OwnJoints:
         return sorted(coordinates, key=depth)
 
     def range(self, coordinate: Coordinate) -> tuple[float, float]:
-        """Ends of a joint [rad or m]; a turn that has none goes round once, a slide some way."""
+        """Ends of a joint [rad or m]; a turn that lacks one goes round once, a slide some way."""
         name, column = coordinate
         m = self._model.mechanisms[name]
         low, high, home = float(m.lower[column]), float(m.upper[column]), float(m.home[column])
-        some = np.pi if m.joints[column].kind == "revolute" else ENDLESS
-        low = home - some if not np.isfinite(low) else low
-        return low, max(home + some, low) if not np.isfinite(high) else high
+        below, above = np.isfinite([low, high]).tolist()
+        if m.joints[column].kind == "revolute" and not (below and above):
+            low = low if below else high - 2 * np.pi if above else home - np.pi
+            return low, low + 2 * np.pi
+        low = low if below else home - ENDLESS
+        return low, high if above else max(home + ENDLESS, low)
 
     def endless(self, coordinate: Coordinate) -> bool:
-        """Whether it slides without ends: then no range of it says what gets between two parts."""
+        """Whether no range of it says what gets between two parts: a slide without ends, or a turn without.
+
+        Of a turn once round is all, unless another joint goes with it by a share of a turn.
+        """
         name, column = coordinate
         m = self._model.mechanisms[name]
-        ends = np.isfinite([m.lower[column], m.upper[column]])
-        return m.joints[column].kind != "revolute" and not bool(ends.all())
+        if np.isfinite([m.lower[column], m.upper[column]]).all():
+            return False
+        whole = m.coupling[:, column]
+        return m.joints[column].kind != "revolute" or not bool((whole == np.round(whole)).all())
 
     def poses(self, positions: Mapping[Coordinate, Array]) -> tuple[Array, Array]:
         """Poses of all bodies with some joints there and all others at home.

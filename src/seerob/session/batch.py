@@ -34,7 +34,7 @@ from seerob.session.opening import coarse
 from seerob.session.run import Bound, Feed, engine_of, settled
 from seerob.twin.spans import Path, Ways
 from seerob.twin.state import Hearing, State
-from seerob.twin.states import Bench, Motion, Questions, Reasons, States
+from seerob.twin.states import Bench, Motion, Questions, Reasons, Seen, States
 from seerob.twin.validity.hearing import SLACK, STANDS, Heard
 
 STRETCH, LONGEST = 256, 1024
@@ -141,6 +141,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     ways: list[Path] = []
     doubts: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}
     noise: dict[str, list[Array | None]] = {name: [] for name in engine.model.mechanisms}
+    seen: dict[str, list[Seen]] = {name: [] for name in engine.model.mechanisms}
     for seq, samples in enumerate(heard):
         engine.take(samples)
         state = engine.tick() if seq else engine.start()
@@ -151,8 +152,11 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
             ways.append(state.path)
         implausible |= dict.fromkeys(as_heard.at(state) or ())
         for name, found in doubts.items():
-            found.append(state.invalid_reason(name))
-            noise[name].append(state.hearings[name].speed_error(state.t))
+            hearing = state.hearings[name]
+            # Of bones that are in doubt `Seen` tells, and the others may be relied on.
+            found.append(state.heard_doubt(name) if hearing.bones_heard else state.invalid_reason(name))
+            noise[name].append(hearing.speed_error(state.t))
+            seen[name].append(Seen.of(hearing))
     reasons = {name: np.array(found, object) for name, found in doubts.items()}
     n = {name: len(mechanism.joints) for name, mechanism in engine.model.mechanisms.items()}
     errors = {
@@ -168,6 +172,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         foreseen=True,
         speed_errors=errors,
         still=still,
+        seen={name: every for name, every in seen.items() if any(each.once or each.said for each in every)},
         coarse=coarse(model),
         implausible=tuple(implausible),
     )
@@ -204,7 +209,7 @@ def judged(
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
     left: dict[str, list[Flags]] = {name: [] for name in asked}
     speeds: list[Array] = []
-    noisy: set[str] = set()
+    alone: dict[str, str] = {}
     if asked and parts:
         # Learns what distances are asked, so that every stretch asks for all of them together.
         _stretch(Bench(model, questions), asked, parts[0].part(0, 1))
@@ -214,14 +219,14 @@ def judged(
         for k in range(len(parts)):
             stretch, fast, rested = made[k % len(shares)][k // len(shares)]
             speeds.append(fast)
-            noisy |= rested
-            for name, (answers, reasons, alone) in stretch.items():
+            alone |= rested
+            for name, (answers, reasons, open_) in stretch.items():
                 found[name].append((answers, reasons))
-                left[name].append(alone)
-    for name in noisy:
-        # How far errors of speeds reach is asked of a state (`seerob.criteria.noisy_speeds`).
+                left[name].append(open_)
+    for name, why in alone.items():
+        # How far errors reach is asked of a state (`seerob.criteria.noisy_speeds`, `State.require_bodies`).
         del asked[name], found[name]
-        notes[name] = "asked instant by instant: speeds are derived from noisy positions"
+        notes[name] = f"asked instant by instant: {why}"
     slow = [one for one in bound if one.criterion.name not in asked]
     walked = _walked(model, slow, motion, findings) if slow else {}
     walked |= {name: _joined(answers) for name, answers in found.items()}
@@ -379,17 +384,17 @@ def _share(
     questions: Questions,
     asked: dict[str, _Able],
     parts: Sequence[Motion],
-) -> list[tuple[Part, Array, set[str]]]:
+) -> list[tuple[Part, Array, dict[str, str]]]:
     """The work of one thread."""
     bench = Bench(model, questions)
     return [_stretch(bench, asked, part) for part in parts]
 
 
-def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Part, Array, set[str]]:
-    """What criteria say, speeds of all bodies, and which criteria asked for speeds that are noisy."""
+def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Part, Array, dict[str, str]]:
+    """What criteria say, speeds of all bodies, and why some are to be asked instant by instant."""
     states = bench.place(motion)
     found: Part = {}
-    noisy: set[str] = set()
+    alone: dict[str, str] = {}
     for name, one in asked.items():
         states.asked.clear()
         states.speeds_asked.clear()
@@ -397,7 +402,10 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
         answers, reasons = _said(one, states)
         with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
         if not motion.speed_errors.keys().isdisjoint(with_carriers | states.speeds_asked):
-            noisy.add(name)
+            alone[name] = "speeds are derived from noisy positions"
+        asked_of = states.asked | {above for who in states.asked for above in bench.model.carriers_of(who)}
+        if some := sorted(motion.seen.keys() & asked_of):
+            alone[name] = f"more is known of {some[0]} than where it is"
         for who in sorted(states.asked):
             if motion.doubts[who].any():
                 reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
@@ -415,8 +423,8 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
     # Only what is within, and so has a limit, is to stay so on the way.
     kept = any((answers.verdict == WITHIN).any() for answers, _, _ in found.values())
     if motion.ways is not None and kept:
-        return found, states.largest_speeds(), noisy
-    return found, np.full((len(states), len(bench.ids)), np.nan), noisy
+        return found, states.largest_speeds(), alone
+    return found, np.full((len(states), len(bench.ids)), np.nan), alone
 
 
 def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
@@ -554,6 +562,8 @@ def _walked(
                 continue
             data.qpos[:], data.qvel[:] = motion.q[k], motion.v[k]
             since = max(k - 1, 0)
+            for name, every in motion.seen.items():
+                every[k].tell(hearings[name])
             for name, hearing in hearings.items():
                 said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
                 errors = motion.speed_errors.get(name)

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -33,9 +33,28 @@ from seerob.twin.authors_view import OF_MANY, AuthorsView
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path, Ways
 from seerob.twin.trees import Followed, Tree
+from seerob.twin.validity.hearing import BoneErrors, BonesHeard, Hearing
 
 Reasons = NDArray[np.object_]
 """Why something is not known at each instant, empty where it is; shape (N,)."""
+
+
+class Seen(NamedTuple):
+    """What is known of somebody at an instant besides where they are."""
+
+    once: bool
+    """They were heard once, and that told no speed."""
+    errors: BoneErrors
+    said: Sequence[BonesHeard]
+
+    @classmethod
+    def of(cls, hearing: Hearing) -> Seen:
+        """What a run knows now."""
+        return cls(hearing.once, {**hearing.bones}, [*hearing.bones_heard])
+
+    def tell(self, hearing: Hearing) -> None:
+        """Let whoever is asked know it, too."""
+        hearing.once, hearing.bones, hearing.bones_heard = self.once, {**self.errors}, [*self.said]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +82,9 @@ class Motion:
     """Which of its instants is the first one here."""
     still: frozenset[str] = frozenset()
     """Robots whose speed nobody tells (`seerob.twin.validity.validity.Validity.moved`)."""
+    seen: Mapping[str, Sequence[Seen]] = field(default_factory=dict)
+    """Of people whom devices see, and of who was heard once, what else is known of them at each instant: who
+    depends on them is asked instant by instant."""
     coarse: Mapping[str, str] = field(default_factory=dict)
     """Of robots and people that are heard too coarsely for energies and forces, why."""
     implausible: tuple[Finding, ...] = ()
@@ -70,23 +92,17 @@ class Motion:
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
-        doubts = {name: found[begin:end] for name, found in self.doubts.items()}
-        ways = None if self.ways is None else self.ways[begin : end - 1]
-        part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
-        errors = {name: found[begin:end] for name, found in self.speed_errors.items()}
-        whole = self if self.of is None else self.of
-        begin += self.begin
-        return Motion(
-            *part,
-            doubts,
-            self.foreseen,
-            ways,
-            errors,
-            whole,
-            begin,
-            self.still,
-            self.coarse,
-            self.implausible,
+        return replace(
+            self,
+            t=self.t[begin:end],
+            q=self.q[begin:end],
+            v=self.v[begin:end],
+            doubts={name: found[begin:end] for name, found in self.doubts.items()},
+            ways=None if self.ways is None else self.ways[begin : end - 1],
+            speed_errors={name: found[begin:end] for name, found in self.speed_errors.items()},
+            seen={name: found[begin:end] for name, found in self.seen.items()},
+            of=self if self.of is None else self.of,
+            begin=self.begin + begin,
         )
 
 

@@ -71,6 +71,11 @@ NOWHERE = Places(frozenset(BONES), frozenset(BONES), {})
 """What is left open of a person whose posture is told, and the place of no bone."""
 
 
+BoneErrors = Mapping[str, tuple[float | None, float | None]]
+"""Bone → how far the twin's is from where a device has it, position [m] and angle [rad]; None where none was
+seen."""
+
+
 class BonesHeard(NamedTuple):
     """What one sample said of the bones of a person, besides how joints are."""
 

@@ -1,4 +1,4 @@
-"""Convex hulls: which facets a point sees is decided in twice the precision, where rounding could decide."""
+"""Convex hulls: which facets a point sees is decided exactly, where rounding could decide."""
 
 from __future__ import annotations
 
@@ -16,38 +16,47 @@ NOISE = 1e-12
 """Of the largest coordinate: what is nearer to a facet than this is not looked at further, and is flat."""
 _ROUNDING = 100 * 2.0**-52
 """Bound on what rounding adds to the volume of a point over a facet, of the product of its lengths."""
-_EXACT = 1e-29
-"""Bound on rounding in twice the precision, of the sum of the sizes of the terms."""
 _SPLIT = 134217729.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _product(a: float, a1: float, b: float, b1: float) -> tuple[float, float]:
-    """Of two numbers of twice the precision (Dekker 1971)."""
+def _product(a: float, b: float) -> tuple[float, float]:
+    """A product and what rounding took from it (Dekker 1971)."""
     p = a * b
     t = _SPLIT * a
     ah = t - (t - a)
     t = _SPLIT * b
     bh = t - (t - b)
     al, bl = a - ah, b - bh
-    rest = ((ah * bh - p) + ah * bl + al * bh) + al * bl + (a * b1 + a1 * b)
-    high = p + rest
-    return high, rest - (high - p)
+    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum(a: float, a1: float, b: float, b1: float) -> tuple[float, float]:
-    """Of two numbers of twice the precision (Knuth 1969)."""
+def _sum(a: float, b: float) -> tuple[float, float]:
+    """A sum and what rounding took from it (Knuth 1969)."""
     s = a + b
     v = s - a
-    rest = (a - (s - v)) + (b - v) + (a1 + b1)
-    high = s + rest
-    return high, rest - (high - s)
+    return s, (a - (s - v)) + (b - v)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def outside(P: Array, a: int, b: int, c: int, p: int) -> bool:
-    """Whether a point is above the plane of three others, seen from where they turn counter-clockwise.
+def _added(E: Array, n: int, number: float) -> int:
+    """Add a number to the exact sum of the first ``n`` of ``E``, smallest first (Shewchuk 1997)."""
+    m = 0
+    for i in range(n):
+        number, rest = _sum(number, E[i])
+        if rest != 0.0:
+            E[m] = rest
+            m += 1
+    if number != 0.0:
+        E[m] = number
+        m += 1
+    return m
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def outside(P: Array, a: int, b: int, c: int, p: int, E: Array) -> bool:
+    """Whether a point is above the plane of three others that turn counter-clockwise from there, exactly.
 
     Args:
         P: Points, shape (n, 3).
@@ -55,21 +64,26 @@ def outside(P: Array, a: int, b: int, c: int, p: int) -> bool:
         b: Of the next.
         c: Of the last.
         p: Of the point.
+        E: Room for 200 numbers.
     """
-    high, low, size = 0.0, 0.0, 0.0
+    n = 0
     for k in range(6):
         i = k % 3
         j, h = ((i + 1) % 3, (i + 2) % 3) if k < 3 else ((i + 2) % 3, (i + 1) % 3)
-        u, u1 = _sum(P[b, j], 0.0, -P[a, j], 0.0)
-        v, v1 = _sum(P[c, h], 0.0, -P[a, h], 0.0)
-        w, w1 = _sum(P[p, i], 0.0, -P[a, i], 0.0)
-        if k >= 3:
-            w, w1 = -w, -w1
-        term, term1 = _product(u, u1, v, v1)
-        term, term1 = _product(term, term1, w, w1)
-        size += abs(term)
-        high, low = _sum(high, low, term, term1)
-    return high > _EXACT * size
+        side = 1.0 if k < 3 else -1.0
+        u = _sum(P[b, j], -P[a, j])
+        v = _sum(P[c, h], -P[a, h])
+        w = _sum(P[p, i], -P[a, i])
+        for x in u:
+            for y in v:
+                high, low = _product(x, y)
+                for z in w:
+                    if high * z != 0.0 or low * z != 0.0:
+                        for part in (high, low):
+                            one, rest = _product(part, side * z)
+                            n = _added(E, n, one)
+                            n = _added(E, n, rest)
+    return bool(n > 0 and E[n - 1] > 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -119,6 +133,7 @@ def quickhull(P: Array, first: Indices, size: float) -> Indices:
     )
     edges, chain = np.empty((3 * room, 2), np.int64), np.empty(3 * room, np.int64)
     leaving, stamp = np.empty(n, np.int64), np.full(n, -1)
+    E = np.empty(200)
     top, next_, frees, pooled, made, turn = 4, 0, 0, n, 4, 0
     a, b, c, d = first
     F[0, 0], F[0, 1], F[0, 2] = a, b, c
@@ -146,7 +161,7 @@ def quickhull(P: Array, first: Indices, size: float) -> Indices:
                     f = fresh[j]
                     if sliver[f]:
                         over = N[f, 0] * P[p, 0] + N[f, 1] * P[p, 1] + N[f, 2] * P[p, 2] - N[f, 3]
-                        if over >= -N[f, 4] and outside(P, F[f, 0], F[f, 1], F[f, 2], p):
+                        if over >= -N[f, 4] and outside(P, F[f, 0], F[f, 1], F[f, 2], p, E):
                             held = f
                             break
             if held >= 0:
@@ -172,7 +187,7 @@ def quickhull(P: Array, first: Indices, size: float) -> Indices:
             if not alive[g]:
                 continue
             over = N[g, 0] * P[point, 0] + N[g, 1] * P[point, 1] + N[g, 2] * P[point, 2] - N[g, 3]
-            if over < -N[g, 4] or (over <= N[g, 4] and not outside(P, F[g, 0], F[g, 1], F[g, 2], point)):
+            if over < -N[g, 4] or (over <= N[g, 4] and not outside(P, F[g, 0], F[g, 1], F[g, 2], point, E)):
                 continue
             seen[seeing] = g
             seeing += 1

@@ -1,7 +1,7 @@
 """The convex hull of points in space.
 
 Quickhull (Barber, Dobkin and Huhdanpaa 1996): the farthest point outside of a facet replaces all facets that
-it sees. Which those are is decided beyond rounding, so that they are one piece and the hull is closed and
+it sees. Which those are is decided exactly, so that they are one piece and the hull is closed and
 convex, however many points lie in one plane.
 """
 

@@ -589,3 +589,27 @@ def test_one_that_judges_bone_by_bone_and_asks_nobody_is_not_within_while_somebo
     for verdicts in (run.verdicts, many.answers.verdict):
         assert (verdicts[20], verdicts[60]) == (0, 2)
     assert "arm: not heard" in many.reasons[60]
+
+
+@pytest.mark.parametrize("said", ["(-1.0, 0.0)", "(0.0, -1.0)", "(float('nan'), 0.0)", "1 / 0"])
+def test_a_bound_of_ones_own_that_cannot_be_is_undecided_on_the_road_and_in_arrays(own, said):
+    text = (
+        MANY.format(ALONE.format("1.0")) + f"    def falls(self, model, points): return lambda s, m: {said}\n"
+    )
+    station = own(text, LOG)
+    Path(station.model.folder, "m.csv").write_text(GAP)
+    run, many = station.run().results["own"], station.batch()["own"]
+    assert (run.verdicts[20], many.answers.verdict[20]) == (2, 2)
+    assert "what bounds it between two ticks failed" in run.worst().reason
+
+
+@pytest.mark.parametrize(
+    ("one", "many", "verdict"),
+    [("1.0", "1.0", WITHIN), ("200.0", "1.0", UNDECIDED), ("200.0", "200.0", EXCEEDED)],
+)
+def test_what_ones_own_says_of_many_instants_it_says_of_one(own, one, many, verdict):
+    text = MANY.format(ALONE.format(many)).replace("self.result(1.0)", f"self.result({one})")
+    station = own(text, q="q = [0, 0]\n")
+    found = station.batch({"arm": np.zeros((30, 2))}, {"arm": np.zeros((30, 2))})["own"]
+    assert (found.verdict, found.note) == (verdict, "")
+    assert ("batch says within at 0 s, and bind does not" in found.reasons[0]) == (verdict is UNDECIDED)

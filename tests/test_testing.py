@@ -340,3 +340,34 @@ def test_a_rule_that_forgets_fails_or_is_taken_back(own_rule, how):
         return
     with pytest.raises(AssertionError, match=words):
         never_within(station)
+
+
+# -- bounds between ticks that forget ----------------------------------------------------------------
+
+FALLS = """
+    def bind(self, model):
+        arm = model.mechanisms["arm"]
+        def evaluate(state):
+            value = float(np.abs(state.qd(arm)).max())
+            return Result(name=self.name, value=value, limit=9.0, verdict=judge(value, 9.0))
+        return evaluate
+    def falls(self, model, points):
+        return lambda span, margin: {}
+"""
+BOUNDS = {
+    "generous": ("(9.0, 9.0)", ""),
+    "nothing": ("(0.0, 0.0)", "own: a margin of .* between two ticks, and falls bounds it by"),
+    "a gain": ("(-1.0, 0.0)", "falls says .*, and no margin falls by less than nothing"),
+    "no number": ("(float('nan'), 0.0)", "falls says .*, and no margin falls by less than nothing"),
+}
+
+
+@pytest.mark.parametrize("how", BOUNDS)
+def test_a_bound_between_ticks_that_forgets_fails(own, how):
+    said, words = BOUNDS[how]
+    station = own(GOOD, FALLS.format(said))
+    if not words:
+        never_within(station)
+        return
+    with pytest.raises(AssertionError, match=words):
+        never_within(station)

@@ -12,6 +12,7 @@ import heapq
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -80,12 +81,22 @@ def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     falls, lowest = criterion.falls(model, points), criterion.lowest(model, points)
     if falls is None and lowest is None:
         return None
+    if falls is not None and not type(criterion).__module__.startswith("seerob."):
+        falls = partial(_losing, falls)
     remembers, people = criterion.remembers(model), _people(criterion, model)
     follows = criterion.follows(model, points)
     within = criterion.follows(model, points)
     again = follows.again if follows is not None else lambda: criterion.bind(model)
     looks = 0 if criterion.bounded_once(model) else MOST if lowest is None else FEW
     return Watch(criterion, points, falls, lowest, remembers, again, follows, within, people, looks)
+
+
+def _losing(falls: Falls, span: Span, margin: float | Array) -> Fall:
+    """What a bound of one's own says, unless a margin would grow by it."""
+    said = falls(span, margin)
+    if not all(np.min(each) >= 0 for each in said):
+        raise ValueError(f"falls says {said}, and no margin falls by less than nothing")
+    return said
 
 
 def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
@@ -294,7 +305,7 @@ class BetweenTicks:
             _, _, a, b, at, _ = heapq.heappop(spans)
             t = path.middle(a.t, b.t)
             self.looks += 1
-            shadow = self._placed(path, t, state)
+            shadow = self.placed(path, t, state)
             try:
                 moment = within.now(shadow)
             except Undecided:
@@ -460,7 +471,7 @@ class BetweenTicks:
         if one is None:
             one, other = other, None
         assert one is not None
-        return _least(one, other, fall)
+        return least_margin(one, other, fall)
 
     def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> Told:
         path = self._way
@@ -501,7 +512,7 @@ class BetweenTicks:
         self.looks += 1
         if i not in self._again:
             self._again[i] = watch.again()
-        shadow = self._placed(path, t, state)
+        shadow = self.placed(path, t, state)
         result = self._asking.at(i, self._again[i], shadow, applies)
         end = _end(watch.criterion, result, t, shadow.largest_speeds())
         if watch.within is not None:
@@ -509,7 +520,7 @@ class BetweenTicks:
                 end = replace(end, figure=watch.within.now(shadow).figure)
         return result, end, shadow
 
-    def _placed(self, path: Path, t: float, state: State) -> State:
+    def placed(self, path: Path, t: float, state: State) -> State:
         """The twin at an instant between two ticks."""
         if self._shadow is None:
             data = mujoco.MjData(state.model.mj)
@@ -523,7 +534,7 @@ class BetweenTicks:
         return shadow
 
 
-def _least(one: Margin, other: Margin | None, lost: Fall) -> float:
+def least_margin(one: Margin, other: Margin | None, lost: Fall) -> float:
     """Bound on the margin between two ends, of which one is known at least, tolerances taken off."""
     (m, off), (fall, bend) = one, lost
     if other is None:

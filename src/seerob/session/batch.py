@@ -42,6 +42,8 @@ STRETCH, LONGEST = 256, 1024
 processor's cache."""
 SHARES = 8
 """Parts that a motion has between the two, so that threads end together."""
+ASKED_AGAIN = 8
+"""Instants of which what one's own says of many is compared with what it says of one, at least."""
 TOGETHER = 32
 """Ways from one instant to the next that are bounded together, at most."""
 
@@ -230,6 +232,10 @@ def judged(
     slow = [one for one in bound if one.criterion.name not in asked]
     walked = _walked(model, slow, motion, findings) if slow else {}
     walked |= {name: _joined(answers) for name, answers in found.items()}
+    for one in bound:
+        name = one.criterion.name
+        if name in asked and asked[name].own and n:
+            walked[name] = _confirmed(model, one, motion, findings, walked[name])
     again = {name: np.concatenate([np.zeros(0, bool), *left[name]]) for name in asked}
     if motion.ways and asked:
         _mark_uncleared(model, bound, again, motion, walked, np.concatenate(speeds))
@@ -248,6 +254,26 @@ def judged(
             name, criterion.unit, criterion.at_most, said, reasons, notes.get(name, ""), between
         )
     return Batch(motion.t, columns)
+
+
+def _confirmed(
+    model: Model, one: Bound, motion: Motion, findings: Sequence[Finding], said: tuple[Answers, Reasons]
+) -> tuple[Answers, Reasons]:
+    """What one's own says of many instants, undecided where it says less of some of them one by one."""
+    answers, reasons = said
+    n = len(motion.t)
+    some = np.zeros(n, bool)
+    some[np.linspace(0, n - 1, min(n, ASKED_AGAIN)).astype(int)] = True
+    within = answers.verdict == WITHIN
+    if within.any():
+        some[np.argmin(np.where(within, np.abs(answers.limit - answers.value), np.inf))] = True
+    road, why = _walked(model, [replace(one, watch=None)], motion, findings, some)[one.criterion.name]
+    greener = np.flatnonzero(some & within & (road.verdict != WITHIN))
+    if not len(greener):
+        return said
+    k = int(greener[0])
+    what = f"batch says within at {motion.t[k]:.4g} s, and bind does not: {why[k]}".removesuffix(": ")
+    return answers.open(), np.where(within, what, reasons)
 
 
 def _mark_uncleared(
@@ -302,7 +328,12 @@ def _mark_uncleared(
                 span = watch.points.span(path, float(motion.t[k]), float(motion.t[k + size]), ids, model.mj)
                 span.between_speeds(speeds[k], speeds[k + size])
                 m, o = bare[k : k + size + 1], off[k : k + size + 1]
-                fall, bend = watch.falls(span, float((m - o).min()))
+                try:
+                    fall, bend = watch.falls(span, float((m - o).min()))
+                except Exception:
+                    # The road says what of it failed, and ends no batch that others are judged in.
+                    open_[1:] |= both
+                    break
                 # Of several ways at once the bound is no sharper than of each, and the least margin counts.
                 one_way = (m[0] + m[1] - fall) / 2 if size == 1 else m.min() - np.asarray(fall) / 2
                 if np.min(np.maximum(one_way, m.min() - bend) - o.max()) >= 0:

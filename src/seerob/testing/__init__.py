@@ -5,8 +5,8 @@ everybody is, and then spoils what is said: of each robot, person and machine th
 and of its variables. A criterion fails when it, a part, a row or a marker of it is within all the same; when
 it rests on somebody whom it does not declare (`Criterion.depends`), on chance, on the time of day, or on what
 was before without saying so (`Criterion.remembers`); when limbs that nobody is sure of could be where it is
-exceeded; or when it is no criterion (no basis, a result that
-contradicts itself).
+exceeded; when it loses more between two ticks than `Criterion.falls` says; or when it is no criterion (no
+basis, a result that contradicts itself).
 
 ``sources_never_within("my_cell")`` takes one in which every criterion is within while its files are played,
 and lets each source lie: it stops, fails, repeats itself, goes back in time, speaks of the future, jumps,
@@ -30,6 +30,8 @@ from seerob.core.errors import SeerobError
 from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
+from seerob.core.verdict import ROUNDING
+from seerob.criteria.between_ticks import BetweenTicks, least_margin, watched
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import Judge, bound_to, declared
 from seerob.description.humans.skeleton import BONES, PARENTS, ROOT
@@ -40,6 +42,7 @@ from seerob.session.opening import source_target
 from seerob.session.run import engine_of, pump, ticks
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
+from seerob.twin.spans import Points
 from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import BonesHeard
 from seerob.workstation.source import Opened, Source
@@ -351,6 +354,7 @@ class _Harness:
                 what = f"it depends on {', '.join(strangers)}: say so in depends, or in variables"
                 told.append(f"{criterion.name}: {what}")
         told += self._unsteady(clean)
+        told += self._loses_more()
         for name in self.model.mechanisms:
             concerned = [i for i, names in enumerate(whom) if name in names]
             moved = self._run(elsewhere=name) if len(concerned) < len(criteria) else ()
@@ -374,6 +378,50 @@ class _Harness:
         told += self._green(self._run(quiet=True), asking, "no variable was heard")
         told += self._green(self._run(muted=True), range(len(criteria)), "it is muted")
         return told
+
+    def _loses_more(self) -> list[str]:
+        """Whose margin falls by more between two ticks than `Criterion.falls` says."""
+        points = Points(self.model)
+        watches = [watched(criterion, self.model, points) for criterion, _ in self._asked]
+        judges = [Judge([bound_to(self.model, criterion, group)]) for criterion, group in self._asked]
+        between, told = BetweenTicks(()), dict[int, str]()
+        ends: list[tuple[Sequence[Result], Array]] = []
+
+        def look(state: State, now: Sequence[Result]) -> None:
+            before, path, speeds = ends[-1:], state.path, state.largest_speeds().copy()
+            ends[:] = [(now, speeds)]
+            if path is None or not before:
+                return
+            ((was, slower),) = before
+            begin, end = float(path.t[0]), float(path.t[-1])
+            span = points.span(path, begin, end, state.attachments.ids, self.model.mj)
+            span.between_speeds(slower, speeds)
+            span.foresee, span.knots = state.foresee, state.knots
+            for i, watch in enumerate(watches):
+                if watch is None or watch.falls is None or watch.follows is not None or watch.remembers:
+                    continue
+                criterion, both = self._asked[i][0], (was[i], now[i])
+                if i in told or any(result.verdict is not Verdict.WITHIN for result in both):
+                    continue
+                one, other = map(criterion.margin, both)
+                try:
+                    fall = watch.falls(span, np.minimum(one[0] - one[1], other[0] - other[1]))
+                except Exception as error:
+                    told[i] = f"{criterion.name}: what bounds it between two ticks failed: {error}"
+                    continue
+                least = least_margin(one, other, fall)
+                for share in (0.25, 0.5, 0.75):
+                    t = begin + share * (end - begin)
+                    (there,) = judges[i](between.placed(path, t, state))
+                    if there.verdict is not Verdict.WITHIN:
+                        continue
+                    m, off = criterion.margin(there)
+                    if (left := float(np.min(m - off))) < least - ROUNDING * max(1.0, abs(least)):
+                        what = f"a margin of {left:.9g} between two ticks"
+                        told[i] = f"{criterion.name}: {what}, and falls bounds it by {least:.9g}"
+
+        list(self._run(look=look))
+        return list(told.values())
 
     def _blind(self, name: str, concerned: Sequence[int]) -> list[str]:
         """Who is within while limbs of a person are not sure, that could be where it is exceeded."""
@@ -457,6 +505,7 @@ class _Harness:
         quiet: bool = False,
         muted: bool = False,
         anew: bool = False,
+        look: Callable[[State, Sequence[Result]], None] | None = None,
     ) -> Iterator[tuple[int, list[tuple[Result, set[str]]]]]:
         """What every criterion says at every tick, and on whom that depends; the last asked ``anew``."""
         model = self.model
@@ -490,6 +539,8 @@ class _Harness:
             for judge in judges:
                 (result,) = judge(state)
                 results.append((result, set(state.asked)))
+            if look is not None:
+                look(state, [result for result, _ in results])
             yield k, results
 
     def _signals(self, k: int, values: Mapping[str, Value]) -> Iterator[SignalSample]:

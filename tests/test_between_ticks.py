@@ -10,7 +10,7 @@ import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
-from seerob.criteria.between_ticks import Told, _least, watched
+from seerob.criteria.between_ticks import Told, least_margin, watched
 from seerob.criteria.contact.regions import REGIONS
 from seerob.criteria.criterion import Criterion, Follows, Moment, judge_interval
 from seerob.criteria.judging import bound_to
@@ -689,7 +689,7 @@ def test_a_margin_is_nowhere_less_than_its_ends_less_half_of_what_it_loses_or_wh
 
     def least(one, also, fall, bend):
         to = [None if end is None else (kind(end[0]), other(end[1])) for end in (one, also)]
-        return _least(
+        return least_margin(
             to[0], to[1], Fall(kind(fall) if kind is float else fall, kind(bend) if kind is float else bend)
         )
 

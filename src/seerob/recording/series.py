@@ -153,7 +153,7 @@ INFORMS = (
     "nothing bounds it between the instants at which it was asked; between_samples can accept that where "
     "there is a verdict"
 )
-"""Likewise, of what has no limit of its own: that there was nothing to judge says nothing green then."""
+"""Why a figure without a limit is not known between: that nobody was near says nothing green then."""
 
 ONE_INSTANT = "the run is one instant, and sources say that something moves"
 

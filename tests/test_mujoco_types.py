@@ -31,6 +31,12 @@ def test_a_field_has_the_type_that_is_said(owner, name, said):
         assert type(value).__name__ == said
 
 
+@pytest.mark.parametrize("name", ["MjSpec", "MjsBody", "MjsGeom", "MjsJoint"])
+def test_what_a_specification_is_made_from_has_the_names_that_are_said(name):
+    said = [getattr(f, "name", None) or f.target.id for f in CLASSES[name].body]
+    assert [n for n in said if not n.startswith("__") and not hasattr(getattr(mujoco, name), n)] == []
+
+
 @pytest.mark.parametrize("name", [name for name in CLASSES if name.startswith("mjt")])
 def test_an_enumeration_has_the_values_that_are_said(name):
     said = {a.targets[0].id: a.value.value for a in CLASSES[name].body}

@@ -5,7 +5,7 @@ from enum import IntEnum
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
@@ -112,11 +112,7 @@ class MjModel:
     @staticmethod
     def from_xml_string(xml: str) -> MjModel: ...
     def __copy__(self) -> Self: ...
-    def body(self, name_or_id: str | int) -> Any: ...
-    def geom(self, name_or_id: str | int) -> Any: ...
-    def joint(self, name_or_id: str | int) -> Any: ...
-    def mesh(self, name_or_id: str | int) -> Any: ...
-    def site(self, name_or_id: str | int) -> Any: ...
+    def body(self, name_or_id: str | int) -> _Named: ...
     def __deepcopy__(self, memo: dict[int, object]) -> Self: ...
 
 class MjData:
@@ -148,7 +144,31 @@ class MjData:
     xpos: NDArray[np.float64]
     xquat: NDArray[np.float64]
 
+class _Named:
+    id: int
+    name: str
+
+class MjsJoint:
+    name: str
+
+class MjsGeom:
+    name: str
+
+class MjsBody:
+    name: str
+    explicitinertial: bool
+    mass: float
+    ipos: ArrayLike
+    iquat: ArrayLike
+    inertia: ArrayLike
+    fullinertia: ArrayLike
+    def add_body(self, **fields: object) -> MjsBody: ...
+    def add_geom(self, **fields: object) -> MjsGeom: ...
+    def add_joint(self, **fields: object) -> MjsJoint: ...
+
 class MjSpec:
+    joints: list[MjsJoint]
+    worldbody: MjsBody
     @staticmethod
     def from_file(filename: str) -> MjSpec: ...
     def compile(self) -> MjModel: ...

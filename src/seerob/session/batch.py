@@ -112,7 +112,7 @@ class Batch(Mapping[str, Column]):
         return batch_html((c.name, c.verdict, c.answers.verdict, c.value, c.unit) for c in self.values())
 
 
-class _Whereabouts(State):
+class _PositionsAlone(State):
     """Where everybody is, and nothing of what follows from it."""
 
     def refresh(self, t: float) -> None:
@@ -132,12 +132,12 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     placed = changed(station, engine=changed(station.engine, physics=False))
     model = replace(model, workstation=placed)
     heard = list(feed)
-    engine = engine_of(model, _Whereabouts)
+    engine = engine_of(model, _PositionsAlone)
     still = frozenset(name for name in model.mechanisms if not engine.state.moved(name))
     as_heard, implausible = AsHeard(model), dict[Finding, None]()
     if not as_heard.waits and (known := known_motion(engine, heard, end)) is not None:
         return replace(known, still=still, coarse=coarse(model))
-    engine = engine_of(model, _Whereabouts)
+    engine = engine_of(model, _PositionsAlone)
     engine.end = end
     t, q, v = [], [], []
     ways: list[Path] = []

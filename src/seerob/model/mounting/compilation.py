@@ -46,7 +46,18 @@ from seerob.model.mounting.things import (
 )
 from seerob.model.variables import Bound, bound
 from seerob.recording.format import filed
-from seerob.workstation.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
+from seerob.workstation.workstation import (
+    Area,
+    Human,
+    Machine,
+    Mounted,
+    Part,
+    Robot,
+    Thing,
+    Tool,
+    Workpiece,
+    Workstation,
+)
 
 
 def listed(mounting: Mounting) -> tuple[Body, ...]:
@@ -274,7 +285,7 @@ class _Compiler:
 
     # -- things -----------------------------------------------------------------------------
 
-    def _part(self, part: Any) -> None:
+    def _part(self, part: Part) -> None:
         self._thing(part, "part", None, pose_matrix(part.at), PART_COLOR)
 
     def _machine(self, machine: Machine) -> None:
@@ -357,7 +368,7 @@ class _Compiler:
 
     def _thing(
         self,
-        thing: Any,
+        thing: Thing,
         role: str,
         parent: str | None,
         parent_from_thing: Array,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import wxyz_from_rotation
+from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.model.model import Body
 from seerob.model.mounting.specification import Mounting
 from seerob.workstation.workstation import Contact
@@ -75,7 +74,7 @@ def _add_geoms(mounting: Mounting, body: Body, contype: int, conaffinity: int, c
                 _mesh(mounting, mj_body, f"{name}.{k}", mesh, masks)
 
 
-def _capsule(mj_body: Any, name: str, solid: Solid, masks: dict[str, Any]) -> None:
+def _capsule(mj_body: mujoco.MjsBody, name: str, solid: Solid, masks: dict[str, float]) -> None:
     assert solid.points is not None
     start, end = solid.points
     length = float(np.linalg.norm(end - start))
@@ -94,7 +93,7 @@ def _capsule(mj_body: Any, name: str, solid: Solid, masks: dict[str, Any]) -> No
     )
 
 
-def _along(z: Any) -> Any:
+def _along(z: Array) -> Array:
     x = np.cross(z, [1.0, 0, 0] if abs(z[0]) < 0.9 else [0, 1.0, 0])
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
@@ -117,7 +116,9 @@ def _convex(mounting: Mounting, body: Body, solid: Solid, cache: Path | None) ->
     return meshes
 
 
-def _mesh(mounting: Mounting, mj_body: Any, name: str, mesh: Mesh, masks: dict[str, Any]) -> None:
+def _mesh(
+    mounting: Mounting, mj_body: mujoco.MjsBody, name: str, mesh: Mesh, masks: dict[str, float]
+) -> None:
     mounting.spec.add_mesh(
         name=name,
         uservert=np.ascontiguousarray(mesh.vertices, np.float32).ravel(),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -50,7 +49,7 @@ class Mounting:
     meshes: dict[str, bytes] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
-    _bodies: dict[str, Any] = field(default_factory=dict)
+    _bodies: dict[str, mujoco.MjsBody] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.spec.compiler.degree = False
@@ -65,7 +64,7 @@ class Mounting:
         # Damping of the controllers is integrated implicitly: stiff gains stay stable.
         self.spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
-    def body(self, name: str, parent: str | None, parent_from_body: Array) -> Any:
+    def body(self, name: str, parent: str | None, parent_from_body: Array) -> mujoco.MjsBody:
         """Add a body; ``parent`` None is the world.
 
         Raises:
@@ -85,11 +84,11 @@ class Mounting:
         """Whether there is a body of that name."""
         return name in self._bodies
 
-    def get(self, name: str) -> Any:
+    def get(self, name: str) -> mujoco.MjsBody:
         """The specification's body of that name."""
         return self._bodies[name]
 
-    def joint(self, body: Any, name: str, joint: Joint) -> None:
+    def joint(self, body: mujoco.MjsBody, name: str, joint: Joint) -> None:
         """Add a joint. Limits are not imposed: the twin shows what was heard, also beyond them."""
         hinge = joint.kind == JointKind.REVOLUTE
         body.add_joint(
@@ -102,7 +101,7 @@ class Mounting:
             frictionloss=joint.friction,
         )
 
-    def inertial(self, body: Any, inertial: Inertial) -> None:
+    def inertial(self, body: mujoco.MjsBody, inertial: Inertial) -> None:
         """Give a body its mass properties."""
         body.explicitinertial = True
         body.mass = inertial.mass
@@ -115,7 +114,7 @@ class Mounting:
             return
         body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
-    def massless(self, body: Any) -> None:
+    def massless(self, body: mujoco.MjsBody) -> None:
         """Give a body with a joint so little mass that no figure changes."""
         body.explicitinertial = True
         body.mass = TINY

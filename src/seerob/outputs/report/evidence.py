@@ -104,7 +104,7 @@ def evaluated(report: Report) -> Html:
         [
             tag("h2", "What was evaluated"),
             table(["", ""], facts),
-            bones_told(log.bones),
+            bone_errors(log.bones),
             tag("h4", "Sources"),
             _sources(heads, how),
             tag("h4", "With what"),
@@ -139,7 +139,7 @@ def bone_rows(people: Mapping[str, BoneErrors]) -> Iterator[list[Cell]]:
             yield [name, e.bone or "all", e.what, e.unit, e.median, e.p95, e.largest, e.t, e.ticks]
 
 
-def bones_told(people: Mapping[str, BoneErrors]) -> Html | None:
+def bone_errors(people: Mapping[str, BoneErrors]) -> Html | None:
     """The report's table; nothing when no device saw a person."""
     # What no device saw has no error, which is no praise.
     seen = {name: len({e.bone for e in errors.bones()}) for name, errors in people.items()}

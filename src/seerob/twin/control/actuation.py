@@ -10,7 +10,6 @@ go through the actuators, whose limits therefore hold here too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -50,7 +49,7 @@ class TaskPull:
         mj.actuator_biasprm[self._actuators, 1] = 0.0
         self._torques = np.zeros(mj.nv)
 
-    def command(self, mj: mujoco.MjModel, data: mujoco.MjData, wanted: Any, kp: Array) -> None:
+    def command(self, mj: mujoco.MjModel, data: mujoco.MjData, wanted: mujoco.MjData, kp: Array) -> None:
         """Turn the commands of its joints into those of its bones.
 
         Args:

@@ -12,7 +12,6 @@ What grippers hold along a motion that was recorded: picked up and let go as in 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -96,7 +95,7 @@ class Grips:
         InputError: The fingers of a gripper do not face each other.
     """
 
-    def __init__(self, state: State, physics: Any) -> None:
+    def __init__(self, state: State, physics: mujoco.MjModel) -> None:
         models = (state.model.mj, physics)
         pieces = [piece for piece in state.model.workstation.workpieces if piece.rest is not None]
         self._grips = [_Grip(state, models, piece) for piece in pieces]
@@ -118,7 +117,7 @@ class Grips:
 class _Grip:
     """A workpiece and its gripper."""
 
-    def __init__(self, state: State, models: tuple[Any, ...], piece: Workpiece) -> None:
+    def __init__(self, state: State, models: tuple[mujoco.MjModel, ...], piece: Workpiece) -> None:
         model = state.model
         self._models, self._piece, self._hand = models, piece.name, piece.on
         machine = next(m for m in model.workstation.machines if m.name == piece.on)

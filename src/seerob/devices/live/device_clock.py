@@ -45,6 +45,8 @@ controller is switched on so often."""
 BUFFERED = 10.0
 """What says again what it said, over a new connection, and is late by less, is a buffer on the way and no
 device that started again [s]: its clock is the one from before, so that it looks as late as it is."""
+BOOTED = 10.0
+"""A clock that begins again below it tells since when its device is on, and is another one [s]."""
 KEPT = 16384
 """Stamps of which it is known what was said with them: half a minute of the fastest source."""
 MARKED, MARK_EVERY = 1 << 15, 1.0
@@ -150,9 +152,9 @@ class DeviceClock:
             self._offset = self._applied = raw
         elif not self._follow(raw, host, device - self._newest):
             return Instant(None, self._standing(host))
-        elif self._ahead is not None and self._before is not None and device > self._before.device:
-            # One packet that came late over a new connection looked like a restart.
-            self._resume(raw, host)
+        elif self._ahead is not None and device - self._newest > REORDERED:
+            # One packet that came late over a new connection looked like a restart: time leaps on from it.
+            self._resume(device, raw, host)
         self._connected = False
         self._newest, self._host = device, max(host, self._host)
         self.latency = raw - self._offset
@@ -160,10 +162,9 @@ class DeviceClock:
         if again and (forgeable or (self._before is not None and said != self._content)):
             # Of a connection that nobody forges, what stands may say the same; what moves does not.
             self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
-            self._resume(raw, host)
         self._repeats = self._repeats or again
-        if self._repeats and self._before is not None and device > self._before.device:
-            self._resume(raw, host)
+        if self._repeats:
+            self._resume(device, raw, host)
         self._remember(device, said)
         t = device + self._applied
         if t <= self._last:
@@ -173,9 +174,9 @@ class DeviceClock:
         self._last = max(self._last, t)
         return Instant(t, self._standing(host))
 
-    def _resume(self, raw: float, host: float) -> None:
+    def _resume(self, device: float, raw: float, host: float) -> None:
         """Go on by the clock from before: it has not started again, what it says came out of a buffer."""
-        if self._before is None:
+        if self._before is None or device <= self._before.device:
             return
         risen = self._before.offset + DRIFT * max(0.0, host - self._before.host)
         if -STEP < raw - risen < BUFFERED:
@@ -242,7 +243,9 @@ class DeviceClock:
         else:
             what = f"its time went back by {back:.3g} s: it seems to have started again"
             self._hold(host, RESTART_HOLD, what)
-        if self._before is None or host - self._restarted > RESTART_HOLD:
+        if 0 <= device < BOOTED:
+            self._before = None
+        elif self._before is None or host - self._restarted > RESTART_HOLD:
             self._before, self._repeats = Known(self._offset, self._newest, self._host), False
         self._restarted = host
         self._offset = self._applied = math.inf

@@ -263,6 +263,11 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "tools[0].tcp.wxyz",
         set(),
     ),
+    "a working point on the other side of the flange": (
+        {"tool": CELL["tool"] + "\ntcp = { position = [0, 0, -0.2] }"},
+        "tools[0].tcp_outside",
+        set(),
+    ),
     "metres in offset_mm": (
         {"limit": "limit = 1.0\noffset_mm = [0, 0, 0.13]"},
         "safety[0].offset",

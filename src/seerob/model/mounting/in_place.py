@@ -117,6 +117,10 @@ def _sizes(model: Model) -> Iterator[Quantity]:
             low, high = box(solids)
             read = f", {thing.mesh} read in {thing.units}" if thing.units else ""
             figures = [("extent", "m", float((high - low).max()), f"its largest edge{read}")]
+            if group == "tools" and thing.tcp is not None:
+                at = thing.tcp.position
+                said = f"tcp.position = {list(at)} m to the box around its shape"
+                figures.append(("tcp_outside", "m", _outside(np.array(at), low, high), said))
             mass = next((body.mass.value for body in bodies if body.mass is not None), None)
             volume = float((high - low).prod())
             if mass is not None and thing.mass is None:
@@ -160,8 +164,7 @@ def _spread(given: GivenThing | GivenBody, low: Array, high: Array) -> list[tupl
     figures = []
     if given.com is not None:
         com = np.array(given.com)
-        outside = float(np.linalg.norm(np.maximum(np.maximum(low - com, com - high), 0)))
-        figures.append(("com_outside", "m", outside, f"com {com.tolist()} m"))
+        figures.append(("com_outside", "m", _outside(com, low, high), f"com {com.tolist()} m"))
     if given.inertia is not None and given.mass is not None:
         xx, yy, zz, xy, xz, yz = given.inertia
         most = float(np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).max())
@@ -169,6 +172,10 @@ def _spread(given: GivenThing | GivenBody, low: Array, high: Array) -> list[tupl
         said = f"{radius:.3g} m of {size:.3g} m, from inertia and mass"
         figures.append(("gyration", "", float(radius / size), said))
     return figures
+
+
+def _outside(point: Array, low: Array, high: Array) -> float:
+    return float(np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0)))
 
 
 def _apart(model: Model, place: _Home) -> Iterator[Quantity]:

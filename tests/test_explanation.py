@@ -10,13 +10,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import t as student
 
 from oracles.pinocchio_oracle import pinocchio_model
 from seerob.app import cli
 from seerob.app.commands.explain import sentence
 from seerob.core.errors import InputError
 from seerob.description.robots import library
-from seerob.session.explanation import NORMAL_95, SLOW, Dynamics, explain, fit, friction, slopes
+from seerob.session.explanation import NORMAL_95, SLOW, Dynamics, explain, fit, friction, slopes, wider
 from seerob.session.station import load
 from seerob.twin.own_words import Said
 
@@ -147,6 +148,32 @@ def test_the_truth_lies_in_95_of_100_intervals() -> None:
             assert found.determined[asked].all()
             inside.append(np.abs(found.values[asked] - truth) <= half[asked])
         assert 0.93 <= np.mean(inside) <= 0.99, alike
+
+
+def test_errors_that_are_much_alike_do_not_make_a_payload_surer_than_it_is() -> None:
+    """400 samples of 2 motions: 28 smooth columns make residuals look less alike than errors are."""
+    alike, inside = 0.95, []
+    for seed in (5, 6):
+        _, q, qd, qdd = motion(seed, 400)
+        without, columns = cell()[1](q, qd, qdd)
+        both = np.concatenate([columns, friction(qd)], axis=-1)
+        clean = needed(q, qd, qdd) - without + COULOMB * np.sign(qd) + VISCOUS * qd
+        rng = np.random.default_rng(seed)
+        for _ in range(10):
+            noise = rng.normal(size=(600, 6))
+            noise = lfilter([np.sqrt(1 - alike**2)], [1, -alike], noise, axis=0)[200:]
+            found = fit(both, clean + noise * NOISE, np.abs(qd) > SLOW["rad"])
+            half = NORMAL_95 * np.sqrt(np.diag(found.covariance))
+            inside.append(np.abs(found.values - [MASS, *(MASS * COM), *np.zeros(24)])[:4] <= half[:4])
+    assert np.mean(inside) >= 0.93
+
+
+def test_few_rows_make_wide_intervals() -> None:
+    """Student's distribution, by SciPy."""
+    for freedom in (4, 5, 10, 30, 1000):
+        assert wider(freedom) * NORMAL_95 == pytest.approx(student.ppf(0.975, freedom), rel=0.02)
+    assert wider(1.0) * NORMAL_95 == pytest.approx(student.ppf(0.975, 1), rel=1e-4)
+    assert wider(-3.0) == wider(3.9) == wider(1.0)
 
 
 def test_what_a_motion_does_not_tell_is_not_told() -> None:

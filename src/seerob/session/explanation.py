@@ -5,8 +5,9 @@ r"""Does the model explain a log? Inverse dynamics against measured torques, and
 
 :math:`\varphi = (m, h, \Sigma)` is a payload on the flange beside what the file has there: its mass, its
 first and second moments in the flange's frame. The equation is linear in all that is fitted: weighted least
-squares, weights from the residuals of a first fit, per joint. Residuals of neighbouring samples are alike,
-so variances are raised by (1 + ρ)/(1 − ρ), ρ their correlation per joint. Intervals: 95 %.
+squares, weights from the residuals of a first fit, per joint. Errors of neighbouring samples are alike,
+so variances are raised by (1 + ρ)/(1 − ρ), ρ their correlation per joint, as residuals of such a fit show it.
+Intervals: 95 % by Student's t.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ LEAST = 20
 """Samples with a moving joint that a fit needs."""
 NORMAL_95 = 1.959964
 """Quantile of the normal distribution: 95 % lie between ± it."""
+STUDENT_1 = 12.7062
+"""That of Student's distribution with one degree of freedom."""
 TOLD = 1e5
 """Condition number above which a direction of the parameters is not told by the motion [scaled columns]."""
 ASKED = 0.05
@@ -150,11 +153,13 @@ def fit(columns: Array, measured: Array, used: NDArray[np.bool_]) -> Fitted:
     residuals[used] = r
     W = (scaled * weights[:, None]) @ keep
     inverse = np.linalg.inv(W.T @ W)
-    inflation = _inflation(residuals)[joint]
+    leverage = ((W @ inverse) * W).sum(axis=1)
+    taken = np.array([leverage[joint == j].sum() for j in range(used.shape[1])])
+    inflation = _inflation(residuals, taken)[joint]
     alone = float((1 / inflation).sum())  # rows, as many as would say as much if each were alone
     freedom = alone / max(alone - keep.shape[1], 1.0)
     middle = (W * inflation[:, None]).T @ W * freedom
-    covariance = keep @ inverse @ middle @ inverse @ keep.T
+    covariance = keep @ inverse @ middle @ inverse @ keep.T * wider(alone - keep.shape[1]) ** 2
     singular = np.linalg.svd(W, compute_uv=False)
     back = np.where(alive, scale, 1.0)
     return Fitted(
@@ -175,19 +180,42 @@ def _basis(scaled: Array) -> tuple[Array, Array]:
     return vt[good].T, hidden < 1e-6
 
 
-def _inflation(residuals: Array) -> Array:
-    """How much variances grow because neighbouring residuals are alike, per joint, at least 1, shape (n,)."""
+def _inflation(residuals: Array, taken: Array) -> Array:
+    r"""How much variances grow because neighbouring residuals are alike, per joint, at least 1, shape (n,).
+
+    What k smooth columns take away of N errors that are alike leaves residuals that are less so: of errors
+    with the correlation :math:`\rho`, each takes :math:`g = (1 + \rho)/(1 - \rho)` times its share, and
+    :math:`r = (N \rho - k g)/(N - k g)` is seen, which is solved for :math:`\rho`.
+
+    Args:
+        residuals: NaN where a row was left out, shape (N, n).
+        taken: Columns that were fitted to each joint, as many as its leverages add up to, shape (n,).
+    """
     found = []
-    for r in residuals.T:
+    for r, k in zip(residuals.T, taken.tolist(), strict=True):
         both = np.isfinite(r[1:]) & np.isfinite(r[:-1])
         if both.sum() < LEAST:
             found.append(1.0)
             continue
         a, b = r[1:][both], r[:-1][both]
-        rho = float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-300))
+        seen = 1 - float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-300))
+        share = k / float(np.isfinite(r).sum())
+        middle = seen * (1 + share) / 2
+        rho = 1 - middle - np.sqrt(max(middle**2 - 2 * seen * share, 0.0))
         rho = min(max(rho, 0.0), 0.999)
         found.append((1 + rho) / (1 - rho))
     return np.array(found)
+
+
+def wider(freedom: float) -> float:
+    """How much wider an interval of 95 % is of few rows than of many: Student's t, to 2 % from 4 on.
+
+    Of fewer, as of one.
+    """
+    if freedom < 4:
+        return STUDENT_1 / NORMAL_95
+    z, v = NORMAL_95, freedom
+    return 1 + (z**2 + 1) / (4 * v) + (5 * z**4 + 16 * z**2 + 3) / (96 * v**2)
 
 
 # -- the robot ----------------------------------------------------------------------------------

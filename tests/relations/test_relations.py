@@ -336,6 +336,23 @@ RELATIONS = {
 }
 
 
+PHYSICS = range(5000, 5060)
+"""Cells, six of them in each run."""
+
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(s, marks=[pytest.mark.soak] * (s >= PHYSICS.start + 6)) for s in PHYSICS]
+)
+def test_pulled_by_the_physics_nothing_is_within_that_the_motion_itself_exceeds(seed, tmp_path):
+    contacts = {"contact", "cart contact", "felt"}
+    cell = random_cell(seed, published=False)
+    cell = replace(cell, walks=False, left_out=cell.left_out | contacts)
+    placed, pulled = pair(tmp_path, cell, replace(cell, physics=True))
+    for name in placed:
+        both = placed[name].verdict, pulled[name].verdict
+        assert both != (Verdict.EXCEEDED, Verdict.WITHIN), (name, pulled[name].worst())
+
+
 FINDS = [("paused", 5), ("all of that", 2026112500)]
 """What was done to a stream, and cells that showed that it made something within."""
 

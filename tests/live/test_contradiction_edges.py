@@ -370,7 +370,7 @@ def test_a_robot_that_stands_may_do_so_to_the_last_bit():
         assert not looking.find(said(0.008 * k, (0.3, -1.2), (0.003 * (-1) ** k, 0.002)))
 
 
-@pytest.mark.parametrize(("rate", "told"), [(0.0038, False), (0.0048, True), (-0.0048, True)])
+@pytest.mark.parametrize(("rate", "told"), [(0.0040, False), (0.0044, True), (-0.0044, True)])
 def test_velocities_over_positions_that_stand_to_the_last_bit(rate, told):
     """2 mrad in half a second, and 30 ms."""
     looking = Contradictions(None)
@@ -498,3 +498,67 @@ def test_what_stands_to_the_last_bit_may_have_braked_so_hard_and_no_harder(unit,
 
     assert found(0.97 * hardest) == ""
     assert "stands to the last bit right after 0.3" in found(1.03 * hardest)
+
+
+def held(steps, times, unit="rad", way=1):
+    """What is found of a joint that goes two steps within equal times and stands to the last bit since."""
+    dt, hold = times
+    places = (0.0, steps[0], steps[0] + steps[1])
+    samples = [said(dt * k, (way * q,)) for k, q in enumerate(places)]
+    samples += [said(2 * dt + t, (way * places[-1],)) for t in hold]
+    return last(samples, Target(name="arm", joints=("a",), units=(unit,), velocity=(3.2,)))
+
+
+def test_a_joint_stands_when_it_says_one_place_for_two_and_a_half_intervals():
+    for until, told in ((0.0245, False), (0.0255, True)):
+        assert bool(held((0.003, 0.00293), (0.01, (0.01, 0.02, until)))) is told
+    # And goes on doing so.
+    assert held((0.003, 0.00293), (0.01, (0.01, 0.02, 0.03, 0.04, 0.05)))
+
+
+def test_a_speed_is_told_by_four_steps_of_the_digits_within_an_interval():
+    for steps, told in ((4.5, True), (4.01, True), (3.99, False)):
+        finest = 0.003 / (steps + 1)
+        assert bool(held((0.003, 0.003 - finest), (0.001, (0.001, 0.002, 0.003)))) is told
+
+
+@pytest.mark.parametrize(("unit", "fastest"), [("rad", math.sqrt(600 * 1e-5)), ("m", math.sqrt(200 * 1e-6))])
+def test_what_a_joint_may_move_without_being_seen_it_may_brake_within(unit, fastest):
+    for share, told in ((0.98, False), (1.03, True)):
+        step = share * fastest * 0.01
+        assert bool(held((step, step - 1e-7), (0.01, (0.01, 0.02, 0.03)), unit)) is told
+
+
+def steadily(rate, scale, seconds, unit="rad", hertz=16):
+    """Ways by its velocities at which those of a joint that goes steadily are found to be off by a factor."""
+    looking = Contradictions(Target(name="arm", joints=("a",), units=(unit,), velocity=(3.2,)))
+    found = []
+    for k in range(round(seconds * hertz)):
+        t = k / hertz
+        why = looking.find(said(t, (scale * rate * t,), (rate,)))
+        assert not why or "is off by a factor" in why
+        found += [t] if why else []
+    return found
+
+
+@pytest.mark.parametrize(
+    ("scale", "told"), [(0.925, False), (0.916, True), (1.0, False), (1.083, False), (1.092, True)]
+)
+def test_velocities_may_be_off_by_eight_hundredths_over_a_long_way(scale, told):
+    assert bool(steadily(1.0, scale, 5.0)) is told
+    assert bool(steadily(-1.0, scale, 5.0)) is told
+
+
+@pytest.mark.parametrize(("unit", "rate", "way"), [("rad", 0.8, 1.0), ("m", 0.25, 0.3)])
+def test_a_long_way_is_a_radian_or_three_hundred_millimetres(unit, rate, way):
+    first = steadily(rate, 0.9, 5.0, unit)[0] * rate * 0.9
+    assert way <= first < way + rate / 16
+    assert first < 1.06 * way
+
+
+@pytest.mark.parametrize(("unit", "told_by"), [("rad", 0.01), ("m", 0.002)])
+def test_ways_between_two_anchors_tell_of_a_factor_from_twice_the_noise_on(unit, told_by):
+    """By whichever is longer, of positions or of velocities."""
+    for share, told in ((0.98, False), (1.04, True)):
+        assert bool(steadily(share * told_by * 16, 0.85, 40.0, unit)) is told
+        assert bool(steadily(share * told_by * 16 / 1.15, 1.15, 40.0, unit)) is told

@@ -127,3 +127,36 @@ def test_where_a_device_puts_a_robot_is_looked_at_too(tmp_path, away, verdict):
         found.append(judge(state)[0])
     assert {result.verdict for result in found} == {verdict}
     assert all(("robots[0].nobody_within" in r.reason) is (verdict is Verdict.UNDECIDED) for r in found)
+
+
+def verdicts(station, steps, *, live=("op",)):
+    """Results of one criterion at each tick of 10 ms: what is heard of whom, or None for nothing."""
+    engine = Engine(station.model, driven=dict.fromkeys(live, 0.05), live={*live})
+    judge, found, state = Judge(station.bound, station.model.findings), [], None
+    for samples in steps:
+        engine.take(list(samples))
+        state = engine.start() if state is None else engine.tick()
+        found.append(judge(state)[0])
+    return found
+
+
+def test_what_is_implausible_is_looked_at_again_after_a_second_and_at_no_tick_before(tmp_path):
+    """A carriage that comes back from 12 m away at 9 m/s, and is 10 m away after a quarter of a second."""
+    text = CELL.replace("q = [0, 0]\n", "").replace('kind = "mvn"\nhuman = "op"', LIVE)
+    station = made(tmp_path, text, {"arm.urdf": SLIDE})
+    places = [max(-9.5 + 0.0, min(0.0, -9.5 + 0.09 * k)) for k in range(130)]
+    steps = [
+        [heard("arm", 0.01 * k, [x], [0.0 if x in (0.0,) else 9.0])] for k, x in enumerate(places)
+    ]
+    found = verdicts(station, steps, live=("arm",))
+    held = ["nobody_within" in result.reason for result in found]
+    assert held == [k < 100 for k in range(130)]
+
+
+def test_a_number_is_confirmed_by_numbers_and_by_its_own_name(tmp_path):
+    """Two confirmations, of which one is of another figure and one of words."""
+    key = 'key = "robots[0].nobody_within"\nof = "arm"\nwhy = "a long hall"\n'
+    other = '[[confirmed]]\nkey = "humans[0].feet"\nof = "op"\nvalue = 90.0\nwhy = "a platform"\n'
+    assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=other)} == {Verdict.UNDECIDED}
+    both = other + f"[[confirmed]]\n{key}value = 20.0\n"
+    assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=both)} == {Verdict.WITHIN}

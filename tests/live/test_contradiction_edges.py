@@ -500,12 +500,12 @@ def test_what_stands_to_the_last_bit_may_have_braked_so_hard_and_no_harder(unit,
     assert "stands to the last bit right after 0.3" in found(1.03 * hardest)
 
 
-def held(steps, times, unit="rad", way=1):
+def held(steps, times, unit="rad", way=1, device=True):
     """What is found of a joint that goes two steps within equal times and stands to the last bit since."""
     dt, hold = times
     places = (0.0, steps[0], steps[0] + steps[1])
-    samples = [said(dt * k, (way * q,)) for k, q in enumerate(places)]
-    samples += [said(2 * dt + t, (way * places[-1],)) for t in hold]
+    samples = [said(dt * k, (way * q,), None, device) for k, q in enumerate(places)]
+    samples += [said(2 * dt + t, (way * places[-1],), None, device) for t in hold]
     return last(samples, Target(name="arm", joints=("a",), units=(unit,), velocity=(3.2,)))
 
 
@@ -562,3 +562,25 @@ def test_ways_between_two_anchors_tell_of_a_factor_from_twice_the_noise_on(unit,
     for share, told in ((0.98, False), (1.04, True)):
         assert bool(steadily(share * told_by * 16, 0.85, 40.0, unit)) is told
         assert bool(steadily(share * told_by * 16 / 1.15, 1.15, 40.0, unit)) is told
+        assert bool(steadily(-share * told_by * 16, 0.85, 40.0, unit)) is told
+        assert bool(steadily(-share * told_by * 16 / 1.15, 1.15, 40.0, unit)) is told
+
+
+def test_where_arrivals_jitter_nobody_knows_how_fast_it_was_when_it_stood_still():
+    assert held((0.003, 0.00293), (0.01, (0.01, 0.02, 0.03)))
+    assert not held((0.003, 0.00293), (0.01, (0.01, 0.02, 0.03)), device=False)
+
+
+@pytest.mark.parametrize(("until", "told"), [(0.045, False), (0.055, True)])
+def test_a_joint_stands_after_two_and_a_half_of_the_longer_of_its_last_intervals(until, told):
+    samples = [said(t, (q,)) for t, q in ((0.0, 0.0), (0.02, 0.012), (0.03, 0.02399))]
+    samples += [said(0.03 + t, (0.02399,)) for t in (0.01, 0.02, 0.03, 0.04, until)]
+    assert bool(last(samples)) is told
+
+
+@pytest.mark.parametrize(("rate", "told"), [(0.0, False), (0.006, True), (-0.006, True)])
+def test_what_stood_for_long_with_no_velocity_is_found_when_it_says_one(rate, told):
+    looking = Contradictions(None)
+    found = [bool(looking.find(said(0.01 * k, (0.3,), (rate * (k > 110),)))) for k in range(170)]
+    assert not any(found[:111])
+    assert any(found) is told

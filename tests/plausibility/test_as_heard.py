@@ -144,10 +144,8 @@ def test_what_is_implausible_is_looked_at_again_after_a_second_and_at_no_tick_be
     """A carriage that comes back from 12 m away at 9 m/s, and is 10 m away after a quarter of a second."""
     text = CELL.replace("q = [0, 0]\n", "").replace('kind = "mvn"\nhuman = "op"', LIVE)
     station = made(tmp_path, text, {"arm.urdf": SLIDE})
-    places = [max(-9.5 + 0.0, min(0.0, -9.5 + 0.09 * k)) for k in range(130)]
-    steps = [
-        [heard("arm", 0.01 * k, [x], [0.0 if x in (0.0,) else 9.0])] for k, x in enumerate(places)
-    ]
+    places = [min(0.0, -9.5 + 0.09 * k) for k in range(130)]
+    steps = [[heard("arm", 0.01 * k, [x], [9.0 if x else 0.0])] for k, x in enumerate(places)]
     found = verdicts(station, steps, live=("arm",))
     held = ["nobody_within" in result.reason for result in found]
     assert held == [k < 100 for k in range(130)]
@@ -160,3 +158,15 @@ def test_a_number_is_confirmed_by_numbers_and_by_its_own_name(tmp_path):
     assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=other)} == {Verdict.UNDECIDED}
     both = other + f"[[confirmed]]\n{key}value = 20.0\n"
     assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=both)} == {Verdict.WITHIN}
+
+
+@pytest.mark.parametrize(("away", "verdict"), [(0.0, Verdict.WITHIN), (-20.0, Verdict.UNDECIDED)])
+def test_where_a_file_of_motion_puts_a_robot_is_looked_at_as_where_a_device_does(tmp_path, away, verdict):
+    """A carriage that a log has 20 m away from everybody."""
+    file = 'kind = "csv"\nrobot = "arm"\nfile = "m.csv"'
+    text = CELL.replace("q = [0, 0]\n", "").replace('kind = "mvn"\nhuman = "op"', file)
+    rows = "t [s],j1 [m],qd_j1 [m/s]\n" + "".join(f"{0.01 * k:.2f},{away},0\n" for k in range(5))
+    urdf = SLIDE.replace('name="j"', 'name="j1"')
+    found = made(tmp_path, text, {"arm.urdf": urdf, "m.csv": rows}).run().results["distance"]
+    assert found.verdict is verdict
+    assert ("robots[0].nobody_within" in found.worst().reason) is (verdict is Verdict.UNDECIDED)

@@ -1,4 +1,4 @@
-"""Where live sources, and devices that saw people, put robots and people: is that plausible?
+"""Where sources put robots, and devices that saw people put these: is that plausible?
 
 Where a file puts somebody is asked before a run (`seerob.model.mounting.in_place`); where a device does is
 known only once it was heard. What is implausible then (nobody within 10 m, feet off the floor, a person
@@ -33,11 +33,12 @@ class AsHeard:
     def __init__(self, model: Model) -> None:
         self._model = model
         people = {human.name for human in model.workstation.humans}
+        robots = {robot.name for robot in model.workstation.robots}
         self._waiting = {
             source.target()
             for source in model.workstation.sources
-            if (isinstance(source, LiveSource) or source.captured)
-            and source.target() in {*people, *(robot.name for robot in model.workstation.robots)}
+            if source.target() in robots
+            or (source.target() in people and (isinstance(source, LiveSource) or source.captured))
         }
         """Whom such a source moves; once they were heard, nobody."""
         self._where: dict[str, Array] = {}

@@ -44,7 +44,7 @@ def spoiled(rng: np.random.Generator) -> Packets:
     # What stands and is played again over a connection that nobody forges looks as what stands.
     faults = [each for each in FAULTS if forgeable or not stands.any() or each != "loop"]
     for _ in range(rng.integers(1, 6)):
-        a, by = rng.uniform(1, seconds), 10 ** rng.uniform(-2, 0.6)
+        a, by = rng.uniform(12, seconds), 10 ** rng.uniform(-2, 0.6)
         w = (t >= a) & (t < a + rng.choice([0.1, 0.5, 3.0, np.inf]))
         match rng.choice(faults):
             case "delay":

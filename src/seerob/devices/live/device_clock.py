@@ -107,6 +107,8 @@ class DeviceClock:
         """When it last started again."""
         self._before: Known | None = None
         """Its clock before that, while it may be the same one."""
+        self._first = math.nan
+        """Stamp that was heard first."""
         self._content = 0
         """What was said last."""
         self._repeats = False
@@ -150,6 +152,7 @@ class DeviceClock:
         raw = host - device
         if not math.isfinite(self._offset):
             self._offset = self._applied = raw
+            self._first = device if math.isnan(self._first) else self._first
         elif not self._follow(raw, host, device - self._newest):
             return Instant(None, self._standing(host))
         elif self._ahead is not None and device - self._newest > REORDERED:
@@ -243,7 +246,7 @@ class DeviceClock:
         else:
             what = f"its time went back by {back:.3g} s: it seems to have started again"
             self._hold(host, RESTART_HOLD, what)
-        if 0 <= device < BOOTED:
+        if 0 <= device < BOOTED or self._newest - self._first < BUFFERED:
             self._before = None
         elif self._before is None or host - self._restarted > RESTART_HOLD:
             self._before, self._repeats = Known(self._offset, self._newest, self._host), False

@@ -549,11 +549,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
             assert by_speed is not None
             v, seen = at.beside
             low, high = by_speed(v), by_speed(v + np.maximum(span.fast[parts] - span.ends[parts], 0.0))
-            fastest, T_r = float((span.fast + span.noise)[people].max(initial=0.0)), own.stop.reaction
-            v_h = max(own.human_speed or REACHING, fastest)
-            longer = separation_distance(high, v_h, T_r, K) - separation_distance(low, v_h, T_r, K)
-            faster = max(fastest - max(own.human_speed or WALKING, float(seen)), 0.0)
-            return np.asarray(at.figure + longer + faster * (T_r + high.T_s))
+            fastest = float((span.fast + span.noise)[people].max(initial=0.0))
+            return np.asarray(at.figure + own._longer(low, high, float(seen), fastest))
 
         def at_speeds(span: Span, _: Moment) -> Array:
             assert by_speed is not None
@@ -588,25 +585,25 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """
         gap = self._gap(model)
         people, parts = rows_of(gap.a), rows_of(gap.b)
-        required: list[Callable[[Array, float], Array]] = []
+        required: list[Callable[[Array, float, Array, float], Array]] = []
         for each in dict.fromkeys((self, self.at_worst(model))):
             own = each._by_device(model)[0]
-            by_speed, K = own._stop(model).by_speed, sum(own._terms()[0]) + gap.deviation
-            if by_speed is None:
+            stop, K = own._stop(model), sum(own._terms()[0]) + gap.deviation
+            if stop.by_speed is None:
                 return None
-            required.append(partial(own._at_speeds, by_speed, K))
+            required.append(partial(own._risen, stop.by_speed, K, stop.lasts))
 
         def rises(span: Span) -> Array:
             # Speeds that may be off by noise are that at both ends.
             ranges = [(span.fast, span.slow)]
             if span.noisy:
                 ranges.append((span.fast + span.noise, span.slow + span.noise[: len(span.slow)]))
-            risen = [
-                S_p(most[parts], greatest(most, people)) - S_p(least[parts], greatest(least, people))
-                for S_p in required
+            found = [
+                risen(least[parts], greatest(least, people), most[parts], greatest(most, people))
+                for risen in required
                 for most, least in ranges
             ]
-            return risen[0] if len(risen) == 1 else np.asarray(np.max(risen, axis=0))
+            return found[0] if len(found) == 1 else np.asarray(np.max(found, axis=0))
 
         return rises
 
@@ -625,6 +622,38 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return None if course is None or not np.isfinite(seen) else own._distance(course, K, seen)
 
         return most
+
+    def _risen(
+        self,
+        by_speed: Callable[[Array], Course],
+        K: float,
+        lasts: bool,
+        slow: Array,
+        slowest: float,
+        fast: Array,
+        fastest: float,
+    ) -> Array:
+        """How much S_p rises from the least to the largest speeds, of parts and of people [m], shape (n,)."""
+        if lasts:
+            # S_p is not that of these speeds, and may lie where it grows faster than theirs.
+            return self._longer(by_speed(slow), by_speed(fast), slowest, fastest)
+        return self._at_speeds(by_speed, K, fast, fastest) - self._at_speeds(by_speed, K, slow, slowest)
+
+    def _longer(self, low: Course, high: Course, seen: float, fastest: float) -> Array:
+        """How much S_p can grow with the course and with how fast people are seen to be [m], shape (n,).
+
+        Whatever it is: between the speeds that ISO 13855 assumes it grows no faster than with the larger.
+
+        Args:
+            low: Of the robot.
+            high: With speeds that are higher.
+            seen: Speed of people with the former [m/s].
+            fastest: With the latter [m/s].
+        """
+        T_r, v_h = self.stop.reaction, max(self.human_speed or REACHING, fastest)
+        longer = separation_distance(high, v_h, T_r, 0.0) - separation_distance(low, v_h, T_r, 0.0)
+        faster = max(fastest - max(self.human_speed or WALKING, seen), 0.0)
+        return np.asarray(longer + faster * (T_r + high.T_s))
 
     def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array, seen: float) -> Array:
         return self._distance(by_speed(v), K, seen)

@@ -30,7 +30,7 @@ MOST = 0.01
 """Of a tick, and of a start."""
 PAGE = 60.0
 """Frames per second."""
-MODULES = ("access", "allowance", "visits")
+MODULES = ("access", "allowance")
 
 
 def least(act: Callable[[], object], times: int, rounds: int) -> float:

@@ -1,6 +1,7 @@
 """A robot of your own from a URDF file: a two-link arm whose kinetic energy fits on a napkin.
 
-Stretched out, its first joint turning at 1 rad/s: E = (m1 r1² + m2 r2²) / 2.
+Stretched out, its first joint turning at 1 rad/s: E = (m1 r1² + m2 r2²) / 2. Each mass is a needle that stands
+on the axis's direction: it has no inertia about it.
 """
 
 from pathlib import Path
@@ -9,7 +10,7 @@ from tempfile import TemporaryDirectory
 import seerob as sr
 
 LINK = """<link name="{name}"><inertial><origin xyz="1 0 0"/><mass value="{mass}"/>
-<inertia ixx="1e-9" iyy="1e-9" izz="1e-9" ixy="0" ixz="0" iyz="0"/></inertial><collision>
+<inertia ixx="0.01" iyy="0.01" izz="1e-9" ixy="0" ixz="0" iyz="0"/></inertial><collision>
 <origin xyz="0.5 0 0"/><geometry><box size="1 0.05 0.05"/></geometry></collision></link>"""
 HINGE = """<joint name="{name}" type="continuous"><origin xyz="{x} 0 0"/><axis xyz="0 0 1"/>
 <parent link="{parent}"/><child link="{child}"/><limit effort="100" velocity="3"/></joint>"""

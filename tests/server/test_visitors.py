@@ -117,7 +117,7 @@ def test_visits_are_in_the_log(caplog):
     caplog.set_level(logging.INFO)
     with LiveView(scene=scene(), meshes=MESHES, port=0) as view, Visitor(view.server) as page:
         page.read()
-    said = [r.getMessage() for r in caplog.records if "visits" in r.name]
+    said = [r.getMessage() for r in caplog.records if "access" in r.name]
     assert said == ["page of 127.0.0.1 (any): connected", "page of 127.0.0.1 (any): gone, refused nothing"]
 
 

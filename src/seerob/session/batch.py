@@ -120,6 +120,22 @@ class _PositionsAlone(State):
         self.t = t
 
 
+def _is_plausible(model: Model, motion: Motion) -> bool:
+    """Whether everybody is somewhere plausible once they are heard (`seerob.criteria.as_heard`)."""
+    as_heard, data, hearings = AsHeard(model), mujoco.MjData(model.mj), _hearings(model, motion)
+    state = _PositionsAlone(model, data, hearings)
+    for k, t in enumerate(motion.t.tolist()):
+        if not as_heard.waits:
+            return True
+        data.qpos[:] = motion.q[k]
+        _hear(hearings, motion, k)
+        state.refresh(t)
+        state.heard()
+        if as_heard.at(state):
+            return False
+    return True
+
+
 def recorded(model: Model, feed: Feed, end: float) -> Motion:
     """Where everybody is at every tick of a feed, without physics: where the samples say.
 
@@ -134,9 +150,10 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     heard = list(feed)
     engine = engine_of(model, _PositionsAlone)
     still = frozenset(name for name in model.mechanisms if not engine.state.moved(name))
-    as_heard, implausible = AsHeard(model), dict[Finding, None]()
-    if not as_heard.waits and (known := known_motion(engine, heard, end)) is not None:
+    known = known_motion(engine, heard, end)
+    if known is not None and _is_plausible(model, known):
         return replace(known, still=still, coarse=coarse(model))
+    as_heard, implausible = AsHeard(model), dict[Finding, None]()
     engine = engine_of(model, _PositionsAlone)
     engine.end = end
     t, q, v = [], [], []
@@ -563,17 +580,7 @@ def _walked(
         only: Instants that are asked, each with the one before; all of them when None. Of others it says
             nothing that counts.
     """
-    # Between two instants nobody is silent, however long it is.
-    hearings = {
-        name: Hearing(
-            given=False,
-            driven=True,
-            timeout=np.inf,
-            once=name in motion.still,
-            coarse=motion.coarse.get(name, ""),
-        )
-        for name in model.mechanisms
-    }
+    hearings = _hearings(model, motion)
     data = mujoco.MjData(model.mj)
     state = State(model, data, hearings)
     # With criteria that were bound for another run, what they remember of it would be in the way.
@@ -592,22 +599,41 @@ def _walked(
                 rows.append(())
                 continue
             data.qpos[:], data.qvel[:] = motion.q[k], motion.v[k]
-            since = max(k - 1, 0)
-            for name, every in motion.seen.items():
-                every[k].tell(hearings[name])
-            for name, hearing in hearings.items():
-                said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
-                errors = motion.speed_errors.get(name)
-                hearing.heard = [
-                    Heard(float(motion.t[i]), why, speed_error=None if errors is None else errors[i])
-                    for i, why in zip(range(since, k + 1), said, strict=True)
-                ]
+            _hear(hearings, motion, k)
             state.path = motion.ways[k - 1] if motion.ways and k and rows[-1] else None
             state.refresh(t)
             rows.append(judge(state))
     said_nothing = tuple(Result(name=one.criterion.name) for one in bound)
     rows = [row or said_nothing for row in rows]
     return {one.criterion.name: _of_results([row[i] for row in rows]) for i, one in enumerate(bound)}
+
+
+def _hearings(model: Model, motion: Motion) -> dict[str, Hearing]:
+    """Of everybody: between two instants nobody is silent, however long it is."""
+    return {
+        name: Hearing(
+            given=False,
+            driven=True,
+            timeout=np.inf,
+            once=name in motion.still,
+            coarse=motion.coarse.get(name, ""),
+        )
+        for name in model.mechanisms
+    }
+
+
+def _hear(hearings: Mapping[str, Hearing], motion: Motion, k: int) -> None:
+    """Let everybody be heard as they were at an instant, and at the one before."""
+    since = max(k - 1, 0)
+    for name, every in motion.seen.items():
+        every[k].tell(hearings[name])
+    for name, hearing in hearings.items():
+        said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
+        errors = motion.speed_errors.get(name)
+        hearing.heard = [
+            Heard(float(motion.t[i]), why, speed_error=None if errors is None else errors[i])
+            for i, why in zip(range(since, k + 1), said, strict=True)
+        ]
 
 
 def _foresee(

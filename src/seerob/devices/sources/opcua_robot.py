@@ -17,7 +17,6 @@ from seerob.core.extras import need
 from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.description.robots import library
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.variables.access import at_home, missing
 from seerob.devices.variables.live_source import PULSES
@@ -301,6 +300,8 @@ def another_robot(robot: Robot, target: Target | None) -> str:
     """Why a server speaks of another robot of the library than the twin; empty where it may be that one."""
     prefix, _, own = ("" if target is None else target.model).partition(":")
     said = robot.about.get("Model", "")
+    from seerob.description.robots import library  # reads meshes, which most sources need not
+
     names = {_spelt(name): name for name in library.names() if _spelt(name) in _spelt(said)}
     if prefix != "library" or not names or names[max(names, key=len)] == own:
         return ""

@@ -1,7 +1,7 @@
 """A robot of your own from a URDF file: a two-link arm whose kinetic energy fits on a napkin.
 
-Stretched out, its first joint turning at 1 rad/s: E = (m1 r1² + m2 r2²) / 2. Each mass is a needle that stands
-on the axis's direction: it has no inertia about it.
+Stretched out, its first joint turning at 1 rad/s: E = (m1 r1² + m2 r2²) / 2. Each mass is a needle
+along the axis: it has no inertia about that.
 """
 
 from pathlib import Path

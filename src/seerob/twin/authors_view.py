@@ -6,10 +6,18 @@ question is answered: what is kept, in a closure or for a thread, says nothing o
 
 from __future__ import annotations
 
-from copy import deepcopy
-from typing import Any
+from copy import copy, deepcopy
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.errors import NotAsked
+from seerob.model.model import Model
+from seerob.twin.joint_columns import moving_dofs
+
+Indices = NDArray[np.int64]
 
 OF_AN_INSTANT = frozenset(
     {
@@ -72,3 +80,56 @@ class AuthorsView:
     def answered(self) -> None:
         """Close it: the question is answered."""
         self._answered = True
+
+
+OF_DOFS = ("qvel", "qacc", "qacc_warmstart", "qfrc_applied", "qfrc_bias", "qfrc_passive", "qfrc_actuator",
+           "qfrc_constraint", "qfrc_smooth", "qfrc_inverse", "cdof", "cdof_dot")  # fmt: skip
+OF_BODIES = ("xpos", "xquat", "xmat", "xipos", "ximat", "cvel", "cacc", "cfrc_int", "cfrc_ext", "cinert")
+OF_SUBTREES = ("subtree_com", "subtree_linvel", "subtree_angmom", "crb")
+"""Arrays of `mujoco.MjData` by degree of freedom, by body, and by body with all that it carries."""
+
+
+class Others(NamedTuple):
+    """What of MuJoCo's data others have an influence on."""
+
+    q: Indices
+    """Positions of joints."""
+    v: Indices
+    """Degrees of freedom."""
+    bodies: Indices
+
+
+def moved_by_others(model: Model, names: tuple[str, ...]) -> Others:
+    """What moves with others than some robots, people and machines, and whoever carries them."""
+    known = {each for name in names for each in (name, *model.carriers_of(name))}
+    others = [m for m in model.mechanisms.values() if m.name not in known]
+    q = np.concatenate([np.zeros(0, np.int64), *(m.q_address for m in others)])
+    v = np.concatenate([np.zeros(0, np.int64), *(m.v_address for m in others)])
+    moved = [i for i in range(model.mj.nbody) if moving_dofs(model.mj, i)[v].any()]
+    return Others(q, v, np.array(moved, np.int64))
+
+
+def without(mj: mujoco.MjModel, data: Any, others: Others) -> Any:
+    """A copy of MuJoCo's data in which what others have an influence on is not a number."""
+    data, (q, v, bodies) = copy(data), others
+    if not len(v):
+        return data
+    data.qpos[q] = np.nan
+    for name in OF_DOFS:
+        getattr(data, name)[v] = np.nan
+    for name in OF_BODIES:
+        getattr(data, name)[bodies] = np.nan
+    # What a body carries is in it: of the world, everybody.
+    above = {0, *bodies.tolist()}
+    for body in bodies.tolist():
+        while body:
+            above.add(body := int(mj.body_parentid[body]))
+    for name in OF_SUBTREES:
+        getattr(data, name)[sorted(above)] = np.nan
+    for kind in ("geom", "site", "cam"):
+        rows = np.isin(getattr(mj, f"{kind}_bodyid"), bodies)
+        for name in (f"{kind}_xpos", f"{kind}_xmat"):
+            getattr(data, name)[rows] = np.nan
+    joints = np.isin(mj.jnt_dofadr, v)
+    data.xanchor[joints], data.xaxis[joints] = np.nan, np.nan
+    return data

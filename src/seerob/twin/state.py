@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from copy import copy, deepcopy
+from copy import deepcopy
 from functools import partial
 from typing import Any, NamedTuple, cast
 
@@ -30,7 +30,7 @@ from seerob.kernels.chain import along, at_point
 from seerob.kernels.spans import greatest
 from seerob.kernels.speed import carried, fastest, in_body, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
-from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView
+from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
@@ -50,13 +50,6 @@ MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
 WRITTEN = ("placed", "velocities of")
 """What is kept of them lies in buffers."""
-
-
-OF_DOFS = ("qvel", "qacc", "qacc_warmstart", "qfrc_applied", "qfrc_bias", "qfrc_passive", "qfrc_actuator",
-           "qfrc_constraint", "qfrc_smooth", "qfrc_inverse", "cdof", "cdof_dot")  # fmt: skip
-OF_BODIES = ("xpos", "xquat", "xmat", "xipos", "ximat", "cvel", "cacc", "cfrc_int", "cfrc_ext", "cinert")
-OF_SUBTREES = ("subtree_com", "subtree_linvel", "subtree_angmom", "crb")
-"""Arrays of `mujoco.MjData` by degree of freedom, by body, and by body with all that it carries."""
 
 
 class MassEllipsoid(NamedTuple):
@@ -109,7 +102,7 @@ class State(Validity):
         self._alone = [(i,) for i in range(n)]
         """Each body by itself, as it is asked for."""
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
-        self._others_of: dict[tuple[str, ...], tuple[Indices, Indices, Indices]] = {}
+        self._others_of: dict[tuple[str, ...], Others] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
         self.captured_qpos: Array | None = None
         """Of an instant between two ticks: ``qpos`` with people where they were captured; None at a tick,
@@ -386,45 +379,11 @@ class State(Validity):
         """
         self.require(*names)
         self.speeds_asked.update(names)
-        return self._data_without(self._others(names)) if self._author else self._data
-
-    def _others(self, names: tuple[str, ...]) -> tuple[Indices, Indices, Indices]:
-        """Positions, velocities and bodies of MuJoCo on which others than these have an influence."""
+        if not self._author:
+            return self._data
         if names not in self._others_of:
-            model = self._model
-            known = {each for name in names for each in (name, *model.carriers_of(name))}
-            others = [m for m in model.mechanisms.values() if m.name not in known]
-            q, v = (np.concatenate([np.zeros(0, np.int64), *rows]) for rows in (
-                [m.q_address for m in others], [m.v_address for m in others]
-            ))  # fmt: skip
-            moved = [i for i in range(model.mj.nbody) if moving_dofs(model.mj, i)[v].any()]
-            self._others_of[names] = q, v, np.array(moved, np.int64)
-        return self._others_of[names]
-
-    def _data_without(self, others: tuple[Indices, Indices, Indices]) -> Any:
-        """A copy of MuJoCo's data in which some positions, velocities and bodies are not numbers."""
-        mj, data, (q, v, bodies) = self._model.mj, copy(self._data), others
-        if not len(v):
-            return data
-        data.qpos[q] = np.nan
-        for name in OF_DOFS:
-            getattr(data, name)[v] = np.nan
-        for name in OF_BODIES:
-            getattr(data, name)[bodies] = np.nan
-        for name in OF_SUBTREES:
-            # What a body carries is in it: of the world, everybody.
-            above = {0, *bodies.tolist()}
-            for body in bodies.tolist():
-                while body:
-                    above.add(body := int(mj.body_parentid[body]))
-            getattr(data, name)[sorted(above)] = np.nan
-        for kind in ("geom", "site", "cam"):
-            rows = np.isin(getattr(mj, f"{kind}_bodyid"), bodies)
-            for name in (f"{kind}_xpos", f"{kind}_xmat"):
-                getattr(data, name)[rows] = np.nan
-        joints = np.isin(mj.jnt_dofadr, v)
-        data.xanchor[joints], data.xaxis[joints] = np.nan, np.nan
-        return data
+            self._others_of[names] = moved_by_others(self._model, names)
+        return without(self._model.mj, self._data, self._others_of[names])
 
     @contextmanager
     def set_apart(self, author: str) -> Iterator[State]:

@@ -211,6 +211,96 @@ def test_a_buffer_that_a_new_connection_is_served_from_is_as_late_as_it_is(late,
     assert clock.latency == pytest.approx(late, abs=0.03)
 
 
+@pytest.mark.parametrize("late", [0.4, 4.0, 9.0])
+def test_a_robot_that_stands_and_is_heard_out_of_a_buffer_is_as_late_as_it_is(late):
+    """What it says is the same at all times: it may have moved since."""
+    clock = DeviceClock()
+    for k in range(2000):
+        clock.hear(50 + PERIOD * k, 55 + PERIOD * k, 7)
+    clock.reconnect()
+    for k in range(2000 - round(late / PERIOD), 4000):
+        found = clock.hear(50 + PERIOD * k, 55 + late + PERIOD * k, 7)
+        assert found.t is None or found.invalid_reason or clock.latency > 0.9 * late, k
+
+
+@pytest.mark.parametrize(
+    ("first", "middle", "newest", "after", "buffered"),
+    [
+        (-20.0, -0.5, 5.0, 0.5, True),
+        (-20.0, 0.0, 5.0, 0.5, False),  # it was switched on just now
+        (-20.0, 9.5, 15.0, 0.5, False),
+        (-20.0, 10.0, 15.0, 0.5, True),
+        (50.0, 55.0, 60.0, 0.5, True),
+        (50.5, 55.0, 60.0, 0.5, False),  # the whole of it was heard for less than ten seconds
+        (80.0, 90.5, 100.0, 0.0, True),
+        (80.0, 90.0, 100.0, 0.0, False),  # late by ten seconds
+    ],
+)
+def test_what_begins_again_within_ten_seconds_is_a_buffer_unless_it_was_just_switched_on(
+    first, middle, newest, after, buffered
+):
+    clock = DeviceClock()
+    for said, stamp in enumerate((first, middle, newest)):
+        clock.hear(stamp, 5.0 + stamp, said)
+    clock.reconnect()
+    assert clock.hear(middle, 5.0 + newest + after, 1).invalid_reason
+    late = newest - middle + after if buffered else 0.0
+    assert clock.latency == pytest.approx(late - (2e-4 * after if buffered else 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+@pytest.mark.parametrize(("leap", "far"), [(0.125, False), (0.25, False), (0.375, True)])
+def test_a_clock_that_is_set_back_is_followed_unless_it_leaps_on_to_where_it_was(leap, far, ahead):
+    """Then one packet came late over a new connection, and what followed it is as late as it is."""
+    clock = DeviceClock()
+    for k in range(21):
+        clock.hear(100.0 + k, 105.0 + k, k)
+    clock.reconnect()
+    clock.hear(115.5, 125.5, 50)
+    assert (clock.offset, clock.latency) == (10.0, 0.0)
+    sooner = 0.03125 * ahead
+    assert (clock.hear(115.5 + leap / 2, 125.5 + leap / 2 - sooner, 51).t is None) is ahead
+    clock.hear(115.5 + (leap if ahead else leap * 1.5), 125.5 + leap * (1.0 if ahead else 1.5) - sooner, 52)
+    assert clock.latency == pytest.approx(5.0 - sooner if ahead and far else 0.0, abs=1e-3)
+    # Nor is it late without a sample that was ahead of its time, however long it was silent.
+    clock.hear(117.0, 127.0 - sooner, 53)
+    assert clock.latency == pytest.approx(5.0 - sooner if ahead and far else 0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("seconds", "kept"), [(1.0, True), (2.5, True), (2.625, False)])
+def test_the_clock_before_a_restart_is_that_before_all_that_followed_within_two_and_a_half_seconds(
+    seconds, kept
+):
+    """Two packets came late and looked like restarts, and what follows them is 2 s late."""
+    clock = DeviceClock()
+    for k in range(21):
+        clock.hear(100.0 + k, 105.0 + k, k)
+    for k, wait in enumerate((0.0, seconds)):
+        clock.reconnect()
+        assert clock.hear(119.5 - k, 128.0 + wait, 50 + k).t is not None
+    assert clock.offset == 9.5 + seconds
+    clock.hear(125.0, 132.0, 60)
+    clock.hear(125.5, 132.5, 61)
+    # Later, it was followed, and what came ahead of it is all that is known.
+    assert clock.latency == pytest.approx(2.0 if kept else 0.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("back", [1.0, 40.0])
+def test_a_buffer_is_late_by_the_clock_of_just_before_it(back):
+    """Of a second after another buffer, or of twenty after a clock was set back."""
+    clock = DeviceClock()
+    for k in range(101):
+        clock.hear(100.0 + k, 105.0 + k, k)
+    clock.reconnect()
+    content, seconds = (99, 1) if back == 1.0 else (500, 20)
+    for k in range(seconds + 1):
+        clock.hear(200.0 - back + k, 205.5 + k, content + k)
+    clock.reconnect()
+    late = clock.hear(200.0 - back + seconds - 1, 205.5 + seconds + 0.25, content + seconds - 1)
+    assert late.invalid_reason
+    assert clock.latency == pytest.approx(1.25 + 1.5 * (back == 1.0), abs=0.01)
+
+
 def test_a_packet_that_a_new_connection_overtook_is_no_news_of_its_clock():
     clock = DeviceClock()
     heard(clock, [(PERIOD * k, 5 + PERIOD * k) for k in range(100)])

@@ -157,17 +157,17 @@ class DeviceClock:
             return Instant(None, self._standing(host))
         elif self._ahead is not None and device - self._newest > REORDERED:
             # One packet that came late over a new connection looked like a restart: time leaps on from it.
-            self._resume(device, raw, host)
+            self._resume(raw, host)
         self._connected = False
         self._newest, self._host = device, max(host, self._host)
-        self.latency = raw - self._offset
         again = said in (self._said.get(device), self._marks.get(device))
         if again and (forgeable or (self._before is not None and said != self._content)):
             # Of a connection that nobody forges, what stands may say the same; what moves does not.
             self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
         self._repeats = self._repeats or again
         if self._repeats:
-            self._resume(device, raw, host)
+            self._resume(raw, host)
+        self.latency = raw - self._offset
         self._remember(device, said)
         t = device + self._applied
         if t <= self._last:
@@ -177,15 +177,14 @@ class DeviceClock:
         self._last = max(self._last, t)
         return Instant(t, self._standing(host))
 
-    def _resume(self, device: float, raw: float, host: float) -> None:
+    def _resume(self, raw: float, host: float) -> None:
         """Go on by the clock from before: it has not started again, what it says came out of a buffer."""
-        if self._before is None or device <= self._before.device:
+        if self._before is None:
             return
-        risen = self._before.offset + DRIFT * max(0.0, host - self._before.host)
-        if -STEP < raw - risen < BUFFERED:
+        risen = self._before.offset + DRIFT * (host - self._before.host)
+        if raw - risen < BUFFERED:
             self._before = None
-            self._offset = self._applied = min(raw, risen)
-            self.latency = raw - self._offset
+            self._offset = self._applied = min(self._offset, risen)
 
     def _remember(self, device: float, said: int) -> None:
         """Keep what is said at a time for a while, and now and then for hours: when, no player can know."""

@@ -12,9 +12,11 @@ from seerob.criteria.ergonomics.eaws_posture import (
     EawsThresholds,
     Interpolation,
     PostureTime,
+    Screening,
     asymmetry_points,
     line_points,
     lines,
+    most_points,
     possible_lines,
 )
 from seerob.criteria.scoring.spans import published
@@ -228,7 +230,63 @@ def test_a_run_that_ends_before_its_cycle_is_undecided(tmp_path, seconds, expect
 def test_what_is_unknown_makes_an_interval(tmp_path):
     *_, last = run(station(tmp_path, ENTERED + 'phases = [{ legs = "posture" }]\n'), lambda _: "bent", 20)
     assert last.value is None
-    assert last.interval == (pytest.approx(25 + 15), pytest.approx(40 + 15))
+    # The body may have been supported for a sixth of the time only, in which more costs nothing.
+    most = most_points({"3a": 1.0, "3b": 1.0}, 1.0)
+    assert 40 < most < 46.5
+    assert last.interval == (pytest.approx(25 + 15), pytest.approx(most + 15))
+
+
+def test_no_share_of_the_time_has_more_points_than_the_most():
+    """Random shares of lines of which each has no more than it may and all have the whole."""
+    rng = np.random.default_rng(0)
+    names = list(lines())
+    for _ in range(300):
+        own = rng.choice(names, rng.integers(1, 5), replace=False)
+        may = dict(zip(own, rng.uniform(0, 1, len(own)), strict=True))
+        whole = rng.uniform(0, 1)
+        most = most_points(may, whole)
+        for _ in range(40):
+            shares = rng.dirichlet(np.full(len(own), 0.5)) * whole
+            points = sum(line_points(n, min(x, may[n])) for n, x in zip(own, shares, strict=True))
+            assert points <= most + 1e-9
+    for name in names:
+        assert most_points({name: 0.4}, 1.0) == pytest.approx(line_points(name, 0.4))
+
+
+def test_a_posture_that_may_have_been_held_between_two_others_counts():
+    """Bent by 15° and by 65° in turn, each for 3 s and known to ±10°: it may have been 25° and 55°, bent
+    forward all the time, which is held; of the lightest lines and of the heaviest none is.
+    """
+    screening = Screening(30.0, 4.0, Interpolation.LINEAR)
+    for k in range(301):
+        posture = made_angles(trunk_flexion=15 if k // 30 % 2 else 65)
+        found = possible_lines(
+            posture, legs="standing", supported=False, thresholds=USUAL, accuracy=np.radians(10)
+        )
+        screening.add(k / 10, found, posture, np.radians(10))
+    low, high = screening.points()
+    assert low.total == 0
+    assert high.total >= line_points("3a", 1.0)
+
+
+@pytest.mark.parametrize("limit", [25, 35])
+def test_a_screening_with_an_accuracy_is_within_below_its_bound_only(tmp_path, limit):
+    """The pelvis tilts to 15° and 65° in turn: with the accuracy it may have been bent all the time."""
+    entered = ENTERED.replace("upper_limbs = 30", "upper_limbs = 0")
+    more = (
+        'phases = [{ legs = "standing", back_supported = false }]\n'
+        f"{entered}limit = {limit}\naccuracy_deg = 10\n"
+    )
+    stage = station(tmp_path, more, cycle=24)
+    states = [
+        state_at(stage, op=(posture(PERSON, {"pelvis_tilt_forward": np.radians(x)}), STILL)) for x in (15, 65)
+    ]
+    for k in range(121):
+        state = states[k // 15 % 2]
+        state.t = k / 5
+        last = judged(stage.bound, state)[0]
+    assert last.verdict is Verdict.UNDECIDED
+    assert last.interval[1] >= 40 + 15
 
 
 def test_what_is_printed_says_where_the_figures_are_from(tmp_path):

@@ -174,3 +174,41 @@ def test_nothing_depends_on_what_comes_later():
     whole = watched(Watch(REST, hold=10, count=4), {"trunk_flexion": lambda t: noise[round(t * SEEN)]}, 80)
     part = watched(Watch(REST, hold=10, count=4), {"trunk_flexion": lambda t: noise[round(t * SEEN)]}, 40)
     assert [str(row) for row in whole[: len(part)]] == [str(row) for row in part]
+
+
+@pytest.mark.parametrize("unseen", [(0.0, 50.0), (20.0, 50.0)])
+def test_of_a_joint_that_nobody_saw_for_a_while_nothing_is_known_until_it_was_seen_for_a_minute(unseen):
+    """Hidden from one instant to another it may have moved as often as it likes, or been held all along."""
+    watch = Watch(REST, hold=60, count=4)
+    found = {}
+    for k in range(120 * SEEN):
+        t = k / SEEN
+        hidden = unseen[0] <= t < unseen[1]
+        wrist = np.nan if hidden else 0.5 * t
+        watch.add(t, made_angles(wrist_flexion=wrist, elbow_flexion=80 + 0.5 * t, neck_flexion=0.5 * t))
+        found[t] = watch.part("wrist", 0)
+    for t in (unseen[1], unseen[1] + 30, unseen[1] + 59):
+        assert found[t].repeated == (0, 1), t
+    assert found[unseen[1] + 61].repeated == (0, 0)
+    assert found[unseen[1] + 11].static == (0, 1)
+    assert found[unseen[1] + 61].static == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "known_to_be"), [(1.0, (0, 1)), (2.0, (0, 1)), (4.0, (0, 0)), (20.0, (0, 0))]
+)
+def test_who_looks_seldom_does_not_know_that_nothing_is_repeated(rate, known_to_be):
+    """A wrist that goes to and fro once a second is always at one place to whoever looks once a second."""
+    watch = Watch(REST, hold=60, count=4)
+    for k in range(round(90 * rate) + 1):
+        watch.add(k / rate, made_angles(wrist_flexion=0.0))
+    assert watch.part("wrist", 0).repeated == known_to_be
+    assert watch.part("neck", 0).repeated == known_to_be
+
+
+def test_one_short_gap_hides_no_more_than_it_can():
+    watch = Watch(REST, hold=60, count=4)
+    for k in range(90 * SEEN):
+        if not 200 < k < 204:
+            watch.add(k / SEEN, made_angles())
+    assert watch.part("wrist", 0).repeated == (0, 0)

@@ -179,7 +179,7 @@ def test_static_and_repeated_work_is_found_where_no_phase_enters_it(tmp_path):
         for f in ("true", "false")
     )
     stage = made(tmp_path, HUMANS + entered + rules)
-    at = found(stage, *np.arange(0, 61.0, 0.5))
+    at = found(stage, *np.arange(0, 61.0, 0.25))
     for t, expected in ((30.0, 0), (60.0, 1)):
         assert parts(at[t]["rulatrue"])["right muscle use of the arms"] == expected
         assert parts(at[t]["rulatrue"])["muscle use of the body"] == expected

@@ -132,6 +132,35 @@ def test_a_silence_forgets():
     assert watch.add(0.0, bent, 0.0, {})["trunk_flexion", 0] == (1, 1)
 
 
+def test_how_often_an_angle_was_entered_that_nobody_saw_is_not_known():
+    """Half a minute out of sight may hold any number of entries; a minute later none counts any more."""
+    rows = [row(20, None, 1), row(20, None, 2, per_minute=4)]
+    found = scores(rows, lambda t: math.nan if 20 <= t < 50 else 30 if 60 <= t < 62 else 0, 130)
+    assert (found[190], found[610], found[1090]) == ((0, 0), (1, 2), (0, 0))
+
+
+def test_who_looks_seldom_does_not_know_how_often_an_angle_was_entered():
+    rows = [row(20, None, 1), row(20, None, 2, per_minute=2)]
+    assert scores(rows, lambda t: 30 if t > 62 else 0, 64, rate=1)[-1] == (1, 2)
+    assert scores(rows, lambda t: 30 if t > 62 else 0, 64, rate=4)[-1] == (1, 1)
+
+
+@pytest.mark.parametrize("accuracy", [0.0, 5.0, 12.0, 25.0, 40.0])
+def test_the_accuracy_never_hides_how_often_an_angle_was_entered(accuracy):
+    """A trunk that bends to 35° and back six times a minute may have done so with any accuracy."""
+    rows = [row(20, 60, 0), row(20, 60, 2, per_minute=2)]
+    found = scores(rows, lambda t: 35 if t % 10 < 3 else 5, 80, accuracy=accuracy)
+    assert found[710][1] == 2
+    if not accuracy:
+        assert found[710] == (2, 2)
+
+
+@pytest.mark.parametrize(("angle", "expected"), [(18, (0, 0)), (10, (0, 0)), (22, (0, 0))])
+def test_an_angle_that_stands_was_entered_once_with_any_constant_error(angle, expected):
+    rows = [row(20, 60, 0), row(20, 60, 2, per_minute=2)]
+    assert scores(rows, lambda _: angle, 80, accuracy=8)[-1] == expected
+
+
 def test_the_head_is_the_neck_on_the_trunk():
     bent = made_angles(trunk_flexion=30, neck_flexion=15)
     assert value_of("head_inclination", 0, bent, math.radians(3)) == (

@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 from enum import StrEnum
 from functools import cache
+from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -101,6 +102,48 @@ def line_points(line: str, share: float, interpolation: Interpolation = Interpol
         reached = int(np.searchsorted(shares, share + _ROUNDING, side="right"))
         return points[reached - 1] if reached else 0.0
     return float(np.interp(share, [0.0, *shares], [0.0, *points]))
+
+
+def most_points(shares: Mapping[str, float], whole: float) -> float:
+    """At most so many points of postures together, of which each may last for no more than its share.
+
+    Args:
+        shares: Of the time that each line may have at most, 0 to 1; together they may be more than the whole.
+        whole: Share of the time that all of them have together.
+
+    Returns:
+        The smaller of two bounds: all shares at once, and the whole time given to where it costs most, by
+        the least concave curves above the points of the form.
+    """
+    number("whole", whole, 0, 1 + _ROUNDING)
+    at_once = sum(line_points(line, share) for line, share in shares.items())
+    pieces = sorted(
+        (
+            ((end[1] - begin[1]) / (end[0] - begin[0]), min(end[0], shares[line]) - begin[0])
+            for line in shares
+            for begin, end in pairwise(_above(line))
+            if shares[line] > begin[0]
+        ),
+        reverse=True,
+    )
+    given, left = 0.0, whole
+    for slope, width in pieces:
+        given += slope * min(width, left)
+        left -= min(width, left)
+    return min(at_once, given)
+
+
+def _above(line: str) -> list[tuple[float, float]]:
+    """Corners of the least concave curve above the points of a line: share and points."""
+    points = lines()[line].points
+    hull = [(0.0, 0.0)]
+    for x, y in zip(published("eaws_posture")["shares"][: len(points)], points, strict=True):
+        while len(hull) > 1 and (y - hull[-2][1]) * (hull[-1][0] - hull[-2][0]) >= (
+            hull[-1][1] - hull[-2][1]
+        ) * (x - hull[-2][0]):
+            hull.pop()
+        hull.append((x, y))
+    return hull
 
 
 def asymmetry_points(at_least: tuple[float, ...]) -> float:
@@ -252,12 +295,14 @@ class Points(NamedTuple):
     lines: dict[str, float]
     rotation: float
     bending: float
+    together: float
+    """Of all lines."""
 
     @property
     def total(self) -> float:
         """Points of section 1, far reach apart."""
         most = float(published("eaws_posture")["asymmetry_sum_most"])
-        return sum(self.lines.values()) + min(self.rotation + self.bending, most)
+        return self.together + min(self.rotation + self.bending, most)
 
 
 class _Ledger:
@@ -284,6 +329,9 @@ class Screening:
 
     def _begin(self) -> None:
         self._ends = (_Ledger(self._hold), _Ledger(self._hold))
+        self._may = {name: PostureTime(self._hold) for name in lines()}
+        self._open = False
+        """Whether some posture may have belonged to several lines."""
 
     def add(self, t: float, possible: tuple[str, ...], angles: Angles, accuracy: Accuracy) -> None:
         """What a posture may be at an instant [s], lightest line first; an earlier instant begins anew."""
@@ -293,6 +341,9 @@ class Screening:
             return
         self._t = t
         measured = Measured(angles, accuracy)
+        self._open = self._open or len(possible) > 1
+        for name, timer in self._may.items():
+            timer.add(t, name if name in possible else "")
         for end, ledger in enumerate(self._ends):
             ledger.lines.add(t, possible[-end])
             for name, timers in ledger.turns.items():
@@ -331,7 +382,13 @@ class Screening:
                 for timers in ledger.turns.values()
             ]
             points = {name: line_points(name, s / whole, self._interpolation) for name, s in seconds.items()}
-            found.append(Points(points, *turns))
+            found.append(Points(points, turns[0], turns[1], sum(points.values())))
+        if self._open:
+            # Which line a posture had may have changed, or stayed and been held, as no single guess of it is.
+            shares = {name: timer.seconds.get(name, 0.0) / whole for name, timer in self._may.items()}
+            most = {name: line_points(name, x, self._interpolation) for name, x in shares.items() if x > 0}
+            together = max(found[0].together, most_points(shares, self.heard / whole))
+            found[1] = found[1]._replace(lines=most, together=together)
         return found[0], found[1]
 
 
@@ -532,8 +589,8 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
             not_modelled=(
                 "sections 2 to 4: action forces, handling of loads, upper limbs; they are entered or missing",
                 "far reach, and frequent dynamic postures shorter than the minimum hold",
-                "with an accuracy or unknown support the ends take the lightest and the heaviest line of "
-                "each instant: an estimate of the interval",
+                "with an accuracy or unknown support the least points are an estimate: those of the lightest "
+                "line of each instant",
                 "lying counts as line 15 whatever the arms do: the form has no other line for it",
             ),
         )

@@ -28,6 +28,8 @@ GAP = 1.0
 """A posture that is left for less [s] was not left."""
 WINDOW = 60.0
 """Over which repetitions are counted [s]."""
+QUICK = 0.4
+"""Nobody moves a joint to and fro by what is counted in less [s]; a choice."""
 _ROUNDING = 1e-9
 """Instants [s] and angles [rad] that differ by less are the same."""
 
@@ -211,6 +213,31 @@ class Moves:
         return max(map(len, self._turns.values()))
 
 
+class Hidden:
+    """How many events may have happened between two looks within the last minute.
+
+    Args:
+        least: Time that one takes [s]; between looks that follow faster there is none.
+        window: [s]
+    """
+
+    def __init__(self, least: float, window: float = WINDOW) -> None:
+        self._least, self._window = least, window
+        self._gaps: deque[tuple[float, int]] = deque()
+
+    def add(self, t: float, gap: float) -> None:
+        """A look at an instant [s], so long after the one before [s]."""
+        self.at(t)
+        if many := int((gap + _ROUNDING) / self._least):
+            self._gaps.append((t, many))
+
+    def at(self, t: float) -> int:
+        """Within the window that ends at an instant [s]."""
+        while self._gaps and self._gaps[0][0] <= t - self._window + _ROUNDING:
+            self._gaps.popleft()
+        return sum(many for _, many in self._gaps)
+
+
 class Found(NamedTuple):
     """What is known of one part of the body: 0 or 1, or both when it cannot be known yet."""
 
@@ -235,11 +262,14 @@ class Watch:
     def begin(self) -> None:
         """Forget everything."""
         self._start = math.nan
-        self._known_before = self._detection.from_rest
-        tolerance, movement = self._detection.tolerance, self._detection.movement
-        self._holds = {key: Hold(tolerance, self._hold) for key in _keys()}
-        self._moves = {key: Moves(movement) for key in _keys()}
+        self._holds: dict[tuple[str, int], Hold] = {}
+        self._moves: dict[tuple[str, int], Moves] = {}
+        self._since: dict[tuple[str, int], float] = {}
+        """Since when each angle is seen without a gap [s]."""
+        self._known_before = dict.fromkeys(_keys(), self._detection.from_rest)
+        """Whether nothing was held or repeated before."""
         self._seen: dict[tuple[str, int], float] = {}
+        self._hidden = {key: Hidden(QUICK) for key in _keys()}
 
     def add(self, t: float, angles: Angles) -> None:
         """The posture at an instant [s]; an earlier one than before begins anew, the same adds nothing."""
@@ -251,7 +281,7 @@ class Watch:
         if math.isfinite(self._t) and t - self._t > GAP + SAMPLE:
             # What happened in a silence is not known, so neither is what was before.
             self.begin()
-            self._known_before = False
+            self._known_before = dict.fromkeys(_keys(), False)
         self._t = t
         if math.isnan(self._start):
             self._start = t
@@ -259,9 +289,21 @@ class Watch:
             value = getattr(angles, name)
             angle = float(value[side] if name in SIDED else value)
             if not math.isnan(angle):
+                self._begin_again(t, name, side)
+                self._hidden[name, side].add(t, t - self._seen.get((name, side), t))
                 self._seen[name, side] = t
                 self._holds[name, side].add(t, angle)
                 self._moves[name, side].add(t, angle)
+
+    def _begin_again(self, t: float, name: str, side: int) -> None:
+        """Forget an angle that nobody saw for a while, as all are forgotten in a silence."""
+        key = (name, side)
+        unseen = t - self._seen.get(key, self._start) > GAP + SAMPLE
+        if key not in self._since or unseen:
+            self._holds[key] = Hold(self._detection.tolerance, self._hold)
+            self._moves[key] = Moves(self._detection.movement)
+            self._since[key] = t if unseen else self._start
+            self._known_before[key] = self._known_before[key] and not unseen
 
     def part(self, part: str, side: int) -> Found:
         """What is known of a part of the body on a side, 0 right and 1 left."""
@@ -274,21 +316,24 @@ class Watch:
         return tuple(self.part(part, side) for side in range(2 if sided else 1))
 
     def _static(self, key: tuple[str, int]) -> Span:
-        since = self._holds[key].since
-        if math.isnan(since) or self._t - self._seen[key] > GAP:
+        if key not in self._seen or self._t - self._seen[key] > GAP:
             return between(0, 1)
+        since = self._holds[key].since
         if self._t - since >= self._hold - _ROUNDING:
             return between(1, 1)
-        whole = since <= self._start + _ROUNDING
-        return between(0, 1) if whole and not self._known_before else between(0, 0)
+        whole = since <= self._since[key] + _ROUNDING
+        return between(0, 1) if whole and not self._known_before[key] else between(0, 0)
 
     def _repeated(self, key: tuple[str, int]) -> Span:
         if key not in self._seen or self._t - self._seen[key] > GAP:
             return between(0, 1)
-        if self._moves[key].count >= self._count:
+        count = self._moves[key].count
+        if count >= self._count:
             return between(1, 1)
-        short = self._t - self._start < WINDOW - _ROUNDING
-        return between(0, 1) if short and not self._known_before else between(0, 0)
+        if count + self._hidden[key].at(self._t) >= self._count:
+            return between(0, 1)
+        short = self._t - self._since[key] < WINDOW - _ROUNDING
+        return between(0, 1) if short and not self._known_before[key] else between(0, 0)
 
 
 def muscle_use(watch: Watch) -> tuple[Span, Span]:

@@ -20,7 +20,7 @@ from msgspec import Meta, Struct
 
 from seerob.core.errors import InputError, Problem, UnknownName, suggestion
 from seerob.core.files.toml_file import read_toml
-from seerob.criteria.scoring.held_work import GAP, WINDOW
+from seerob.criteria.scoring.held_work import GAP, QUICK, WINDOW, Hidden
 from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.spans import ROUNDING
 from seerob.description.humans.angles import NEEDS, SIDED, Angles
@@ -157,8 +157,15 @@ class Stay:
         while self.entries and self.entries[0] <= t - WINDOW + _ROUNDING:
             self.entries.popleft()
 
-    def met(self, row: ZoneRow, t: float, *, more: float = 0.0) -> bool:
-        """Whether a row's time or number is reached; ``more`` is how much larger the angle may have been."""
+    def met(self, row: ZoneRow, t: float, *, more: float = 0.0, hidden: int = 0) -> bool:
+        """Whether a row's time or number is reached.
+
+        Args:
+            row: The row.
+            t: Now [s].
+            more: How much larger the angle may have been [rad].
+            hidden: How many entries nobody may have seen.
+        """
         if not row.timed:
             return True
         held = -1.0 if math.isnan(self.since) else t - self.since
@@ -167,8 +174,12 @@ class Stay:
                 abs(self.peak) + more if self.peak >= 0 else self.peak - more
             )
         long = row.hold is not None and held >= row.hold - _ROUNDING
-        often = row.per_minute is not None and len(self.entries) >= row.per_minute - _ROUNDING
+        often = row.per_minute is not None and len(self.entries) + hidden >= row.per_minute - _ROUNDING
         return long or often
+
+
+STEP = math.radians(2.5)
+"""Errors of an angle that are tried are no further apart [rad], a choice: entries by less are trembling."""
 
 
 class ZoneWatch:
@@ -187,8 +198,12 @@ class ZoneWatch:
 
     def _begin(self, known_before: bool) -> None:
         self._known_before, self._start = known_before, math.nan
-        # Surely, possibly and as measured.
+        # Surely and possibly.
         self._stays = {(i, side): (Stay(), Stay()) for i in range(len(self._rows)) for side in range(2)}
+        self._off: dict[tuple[int, int], list[Stay]] = {}
+        """Of rows that count entries, by number and side: as many as there are errors that are tried."""
+        self._seen: dict[tuple[str, int], float] = {}
+        self._hidden: dict[tuple[str, int], Hidden] = {}
 
     def add(
         self,
@@ -224,6 +239,10 @@ class ZoneWatch:
     ) -> tuple[float, float]:
         least, most = RANGES.get(name, (-math.pi, math.pi))
         missing = math.isnan(value)
+        if not missing:
+            hidden = self._hidden.setdefault((name, side), Hidden(QUICK))
+            hidden.add(t, t - self._seen.get((name, side), self._start))
+            self._seen[name, side] = t
         first, last = (least, most) if missing else (value - error, value + error)
         rows = [
             (i, row)
@@ -265,8 +284,17 @@ class ZoneWatch:
             short = row.per_minute is not None and t - self._start < WINDOW - _ROUNDING
             lasting = row.per_minute is None or row.hold is not None
             begun = not ((lasting and whole) or short)
-        may = possible.met(row, t, more=error) or not begun or math.isnan(value)
-        return sure.met(row, t, more=-error), may
+        hidden = self._hidden[row.angle, side].at(t) if (row.angle, side) in self._hidden else 0
+        may = possible.met(row, t, more=error, hidden=hidden) or not begun or math.isnan(value)
+        if row.per_minute is None or not error:
+            return sure.met(row, t, more=-error), may
+        # An angle that may be inside all the while entered once, whatever its error; with one of them it
+        # may have come and gone.
+        off = self._off.setdefault((i, side), [Stay() for _ in range(2 * math.ceil(error / STEP) + 1)])
+        for stay, by in zip(off, np.linspace(-error, error, len(off)).tolist(), strict=True):
+            stay.add(t, row.within(value + by), angle)
+        every = all(stay.met(row, t) for stay in off)
+        return every, may or any(stay.met(row, t, hidden=hidden) for stay in off)
 
 
 def value_of(name: str, side: int, angles: Angles, accuracy: Accuracy) -> tuple[float, float]:

@@ -216,6 +216,7 @@ def test_a_zero_that_is_off_and_a_loose_cable_hide_no_peak(tmp_path, record, ver
     [
         ({"spring_N_mm": "25000"}, "spring_N_mm = 25000 N/mm"),
         ({"pressure_N_cm2": "1.5"}, "contact_area = 0.0133333 m²"),  # N/mm²
+        ({"force_N": "0.2"}, "contact_area = 1.33333e-07 m²"),  # kN
     ],
 )
 def test_units_that_nobody_means_leave_it_open_and_relieve_nothing(tmp_path, changed, reason) -> None:
@@ -223,7 +224,7 @@ def test_units_that_nobody_means_leave_it_open_and_relieve_nothing(tmp_path, cha
     assert part.verdict is Verdict.UNDECIDED
     assert reason in part.reason
     more = "281" if "pressure_N_cm2" not in changed else "2810"
-    assert chest(cell(tmp_path / "b", entry(**changed, force_N=more))).verdict is not Verdict.WITHIN
+    assert chest(cell(tmp_path / "b", entry(**{**changed, "force_N": more}))).verdict is not Verdict.WITHIN
 
 
 @settings(max_examples=40, deadline=None)
@@ -261,6 +262,9 @@ def test_records_are_read_with_their_units(tmp_path: Path, text: str) -> None:
         ("Time [s];Force [N]\n0;0\n1;0\n", "no force above 0"),
         ("Time [s];Force [N]\n0;2\n0,01;-900\n0,02;1\n", "pressing is positive: turn the sign"),
         ("Time [s];Force [N]\n0;x\n1;0\n", "'x'"),
+        ("Time [s];Force [N];Force [N]\n0;0;0\n1;5;900\n", "more than one column says Force"),
+        ("Time [s];Force [N];Time [s];Force [N]\n0;0;0;0\n1;5;1;900\n", "more than one column says Time"),
+        ("Time [s],Force [N]\n0,0,0,0\n1,5,280,5\n", "row 2 has more cells than the header"),
         ("", "empty"),
     ],
 )
@@ -294,6 +298,37 @@ def test_a_record_that_may_miss_its_peak_is_never_within(tmp_path: Path, force, 
     curve = "Time [s];Force [N]\n" + "".join(f"{a:.6g};{b:.6g}\n" for a, b in zip(t, F, strict=True))
     station = cell(tmp_path, entry(curve='"a.csv"', force_N=None), files={"a.csv": curve})
     part = chest(station)
+    assert part.verdict is (Verdict.UNDECIDED if why else Verdict.WITHIN)
+    assert why in part.reason
+
+
+@pytest.mark.parametrize(
+    ("force", "left_out", "why"),
+    [
+        (lambda t: 100 - 30 * (t > 0.5) + np.sin(70 * t), (), ""),
+        (lambda t: 100 + 2 * np.sin(50 * t), (), ""),
+        (lambda t: 60 + 60 * t, (), "while its force still rises"),
+        (
+            lambda t: 100 + np.sin(70 * t) + 500 * np.clip(t - 1.0, 0, 0.1),
+            (0.8, 1.5),
+            "nothing was told for 0.7",
+        ),
+    ],
+)
+def test_a_force_that_lasts_is_known_as_far_as_it_was_told(tmp_path: Path, force, left_out, why: str) -> None:
+    """A press of which the rise was left out, or that was cut off while it rose, was within."""
+    wall = '[[parts]]\nname = "wall"\nshape = { box = [1, 0.1, 1] }\nat = { position = [1.5, 0.3, 0] }\n'
+    t = np.arange(0, 0.75 if "rises" in why else 1.8, 1e-3)
+    F = np.where(t < 0.1, 0.0, force(t)) * (t < 1.7)
+    keep = np.ones(len(t), bool) if not left_out else (t < left_out[0]) | (t > left_out[1])
+    if left_out:
+        F[t > left_out[1]] = 60
+    curve = "Time [s];Force [N]\n" + "".join(
+        f"{a:.6g};{b:.6g}\n" for a, b in zip(t[keep], F[keep], strict=True)
+    )
+    clamped = {"contact": '"clamped"', "speed": "0.3", "pressure_N_cm2": "110", "force_N": None}
+    station = cell(tmp_path, entry(**clamped, curve='"a.csv"'), tool=wall, files={"a.csv": curve})
+    part = chest(station, 0.3)
     assert part.verdict is (Verdict.UNDECIDED if why else Verdict.WITHIN)
     assert why in part.reason
 

@@ -140,3 +140,80 @@ def test_the_energy_of_a_cart_that_carries_nobody_is_the_same_in_arrays(tmp_path
     assert np.nanmax(run.values) > 100
     np.testing.assert_allclose(column.value, run.values, rtol=1e-9)
     np.testing.assert_array_equal(column.answers.verdict, run.verdicts)
+
+
+def _log(t, *columns):
+    """A log of joints [m or rad] by instants."""
+    rows = [",".join(["t [s]", *(f"j{i} [{unit}]" for i, (unit, _) in enumerate(columns))])]
+    rows += [
+        ",".join(map(repr, row)) for row in zip(t.tolist(), *(q.tolist() for _, q in columns), strict=True)
+    ]
+    return "\n".join(rows) + "\n"
+
+
+T = np.arange(0, 1.001, 0.01)
+GOES = np.maximum(T - 0.5, 0.0) ** 2
+"""Stands for half a second, then gets faster by 2 m/s² [m]."""
+LOGS = {
+    "arm.urdf": two_r(),
+    "moves.csv": _log(T, ("m", GOES)),
+    "arm.csv": _log(T, ("rad", np.pi + 0.001 * np.sin(T)), ("rad", 0 * T)),
+}
+
+
+def recorded(x, mounted, machine):
+    """A person at x, an arm that stands, and a machine that gets faster."""
+    sources = {"arm": "arm.csv", "mover": "moves.csv"}
+    return (
+        "[engine]\nphysics = false\ngravity = [0, 0, 0]\n"
+        + person("op", x, 0, 0)
+        + f'[[robots]]\nname = "arm"\nmodel = "arm.urdf"\nrotor_inertia = [0.0, 0.0]\n{mounted}'
+        + f'[[machines]]\nname = "mover"\n{machine}'
+        + "".join(f'[[sources]]\nkind = "csv"\nrobot = "{k}"\nfile = "{f}"\n' for k, f in sources.items())
+        + separation("arm").replace(STOP, f"stop = {{ reaction = {T_R}, stopping = {T_S} }}\n")
+    )
+
+
+T_R, T_S = 0.4, 0.1
+
+
+def required(t):
+    """S_p of what gets faster by 2 m/s² from 0.5 s on, for a stop that begins at the end of T_r."""
+    end = t + T_R
+    v_s, way = 2 * max(end - 0.5, 0.0), max(end - 0.5, 0.0) ** 2 - max(t - 0.5, 0.0) ** 2
+    return 1.6 * (T_R + T_S) + way + v_s * T_S
+
+
+def test_what_a_carrier_does_while_a_recorded_arm_reacts_is_open_in_arrays_as_in_a_run(tmp_path):
+    """The arm's S_p was that of the carrier's present speed, while it gets faster."""
+    cart = (
+        "mass = 100\nshape = { box = [1.0, 0.6, 0.3] }\nat = { position = [0.1, 0, 0.2] }\n"
+        "slide = { along = [1, 0, 0], lower = -1, upper = 3 }\n"
+    )
+    text = recorded(2.0, 'on = "mover"\nbase = { position = [-0.4, 0, 1.5] }\n', cart)
+    station = made(tmp_path, text, LOGS)
+    run = station.run().results["arm"]
+    arrays = {"arm": np.stack([np.pi + 0 * T, 0 * T], 1), "mover": GOES[:, None]}
+    speeds = {"arm": np.zeros((len(T), 2)), "mover": 2 * np.maximum(T - 0.5, 0.0)[:, None]}
+    for column in (station.batch()["arm"], station.batch(arrays, speeds, t=T)["arm"]):
+        said = column.answers.verdict
+        np.testing.assert_array_equal(said[:-1], run.verdicts[:-1])
+        beyond = np.array([required(t) for t in T]) > column.value
+        assert (column.value > column.answers.limit)[beyond].any()
+        assert not (said[beyond] == 0).any()
+
+
+def test_what_an_arm_carries_may_get_faster_by_itself_while_it_reacts(tmp_path):
+    """A slide on a flange that stands, whose present speed alone was in S_p of the arm."""
+    ram = (
+        'on = "arm/tip"\nshape = { box = [0.3, 0.1, 0.1] }\nmass = 1\n'
+        "slide = { along = [1, 0, 0], lower = 0, upper = 0.6 }\n"
+    )
+    files = LOGS | {"arm.csv": _log(T, ("rad", 0.001 * np.sin(T)), ("rad", 0 * T))}
+    text = recorded(3.5, "", ram)
+    found = made(tmp_path, text, files).run().results["arm"]
+    beyond = np.array([required(t) for t in T]) > np.array(found.values)
+    assert (np.array(found.values) > np.array(found.limits))[beyond].any()
+    assert not (np.array(found.verdicts)[beyond] == 0).any()
+    far = made(tmp_path / "far", text.replace("3.5, 0, 0", "4.6, 0, 0"), files).run().results["arm"]
+    assert (np.array(far.verdicts)[:90] == 0).all()

@@ -194,6 +194,11 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         seen={name: every for name, every in seen.items() if any(each.once or each.said for each in every)},
         coarse=coarse(model),
         implausible=tuple(implausible),
+        unforeseen=frozenset(
+            machine.name
+            for machine in model.workstation.machines
+            if engine.state.hearings[machine.name].driven
+        ),
     )
 
 
@@ -640,6 +645,8 @@ def _foresee(
     model: Model, motion: Motion, state: State, name: str, t: Array
 ) -> tuple[Array, Array, str] | None:
     """Tell what a robot or human does ahead (`seerob.twin.state.Foresee`): the motion says it."""
+    if name in motion.unforeseen:
+        return None
     rows = np.searchsorted(motion.t, t - SLACK)
     beyond, rows = bool(len(rows)) and rows[-1] >= len(motion.t), np.minimum(rows, len(motion.t) - 1)
     columns = state.columns[name]

@@ -89,6 +89,8 @@ class Motion:
     """Of robots and people that are heard too coarsely for energies and forces, why."""
     implausible: tuple[Finding, ...] = ()
     """What was found of where devices saw people, at any instant."""
+    unforeseen: frozenset[str] = frozenset()
+    """Machines that are moved: what they do next nobody knows in a run either (`Engine.ahead`)."""
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
@@ -477,7 +479,8 @@ def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) ->
             doubts[name][:] = f"{name}: {NOWHERE}"
     robots = [m.name for m in model.mechanisms.values() if m.role == "robot"]
     still = {name for name in robots if given.keys().isdisjoint((name, *model.carriers_of(name)))}
-    return Motion(t, q, v, doubts, still=frozenset(still))
+    moved = frozenset(name for name in given if model.mechanisms[name].role == "machine")
+    return Motion(t, q, v, doubts, still=frozenset(still), unforeseen=moved)
 
 
 def _at_home(mechanism: Mechanism, n: int) -> tuple[Array, Array]:

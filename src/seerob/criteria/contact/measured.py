@@ -57,6 +57,10 @@ COARSE = 2e-3
 (a hand, 0.6 kg and 75 N/mm: π √(m/k)), samples so far apart meet 94 % at least. Own choice (D)."""
 DROPS = 0.3
 """Share of its largest force from which no contact falls to nothing in a sample. Own choice (D)."""
+SLOW = 0.1
+"""A force that a drive keeps up is looked at so often at least [s]. Own choice (D)."""
+RISES = 0.02
+"""By which share of itself a force that has settled rises in `SLOW` at most. Own choice (D)."""
 FLAT = 10
 """So many samples in a row at the largest force are the end of a device's range, rather than a peak."""
 CALIBRATED = dt.timedelta(days=366)
@@ -195,6 +199,12 @@ def missing(t: Array, force: Array) -> tuple[str, ...]:
     step = float(np.diff(seen).max(initial=0.0))
     if step > COARSE * (1 + ROUNDING):
         found.append(f"samples are {1e3 * step:.3g} ms apart, and a peak between them is not seen")
+    later = np.diff(t) * (touches[:-1] | touches[1:]) * (t[1:] > t[first] + TRANSIENT)
+    if (gap := float(later.max(initial=0.0))) > SLOW * (1 + ROUNDING):
+        found.append(f"nothing was told for {gap:.3g} s of the force that lasts")
+    last, before = (force[(t > end - SLOW) & (t <= end)] for end in (t[-1], t[-1] - SLOW))
+    if touches[-1] and last.max() > (1 + RISES) * before.max(initial=0.0):
+        found.append("the record ends in contact while its force still rises")
     # Who is let go feels less and less; a loose cable says nothing from one sample to the next.
     gone = np.flatnonzero((force[:-1] >= DROPS * peak) & ~touches[1:])
     if len(gone) and touches[gone[0] + 1 :].any():
@@ -484,11 +494,20 @@ def read_curve(path: Path, name: str) -> tuple[Array, Array]:
     for delimiter in (";", "\t", ","):
         grid = TextGrid(path, name, encoding, delimiter)
         for row, cells in enumerate(head(grid, 50), start=1):
-            t, force = (_column(cells, words, units) for words, units in ((_TIME, _TIMES), (_FORCE, _FORCES)))
-            if t is None or force is None:
+            every = [_columns(cells, words, units) for words, units in ((_TIME, _TIMES), (_FORCE, _FORCES))]
+            if not all(every):
                 continue
+            if beside := [cells[each[1][0]] for each in every if len(each) > 1]:
+                what = f"more than one column says {' and '.join(beside)}"
+                raise InputError.at(name, "header", what, "keep one record in a file")
+            t, force = (each[0] for each in every)
             columns = {"time": t[0], "force": force[0]}
-            numbers = read_numbers(grid, row + 1, columns, decimal_comma=delimiter != ",")
+            numbers = read_numbers(grid, row + 1, columns, decimal_comma=delimiter != ",", width=len(cells))
+            if numbers.longer:
+                what = f"row {numbers.first_longer} has more cells than the header"
+                raise InputError.at(
+                    name, "header", what, "decimal commas need semicolons or tabs between cells"
+                )
             instants, forces = numbers.values[:, 0] * t[1], numbers.values[:, 1] * force[1]
             if len(instants) < 2 or not (np.diff(instants) > 0).all():
                 raise InputError.at(name, cells[t[0]], "instants that do not rise", "give the record itself")
@@ -507,11 +526,12 @@ _TIME = ("time", "zeit", "t", "temps", "tempo")
 _FORCE = ("force", "kraft", "f", "forza")
 
 
-def _column(cells: Sequence[str], words: Sequence[str], units: dict[str, float]) -> tuple[int, float] | None:
-    """Index of a column and the factor of its unit."""
+def _columns(cells: Sequence[str], words: Sequence[str], units: dict[str, float]) -> list[tuple[int, float]]:
+    """Index of each such column and the factor of its unit."""
+    found = []
     for i, cell in enumerate(cells):
         name, _, rest = cell.strip().replace("(", "[").replace(")", "]").partition("[")
         unit = rest.rstrip("] ").strip()
         if name.strip().lower() in words and unit in units:
-            return i, units[unit]
-    return None
+            found.append((i, units[unit]))
+    return found

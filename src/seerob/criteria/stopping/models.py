@@ -20,7 +20,7 @@ from seerob.criteria.stopping.by_energy import bind_braked_in_span
 from seerob.criteria.stopping.by_table import InSpan, Stopping, bind_in_span, bind_table, not_its_own
 from seerob.criteria.stopping.onset import At as OnsetAt
 from seerob.criteria.stopping.onset import Onset, by_speed
-from seerob.criteria.stopping.reaction import Reactions, bind_reaction, joint_limits
+from seerob.criteria.stopping.reaction import Reactions, bind_reaction, bind_riders, joint_limits
 from seerob.criteria.stopping.simulated import Stopped, StopSimulation
 from seerob.criteria.stopping.table import StoppingTable
 from seerob.criteria.stopping.terms import (
@@ -214,10 +214,12 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         )
         found = replace(found, doubts=(*found.doubts, unbounded_reason))
     by_onset, given = found.by_onset, by_speed(stop.reaction, stop.acceleration or 0.0)
-    asked, how, left_out = bind_reaction(
+    asked, how = bind_reaction(
         model, robot, gap, stop.reaction, stop.acceleration,
         points=stop.model != "simulated", joints=not found.timed,
     )  # fmt: skip
+    carries = stop.acceleration is None and bool(robot.riders)
+    by_themselves = bind_riders(model, robot, gap, stop.reaction) if carries else None
 
     def reactions(state: State) -> tuple[OnsetAt, OnsetAt | None]:
         found: tuple[OnsetAt, OnsetAt | None] = state.once(("onset", asked), lambda: asked(state))
@@ -243,9 +245,20 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             least = np.zeros_like(onset.S_r)
             return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, doubts)))
 
+        ways, restless = (np.zeros(0), "") if by_themselves is None else by_themselves(state)
+        # Who stops within a stroke takes no longer than with the given deceleration over all of it.
+        longer = (
+            0.0 if stop.deceleration is None else math.sqrt(2 * ways.max(initial=0.0) / stop.deceleration)
+        )
+
         def at(scale: float) -> Course:
             course = after(least(scale), scale)
-            return course if most is None else replace(course, most=after(most(scale), scale))
+            top = None if most is None else after(most(scale), scale)
+            if restless or ways.any():
+                top = top or course
+                doubts = "; ".join(filter(None, (top.unbounded_reason, restless)))
+                top = replace(top, S_r=top.S_r + ways, T_s=top.T_s + longer, unbounded_reason=doubts)
+            return course if top is None else replace(course, most=top)
 
         return at
 
@@ -255,8 +268,8 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         found.formula,
         (*found.inputs, how),
         found.doubts,
-        (*found.not_modelled, *left_out),
-        _inverse(stop) if found.timed else None,
+        found.not_modelled,
+        _inverse(stop) if found.timed and not carries else None,
         None if by_onset is None else lambda v: by_onset(given(v)),
         found.in_span,
         stop.acceleration is None,

@@ -505,7 +505,7 @@ class Levers:
     def __init__(self, model: Model, robot: Mechanism, gap: Gap) -> None:
         kinds = model.mj.jnt_type[model.mj.dof_jntid[robot.v_address]]
         turns = kinds == mujoco.mjtJoint.mjJNT_HINGE
-        rows = [_chain(model, robot, model.bodies[i]) for i in gap.b]
+        rows = [chain_of(model, robot, model.bodies[i]) for i in gap.b]
         self._chains = [(index, turns[row], row) for index, row in zip(gap.b, rows, strict=True)]
         self._robot, self._model = robot, model
 
@@ -524,7 +524,7 @@ class Levers:
         return found
 
 
-def _chain(model: Model, robot: Mechanism, body: Body) -> NDArray[np.int64]:
+def chain_of(model: Model, robot: Mechanism, body: Body) -> NDArray[np.int64]:
     """Joints of a robot that move a body, from the base outward, as rows of its coupling, shape (k,)."""
     found: list[int] = []
     at = body.mj

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
+import mujoco
 import numpy as np
 
 from seerob.core.snapshot import Input, Origin
@@ -15,11 +17,15 @@ from seerob.criteria.stopping.onset import (
     Levers,
     Onset,
     by_joints,
+    chain_of,
     constant,
     held,
+    largest_between,
     shaken,
+    with_knots,
 )
 from seerob.model.model import Gap, Mechanism, Model
+from seerob.twin.moving_base import RESTS
 from seerob.twin.state import State
 
 Reactions = Callable[[State], tuple[At, At | None]]
@@ -33,7 +39,7 @@ GIVE = "give stop.acceleration"
 
 def bind_reaction(
     model: Model, robot: Mechanism, gap: Gap, T_r: float, a: float | None, *, points: bool, joints: bool
-) -> tuple[Reactions, Input, tuple[str, ...]]:
+) -> tuple[Reactions, Input]:
     """Resolve what a robot does until it brakes.
 
     Args:
@@ -46,7 +52,7 @@ def bind_reaction(
         joints: Whether how it brakes asks for its joints.
 
     Returns:
-        How to ask, where it is from, and what is left out.
+        How to ask, and where it is from.
     """
 
     def noise(state: State) -> tuple[Array, Array] | None:
@@ -69,18 +75,18 @@ def bind_reaction(
         )
         given = constant(robot, gap, T_r, a, unsaid)
         what = Input(name=NAME, value=a, unit="m/s²", origin=Origin.GIVEN, source="workstation file")
-        return lambda state: with_noise(state, (given(state), None)), what, ()
+        return lambda state: with_noise(state, (given(state), None)), what
     foreseen = Foreseen(model, robot, gap, T_r, joints=joints)
     limits = _acceleration_limits(model, robot)
     levers = Levers(model, robot, gap)
     largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
     endless = ", ".join(j.name for j, x in zip(robot.joints, largest, strict=True) if np.isinf(x))
-    carriers, now = model.carriers_of(robot.name), np.zeros(0)
+    carriers = model.carriers_of(robot.name)
     lead = model.workstation.engine.tick
 
     def reactions(state: State) -> tuple[At, At | None]:
         known = foreseen.at(state)
-        if known is not None and all(state.foresee(each, now) is not None for each in carriers):
+        if known is not None and all(stands_until(state, each, T_r + lead) for each in carriers):
             return with_noise(state, (known, None))
         v, qd = state.fastest_speeds(gap.b), state.qd(robot)
         if robot.role != "robot":
@@ -131,8 +137,53 @@ def bind_reaction(
     elif endless or robot.role != "robot" or carriers:
         value, origin, source = "not known", Origin.MISSING, ""
     what = Input(name=NAME, value=value, unit=unit, origin=origin, source=source)
-    left_out = tuple(f"an acceleration of {name}, which {robot.name} carries" for name in robot.riders)
-    return reactions, what, left_out
+    return reactions, what
+
+
+def stands_until(state: State, name: str, span: float) -> bool:
+    """Whether a robot or machine is known to stand, and to go on standing for a while [s]."""
+    period, t = state.model.workstation.engine.tick, state.t
+    k = math.floor(t / period + 1e-6)
+    instants, _ = with_knots(state.knots, name, t, k, math.ceil((t + span) / period - 1e-6), period)
+    found = state.foresee(name, instants)
+    if found is None or found[2]:
+        return False
+    q, qd, _ = found
+    moved = np.abs(qd).max(initial=0.0), largest_between(instants, q, qd).max(initial=0.0)
+    return bool(max(moved) <= RESTS)
+
+
+def bind_riders(model: Model, robot: Mechanism, gap: Gap, T_r: float) -> Callable[[State], tuple[Array, str]]:
+    """Resolve how far machines on a robot may carry parts by themselves until all stand.
+
+    No farther than their fingers and slides reach, whatever they do. Nothing bounds what turns.
+
+    Args:
+        model: The workstation.
+        robot: Who carries them.
+        gap: Its second set are the moving parts.
+        T_r: Reaction time [s].
+
+    Returns:
+        From a state to ways [m], shape (n,), and why they may be longer.
+    """
+    none, lead = np.zeros(len(gap.b)), model.workstation.engine.tick
+    strokes: list[tuple[str, Array, str]] = []
+    for rider in (model.mechanisms[name] for name in robot.riders):
+        kinds = model.mj.jnt_type[model.mj.dof_jntid[rider.v_address]]
+        reach = np.abs(rider.coupling) @ (rider.upper - rider.lower)
+        endless = (kinds != mujoco.mjtJoint.mjJNT_SLIDE).any() or not np.isfinite(reach).all()
+        why = f"{rider.name} moves on {robot.name}, and nobody says how fast it may get faster: {GIVE}"
+        rows = [chain_of(model, rider, model.bodies[i]) for i in gap.b]
+        ways = none if endless else np.array([reach[row].sum() for row in rows])
+        strokes.append((rider.name, ways, why if endless else ""))
+
+    def at(state: State) -> tuple[Array, str]:
+        going = [each for each in strokes if not stands_until(state, each[0], T_r + lead)]
+        why = "; ".join(filter(None, (each[2] for each in going)))
+        return np.sum([none, *(each[1] for each in going)], axis=0), why
+
+    return at
 
 
 def _acceleration_limits(model: Model, robot: Mechanism) -> Array | None:

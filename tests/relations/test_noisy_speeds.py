@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_cells import files, random_cell, station
+from random_cells import ALL, files, random_cell, station
+from random_cells import said as log_of
 from test_bounds import by_table, map_csv
 
 from made_cell import meant
@@ -149,3 +150,32 @@ def test_what_noise_may_make_exceed_is_not_within(seed, tmp_path):
         assert run[name].verdicts[k] != WITHIN, name
         greener = (noisy[name].verdict == WITHIN) & (known[name].verdict != WITHIN)
         assert not greener.any(), name
+
+
+@pytest.mark.parametrize("physics", [False, True])
+@pytest.mark.parametrize("seed", [3, 12])
+def test_slopes_between_noisy_samples_hide_no_speed_that_the_log_says(seed, physics, tmp_path):
+    """Speeds of the log are exact, its positions are not, and ticks lie between its samples."""
+    cell = random_cell(seed, published=False, around=False)
+    figures = {"speed": "speed", "fastest": "speed", "energy": "energy"}
+    cell = replace(
+        cell, rate=125.0, duration=1.0, speeds=True, walks=False, tool=None, physics=physics,
+        machine=None, left_out=frozenset(ALL) - figures.keys(),
+    )  # fmt: skip
+    true = log_of(replace(cell, physics=False), tmp_path / "truth")
+    limits = cell.limits | {
+        limit: float(np.median(true[name].values)) for name, limit in figures.items() if name != "speed"
+    }
+    noisy = replace(cell, noise=2e-4, limits=limits)
+    made = station(noisy, tmp_path / "noisy")
+    run = made.run().results
+    arrays = None if physics else made.batch()
+    could = 0
+    for name, limit in figures.items():
+        beyond = true[name].values > (1.05 * limits[limit] + 0.01)
+        could += int(beyond.sum())
+        for verdicts in (run[name].verdicts, arrays and arrays[name].answers.verdict):
+            if verdicts is not None:
+                assert len(verdicts) == len(beyond)
+                assert not (beyond & (verdicts == WITHIN)).any(), (name, verdicts[beyond])
+    assert could > 50

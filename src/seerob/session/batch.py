@@ -454,8 +454,12 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
         states.alone = np.zeros(len(states), bool)
         answers, reasons = _said(one, states)
         with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
-        if not motion.speed_errors.keys().isdisjoint(with_carriers | states.speeds_asked):
-            alone[name] = "speeds are derived from noisy positions"
+        movers = (with_carriers | states.speeds_asked) & motion.speed_errors.keys()
+        noisy = np.any([motion.speed_errors[who].any(axis=1) for who in movers], axis=0)
+        if np.all(noisy) or (np.any(noisy) and one.criterion.remembers(bench.model)):
+            alone[name] = "speeds follow from noisy positions"
+        else:
+            states.alone |= noisy
         asked_of = states.asked | {above for who in states.asked for above in bench.model.carriers_of(who)}
         if some := sorted(motion.seen.keys() & asked_of):
             alone[name] = f"more is known of {some[0]} than where it is"

@@ -18,12 +18,13 @@ import numpy as np
 from seerob.core.samples import REPEATED, JointSample, Quality, Sample
 from seerob.core.transforms import Array
 from seerob.devices.live.listening import LiveSource
+from seerob.files.trajectories.trajectory import QUIET
 from seerob.kernels.pull import SLACK, along
 from seerob.model.model import Mechanism, Model
 from seerob.recording.answers import Flags
 from seerob.twin.control.reference import MAX_KEPT
 from seerob.twin.control.sample_values import LARGEST, largest_speed
-from seerob.twin.engine import Engine, last_tick
+from seerob.twin.engine import Engine, last_tick, together
 from seerob.twin.spans import Indices, Ways
 from seerob.twin.states import Motion, Reasons
 from seerob.twin.validity.hearing import STANDS, Heard, Hearing
@@ -185,12 +186,26 @@ class _Track:
         hearing.leaves_at = float(np.abs(self.v[newest]).max(initial=0.0)) if stands else 0.0
 
     def speed_errors(self, ticks: Array) -> Array | None:
-        """How far velocities may be off at each tick, shape (N, n); None where nobody says so."""
-        if self.errors is None:
-            return None
-        worse = np.maximum(self.errors[np.maximum(self.past - 1, 0)], self.errors[self._following])
-        nothing = np.isneginf(worse)
-        return None if nothing.all() else np.where(nothing, 0.0, worse)
+        """How far velocities may be off at each tick, shape (N, n); None where nobody says so.
+
+        As `seerob.twin.validity.hearing.Hearing.speed_error`: what samples around say of theirs, or how far
+        the slope between two of them is from the velocities that they say.
+        """
+        found = self._unlike(ticks)
+        if self.errors is not None:
+            worse = np.maximum(self.errors[np.maximum(self.past - 1, 0)], self.errors[self._following])
+            found = np.where(np.isneginf(worse), found, worse)
+        return found if found.any() else None
+
+    def _unlike(self, ticks: Array) -> Array:
+        before, after = np.maximum(self.past - 1, 0), self._following
+        inside = (self.past > 0) & (self.past < self.received)
+        q, v, a = np.empty((3, len(ticks), self.q.shape[1]))
+        along(self.t, self.q, self.v, np.zeros(len(self.t), bool), 0.0, ticks, q, v, a)
+        share = (ticks - self.t[before]) / np.where(inside, self.t[after] - self.t[before], 1.0)
+        off = np.abs(v - (self.v[before] + share[:, None] * (self.v[after] - self.v[before])))
+        off[~(inside & (off.max(axis=1, initial=0.0) > QUIET))] = 0.0
+        return together(off)
 
 
 def _ways(model: Model, tracks: dict[str, _Track], ticks: Array) -> Ways:

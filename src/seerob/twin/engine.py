@@ -59,6 +59,18 @@ POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
 
 
+def together(off: Array) -> Array:
+    r"""Errors of joints as large as if they were independent, for those that act all at once.
+
+    Who sums squares of shares :math:`w_j \delta_j` must find no less than
+    :math:`\sum_j |w_j \delta_j| \le \sqrt{n} \sqrt{\sum_j w_j^2 \delta_j^2}` of n of them.
+
+    Args:
+        off: [rad/s or m/s], shape (..., n).
+    """
+    return np.asarray(np.sqrt((off > 0).sum(axis=-1, keepdims=True)) * off)
+
+
 def last_tick(duration: float, period: float) -> int:
     """Number of the last tick of a motion, which ends with it: from half to one and a half as long as others.
 
@@ -652,6 +664,8 @@ class Engine:
             self.state.refresh(t)
 
     def _note_errors(self) -> None:
+        for mechanism in self._mechanisms if self.controllers else ():
+            self._hearings[mechanism.name].unlike = self._unlike(mechanism)
         for name, following in self._followings.items() if self.controllers else ():
             q = self.state.joint_positions(self.model.mechanisms[name])
             self._hearings[name].bones = following.errors(self.state.t, q)
@@ -670,6 +684,26 @@ class Engine:
             hearing.error, hearing.saturated = float(off[k]), bool(saturated[k])
             if mechanism.role == "human" and self.controllers:
                 self._note_captured(mechanism, hearing)
+
+    def _unlike(self, mechanism: Mechanism) -> Array | None:
+        """How far speeds of the twin are from those that are said; None where that is `QUIET`, or none are.
+
+        Between two samples it moves along their positions, and those may be noisier than their speeds.
+        """
+        hearing, reference = self._hearings[mechanism.name], self._references[mechanism.name]
+        t = self.state.t
+        # Noise of speeds that a file's positions told is that half way between two of them.
+        if mechanism.name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
+            return None
+        said = reference.said_speeds(t)
+        if said is None:
+            return None
+        if mechanism.role == "human" and self.physics:
+            moves = reference.at(t)[1]  # what holds it elsewhere is no noise
+        else:
+            moves = self._shown.qvel[mechanism.v_address[mechanism.own]]
+        off = np.abs(moves - said)
+        return together(off) if kernel.greatest(off) > QUIET else None
 
     def _touches(self) -> list[tuple[int, int, float]]:
         """Every contact now: two of MuJoCo's bodies and the normal force [N]."""

@@ -424,10 +424,11 @@ class State(Validity):
         return np.asarray(self._qvel[self.columns[mechanism.name].own_v])
 
     def speed_error(self, mechanism: Mechanism) -> Array | None:
-        """How far its joint velocities may be off, where they were derived from noisy positions.
+        """How far its joint velocities may be off, where they follow from noisy positions.
 
         Returns:
-            Three standard deviations [rad/s or m/s], shape (n,); None where nobody says that they were.
+            Three standard deviations, and between two samples how far they are from the velocities that these
+            say [rad/s or m/s], shape (n,); None where nobody says that they do.
         """
         self.require(mechanism.name)
         return self._every_speed_error().get(mechanism.name)

@@ -5,9 +5,10 @@ Between two samples the reference is the cubic that has their positions and velo
 .. math:: q(s) = h_{00} q_0 + h_{10} T \dot q_0 + h_{01} q_1 + h_{11} T \dot q_1,\quad s = (t - t_0)/T
 
 so velocity is continuous and acceleration is known, which feed-forward needs. Samples without
-velocities get that of the parabola through them and their neighbours, of the two before for the
-newest. After the newest sample the reference holds its position, of a live source once it has coasted;
-before the oldest it waits there.
+velocities get that of the parabola through them and their neighbours, of the two before for the newest.
+Of samples with velocities noise of positions makes the slope of that cubic another one than the velocities
+say, by :math:`6 s (1 - s)` times the difference of the chord's slope and their mean. After the newest sample
+the reference holds its position, of a live source once it has coasted; before the oldest it waits there.
 
 Two samples that only an impossible speed could join are a jump, not a motion: the reference stays
 where it was until the later one, and the twin is put there instead of being pulled.
@@ -184,6 +185,24 @@ class Reference:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
         q, v, a = self.course(np.array([t]))
         return q[0], v[0], a[0]
+
+    def said_speeds(self, t: float) -> Array | None:
+        """Speeds at ``t`` [s] on the straight line between those that two samples say [rad/s or m/s], (n,).
+
+        The slope of the cubic through both is another one where their positions are noisy. None where no
+        sample says any, or a jump leads there.
+        """
+        k = bisect_right(self._times, t + SLACK) - 1
+        last = len(self._times) - 1
+        if k < 0 or self._guessed[k]:
+            return None
+        times, _, speeds, jumps = self._known()
+        if k == last:
+            return speeds[k] if t - times[k] <= self._coast + SLACK else None
+        if self._guessed[k + 1] or jumps[k + 1]:
+            return None
+        share = (t - times[k]) / (times[k + 1] - times[k])
+        return np.asarray(speeds[k] + share * (speeds[k + 1] - speeds[k]))
 
     def put(self, t: float, places: tuple[Indices, Indices], qpos: Array, qvel: Array, before: Array) -> None:
         """Put it on its motion at an instant, among everybody.

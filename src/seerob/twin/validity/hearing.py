@@ -147,6 +147,9 @@ class Hearing:
     """It was heard once, or once after a silence, and that told no speed."""
     grace: float = 0.0
     """How long after its newest sample it may be late all the same [s]."""
+    unlike: Array | None = None
+    """How far the twin's joint velocities are from those that its source says now [rad/s or m/s], shape (n,);
+    None where they are not, or it says none."""
     coarse: str = ""
     """Why what is heard is too coarse for energies and forces; empty when it is not."""
 
@@ -222,9 +225,15 @@ class Hearing:
         return self.heard[max(k - 1, 0) : k + 1]
 
     def speed_error(self, t: float) -> Array | None:
-        """How far joint velocities may be off at ``t`` [s], shape (n,): the worse of two samples."""
+        """How far joint velocities may be off at ``t`` [s], shape (n,).
+
+        The worse of two samples, and by how much the twin is faster or slower than both say.
+        """
         around = [said.speed_error for said in self.around(t) if said.speed_error is not None]
-        return np.max(around, axis=0) if around else None
+        told = np.max(around, axis=0) if around else None
+        if self.unlike is None:
+            return told
+        return self.unlike if told is None else np.asarray(told + self.unlike)
 
     def doubt_ahead(self, t: float, until: float) -> str:
         """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""

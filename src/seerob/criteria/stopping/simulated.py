@@ -97,6 +97,7 @@ class StopSimulation:
         self._data = mujoco.MjData(model.mj)
         self._ids = np.array([body.mj for body in self.bodies], np.int64)
         self._roots = model.mj.body_rootid[self._ids]
+        self._block = np.ix_(robot.v_address, robot.v_address)
         self._M, self._b = np.zeros((model.mj.nv, model.mj.nv)), np.zeros(model.mj.nv)
 
     def stop(
@@ -176,25 +177,30 @@ class StopSimulation:
         mujoco.mj_fullM(self._mj, self._data, self._M)
         mujoco.mj_rne(self._mj, self._data, 0, self._b)
         address, coupling = robot.v_address, robot.coupling
-        M = coupling.T @ self._M[np.ix_(address, address)] @ coupling
+        M = coupling.T @ self._M[self._block] @ coupling
         after = np.empty(len(v))
         b = coupling.T @ self._b[address]
         if not braked(np.ascontiguousarray(M), b, np.ascontiguousarray(v), self.brakes, STEP, after):
             raise Undecided(f"{self.robot.name}: the stop could not be simulated")
         return after
 
-    def speeds(self) -> Array:
-        """Bound on the speed of any point of each body where it was placed [m/s], shape (n,)."""
-        data = self._data
-        found = np.empty(len(self.bodies))
+    def speeds(self, twists: Array, turned: Array, arms: Array) -> Array:
+        """Bound on the speed of any point of each body at K instants [m/s], shape (K, n).
+
+        Args:
+            twists: MuJoCo's ``cvel`` of each body, of the point at the centre of mass of its whole tree:
+                angular [rad/s], then linear [m/s], shape (K, n, 6).
+            turned: World from body, shape (K, n, 3, 3).
+            arms: From that point to the origin of each body [m], world axes, shape (K, n, 3).
+        """
+        found = np.empty(arms.shape[:2])
         for k, body in enumerate(self.bodies):
-            turn, linear = data.cvel[body.mj, :3], data.cvel[body.mj, 3:]
-            # cvel speaks of the point at the common centre of mass of the whole tree.
-            origin = data.xpos[body.mj] - data.subtree_com[self._roots[k]]
-            arms = body.corners @ data.xmat[body.mj].reshape(3, 3).T + origin
-            velocities = linear + np.cross(turn, arms)
-            reach = (body.radius + body.deviation) * np.linalg.norm(turn)
-            found[k] = np.sqrt(np.einsum("ij,ij->i", velocities, velocities).max()) + reach
+            (w0, w1, w2), (v0, v1, v2) = twists[:, k, :3].T[..., None], twists[:, k, 3:].T[..., None]
+            x, y, z = np.moveaxis(body.corners @ np.swapaxes(turned[:, k], 1, 2) + arms[:, k, None], 2, 0)
+            x, y, z = v0 + (w1 * z - w2 * y), v1 + (w2 * x - w0 * z), v2 + (w0 * y - w1 * x)
+            fastest = (x * x + y * y + z * z).max(axis=1)
+            reach = (body.radius + body.deviation) * np.linalg.norm(twists[:, k, :3], axis=1)
+            found[:, k] = np.sqrt(fastest) + reach
         return found
 
 
@@ -203,14 +209,17 @@ class _Trace:
 
     def __init__(self, simulation: StopSimulation) -> None:
         self._simulation = simulation
-        self._rows: list[tuple[float, Array, Array, Array, Array, Array]] = []
+        self._rows: list[tuple[float, Array, Array, Array, Array, Array, Array]] = []
 
     def add(self, t: float, q: Array, v: Array) -> None:
         s = self._simulation
         data, ids = s._data, s._ids
+        positions = data.xpos[ids]
+        arms = positions - data.subtree_com[s._roots]
         turned = data.xmat[ids].reshape(-1, 3, 3)
-        self._rows.append((t, q.copy(), v.copy(), turned.copy(), data.xpos[ids].copy(), s.speeds()))
+        self._rows.append((t, q.copy(), v.copy(), turned, positions, data.cvel[ids], arms))
 
     def stopped(self, braking: int) -> Stopped:
-        t, q, v, rotations, positions, speeds = map(np.array, zip(*self._rows, strict=True))
+        t, q, v, rotations, positions, twists, arms = map(np.array, zip(*self._rows, strict=True))
+        speeds = self._simulation.speeds(twists, rotations, arms)
         return Stopped(t, q, v, braking, rotations, positions, speeds)

@@ -17,7 +17,20 @@ from seerob.criteria.ergonomics.owas import (
     owas,
 )
 from seerob.criteria.scoring.measured import ArmPolicy, Measured, arm_score
-from seerob.criteria.scoring.spans import Span, Thresholds, beyond, exactly, graded
+from seerob.criteria.scoring.spans import (
+    ROUNDING,
+    Span,
+    Thresholds,
+    answer,
+    between,
+    beyond,
+    cells,
+    either,
+    exactly,
+    fallen,
+    graded,
+    reached,
+)
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import bone_poses, mirrored
 
@@ -266,3 +279,70 @@ def test_an_arm_that_points_sideways_has_any_flexion():
     assert (span.low.tolist(), span.high.tolist()) == ([1, 1], [4, 4])
     sure = arm_score(Measured(aside, np.radians(4)), rula.upper_arm, ArmPolicy.PROJECTION)
     assert (sure.low.tolist(), sure.high.tolist()) == ([4, 4], [4, 4])
+
+
+def ends(span):
+    return span.low.tolist(), span.high.tolist()
+
+
+def test_scores_are_whole_numbers_that_add_up_end_by_end():
+    one, other = between([1, 2], [1, 4]), exactly([3, 1])
+    assert ends(one + other) == ([4, 3], [4, 5])
+    assert ends(one.at_least(2)) == ([2, 2], [2, 4])
+    assert ends(either(one, other)) == ([3, 2], [3, 4])
+    assert (one.known, other.known) == (False, True)
+    assert [ends(answer(yes)) for yes in (True, False, None)] == [(1, 1), (0, 0), (0, 1)]
+    assert ends(between([1.0, -1e9], [1.0, 1e9])) == ([1, -(10**9)], [1, 10**9])
+    for low, high in (([1, 2], [1, 1]), (1.5, 2), (0, 1e9 + 1), (0, float("nan"))):
+        with pytest.raises(ValueError, match="score"):
+            between(low, high)
+    with pytest.raises(TypeError):
+        one + 1
+    with pytest.raises(ValueError, match="read-only"):
+        cells("rula", "A")[0] = 1
+
+
+@pytest.mark.parametrize("edge", [-0.75, 0.0, 0.5])
+def test_exactly_at_rounding_from_an_edge_it_is_reached(edge):
+    """Of a number as of an array of them; at an edge of 0, which is neutral, from there on."""
+    near = edge - ROUNDING if edge else ROUNDING
+    for angle, at in ((near, True), (np.nextafter(near, -9), False), (float("nan"), True)):
+        assert reached(float(angle), edge) is at
+        assert fallen(-float(angle), -edge) is at
+        assert reached(np.array([angle, 9.0]), edge).tolist() == [at, True]
+        assert fallen(np.array([-angle, -9.0]), -edge).tolist() == [at, True]
+
+
+def steps(x):
+    """1 below 0, 2 below 1, then 3: what is least on one side only."""
+    return 1 + (x >= 0.0).astype(np.int64) + (x >= 1.0).astype(np.int64)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_angle_is_scored_by_the_worst_that_rounding_alone_makes_of_it(sign):
+    """On either side of an edge; an angle that may be turned by half a turn has the greatest score."""
+    angle = sign * np.array([0.9, 0.9, 0.2, -0.5, -0.5])
+    far = np.array([0.0, 0.2, 0.2, np.pi, np.nextafter(np.pi, 0)])
+    found = graded(angle, lambda x: steps(sign * x), within=(1, 5), rounding=far)
+    assert ends(found) == ([2, 3, 2, 5, 3], [2, 3, 2, 5, 3])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_angle_that_is_known_to_an_accuracy_has_the_scores_of_both_its_ends(sign):
+    angle, accuracy = sign * np.array([0.9, 0.9, 1.1, 0.9, 0.9]), np.array([0.0, 0.2, 0.2, 0.2, 0.2])
+    far = np.array([0.0, 0.0, 0.0, np.pi, np.nextafter(np.pi, 0)])
+    found = graded(angle, lambda x: steps(sign * x), within=(1, 5), accuracy=accuracy, rounding=far)
+    assert ends(found) == ([2] * 5, [2, 3, 3, 5, 3])
+    # Rounding that the accuracy does not cover counts beside it.
+    near = graded(angle[:1], lambda x: steps(sign * x), within=(1, 5), accuracy=1e-9, rounding=0.2)
+    assert ends(near) == ([2], [3])
+
+
+def test_beyond_counts_the_size_of_an_angle_or_its_sign_too():
+    angle = np.array([-0.6, -0.4, 0.4, 0.6, np.nan])
+    assert ends(beyond(angle, 0.5)) == ([1, 0, 0, 1, 0], [1, 0, 0, 1, 1])
+    assert ends(beyond(angle, 0.5, signed=True)) == ([0, 0, 0, 1, 0], [0, 0, 0, 1, 1])
+    assert ends(beyond(angle, 0.5, accuracy=0.2)) == ([0] * 5, [1] * 5)
+    assert ends(beyond(angle, 0.5, accuracy=0.2, signed=True)) == ([0] * 5, [0, 0, 1, 1, 1])
+    assert ends(beyond(angle, 0.5, rounding=0.2)) == ([1, 1, 1, 1, 0], [1] * 5)
+    assert ends(beyond(angle, 0.5, rounding=0.2, signed=True)) == ([0, 0, 1, 1, 0], [0, 0, 1, 1, 1])

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
+from itertools import accumulate
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
-from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample
+from seerob.core.errors import InputError
+from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample, Quality, SignalSample
 from seerob.devices.live import contradictions
-from seerob.devices.live.contradictions import Contradictions
-from seerob.workstation.source import Target
+from seerob.devices.live.contradictions import HOLD, Contradictions, LookedAt, _Scale, looked_at
+from seerob.workstation.source import Opened, Target
 
 BEGIN = 100.0
 """Of the device's clock [s]."""
@@ -459,14 +463,15 @@ def limited(unit, limit=1.0):
 
 @pytest.mark.parametrize("way", [1, -1])
 @pytest.mark.parametrize(("unit", "noise"), [("rad", 0.02), ("m", 0.005)])
-def test_speeds_may_rise_by_a_fifth_more_than_the_limit_and_their_noise(unit, noise, way):
+@pytest.mark.parametrize("dt", [0.0501, 0.1])
+def test_speeds_may_rise_by_a_fifth_more_than_the_limit_and_their_noise(unit, noise, way, dt):
     def found(gained):
-        q = 0.05 * (0.5 + 0.5 + gained)
+        q = 0.5 * dt * (0.5 + 0.5 + gained)
         return last(
-            [said(0.0, (0.0,), (way * 0.5,)), said(0.1, (way * q,), (way * (0.5 + gained),))], limited(unit)
+            [said(0.0, (0.0,), (way * 0.5,)), said(dt, (way * q,), (way * (0.5 + gained),))], limited(unit)
         )
 
-    most = 1.2 * 0.1 + noise
+    most = 1.2 * dt + noise
     assert found(most - 2e-4) == ""
     assert "gets faster with" in found(most + 2e-4)
 
@@ -501,11 +506,11 @@ def test_what_stands_to_the_last_bit_may_have_braked_so_hard_and_no_harder(unit,
 
 
 def held(steps, times, unit="rad", way=1, device=True):
-    """What is found of a joint that goes two steps within equal times and stands to the last bit since."""
+    """What is found of a joint that goes steps within equal times and stands to the last bit since."""
     dt, hold = times
-    places = (0.0, steps[0], steps[0] + steps[1])
+    places = [0.0, *accumulate(steps)]
     samples = [said(dt * k, (way * q,), None, device) for k, q in enumerate(places)]
-    samples += [said(2 * dt + t, (way * places[-1],), None, device) for t in hold]
+    samples += [said(len(steps) * dt + t, (way * places[-1],), None, device) for t in hold]
     return last(samples, Target(name="arm", joints=("a",), units=(unit,), velocity=(3.2,)))
 
 
@@ -520,6 +525,25 @@ def test_a_speed_is_told_by_four_steps_of_the_digits_within_an_interval():
     for steps, told in ((4.5, True), (4.01, True), (3.99, False)):
         finest = 0.003 / (steps + 1)
         assert bool(held((0.003, 0.003 - finest), (0.001, (0.001, 0.002, 0.003)))) is told
+
+
+def test_digits_are_told_by_a_short_step_and_by_none_that_are_equal():
+    for step, dt in ((0.003, 0.001), (0.9, 0.0301)):
+        assert not held((step, step), (dt, (dt, 2 * dt, 3 * dt)))
+    assert not held((1e-9, 0.003, 0.003), (1e-3, (1e-3, 2e-3, 3e-3)))
+    assert held((2e-9, 0.003, 0.003), (1e-3, (1e-3, 2e-3, 3e-3)))
+    assert held((0.01, 0.001, 0.0045), (5e-4, (5e-4, 1e-3, 1.5e-3)))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("rates", [(0.9, 0.9, 0.0), (0.0, 0.0, 0.9)])
+def test_a_joint_that_stands_may_have_moved_just_before_or_begin_to(rates, way):
+    """4.5 mrad by its velocities, of which 30 ms of the larger one may be late."""
+    places = (0.5, 0.5 + 0.01 * rates[0], 0.5 + 0.01 * rates[0])
+    samples = [
+        said(0.01 * k, (way * q,), (way * r,)) for k, (q, r) in enumerate(zip(places, rates, strict=True))
+    ]
+    assert not last(samples)
 
 
 @pytest.mark.parametrize(("unit", "fastest"), [("rad", math.sqrt(600 * 1e-5)), ("m", math.sqrt(200 * 1e-6))])
@@ -584,3 +608,212 @@ def test_what_stood_for_long_with_no_velocity_is_found_when_it_says_one(rate, to
     found = [bool(looking.find(said(0.01 * k, (0.3,), (rate * (k > 110),)))) for k in range(170)]
     assert not any(found[:111])
     assert any(found) is told
+
+
+@pytest.mark.parametrize("unit", ["rad", "m"])
+def test_of_a_factor_the_last_long_ways_tell_most(unit):
+    """From four long ways on, what was counts half: sums of squares of ways, and of those velocities say."""
+    way = contradictions.LONG_WAY[unit]
+
+    def told(*rows):
+        scale = _Scale(unit)
+        for went, rate in rows:
+            scale.add(went * way, rate * way)
+        return scale.off()
+
+    for first, squares in ((3.9, 3.9**2), (4.5, 4.5**2 / 2)):
+        factor = math.sqrt((squares + 0.64) / (squares + 64))
+        assert f"move at {factor:.3g} ×" in told((first, first), (0.8, 8.0))
+    # 6 of a way are 3.8 of it after one more, which is not halved again.
+    assert f"move at {math.sqrt(19.28 / 146):.3g} ×" in told((6, 6), (0.8, 8), (0.8, 8))
+
+
+def test_at_exactly_eight_hundredths_and_a_long_way_a_factor_is_none_and_is_told():
+    scale = _Scale("rad")
+    scale.add(1.0, 2.0)
+    assert "move at 0.5 ×" in scale.off()
+    for bound in (1 - 0.08, 1 / (1 - 0.08)):
+        way = next(
+            x
+            for x in (2 * bound, *(2 * bound + k * 4e-16 for k in range(-4, 5)))
+            if math.sqrt(x**2 / 4) == bound
+        )
+        for beside, told in ((0.0, False), (1e-9 if bound > 1 else -1e-9, True)):
+            scale = _Scale("rad")
+            scale.add(way + beside, 2.0)
+            assert bool(scale.off()) is told
+
+
+@pytest.mark.parametrize("limits", [(0.5,), (9.0, 0.5)])
+def test_of_two_joints_the_one_that_gets_faster_than_it_can_is_told(limits):
+    target = Target(name="arm", joints=("a", "b"), units=("rad", "rad"), velocity=(3, 3), acceleration=limits)
+
+    def found(gained):
+        way = 0.5 * 0.0501 * (1.0 + gained)
+        return last(
+            [said(0.0, (0.0, 0.0), (0.5, 0.5)), said(0.0501, (0.02505, way), (0.5, 0.5 + gained))], target
+        )
+
+    most = 1.2 * 0.5 * 0.0501 + 0.02
+    assert found(most - 2e-4) == ""
+    assert "joint 2 gets faster with" in found(most + 2e-4)
+
+
+def placed(places, dt=0.1, way=1, limit=1.0):
+    """What is found of a joint that says positions alone, half a turn away from 0."""
+    samples = [said(dt * k, (3.0 + way * q,)) for k, q in enumerate(places)]
+    return last(
+        samples, Target(name="arm", joints=("a",), units=("rad",), velocity=(9.0,), acceleration=(limit,))
+    )
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(
+    ("places", "told"),
+    [
+        ((0, 0, 0), False),
+        ((0, 0, 0.4), True),
+        ((0, 0, 0, 0, 0.4), True),
+        ((0, -0.05, 0.35), False),  # it turned round
+        ((0, 0.01, 0.02, 0.5, 0.45), False),
+        ((0.08, 0, 0.02, 0.04, 0.5, 0.9), True),
+    ],
+)
+def test_who_turned_round_may_have_braked_and_who_stood_gets_no_faster_than_it_can(places, told, way):
+    assert bool(placed(places, way=way)) is told
+
+
+@pytest.mark.parametrize(("more", "told"), [(0.075, False), (0.09, True)])
+def test_positions_alone_are_compared_over_half_a_second_and_more(more, told):
+    """A fifth more than 1 rad/s², and what noise makes of two spans of five instants: 0.0845 rad/s²."""
+    assert bool(placed([0.5 * (1.2 + more) * (0.0625 * k) ** 2 for k in range(11)], 0.0625)) is told
+
+
+def test_a_step_of_who_went_before_is_no_less_of_one():
+    """10 mrad, half a second at one place, and 20 mrad while velocities are zero."""
+    places = [(0.0, 0.0), (0.005, 0.16), (0.01, 0.0), *[(0.01, 0.0)] * 12, (0.03, 0.0)]
+    samples = [said(0.0625 * k, (q,), (rate,)) for k, (q, rate) in enumerate(places)]
+    assert not last(samples[:-1])
+    assert "is zero while the joint moves" in last(samples)
+
+
+def test_of_two_joints_that_hang_the_first_is_named():
+    places = (0.0, 0.003, 0.00593, *[0.00593] * 3)
+    found = last([said(0.01 * k, (q, q)) for k, q in enumerate(places)])
+    assert found.startswith("joint 1 stands to the last bit")
+
+
+# -- a recorded source, sample by sample ---------------------------------------------------------------
+
+
+def looked(samples, target=None, name="mine"):
+    """Each sample with why it is in doubt."""
+    return [(sample.quality, sample.reason) for sample in LookedAt(samples, name, target)]
+
+
+def doubts(samples, target=None):
+    """Of each sample whether it is in doubt."""
+    found = looked(samples, target)
+    assert all((quality is Quality.DEGRADED) is bool(reason) for quality, reason in found)
+    return [bool(reason) for _, reason in found]
+
+
+def sample(t, q=0.0, device=None, target="arm", **more):
+    return JointSample(source="", seq=0, target=target, t=t, t_device=device, q=(q,), **more)
+
+
+def test_a_recorded_source_whose_time_goes_on_is_in_no_doubt():
+    assert doubts([]) == []
+    assert doubts([sample(0.1 * k, 0.01 * k) for k in range(9)]) == [False] * 9
+    assert doubts([sample(0.1 * k, 0.01 * k, 50 + 0.1 * k) for k in range(9)]) == [False] * 9
+    signals = [SignalSample(source="", seq=0, t=t, values={"a": 1.0}) for t in (0.0, 0.0, 0.1, 0.1, 0.2)]
+    assert doubts(signals) == [False] * 5
+
+
+@pytest.mark.parametrize("late", [0.0, 0.2, 0.3, math.inf])
+def test_from_where_time_does_not_go_on_a_recorded_source_is_in_doubt_for_good(late):
+    """The sample before it too, of the same target; those of another are not."""
+    times = (0.0, 0.1, 0.2, 0.3, late, 0.4, 0.5, 9.0)
+    found = looked([sample(t) for t in times])
+    assert [bool(reason) for _, reason in found] == [False] * 3 + [True] * 4
+    assert found[3] == (Quality.DEGRADED, f"mine: time goes from 0.300 to {late:.3f} s")
+    other = [sample(0.25 + k, target="other") for k in range(2)]
+    assert doubts([sample(0.2), sample(0.3), other[0], sample(late), sample(0.4), other[1]]) == [
+        False, False, False, True, False,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("device", [50.3, 50.2, 50.0, math.inf, math.nan])
+def test_a_recorded_source_whose_own_time_does_not_go_on_is_in_doubt_for_a_while(device):
+    step = HOLD / 4
+    at = [50.0, 50.1, 50.2, 50.3, device, *(50.4 + 0.1 * k for k in range(8))]
+    samples = [sample(step * k, 0.0, d) for k, d in enumerate(at)]
+    found = doubts(samples)
+    assert found[:4] == [False] * 4
+    assert found[4:9] == [True] * 5
+    assert not any(found[10:])
+
+
+def test_what_a_recorded_source_contradicts_holds_for_a_while_and_no_longer():
+    step = HOLD / 4
+    samples = [sample(step * k, 0.0 if k < 4 else 3.0 + 90 * HOLD) for k in range(14)]
+    assert doubts(samples) == [False] * 4 + [True] * 5 + [False] * 5
+    # One that keeps its own doubts keeps its words.
+    samples[5] = replace(samples[5], reason="own")
+    assert looked(samples)[5] == (Quality.DEGRADED, "own")
+    samples[5] = replace(samples[5], quality=Quality.INVALID)
+    assert looked(samples)[5][0] is Quality.INVALID
+
+
+@pytest.mark.parametrize(
+    ("q", "told"), [(-1.1, False), (-1.11, True), (1.6, False), (1.61, True), (0.0, False)]
+)
+def test_a_joint_of_a_recorded_source_lies_within_its_limits_and_a_tenth(q, told):
+    target = Target(name="arm", joints=("a",), units=("rad",), lower=(-1.0,), upper=(1.5,))
+    assert doubts([sample(0.0, q)], target) == [told]
+    assert doubts([sample(0.0, q, target="other")], target) == [False]
+    assert doubts([sample(0.0, q)]) == [False]
+    assert doubts([pose(0.0, (q, 0, 0))], target) == [False]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (3, "it yields int"),
+        (sample("0"), "t is '0'"),
+        (sample(0.0, quality="good"), "quality 'good'"),
+        (replace(sample(0.0), q=None), "q is None"),
+        (replace(sample(0.0), q=[0.1]), "q is [0.1]"),
+        (replace(sample(0.0), q=(0.1, "a")), "q is (0.1, 'a')"),
+        (replace(sample(0.0), qd=[0.1]), "qd is [0.1]"),
+        (replace(sample(0.0), tau=("a",)), "tau is ('a',)"),
+    ],
+)
+def test_what_is_no_sample_ends_the_run_with_words(wrong, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        looked([wrong])
+
+
+@pytest.mark.parametrize(
+    ("before", "when"), [([], "before its first sample"), ([sample(0.5)], "after its sample of 0.500 s")]
+)
+def test_a_recorded_source_that_fails_says_when(before, when):
+    def failing(error):
+        yield from before
+        raise error
+
+    with pytest.raises(InputError, match=f"it fails {when}: ZeroDivisionError: own"):
+        looked(failing(ZeroDivisionError("own")))
+    with pytest.raises(OSError, match="disk"):
+        looked(failing(OSError("disk")))
+
+
+@pytest.mark.parametrize("duration", [0.0, 0.5, 9.0])
+def test_what_a_source_opens_is_looked_at(duration):
+    opened = looked_at(Opened(samples=[sample(0.0)], duration=duration), "mine", None)
+    assert isinstance(opened.samples, LookedAt)
+    for wrong in (-1e-9, math.inf, math.nan):
+        with pytest.raises(InputError, match=f"the duration is {wrong} s"):
+            looked_at(Opened(samples=[], duration=wrong), "mine", None)
+    with pytest.raises(InputError, match="open returns list"):
+        looked_at([sample(0.0)], "mine", None)

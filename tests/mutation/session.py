@@ -164,6 +164,8 @@ class Mutation:
                 sys.settrace(None)
                 threading.settrace(None)
             seconds[item.nodeid] = time.perf_counter() - start
+            # A thread of the test may live on and add to them.
+            seen, run = seen.copy(), run.copy()
             if any(report.failed for report in reports):
                 self.failed.append(item.nodeid)
                 continue

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from msgspec import structs
 
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.samples import Quality
 from seerob.core.verdict import Verdict
+from seerob.criteria.as_heard import AsHeard, _no_farther
 from seerob.criteria.judging import Judge
+from seerob.devices.sources.csv import Csv
+from seerob.devices.sources.joint_angles import JointAngleFile
+from seerob.devices.sources.keyframes import Keyframes
+from seerob.devices.sources.mvn import Mvn
 from seerob.twin.engine import Engine
+from seerob.workstation.source import Source
 
 CELL = (
     FLOATING.replace("{ ", "{ physics = false, ")
@@ -83,7 +92,9 @@ def test_it_is_confirmed_up_to_a_value(tmp_path, value, verdict):
     assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=own)} == {verdict}
 
 
-@pytest.mark.parametrize(("confirmed", "verdict"), [(-0.4, Verdict.WITHIN), (0.4, Verdict.UNDECIDED)])
+@pytest.mark.parametrize(
+    ("confirmed", "verdict"), [(-0.4, Verdict.WITHIN), (0.4, Verdict.UNDECIDED), (-0.2, Verdict.UNDECIDED)]
+)
 def test_it_is_confirmed_to_one_side_only(tmp_path, confirmed, verdict):
     """Who may stand 0.4 m above the floor does not sink 0.3 m into it, nor the other way round."""
     own = f'[[confirmed]]\nkey = "humans[0].feet"\nof = "op"\nvalue = {confirmed}\nwhy = "a platform"\n'
@@ -170,3 +181,27 @@ def test_where_a_file_of_motion_puts_a_robot_is_looked_at_as_where_a_device_does
     found = made(tmp_path, text, {"arm.urdf": urdf, "m.csv": rows}).run().results["distance"]
     assert found.verdict is verdict
     assert ("robots[0].nobody_within" in found.worst().reason) is (verdict is Verdict.UNDECIDED)
+
+
+@pytest.mark.parametrize(("value", "confirmed", "no_farther"), [
+    (0.3, 0.3, True), (-0.3, -0.3, True), (0.3, 0.2, False), (-0.3, -0.2, False), (0.2, -0.3, False),
+])  # fmt: skip
+def test_up_to_the_value_that_was_confirmed_and_at_it(value, confirmed, no_farther):
+    assert _no_farther(value, confirmed) is no_farther
+
+
+@pytest.mark.parametrize(
+    ("source", "waits"),
+    [
+        (Source(), False),
+        (Keyframes(human="op", file="m.toml"), False),  # asked where it begins, when it is opened
+        (JointAngleFile(human="op", file="m.mot"), True),
+        (Mvn(human="op"), True),
+        (Mvn(human="other"), False),
+        (Csv(robot="arm", file="m.csv"), True),
+    ],
+)
+def test_it_waits_for_whom_a_device_or_a_capture_places(tmp_path, source, waits):
+    model = made(tmp_path, CELL, {"arm.urdf": two_r()}).model
+    asked = AsHeard(replace(model, workstation=structs.replace(model.workstation, sources=(source,))))
+    assert asked.waits is waits

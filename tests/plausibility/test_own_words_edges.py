@@ -94,12 +94,19 @@ def test_torques_of_the_opposite_sign_are_told_from_half(factor: float, told: bo
         (1000.0, "N·mm"), (1390.0, "N·mm"), (1410.0, ""), (610.0, "N·mm"), (590.0, ""),
         (1e-3, "kN·m"), (1.39e-3, "kN·m"), (1.41e-3, ""), (0.61e-3, "kN·m"), (0.59e-3, ""),
         (100.0, "N·cm"), (139.0, "N·cm"), (141.0, ""), (61.0, "N·cm"), (59.0, ""), (1.0, ""), (1.3, ""),
+        (600.0, ""), (60.0, ""),
     ],
 )  # fmt: skip
 def test_units_of_torques(factor: float, name: str) -> None:
     model = np.array([[10.0, -4.0], [8.0, 3.0], [-9.0, 1.0]])
     why = sign_or_unit(factor * model, model)
     assert (f"{factor:.3g} × what the model needs: {name} read as N·m" in why) if name else why == ""
+
+
+def test_at_exactly_the_thresholds_torques_are_those_of_the_model() -> None:
+    """A third of the opposite, and a correlation of 0.9: 9 of (9, 3, 3, 1), whose length is 10."""
+    assert sign_or_unit(np.array([[-3.0]]), np.array([[9.0]])) == ""
+    assert sign_or_unit(1000 * np.array([[9.0, 3, 3, 1]]), np.array([[10.0, 0, 0, 0]])) == ""
 
 
 @pytest.mark.parametrize(("angle", "told"), [(24.0, True), (27.0, False)])
@@ -215,10 +222,10 @@ def test_live_torques_are_judged_from_five_on_where_masses_are_known(
     unknown = known[: known.index("<inertial>")] + known[known.index("</inertial>") + len("</inertial>") :]
     for name, urdf, told in (("known", known, True), ("unknown", unknown, False)):
         words = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
-        for k in range(6):
+        for k in range(12):  # every second of which is looked at
             tau = tuple(-t for t in torques)
-            assert words.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=tau)) == ""
-            assert ("the opposite sign" in words.torque_doubt) is (told and k >= 4), k
+            assert words.invalid_reason(heard("arm", 0.0625 * k, q, qd, tau=tau)) == ""
+            assert ("the opposite sign" in words.torque_doubt) is (told and k >= 8), k
         right = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
         for k in range(6):
             right.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=torques))
@@ -452,6 +459,11 @@ def test_live_words_are_looked_at_ten_times_a_second_and_place_and_speed_by_them
     assert right.invalid_reason(heard("arm", 0.1, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0099, 0.0))) == ""
     assert right.invalid_reason(heard("arm", 0.2, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0101, 0.0))) != ""
     assert right.invalid_reason(heard("arm", 0.3, (0.0, 0.0), (1.0, 0.0))) == ""
+    wide = TWO_R + "tcp_tolerance_mm = 125\n"
+    words = LiveWords(made(tmp_path, FLOATING + wide, {"arm.urdf": two_r()}).model, "arm")
+    for off, told in ((0.125, False), (0.126, True)):
+        found = words.invalid_reason(heard("arm", 0.0, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, off, 0.0)))
+        assert bool(found) is told
 
 
 @pytest.mark.parametrize(
@@ -553,7 +565,7 @@ def test_a_table_in_a_frame_that_nobody_gave_is_compared_as_one_rigid_body(tmp_p
     other = told_of(tmp_path, TOOLS, lambda *at: 1.1 * anywhere(*at), frame_known=False)
     assert "more than 10 mm" in other
     # From a tenth of a metre on, along any axis.
-    for size, little in ((0.0999, True), (0.1001, False)):
+    for size, little in ((0.0999, True), (0.1, False)):
         places = lambda tip, x, y, size=size: np.outer(np.linspace(0, size, 8), [0.2, 1.0, 0.5])  # noqa: E731
         found = told_of(tmp_path, "", places, frame_known=False)
         assert ("move too little to be compared" in found) is little
@@ -562,9 +574,17 @@ def test_a_table_in_a_frame_that_nobody_gave_is_compared_as_one_rigid_body(tmp_p
 def test_a_speed_that_fits_at_one_of_the_points_is_that_of_the_twin(tmp_path) -> None:
     model = made(tmp_path, FLOATING + TWO_R + TOOLS, {"arm.urdf": two_r()}).model
     t, q, qd = np.arange(8.0), np.zeros((8, 2)), np.tile([0.0, 1.0], (8, 1))
-    for speed, told in ((1.0, False), (np.hypot(1.1, 0.2), False), (1.8, True), (0.5, True)):
+    far = made(
+        tmp_path / "far",
+        FLOATING + TWO_R + TOOLS.replace("[0, 0.2, 0]", "[0, 2.0, 0]"),
+        {"arm.urdf": two_r()},
+    ).model
+    for of, speed, told in (
+        (model, 1.0, False), (model, np.hypot(1.1, 0.2), False), (model, 1.8, True), (model, 0.5, True),
+        (far, 1.0, False), (far, np.hypot(1.1, 2.0), False), (far, 1.6, True),
+    ):  # fmt: skip
         said = Said("f", t, q, qd, None, None, True, np.full(8, speed))
-        assert bool([*compared(model, "arm", said)]) is told
+        assert bool([*compared(of, "arm", said)]) is told
 
 
 def test_external_torques_of_a_robot_are_not_those_of_its_model(tmp_path) -> None:

@@ -255,7 +255,7 @@ class LiveWords:
         """Why one sample contradicts the twin; empty when it does not, or says nothing of its TCP."""
         looks = sample.t >= self._looked + EVERY
         self._looked = sample.t if looks else self._looked
-        if sample.tau is not None and looks:
+        if looks:
             self._hear_torques(sample)
         if self._robot is None or (sample.tcp is None and sample.tcp_speed is None):
             return ""
@@ -297,7 +297,7 @@ class LiveWords:
         twin = self._robot.speeds(posture, np.array([sample.qd]))[:, 0]
         speeds = np.array([sample.tcp_speed, *twin.tolist()])
         last, t = self._newest, sample.t
-        if not math.isfinite(speeds.sum()) and not np.isfinite(speeds).all():
+        if not math.isfinite(speeds.sum()):
             self._newest = None
             return "the speed of its own tool centre point is no number"
         if last is None or not 0 < t - last.t < SPAN:

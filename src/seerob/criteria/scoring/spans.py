@@ -166,7 +166,7 @@ def between(low: ArrayLike, high: ArrayLike) -> Span:
 def _scores(given: ArrayLike) -> Ints:
     found = np.asarray(given)
     if found.dtype.kind in "iub":
-        return found.astype(np.int64, copy=False)
+        return np.asarray(found, np.int64)
     return whole("score", found, -LARGEST, LARGEST)
 
 
@@ -194,16 +194,13 @@ def graded(
         neutral: [rad]
         rounding: How far rounding alone may turn it [rad], shaped likewise: the worst of that counts.
     """
-    if not any_of(accuracy):
-        low = high = score(angle)
-        if any_of(rounding):
-            worst = np.maximum(high, np.maximum(score(angle - rounding), score(angle + rounding)))
-            low = high = np.where(rounding >= np.pi, within[1], worst)
-    else:
+    if any_of(accuracy) or any_of(rounding):
         first, last = angle - accuracy, angle + accuracy
-        high = np.maximum(score(first), score(last))
+        high = np.maximum(score(first - rounding), score(last + rounding))
         high = np.where(np.asarray(rounding) >= np.pi, within[1], high)
-        low = score(np.clip(neutral, first, last))
+        low = score(np.clip(neutral, first, last)) if any_of(accuracy) else high
+    else:
+        low = high = score(angle)
     missing = np.isnan(angle)
     if missing.any():
         low, high = np.where(missing, within[0], low), np.where(missing, within[1], high)

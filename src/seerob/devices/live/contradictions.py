@@ -67,6 +67,8 @@ HARDEST = {"rad": 300.0, "m": 100.0}
 """No joint brakes harder [rad/s² or m/s²]: ten times what published stopping tables of arms come to."""
 FINEST = {"rad": 1e-5, "m": 1e-6}
 """What a joint may move without being seen, where it is said more finely [rad or m]."""
+ROUNDED = 1e-9
+"""What is left of two equal steps by rounding alone [rad or m]."""
 STEPS = 4
 """Times the step of its digits that a joint must go within an interval, for its speed to be told by it."""
 HELD = 2e-3, 2.5
@@ -148,12 +150,8 @@ class _Standing:
         if math.isnan(step):
             self._step, self._interval = 0.0, math.inf
         else:
-            size = abs(step)
-            turned = abs(size - abs(self._step))
-            if 1e-9 < size < self._finest:
-                self._finest = size
-            if 1e-9 < turned < self._finest:
-                self._finest = turned
+            seen = (abs(step), abs(abs(step) - abs(self._step)))
+            self._finest = min([self._finest, *(way for way in seen if way > ROUNDED)])
             self._step, self._interval = step, interval
         self._q, self._since, self._window = q, t, t
         self._way = self._fastest = 0.0

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seerob as sr
+from seerob.recording.format import content_hash
 from seerob.workstation.workstation import (
     PLUGINS,
     TABLES,
@@ -18,7 +19,6 @@ from seerob.workstation.workstation import (
     Pose,
     Shape,
     Workstation,
-    content_hash,
     locate,
 )
 

@@ -12,6 +12,7 @@ import openpyxl
 import pytest
 from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
+from msgspec.structs import replace
 
 import seerob as sr
 from made_cell import FLOATING, TWO_R, heard, made, two_r
@@ -19,7 +20,7 @@ from seerob.app.cli import main
 from seerob.core.errors import InputError
 from seerob.core.samples import BodyPoint, BodySample
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.recording.format import Visitor
+from seerob.recording.format import Visitor, content_hash
 from seerob.session.sharing import share
 
 PLANTED = (
@@ -213,9 +214,15 @@ def test_a_recording_is_inspected_without_its_sources(recorded, capsys):
     assert "connects" not in said
 
 
+def _put(recording, files):
+    """Other files, and a scene that says that they are its own."""
+    recording.files = files
+    recording.scene = replace(recording.scene, workstation_hash=content_hash(files))
+
+
 def test_one_without_a_workstation_file_is_no_traceback(tmp_path, recorded):
     recording = sr.Recording.open(recorded)
-    recording.files = {"a.csv": b""}
+    _put(recording, {"a.csv": b""})
     with pytest.raises(InputError, match=r"workstation\.toml: is not in it"):
         share(recording, tmp_path / "out.mcap")
 
@@ -227,7 +234,7 @@ def test_no_name_of_a_file_leads_out_of_where_it_is_unpacked(tmp_path, recorded,
     recording = sr.Recording.open(recorded)
     folder = tmp_path / "a" / "b"
     folder.mkdir(parents=True)
-    recording.files = {**recording.files, name.replace("TMP", str(tmp_path)): b"PLANTED"}
+    _put(recording, {**recording.files, name.replace("TMP", str(tmp_path)): b"PLANTED"})
     for unpacks in (lambda: share(recording, tmp_path / "out.mcap"), lambda: recording.extract(folder)):
         with pytest.raises(InputError, match="do not trust this recording"):
             unpacks()

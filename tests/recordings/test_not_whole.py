@@ -58,8 +58,8 @@ def whole(tmp_path_factory) -> Path:
     return folder / "run" / "run.mcap"
 
 
-def rewritten(path: Path, to: Path, change) -> Path:
-    """A copy by the foreign library, checksums and index in order, of what is left of each message."""
+def rewritten(path: Path, to: Path, change, file_change=lambda data: data, planted=()) -> Path:
+    """A copy by the foreign library, checksums and index in order, of what is left of it."""
     with path.open("rb") as old, to.open("wb") as new:
         reader, writer = make_reader(old), Writer(new)
         writer.start()
@@ -67,7 +67,11 @@ def rewritten(path: Path, to: Path, change) -> Path:
         for entry in reader.iter_metadata():
             writer.add_metadata(entry.name, entry.metadata)
         for file in reader.iter_attachments():
-            writer.add_attachment(file.create_time, file.log_time, file.name, file.media_type, file.data)
+            writer.add_attachment(
+                file.create_time, file.log_time, file.name, file.media_type, file_change(file.data)
+            )
+        for name, content in planted:
+            writer.add_attachment(0, 0, name, "text/plain", content)
         for schema, channel, message in reader.iter_messages(log_time_order=False):
             data = change(channel.topic, message)
             if data is None:
@@ -82,6 +86,31 @@ def rewritten(path: Path, to: Path, change) -> Path:
             )
         writer.finish()
     return to
+
+
+def same(topic, message):
+    return message.data
+
+
+@pytest.mark.parametrize("how", ["another limit", "a second workstation file", "another recording behind it"])
+def test_a_recording_with_other_files_or_more_behind_it_is_not_within(whole, tmp_path, how, capsys):
+    """It was within by the limit that was typed into it, and by the first of two that were joined."""
+    fast = made(tmp_path / "cell", CELL, {"arm.urdf": two_r(), "motion.csv": motion(2.5)})
+    said = fast.run(folder=tmp_path / "run", sinks=[Recorder(lossless=True)])
+    assert said.verdict is Verdict.EXCEEDED
+    source, file = tmp_path / "run" / "run.mcap", tmp_path / "run.mcap"
+    looser = CELL.replace("limit = 3", "limit = 7")
+    if how == "another limit":
+        rewritten(source, file, same, lambda data: looser.encode() if data == CELL.encode() else data)
+    elif how == "a second workstation file":
+        rewritten(source, file, same, planted=[("file/workstation.toml", looser.encode())])
+    else:
+        file.write_bytes(whole.read_bytes() + source.read_bytes())
+    recording = Recording.open(file)
+    again = load_recorded(recording).replay(recording)
+    assert again.verdict is Verdict.UNDECIDED
+    assert main(["report", str(file), "-o", str(tmp_path / "again"), "--json"]) == 2
+    assert recording.findings[0].text in capsys.readouterr().out
 
 
 def spoiled(whole: Path, how: str, to: Path) -> Path:
@@ -142,7 +171,7 @@ def test_what_comes_after_a_hole_is_judged_at_its_time(tmp_path, monkeypatch):
 
 
 def test_what_the_other_library_copies_word_for_word_is_whole(whole, tmp_path):
-    file = rewritten(whole, tmp_path / "run.mcap", lambda topic, message: message.data)
+    file = rewritten(whole, tmp_path / "run.mcap", same)
     recording = Recording.open(file)
     assert recording.check() == ()
     assert load_recorded(recording).replay(recording).verdict is Verdict.WITHIN
@@ -151,7 +180,7 @@ def test_what_the_other_library_copies_word_for_word_is_whole(whole, tmp_path):
 def test_a_recording_that_nobody_sealed_is_not_within(whole, tmp_path, monkeypatch):
     """As of a version before seals, whose end says nothing of them."""
     file = tmp_path / "run.mcap"
-    rewritten(whole, file, lambda topic, message: message.data)
+    rewritten(whole, file, same)
     recording = Recording.open(file)
     del recording._index.metadata[END_METADATA]["sha256"]
     assert "does not seal" in recording.check()[0].text

@@ -97,6 +97,15 @@ def source_files(references: Iterable[str], *, folder: Path, outside: bool = Fal
     return found
 
 
+def content_hash(files: Mapping[str, bytes]) -> str:
+    """SHA-256 over the names and contents of files, independent of their order."""
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{len(files[name])}\0".encode())
+        digest.update(files[name])
+    return digest.hexdigest()
+
+
 def _hashes(path: Path) -> bytes:
     lines = []
     for part in sorted(p for p in path.rglob("*") if p.is_file())[:MOST] if path.is_dir() else [path]:

@@ -39,6 +39,7 @@ from seerob.recording.format import (
     VIEW_SCENE,
     VIEWS,
     Tick,
+    content_hash,
     nanoseconds,
 )
 
@@ -48,7 +49,7 @@ MAX_CHUNK = 256 * 2**20
 MAX_TEXT = 2**20
 """Longest name or metadata record that is read [bytes]."""
 
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x03, 0x04, 0x05, 0x06, 0x07
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
 _ATTACHMENT, _METADATA, _DATA_END = 0x09, 0x0C, 0x0F
 
 
@@ -101,6 +102,8 @@ class McapIndex:
     """Whether the writer came to write the end mark."""
     unread: int = 0
     """Bytes at the end that hold no whole record."""
+    beyond: int = 0
+    """Bytes behind the end of the file's own records, as of another file that was joined to it."""
 
 
 def scan(path: Path) -> McapIndex:
@@ -131,6 +134,7 @@ def scan(path: Path) -> McapIndex:
                 position += 9 + length
                 file.seek(position)
             index.unread = 0 if index.finished else size - position
+            index.beyond = _beyond(file, position, size) if index.finished else 0
             if index.chunks and not index.finished:
                 # Its message indexes may have been cut off halfway.
                 index.chunks[-1].channels.clear()
@@ -138,6 +142,17 @@ def scan(path: Path) -> McapIndex:
         what = f"cannot be read: {error.strerror}"
         raise InputError.at(path, "", what, "check path and permission") from error
     return index
+
+
+def _beyond(file: BinaryIO, position: int, size: int) -> int:
+    """Bytes behind the footer of a file whose records of data end at a position."""
+    footer = False
+    while not footer and position + 9 <= size:
+        file.seek(position)
+        opcode, length = struct.unpack("<BQ", file.read(9))
+        position += 9 + length
+        footer = opcode == _FOOTER
+    return max(size - position - len(MAGIC), 0)
 
 
 def _record(index: McapIndex, file: BinaryIO, opcode: int, start: int, length: int) -> None:
@@ -377,6 +392,8 @@ class Recording:
                 f"the recording was cut off: it can be read until t = {self.end:.3f} s, less than a second "
                 f"after that may be lost ({self._index.unread} bytes at the end hold no whole record)"
             )
+        if self._index.beyond:
+            short.append(f"{self._index.beyond} bytes lie behind its end: more was joined to the recording")
         end = self._index.metadata.get(END_METADATA, {})
         for key, text, heard in (
             (
@@ -410,6 +427,8 @@ class Recording:
         if self._ended and not self._damage and then != digest.hexdigest():
             what = "changed since it was written" if then else "written by a version that does not seal"
             self._damage[f"the recording was {what}: nothing says that it is all that was heard"] = None
+        if content_hash(self.files) != self.scene.workstation_hash:
+            self._damage["the files in the recording are not those that it was made with"] = None
         return self.findings
 
     @cached_property

@@ -26,9 +26,10 @@ from seerob.model.volumes.moving import posed, reach_box
 from seerob.model.volumes.reachable import reachable_volume
 from seerob.model.volumes.swept import BATCH, Sweep, Swept
 from seerob.outputs.sink import Closing, Writer
+from seerob.recording.format import content_hash
 from seerob.session.run import Bound
 from seerob.twin.machines.gripping import before
-from seerob.workstation.workstation import Area, SweptArea, Workstation, content_hash
+from seerob.workstation.workstation import Area, SweptArea, Workstation
 
 VERSION = "seerob swept area 3"
 """Changes whenever what is made does."""

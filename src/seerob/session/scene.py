@@ -10,12 +10,13 @@ from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInf
 from seerob.criteria.judging import Bound
 from seerob.description.norms.editions import headline
 from seerob.model.model import Model
+from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
 from seerob.session.opening import coarse
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import nobody_says
 from seerob.workstation.variables import Value, WhenStale
-from seerob.workstation.workstation import Workstation, content_hash
+from seerob.workstation.workstation import Workstation
 
 
 def scene_of(

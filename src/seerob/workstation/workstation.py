@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -442,12 +441,3 @@ def file_among(names: Iterable[str]) -> str:
     """Which of the files of a recording is the workstation file."""
     own = [name for name in names if "/" not in name and name.endswith(".toml")]
     return FILE_NAME if FILE_NAME in own or len(own) != 1 else own[0]
-
-
-def content_hash(files: dict[str, bytes]) -> str:
-    """SHA-256 over the names and contents of files, independent of their order."""
-    digest = hashlib.sha256()
-    for name in sorted(files):
-        digest.update(f"{name}\0{len(files[name])}\0".encode())
-        digest.update(files[name])
-    return digest.hexdigest()

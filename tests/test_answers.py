@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seerob.core.snapshot import Verdict
-from seerob.criteria.criterion import judge, judge_interval
+from seerob.core.verdict import judge, judge_interval
 from seerob.recording.answers import Answers, judge_many
 from seerob.recording.series import CODES, NO_VERDICT
 

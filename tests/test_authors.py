@@ -24,7 +24,8 @@ WITHIN, EXCEEDED, UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDE
 HEAD = """
 from dataclasses import dataclass
 import numpy as np
-from seerob.criteria.criterion import Criterion, judge
+from seerob.criteria.criterion import Criterion
+from seerob.core.verdict import judge
 from seerob.distance.least import Per
 from seerob.core.snapshot import Basis, Result, Verdict
 
@@ -180,7 +181,7 @@ GOOD = BIND.format(READS["q"])
     ("text", "head", "words"),
     [
         (GOOD, NO_BASIS, r"Own of own_\w+\.rule has no basis: define basis\(self, model\)"),
-        ("", HEAD, r"has no bind: define bind\(self, model\)"),
+        ("", HEAD, r"has no compute: define compute\(self, model\)"),
         (
             "    def bind(self, model): return 1 / 0\n",
             HEAD,
@@ -490,7 +491,8 @@ def test_every_method_of_ones_own_is_given_a_model_of_its_own(own, method):
         head = head.replace("model): return Basis", f"model):\n        {spoil}\n        return Basis")
     else:
         text += f"    def {method}(self, model, *more):\n        {spoil}\n"
-        text += f"        return Criterion.{method}(self, model, *more)\n"
+        of_base = "None" if method == "compute" else f"Criterion.{method}(self, model, *more)"
+        text += f"        return {of_base}\n"
     station = own(text, head=head)
     (rule,) = station.workstation.safety
     kept = station.model.mj.body_mass.copy(), [body.corners.copy() for body in station.model.bodies]

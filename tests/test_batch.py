@@ -15,7 +15,8 @@ from motion_io import made_pictures
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Basis, Result, Verdict
-from seerob.criteria.criterion import Criterion, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion
 from seerob.recording.answers import Answers
 from seerob.recording.series import CODES, NO_VERDICT
 from seerob.session import batch as batches

@@ -10,9 +10,10 @@ import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
+from seerob.core.verdict import judge_interval
 from seerob.criteria.between_ticks import Told, least_margin, watched
 from seerob.criteria.contact.regions import REGIONS
-from seerob.criteria.criterion import Criterion, Follows, Moment, judge_interval
+from seerob.criteria.criterion import Criterion, Follows, Moment
 from seerob.criteria.judging import bound_to
 from seerob.criteria.safety.power_and_force import Contacts
 from seerob.description.humans.skeleton import BONES

@@ -133,7 +133,8 @@ def test_whatever_ships_is_asked(everything):
 
 HEAD = """
 import numpy as np
-from seerob.criteria.criterion import Criterion, judge
+from seerob.criteria.criterion import Criterion
+from seerob.core.verdict import judge
 from seerob.core.snapshot import Basis, Label, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):

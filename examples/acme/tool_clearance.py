@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from seerob.api import Basis, Criterion, Evaluate, Falls, Model, Points, Result, State, approaching, judge
+from seerob.api import Basis, Compute, Criterion, Falls, Figure, Model, Points, approaching
 
 
 class ToolClearance(Criterion, frozen=True, kw_only=True):
@@ -22,22 +22,10 @@ class ToolClearance(Criterion, frozen=True, kw_only=True):
         """Name whom it speaks of."""
         return (self.at,)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look the name up once, and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look the name up once, and return the function that computes the height."""
         frame = model.frame(self.at)
-
-        def evaluate(state: State) -> Result:
-            height = float(state.pose(frame)[1][2])
-            return Result(
-                name=self.name,
-                value=height,
-                unit=self.unit,
-                limit=self.limit,
-                at_most=False,
-                verdict=judge(height, self.limit, at_most=False),
-            )
-
-        return evaluate
+        return lambda twin: Figure(twin.pose(frame)[1][..., 2], self.limit)
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound the change between two ticks by the point's way."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from seerob.api import Basis, Criterion, Evaluate, Falls, Model, Points, Result, State, approaching, judge
+from seerob.api import Basis, Compute, Criterion, Falls, Figure, Model, Points, approaching
 
 
 class WorkHeight(Criterion, frozen=True, kw_only=True):
@@ -21,17 +21,14 @@ class WorkHeight(Criterion, frozen=True, kw_only=True):
         """What it speaks of."""
         return (self.at,)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look the name up once, and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look the name up once, and return the function that computes the height."""
         frame = model.frame(self.at)  # a name that does not exist fails here, not in the loop
+        return lambda twin: Figure(twin.pose(frame)[1][..., 2], self.limit)
 
-        def evaluate(state: State) -> Result:
-            _, position = state.pose(frame)
-            height = float(position[2])
-            verdict = judge(height, self.limit)
-            return Result(name=self.name, value=height, unit=self.unit, limit=self.limit, verdict=verdict)
-
-        return evaluate
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together: of these the heights have one dimension more."""
+        return ""
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound the change between two ticks: the height changes by no more than the point's way."""

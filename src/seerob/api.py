@@ -24,8 +24,9 @@ from seerob.core.markers import (
 )
 from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Result, Row, Scene, Snapshot
-from seerob.core.verdict import Verdict
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval, worst
+from seerob.core.verdict import Verdict, judge, judge_interval, worst
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.phases import Phase, phase_at, shared_phases
 from seerob.criteria.scoring.rule import PostureRule as Rule
 from seerob.criteria.scoring.rule import bind_posture
@@ -51,11 +52,13 @@ __all__ = [
     "BodySample",
     "Box",
     "Closing",
+    "Compute",
     "Criterion",
     "Ellipsoid",
     "Evaluate",
     "EvaluateMany",
     "Falls",
+    "Figure",
     "Finding",
     "Highlight",
     "Hull",
@@ -72,6 +75,7 @@ __all__ = [
     "Points",
     "Polyline",
     "PoseSample",
+    "Present",
     "Prism",
     "Quality",
     "Rays",
@@ -82,6 +86,7 @@ __all__ = [
     "Scene",
     "SeerobError",
     "Segment",
+    "Shown",
     "SignalSample",
     "Sink",
     "Snapshot",
@@ -91,6 +96,7 @@ __all__ = [
     "State",
     "States",
     "Target",
+    "Twin",
     "Undecided",
     "UnknownName",
     "Verdict",

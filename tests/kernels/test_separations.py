@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from seerob.core.verdict import ROUNDING, Verdict
-from seerob.criteria.criterion import judge_interval, worst
+from seerob.core.verdict import ROUNDING, Verdict, judge_interval, worst
 from seerob.criteria.stopping.terms import Course, separation_distance
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING, least_distance
 from seerob.kernels.separation import EXCEEDED, UNDECIDED, WITHIN, judged, separations

@@ -11,8 +11,7 @@ from pathlib import Path
 
 from mutation.operators import SPOKEN, mutants, mutated
 from mutation.session import PACKAGE, put_in
-from seerob.core.verdict import Verdict
-from seerob.criteria.criterion import judge
+from seerob.core.verdict import Verdict, judge
 from seerob.criteria.stopping import models, terms
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -15,10 +15,10 @@ from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Result, Verdict
 from seerob.core.tolerances import Spread
+from seerob.core.verdict import judge, judge_interval, worst
 from seerob.criteria.contact.limits import Judged, RegionArrays, area_verdict, ranks
 from seerob.criteria.contact.rows import area_results, margin
 from seerob.criteria.contact.shape import ContactShape, force_at_pressure
-from seerob.criteria.criterion import judge, judge_interval, worst
 from seerob.criteria.judging import Judge
 from seerob.criteria.safety.effective_mass import inverse_effective_mass, principal_masses
 from seerob.criteria.safety.manipulability import Manipulability, singular_values

@@ -37,3 +37,42 @@ def admitted(limit: float, *, at_most: bool = True) -> float:
         return limit
     room = ROUNDING * max(1.0, abs(limit))
     return limit - room if at_most else limit + room
+
+
+# To ask an enumeration for a member takes longer than all the rest of a judgement.
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
+
+def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:
+    """Verdict of a value against a limit, by the rule of `keeps`; no limit is no verdict.
+
+    A value that is not a number is UNDECIDED, whatever the limit.
+    """
+    if math.isnan(value):
+        return _UNDECIDED
+    if limit is None:
+        return None
+    return _WITHIN if keeps(value, limit, at_most=at_most) else _EXCEEDED
+
+
+def judge_interval(
+    interval: tuple[float, float], limit: float | None, *, at_most: bool = True
+) -> Verdict | None:
+    """Verdict when the true value lies in ``interval``: UNDECIDED when the limit lies inside it."""
+    low, high = interval
+    if limit is not None and type(low) is float is type(high):
+        if math.isnan(low) or math.isnan(high):
+            return _UNDECIDED
+        last = admitted(limit, at_most=at_most)
+        kept, also = (low <= last, high <= last) if at_most else (low >= last, high >= last)
+        return _UNDECIDED if kept is not also else _WITHIN if kept else _EXCEEDED
+    verdict = judge(low, limit, at_most=at_most)
+    return verdict if verdict is judge(high, limit, at_most=at_most) else _UNDECIDED
+
+
+def worst(verdicts: list[Verdict | None]) -> Verdict | None:
+    """The verdict of a whole: EXCEEDED before UNDECIDED before WITHIN before none."""
+    for verdict in (_EXCEEDED, _UNDECIDED, _WITHIN):
+        if verdict in verdicts:
+            return verdict
+    return None

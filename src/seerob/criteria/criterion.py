@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import wraps
@@ -12,8 +11,8 @@ from msgspec import Meta, Struct
 
 from seerob.core.errors import UnknownName
 from seerob.core.quantities import Seconds
-from seerob.core.snapshot import Basis, Finding, Result, Verdict
-from seerob.core.verdict import admitted, keeps
+from seerob.core.snapshot import Basis, Finding, Result
+from seerob.criteria.figure import Compute, Present, Shown, answers_of, result_of, verdict_of
 
 if TYPE_CHECKING:
     from seerob.core.transforms import Array
@@ -71,17 +70,14 @@ class Claim(Protocol):
 
 
 GIVEN_A_MODEL = {
-    "bind", "batch", "remembers", "falls", "lowest", "bounded_once", "follows", "basis", "looks_ahead",
-    "claims", "depends", "judged", "unshaped",
+    "compute", "present", "one_by_one", "bind", "batch", "remembers", "falls", "lowest", "bounded_once",
+    "follows", "basis", "looks_ahead", "claims", "depends", "judged", "unshaped",
 }  # fmt: skip
 """Methods of a criterion whose first argument is the model."""
 
 EvaluateMany = Callable[["States"], "Answers"]
 """Called with many instants; may raise `Undecided`, of all of them."""
-
-
-# To ask an enumeration for a member takes longer than all the rest of a judgement.
-_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+NOTHING_SHOWN = Shown()
 
 
 class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -133,8 +129,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             for name in GIVEN_A_MODEL & vars(cls).keys():
                 setattr(cls, name, _apart(vars(cls)[name]))
 
-    def bind(self, model: Model) -> Evaluate:
-        """Resolve every name once and return the function that judges a state.
+    def compute(self, model: Model) -> Compute:
+        """Resolve every name once and return the function that computes the figure of an instant.
+
+        What it says against the limit is decided by `seerob.criteria.figure`, for a run and for arrays.
 
         Raises:
             UnknownName: A robot, body or human that the workstation does not have.
@@ -142,12 +140,43 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """
         raise NotImplementedError
 
+    def present(self, model: Model) -> Present:
+        """Return the function that says and draws what was computed of one instant."""
+        return lambda state, figure, verdict: NOTHING_SHOWN
+
+    def one_by_one(self, model: Model) -> str:
+        """Why instants are computed one by one; empty where `compute` takes many at once, as arrays."""
+        return "with these options it is not made for batches"
+
+    def bind(self, model: Model) -> Evaluate:
+        """Return the function that judges a state: by what `compute` says, unless it is given instead.
+
+        Raises:
+            UnknownName: As of `compute`.
+            InputError: Likewise.
+        """
+        return self.judging(self.compute(model), self.present(model))
+
+    def judging(self, compute: Compute, present: Present) -> Evaluate:
+        """Return the function that judges what one function computes and another one shows."""
+        same = Result(name=self.name, unit=self.unit, at_most=self.at_most)
+
+        def evaluate(state: State) -> Result:
+            figure = compute(state)
+            verdict = verdict_of(figure, at_most=same.at_most)
+            return result_of(figure, verdict, present(state, figure, verdict), same)
+
+        return evaluate
+
     def batch(self, model: Model) -> EvaluateMany | None:
-        """The function that judges many states at once, where there is one.
+        """Return the function that judges many states at once, where there is one.
 
         It depends on no instant but the one it speaks of, and says of it what that of `bind` says.
         """
-        return None
+        if self.one_by_one(model):
+            return None
+        compute = self.compute(model)
+        return lambda states: answers_of(compute(states), len(states), at_most=self.at_most)
 
     def remembers(self, model: Model) -> bool:
         """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
@@ -239,38 +268,3 @@ def _apart(method: Callable[..., Any]) -> Callable[..., Any]:
         return method(self, model.own_of(self.name), *more)
 
     return of_its_own
-
-
-def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:
-    """Verdict of a value against a limit, by the rule of `seerob.core.verdict.keeps`; no limit is no verdict.
-
-    A value that is not a number is UNDECIDED, whatever the limit.
-    """
-    if math.isnan(value):
-        return _UNDECIDED
-    if limit is None:
-        return None
-    return _WITHIN if keeps(value, limit, at_most=at_most) else _EXCEEDED
-
-
-def judge_interval(
-    interval: tuple[float, float], limit: float | None, *, at_most: bool = True
-) -> Verdict | None:
-    """Verdict when the true value lies in ``interval``: UNDECIDED when the limit lies inside it."""
-    low, high = interval
-    if limit is not None and type(low) is float is type(high):
-        if math.isnan(low) or math.isnan(high):
-            return _UNDECIDED
-        last = admitted(limit, at_most=at_most)
-        kept, also = (low <= last, high <= last) if at_most else (low >= last, high >= last)
-        return _UNDECIDED if kept is not also else _WITHIN if kept else _EXCEEDED
-    verdict = judge(low, limit, at_most=at_most)
-    return verdict if verdict is judge(high, limit, at_most=at_most) else _UNDECIDED
-
-
-def worst(verdicts: list[Verdict | None]) -> Verdict | None:
-    """The verdict of a whole: EXCEEDED before UNDECIDED before WITHIN before none."""
-    for verdict in (_EXCEEDED, _UNDECIDED, _WITHIN):
-        if verdict in verdicts:
-            return verdict
-    return None

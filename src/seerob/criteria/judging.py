@@ -71,8 +71,11 @@ def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
         SeerobError: It cannot be, and why; whatever a criterion of one's own raises, with the place.
     """
     kind = type(criterion)
-    for method, gives in (("bind", "the function that judges a state"), ("basis", "formula, source, inputs")):
-        if getattr(kind, method) is getattr(Criterion, method):
+    for method, gives, instead in (
+        ("compute", "the function that computes a figure", ("bind",)),
+        ("basis", "formula, source, inputs", ()),
+    ):
+        if all(getattr(kind, each) is getattr(Criterion, each) for each in (method, *instead)):
             raise PluginError(
                 f"{kind.__name__} of {kind.__module__} has no {method}: define {method}(self, model), "
                 f"which returns {gives} (CONTRIBUTING.md, “A criterion”)"

@@ -387,7 +387,7 @@ def _able(
         criterion = one.criterion
         many = criterion.batch(model)
         if many is None:
-            notes[criterion.name] = "asked instant by instant: with these options it is not made for batches"
+            notes[criterion.name] = f"asked instant by instant: {criterion.one_by_one(model)}"
         elif held(criterion, model, findings) or unmentioned(criterion, model):
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
@@ -396,7 +396,8 @@ def _able(
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
             needs, rests = _movers(criterion, model), relied_on(criterion, model)
-            able[criterion.name] = _Able(criterion, many, names, needs, rests)
+            widens = criterion.by_speed and not criterion.one_by_one(model)
+            able[criterion.name] = _Able(criterion, many, names, needs, rests, widens)
     return able, notes
 
 
@@ -413,11 +414,13 @@ class _Able:
 
     relied_on: tuple[str, ...]
     """Of whom something must be heard where it is within."""
+    widens: bool
+    """Whether its intervals hold what noise makes of speeds, of many instants as of one."""
 
     @cached_property
     def own(self) -> bool:
         """Whether its function is one of the user's, which does not ship."""
-        return not type(self.criterion).batch.__module__.startswith("seerob.")
+        return not type(self.criterion).__module__.startswith("seerob.")
 
 
 def _movers(criterion: Criterion, model: Model) -> tuple[str, ...]:
@@ -456,7 +459,9 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
         with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
         movers = (with_carriers | states.speeds_asked) & motion.speed_errors.keys()
         noisy = np.any([motion.speed_errors[who].any(axis=1) for who in movers], axis=0)
-        if np.all(noisy) or (np.any(noisy) and one.criterion.remembers(bench.model)):
+        if one.widens:
+            pass  # its intervals hold what noise makes of speeds
+        elif np.all(noisy) or (np.any(noisy) and one.criterion.remembers(bench.model)):
             alone[name] = "speeds follow from noisy positions"
         else:
             states.alone |= noisy

@@ -24,7 +24,8 @@ OF_AN_INSTANT = frozenset(
         "along", "asked", "attachments", "body_velocities", "bones_in_doubt", "bones_turned_in_doubt",
         "captured", "closest", "closest_per_body", "columns", "contact_forces", "data_of", "distances",
         "drawn_point", "fastest_point", "fastest_points", "fastest_speed", "fastest_speeds", "foresee",
-        "heard_doubt", "hearing", "in_body", "input_reason", "invalid_bodies", "invalid_place_reason",
+        "heard_doubt", "hearing", "in_body", "input_reason",
+        "inverse_effective_mass", "many", "singular_values", "invalid_bodies", "invalid_place_reason",
         "invalid_reason", "jacobian", "joint_noise", "joint_positions", "knots", "largest_speeds",
         "mass_ellipsoid", "mass_matrix", "measured_torques", "model", "moved", "once", "placed", "pose",
         "poses", "q", "qd", "require", "require_bodies", "signal", "signals_meanwhile", "speed_error",
@@ -37,8 +38,9 @@ SHARED = frozenset({"asked", "attachments", "columns"})
 """Those of the names that give what everybody uses: copies of it."""
 OF_MANY = frozenset(
     {
-        "asked", "closest", "closest_per_body", "fastest_points", "held", "jacobian", "mass_matrix", "model",
-        "placed", "qd", "require",
+        "along", "asked", "closest", "closest_per_body", "fastest_points", "held", "inverse_effective_mass",
+        "jacobian", "many", "mass_matrix", "model", "placed", "pose", "qd", "require", "singular_values",
+        "speed_error", "velocity",
     }
 )  # fmt: skip
 """Names of `seerob.twin.states.States`, likewise."""

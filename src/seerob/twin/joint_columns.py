@@ -51,8 +51,8 @@ class Columns:
         )
 
     def of_rows(self, every: Array) -> Array:
-        """Columns of the commanded joints, (r, nv) to (r, n)."""
-        own = every[:, self.all_v]
+        """Columns of the commanded joints, (..., nv) to (..., n)."""
+        own = every[..., self.all_v]
         return own.copy() if self.coupling is None else own @ self.coupling
 
     def of_matrix(self, every: Array) -> Array:

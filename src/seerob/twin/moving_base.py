@@ -7,6 +7,7 @@ is when it stands on a machine that moves or carries one: then its bodies are as
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import cast
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from seerob.core.samples import PoseSample
 from seerob.core.transforms import Array
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.state import State
+from seerob.twin.states import States
 
 RESTS = 1e-3
 """Largest speed of a joint of a machine that counts as standing still [m/s or rad/s]."""
@@ -37,11 +39,11 @@ def first_moving(state: State, mechanisms: Iterable[Mechanism], *, rests: float 
     return None
 
 
-def velocity_of(state: State, frame: Frame, mechanism: Mechanism, offset: Array) -> Array:
-    """Velocity of a point in the world, linear before angular, (6,) [m/s, rad/s].
+def velocity_of(state: State | States, frame: Frame, mechanism: Mechanism, offset: Array) -> Array:
+    """Velocity of a point in the world, linear before angular, (6,) [m/s, rad/s]; (N, 6) at N instants.
 
     Args:
-        state: The twin.
+        state: The twin; at many instants where the mechanism alone moves the point.
         frame: The frame.
         mechanism: Who moves it, see `seerob.model.model.Model.carrier`.
         offset: The point in the frame [m], shape (3,).
@@ -51,6 +53,7 @@ def velocity_of(state: State, frame: Frame, mechanism: Mechanism, offset: Array)
     """
     if mechanism.alone:
         return state.velocity(frame, mechanism, offset)
+    state = cast("State", state)
     data = state.data_of(*_movers(state, frame, mechanism))
     rotation, position = state.pose(frame)
     twist = data.cvel[frame.mj]

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import deepcopy
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -80,6 +80,8 @@ def _point_of(xmat: Array, xpos: Array, frame: Frame, offset: Array) -> Array:
 
 class State(Validity):
     """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
+
+    many: ClassVar[bool] = False
 
     def __init__(
         self, model: Model, data: mujoco.MjData, hearings: dict[str, Hearing], signals: Signals | None = None
@@ -694,6 +696,10 @@ class State(Validity):
         qd = self._qvel[self.columns[mechanism.name].own_v]
         return np.asarray(self._point(frame, mechanism, offset).jacobian @ qd)
 
+    def singular_values(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> list[float]:
+        """Singular values of the linear rows of `jacobian`, largest first; three."""
+        return self.velocity_ellipsoid(frame, mechanism, offset)[0]
+
     def velocity_ellipsoid(
         self, frame: Frame, mechanism: Mechanism, offset: Array | None = None
     ) -> tuple[list[float], list[float]]:
@@ -719,6 +725,12 @@ class State(Validity):
             self._cache[key] = frame, MassEllipsoid(inverse, axes, figures[:3], figures[3:].tolist())
         found: MassEllipsoid = self._cache[key][1]
         return found
+
+    def inverse_effective_mass(
+        self, frame: Frame, mechanism: Mechanism, offset: Array | None = None
+    ) -> Array:
+        """Inverse of the effective mass matrix of a point [1/kg], shape (3, 3); see `mass_ellipsoid`."""
+        return self.mass_ellipsoid(frame, mechanism, offset).inverse
 
     def _point(self, frame: Frame, mechanism: Mechanism, offset: Array | None) -> _Point:
         # Not its name: a tool's working point is called like the tool.

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -24,7 +24,8 @@ from seerob.core.errors import InputError, Problem, Undecided
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.distance.least import Closests, Per, Query, Survey
-from seerob.kernels.chain import held_many, jacobians
+from seerob.kernels.axes import mobility, principal_axes
+from seerob.kernels.chain import along, held_many, jacobians
 from seerob.kernels.speed import fastest_many, stacked, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
@@ -192,6 +193,8 @@ class Bench:
 class States:
     """The twin at N instants."""
 
+    many: ClassVar[bool] = True
+
     def __init__(self, bench: Bench, motion: Motion) -> None:
         self.model, self._motion, self.doubts = bench.model, motion, motion.doubts
         self.asked: set[str] = set()
@@ -356,6 +359,62 @@ class States:
             self._cache[key] = frame, found if columns.coupling is None else found @ columns.coupling
         return np.asarray(self._cache[key][1])
 
+    def velocity(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
+        """Velocities that the joints of a mechanism give a point, linear before angular, shape (N, 6)."""
+        return np.asarray((self.jacobian(frame, mechanism, offset) @ self.qd(mechanism)[..., None])[..., 0])
+
+    def singular_values(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
+        """Singular values of the linear rows of `jacobian`, largest first, shape (3, N)."""
+        rows = np.array(self.jacobian(frame, mechanism, offset)[:, :3])
+        values, directions = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
+        principal_axes(rows, values, directions)
+        values[np.isnan(values).any(axis=-1)] = np.nan
+        return values.T
+
+    def pose(self, frame: Frame) -> tuple[Array, Array]:
+        """World rotations (N, 3, 3) and positions (N, 3) [m] of a frame."""
+        moving = [m for m in self.model.mechanisms.values() if frame.mj in m.mj_bodies]
+        self.require(*(m.name for m in moving))
+        self._settled([body.index for body in self.model.bodies if body.mj == frame.mj])
+        R, x = self._moved["xmat"][:, frame.mj].reshape(-1, 3, 3), self._moved["xpos"][:, frame.mj]
+        return R @ frame.body_from_frame[:3, :3], x + R @ frame.body_from_frame[:3, 3]
+
+    def inverse_effective_mass(
+        self, frame: Frame, mechanism: Mechanism, offset: Array | None = None
+    ) -> Array:
+        """Inverses of the effective mass matrix of a point [1/kg], shape (N, 3, 3)."""
+        J, M = self.jacobian(frame, mechanism, offset)[:, :3], self.mass_matrix(mechanism)
+        found = np.empty((len(self), 3, 3))
+        if not mobility(np.ascontiguousarray(J), np.ascontiguousarray(M), found):
+            raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
+        return found
+
+    def speed_error(self, mechanism: Mechanism) -> Array | None:
+        """How far its joint velocities may be off, shape (N, n); None where nobody says that they were."""
+        self.require(mechanism.name)
+        return self._motion.speed_errors.get(mechanism.name)
+
+    def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:
+        r"""Rows :math:`u^T J_v` of points of several bodies, shape (N, b, n).
+
+        Args:
+            bodies: By index.
+            mechanism: Whose joints the columns are.
+            points: One of each body, in the world [m], shape (N, b, 3).
+            directions: Likewise, shape (N, b, 3).
+        """
+        self.require(mechanism.name)
+        self._settled(bodies)
+        bench, moved, rows = self._bench, self._moved, np.array(bodies, np.int64)
+        moves = np.array([moving_dofs(bench.mj, int(i)) for i in bench.ids[rows]])
+        every = np.empty((len(self), len(rows), bench.mj.nv))
+        for k in range(len(self)):
+            along(
+                moved["cdof"][k], moved["subtree_com"][k], bench.roots[rows], moves,
+                np.ascontiguousarray(points[k]), np.ascontiguousarray(directions[k]), every[k],
+            )  # fmt: skip
+        return np.asarray(bench.columns[mechanism.name].of_rows(every))
+
     def fastest_points(self, bodies: Sequence[int]) -> tuple[Array, Array, Array]:
         """Bounds on the speeds of any points of bodies, corners and their velocities; see `State`.
 
@@ -385,11 +444,13 @@ class States:
         speed, point, velocity = self._cache["fastest"]
         return speed, point, velocity
 
-    def closest(self, gap: Gap) -> Closests:
+    # Whom a device sees is asked of instant by instant: nobody here is estimated, or has strayed.
+
+    def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where two sets are nearest, shape (N,)."""
         return self._distances(gap, Per.SETS).of(slice(None), 0)
 
-    def closest_per_body(self, gap: Gap) -> Closests:
+    def closest_per_body(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``, shape (N, b)."""
         return self._distances(gap, Per.BODY)
 

@@ -35,9 +35,8 @@ from seerob.core.files.bounded import REMEDY, leads_outside
 from seerob.core.files.toml_file import read_toml
 from seerob.core.snapshot import Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
-from seerob.core.verdict import keeps
+from seerob.core.verdict import keeps, worst
 from seerob.criteria.contact.limits import RegionArrays
-from seerob.criteria.criterion import worst
 from seerob.files.tables.grid import read_numbers
 from seerob.files.tables.table_files import TextGrid, check_file, encoding_of, head
 from seerob.model.model import Mechanism, Model

@@ -21,7 +21,8 @@ from msgspec.structs import asdict
 from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
-from seerob.criteria.criterion import Evaluate, judge_interval
+from seerob.core.verdict import judge_interval
+from seerob.criteria.criterion import Evaluate
 from seerob.criteria.scoring.basis import chosen, entered, posture_quality
 from seerob.criteria.scoring.held_work import GAP
 from seerob.criteria.scoring.measured import Accuracy, Measured

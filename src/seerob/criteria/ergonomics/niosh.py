@@ -21,7 +21,8 @@ from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.criteria.scoring.phases import Kilograms, Seconds
 from seerob.criteria.scoring.spans import published
 from seerob.model.model import Model

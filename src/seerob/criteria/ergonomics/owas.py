@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from seerob.core.domains import number, whole
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
-from seerob.criteria.criterion import Evaluate, judge, judge_interval
+from seerob.core.verdict import judge, judge_interval
+from seerob.criteria.criterion import Evaluate
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
 from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, shared_phases

@@ -19,7 +19,8 @@ from seerob.core import figures
 from seerob.core.errors import InputError, Undecided, UnknownName
 from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.criteria.sensors.sensing import Names, bodies_of, carriers_of, names_of
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import Approach, Edition

@@ -3,7 +3,8 @@ r"""Effective mass of a point of a robot, [Weistroffer2022]_ Eqs. 7 and 8, [Khat
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Callable
+from typing import Annotated, ClassVar, Literal, cast
 
 import mujoco
 import numpy as np
@@ -11,22 +12,23 @@ from msgspec import Meta
 
 from seerob.core import figures
 from seerob.core.domains import agree
-from seerob.core.markers import Marker, drawn
+from seerob.core.markers import Marker
 from seerob.core.quantities import Metres3
-from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
+from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result
 from seerob.core.tolerances import Shifts, Spread, deciding, spread
 from seerob.core.transforms import Array
+from seerob.core.verdict import Verdict
 from seerob.criteria.contact.impact_mass import simplified_mass
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, Lowest, judge, judge_interval
+from seerob.criteria.criterion import Criterion, Lowest
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.kernels.axes import mobility, principal_axes, reciprocals
 from seerob.model import provenance
-from seerob.model.model import Mechanism, Model
-from seerob.recording.answers import Answers
-from seerob.twin.accuracy.mass_tolerances import MassTolerances, Matrices
+from seerob.model.model import Frame, Mechanism, Model
+from seerob.recording.answers import Flags
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import velocity_of
 from seerob.twin.spans import Points, Span, coupling_of
 from seerob.twin.state import State
-from seerob.twin.states import States
 
 DRAWN = 0.02
 """Half axis, or arrow, drawn for 1 kg [m]."""
@@ -73,12 +75,6 @@ def projected_mass(inverse: Array, u: Array) -> Array:
     """
     along = np.asarray((u[..., None, :] @ inverse @ u[..., :, None])[..., 0, 0])
     return reciprocals(along.reshape(-1)).reshape(along.shape)
-
-
-def _mass_along(inverse: Array, u: Array) -> float:
-    """`projected_mass` of one direction."""
-    along = float(u @ inverse @ u)
-    return math.inf if along <= 0.0 else 1.0 / along
 
 
 def principal_masses(inverse: Array) -> tuple[Array, Array]:
@@ -150,44 +146,68 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """Say what no shape shows of the robot; a direction that is not toward somebody needs no shape."""
         return "" if self.toward is None else super().unshaped(model)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the mass."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
         robot.require_masses(self.name)
-        offset = np.array(self.offset)
+        offset, tolerances = np.array(self.offset), MassTolerances(model, robot)
+        direction = self._direction(model, frame, robot)
+
+        def compute(twin: Twin) -> Figure:
+            inverse = twin.inverse_effective_mass(frame, robot, offset)
+            u, known = direction(twin, inverse)
+            mass, interval = np.where(known, projected_mass(inverse, u), np.nan), None
+            if len(tolerances) and known and np.isfinite(mass):
+                ends = self._ends(tolerances, cast("State", twin), frame, offset, u)
+                interval = ends.low, ends.high
+            # Without a direction there is nothing to judge, unless a limit was to hold toward somebody.
+            nothing = ~known & (self.toward is None or self.limit is None)
+            value = mass if twin.many or known else None
+            return Figure(value, self.limit, interval, nothing, beside=(u, known))
+
+        return compute
+
+    def _direction(
+        self, model: Model, frame: Frame, robot: Mechanism
+    ) -> Callable[[Twin, Array], tuple[Array, Flags]]:
+        """Unit vectors, shape (..., 3), and whether there is a direction, shape (...), given Λ⁻¹."""
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
+        offset = np.array(self.offset)
+
+        def direction(twin: Twin, inverse: Array) -> tuple[Array, Flags]:
+            if gap is not None:
+                closest = twin.closest(gap)
+                along = closest.point_b - closest.point_a
+            elif self.along == "worst":
+                along = principal_masses(inverse)[1][..., -1]
+            else:
+                along = velocity_of(twin, frame, robot, offset)[..., :3]
+            length = np.sqrt(np.vecdot(along, along))
+            known = length > STANDSTILL if gap is None else length >= TOUCHING
+            return along / np.where(known, length, 1.0)[..., None], known
+
+        return direction
+
+    def present(self, model: Model) -> Present:
+        """Return the function that draws the ellipsoid, and says why there is no direction."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        robot = model.carrier(frame)
         tolerances = MassTolerances(model, robot)
         simplified = self._simplified(model, robot, tolerances)
 
-        def direction(state: State, axes: Array) -> tuple[Array | None, str]:
-            if gap is not None:
-                closest = state.closest(gap)
-                line = closest.point_b - closest.point_a
-                length = math.sqrt(float(line @ line))
-                if length < TOUCHING:
-                    return None, "touching: the line to the person has no direction"
-                return line / length, ""
-            if self.along == "worst":
-                return axes[:, -1], ""
-            v = velocity_of(state, frame, robot, offset)[:3]
-            speed = math.sqrt(float(v @ v))
-            return (v / speed, "") if speed > STANDSTILL else (None, "stands still: no direction of motion")
-
-        def evaluate(state: State) -> Result:
-            inverse, axes, masses, wxyz = state.mass_ellipsoid(frame, robot, offset)
-            u, reason = direction(state, axes)
-            mass = None if u is None else _mass_along(inverse, u)
-            verdict, interval, open_ = self._verdict(mass), None, ""
-            if len(tolerances) and u is not None and mass is not None and math.isfinite(mass):
-                ends = self._ends(
-                    tolerances.matrices(state), len(tolerances), state.jacobian(frame, robot, offset)[:3], u
-                )
-                interval = float(ends.low), float(ends.high)
-                verdict = judge_interval(interval, self.limit)
-                open_ = deciding(tolerances.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
-            if u is None and gap is not None and self.limit is not None:
-                verdict = Verdict.UNDECIDED
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            _, _, masses, wxyz = state.mass_ellipsoid(frame, robot, offset)
+            u, known = figure.beside
+            mass, reason = None if figure.value is None else float(figure.value), ""
+            if not known:
+                touching = "touching: the line to the person has no direction"
+                reason = "stands still: no direction of motion" if self.toward is None else touching
+            elif mass is not None and math.isinf(mass):
+                reason = "cannot be pushed that way: infinite"
+            elif figure.interval is not None and verdict is Verdict.UNDECIDED:
+                ends = self._ends(tolerances, state, frame, offset, u)
+                reason = deciding(tolerances.tolerances, ends.widths)
             place = state.drawn_point(frame, offset)
 
             def draw() -> tuple[Marker, ...]:
@@ -198,34 +218,26 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                     radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
                     verdict=verdict,
                 )
-                if u is None or mass is None:
+                if mass is None:
                     return (ellipsoid,)
                 vector = tuple((min(DRAWN * mass, LARGEST_DRAWN) * u).tolist())
                 label = figures.worded(mass, self.limit, self.unit, at_most=True)
                 return ellipsoid, Arrow(origin=center, vector=vector, label=label, verdict=verdict)
 
-            return Result(
-                name=self.name,
-                value=mass if mass is not None and math.isfinite(mass) else None,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=verdict,
-                nothing=verdict is None and (mass is None or not math.isfinite(mass)),
-                interval=interval,
-                reason=reason
-                or open_
-                or ("" if mass is None or math.isfinite(mass) else "cannot be pushed that way: infinite"),
-                parts=(
-                    *(
-                        Result(name=name, value=m if math.isfinite(m) else None, unit="kg")
-                        for name, m in zip(NAMES, masses.tolist(), strict=True)
-                    ),
-                    simplified,
-                ),
-                markers=drawn(draw),
+            principal = (
+                Result(name=name, value=m if math.isfinite(m) else None, unit="kg")
+                for name, m in zip(NAMES, masses.tolist(), strict=True)
             )
+            return Shown(reason, draw, (*principal, simplified))
 
-        return evaluate
+        return present
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so where a mass has a tolerance or something else moves it."""
+        robot = model.carrier(model.frame(self.at))
+        if len(MassTolerances(model, robot)):
+            return "a mass has a tolerance"
+        return "" if robot.alone else "something that moves carries the robot"
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         r"""Least margin in a span; None of what moves something else too, and of tolerances of masses.
@@ -307,15 +319,19 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
 
         return lowest
 
-    def _ends(self, matrices: Matrices, inputs: int, J_v: Array, u: Array) -> Spread:
+    def _ends(
+        self, tolerances: MassTolerances, state: State, frame: Frame, offset: Array, u: Array
+    ) -> Spread:
         """Of the mass along u, or of the heaviest direction there is at each end."""
+        matrices = tolerances.matrices(state)
+        J_v = state.jacobian(frame, tolerances.robot, offset)[:3]
 
         def at(shifts: Shifts) -> Array:
             inverse = inverse_effective_mass(J_v, matrices.at(shifts))
             heaviest = self.along == "worst" and self.toward is None
             return principal_masses(inverse)[0][-1] if heaviest else projected_mass(inverse, u)
 
-        return spread(at, inputs)
+        return spread(at, len(tolerances))
 
     @staticmethod
     def _simplified(model: Model, robot: Mechanism, tolerances: MassTolerances) -> Result:
@@ -325,37 +341,6 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             ends = spread(lambda shifts: np.array(tolerances.simplified(mass, shifts)), len(tolerances))
             interval = float(ends.low), float(ends.high)
         return Result(name="M/2 + m_L", value=mass, unit="kg", interval=interval)
-
-    def batch(self, model: Model) -> EvaluateMany | None:
-        """Judge many instants at once; None where a mass has a tolerance or something else moves it."""
-        frame, offset = model.frame(self.at), np.array(self.offset)
-        robot = model.carrier(frame)
-        if len(MassTolerances(model, robot)) or not robot.alone:
-            return None
-        gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
-
-        def evaluate(states: States) -> Answers:
-            J_v = states.jacobian(frame, robot, offset)[:, :3]
-            inverse = inverse_effective_mass(J_v, states.mass_matrix(robot))
-            if gap is not None:
-                closest = states.closest(gap)
-                along = closest.point_b - closest.point_a
-            elif self.along == "worst":
-                along = principal_masses(inverse)[1][..., -1]
-            else:
-                along = (J_v @ states.qd(robot)[..., None])[..., 0]
-            length = np.sqrt(np.einsum("ij,ij->i", along, along))
-            known = length > STANDSTILL if gap is None else length >= TOUCHING
-            u = along / np.where(known, length, 1.0)[:, None]
-            mass = np.where(known, projected_mass(inverse, u), np.nan)
-            found = Answers.against(mass, self.limit, at_most=self.at_most).finite()
-            # Without a direction there is nothing to judge, unless a limit was to hold toward somebody.
-            return found if gap is not None else found.without_verdict(~known)
-
-        return evaluate
-
-    def _verdict(self, mass: float | None) -> Verdict | None:
-        return None if mass is None else judge(mass, self.limit)
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

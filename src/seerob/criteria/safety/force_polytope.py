@@ -20,7 +20,8 @@ from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany
 from seerob.criteria.polytope import Polytope, free_moment, torque_box, zero_moment
 from seerob.description.norms import body_limits
 from seerob.description.norms.limit_inputs import force_inputs, pushed_region

@@ -18,7 +18,8 @@ from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, Lowest, judge_interval, worst
+from seerob.core.verdict import judge_interval, worst
+from seerob.criteria.criterion import Criterion, Evaluate, Lowest
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques

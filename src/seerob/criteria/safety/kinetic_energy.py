@@ -2,7 +2,7 @@ r"""Kinetic energy of a robot, [Weistroffer2022]_ Eq. 5."""
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 from msgspec import Meta
@@ -10,21 +10,21 @@ from msgspec import Meta
 from seerob.core import figures
 from seerob.core.domains import at_least
 from seerob.core.errors import Undecided
-from seerob.core.markers import drawn
-from seerob.core.snapshot import Basis, Result, Sphere, Verdict
-from seerob.core.tolerances import deciding, spread
+from seerob.core.snapshot import Basis, Result, Sphere
+from seerob.core.tolerances import Spread, deciding, spread
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import NOISE
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
-from seerob.recording.answers import Answers
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import energy_of
 from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, change_of_motion
 from seerob.twin.state import State
-from seerob.twin.states import States
 
+ORIGIN = np.zeros(3)
 DRAWN = 0.1
 """Radius of the sphere of 1 J [m]; the volume is proportional to the energy."""
 
@@ -65,75 +65,70 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         """The robot."""
         return (self.robot,)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the energy."""
         robot = model.mover(self.robot)
         aboard = _aboard(model, robot)
         for each in (robot, *aboard):
             each.require_masses(self.name)
         masses, alone = MassTolerances(model, robot), robot.alone and not aboard
 
-        def evaluate(state: State) -> Result:
-            qd = state.qd(robot)
-            energy = (
-                float(kinetic_energy(state.mass_matrix(robot), qd))
-                if alone
-                else sum(energy_of(state, each) for each in (robot, *aboard))
-            )
-            verdict, interval, reason = judge(energy, self.limit), None, ""
-            if len(masses) and not alone:
-                raise Undecided(
-                    f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
-                )
+        def compute(twin: Twin) -> Figure:
+            qd = twin.qd(robot)
+            energy: float | Array
+            if alone:
+                energy = kinetic_energy(twin.mass_matrix(robot), qd)
+            else:
+                energy = sum(energy_of(cast("State", twin), each) for each in (robot, *aboard))
+            low = high = energy
             if len(masses):
-                matrices = masses.matrices(state)
-                ends = spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
-                interval = float(ends.low), float(ends.high)
-                verdict = judge_interval(interval, self.limit)
-                reason = deciding(masses.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
-            error = state.speed_error(robot)
+                if not alone:
+                    raise Undecided(
+                        f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
+                    )
+                ends = self._ends(masses, cast("State", twin))
+                low, high = ends.low, ends.high
+            error = twin.speed_error(robot)
             if error is not None:
                 # √(2E) is a norm of the velocities: it is off by no more than that of their errors.
-                off = float(np.sqrt(np.diagonal(state.mass_matrix(robot)) @ error**2))
-                low, high = (energy, energy) if interval is None else interval
-                interval = (
-                    0.5 * max(np.sqrt(2 * max(low, 0.0)) - off, 0.0) ** 2,
-                    0.5 * (np.sqrt(2 * max(high, 0.0)) + off) ** 2,
-                )
-                verdict = judge_interval(interval, self.limit)
-                if verdict is Verdict.UNDECIDED:
-                    reason = reason or NOISE
-            tip = state.drawn_point(robot.tip, np.zeros(3))
+                off = np.sqrt(np.einsum("...ii,...i->...", twin.mass_matrix(robot), error**2))
+                low = 0.5 * np.maximum(np.sqrt(2 * np.maximum(low, 0.0)) - off, 0.0) ** 2
+                high = 0.5 * (np.sqrt(2 * np.maximum(high, 0.0)) + off) ** 2
+            return Figure(energy, self.limit, None if low is high else (low, high))
+
+        return compute
+
+    @staticmethod
+    def _ends(masses: MassTolerances, state: State) -> Spread:
+        matrices, qd = masses.matrices(state), state.qd(masses.robot)
+        return spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
+
+    def present(self, model: Model) -> Present:
+        """Return the function that draws a sphere at the tool's working point."""
+        robot = model.mover(self.robot)
+        masses = MassTolerances(model, robot)
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            place, energy, reason = state.drawn_point(robot.tip, ORIGIN), figure.number, ""
+            if verdict is Verdict.UNDECIDED:
+                widths = self._ends(masses, state).widths if len(masses) else np.zeros(0)
+                reason = deciding(masses.tolerances, widths) or NOISE
 
             def draw() -> tuple[Sphere, ...]:
                 label = figures.worded(energy, self.limit, self.unit, at_most=True)
                 radius = DRAWN * max(energy, 0.0) ** (1 / 3)
-                return (Sphere(center=tuple(tip().tolist()), radius=radius, label=label, verdict=verdict),)
+                return (Sphere(center=tuple(place().tolist()), radius=radius, label=label, verdict=verdict),)
 
-            return Result(
-                name=self.name,
-                value=energy,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=verdict,
-                reason=reason,
-                interval=interval,
-                markers=drawn(draw),
-            )
+            return Shown(reason, draw)
 
-        return evaluate
+        return present
 
-    def batch(self, model: Model) -> EvaluateMany | None:
-        """Judge many instants at once; None where a mass has a tolerance or something else moves it."""
+    def one_by_one(self, model: Model) -> str:
+        """Say so where a mass has a tolerance or something else moves it."""
         robot = model.mover(self.robot)
-        if len(MassTolerances(model, robot)) or not robot.alone or _aboard(model, robot):
-            return None
-
-        def evaluate(states: States) -> Answers:
-            energy = kinetic_energy(states.mass_matrix(robot), states.qd(robot))
-            return Answers.against(energy, self.limit, at_most=self.at_most)
-
-        return evaluate
+        if len(MassTolerances(model, robot)):
+            return "a mass has a tolerance"
+        return "" if robot.alone and not _aboard(model, robot) else "something moves it, or is on it"
 
     def falls(self, model: Model, points: Points) -> Falls | None:
         r"""Bound between instants the largest energy that tolerances of masses allow.

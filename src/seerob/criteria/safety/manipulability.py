@@ -9,18 +9,17 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
-from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
-from seerob.core.snapshot import Basis, Ellipsoid, Result, Verdict
+from seerob.core.snapshot import Basis, Ellipsoid, Result
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.recording.answers import Answers
 from seerob.twin.spans import Fall, Falls, Points, Span, coupling_of
 from seerob.twin.state import State
-from seerob.twin.states import States
 
 STEP = math.radians(1)
 """How far joints are moved to see which leads out of a singularity [rad or m]."""
@@ -99,19 +98,25 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         """The point."""
         return (self.at,)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        frame = model.frame(self.at)
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the figure."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
         mechanism = model.carrier(frame)
-        offset = np.array(self.offset)
+        return lambda twin: Figure(twin.singular_values(frame, mechanism, offset)[2], self.limit)
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together."""
+        return ""
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what leads out of a singularity, and draws the ellipsoid."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        mechanism = model.carrier(frame)
         names = [joint.name for joint in mechanism.joints]
 
-        def evaluate(state: State) -> Result:
-            state.require(mechanism.name)
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             sigma, wxyz = state.velocity_ellipsoid(frame, mechanism, offset)
-            smallest = sigma[2]
-            verdict = judge(smallest, self.limit, at_most=False)
-            reason = ""
+            smallest, reason = sigma[2], ""
             if verdict is Verdict.EXCEEDED and len(names) >= 3:
                 after = least_value_after(state.jacobian(frame, mechanism, offset)).max(axis=1)
                 joint = names[int(after.argmax())]
@@ -135,30 +140,9 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 Result(name="σ₂", value=sigma[1], unit="m/rad"),
                 Result(name="√det J_v J_vᵀ", value=math.prod(sigma), unit="m³/rad³"),
             )
-            return Result(
-                name=self.name,
-                value=smallest,
-                unit=self.unit,
-                limit=self.limit,
-                at_most=False,
-                verdict=verdict,
-                reason=reason,
-                parts=parts,
-                markers=drawn(draw),
-            )
+            return Shown(reason, draw, parts)
 
-        return evaluate
-
-    def batch(self, model: Model) -> EvaluateMany:
-        """Return the function that judges many instants at once, or None where there is none."""
-        frame, offset = model.frame(self.at), np.array(self.offset)
-        mechanism = model.carrier(frame)
-
-        def evaluate(states: States) -> Answers:
-            sigma, _ = singular_values(states.jacobian(frame, mechanism, offset)[:, :3])
-            return Answers.against(sigma[:, 2], self.limit, at_most=self.at_most)
-
-        return evaluate
+        return present
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how far singular values fall between instants: by the norm of the Jacobian's change."""

@@ -9,21 +9,20 @@ from msgspec import Meta
 
 from seerob.core import figures
 from seerob.core.errors import InputError
-from seerob.core.markers import drawn
-from seerob.core.snapshot import Basis, Result, Segment, Verdict
+from seerob.core.snapshot import Basis, Segment
 from seerob.core.tolerances import Tolerance, deciding
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.partly_seen import partly_seen
 from seerob.distance.least import DistanceKind
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
-from seerob.recording.answers import Answers
 from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.accuracy.tracking_error import tracking
 from seerob.twin.body_place import BodyPlaces
 from seerob.twin.spans import Falls, Points, approaching
 from seerob.twin.state import State
-from seerob.twin.states import States
 
 
 class MinimumDistance(Criterion, frozen=True, kw_only=True):
@@ -54,24 +53,43 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
         return model.gap(a, b)
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        return partly_seen(model, self._gap(model), lambda gap: self._bound(model, gap))
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
 
-    def _bound(self, model: Model, gap: Gap) -> Evaluate:
-        places = BodyPlaces(model)
-        ends = DistanceEnds(model, gap)
+        def bind(gap: Gap) -> Evaluate:
+            return self.judging(self._distance(model, gap), self._line(model, gap))
 
-        def evaluate(state: State) -> Result:
-            closest = state.closest(gap, allow_estimated=True, strayed=True)
+        return partly_seen(model, self._gap(model), bind)
+
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the distance."""
+        return self._distance(model, self._gap(model))
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together."""
+        return ""
+
+    def _distance(self, model: Model, gap: Gap) -> Compute:
+        ends, either = DistanceEnds(model, gap), self.uncertainty
+
+        def compute(twin: Twin) -> Figure:
+            closest = twin.closest(gap, allow_estimated=True, strayed=True)
+            low, high = ends.of_sets(twin, closest.distance)
+            # Crossing shapes are deeper than the figure says: never within, not even of 0.
+            crossing = closest.kind == DistanceKind.DEPTH_AT_LEAST
+            interval = low - gap.deviation - either, high + either
+            return Figure(closest.distance, self.limit, interval, exceeded=crossing, beside=closest)
+
+        return compute
+
+    def _line(self, model: Model, gap: Gap) -> Present:
+        places, ends = BodyPlaces(model), DistanceEnds(model, gap)
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            closest, open_ = figure.beside, ""
             distance = closest.distance
-            low, high = ends.of_sets(state, distance)
-            seen = (high - low) / 2
-            interval = (low - gap.deviation - self.uncertainty, high + self.uncertainty)
-            verdict = judge_interval(interval, self.limit, at_most=False)
-            open_ = f"; {_deciding(self.uncertainty, seen, gap)}" if verdict is Verdict.UNDECIDED else ""
-            if closest.kind == DistanceKind.DEPTH_AT_LEAST and self.limit is not None:
-                # Crossing shapes are deeper than the figure says: never within, not even of 0.
-                verdict = Verdict.EXCEEDED
+            if verdict is Verdict.UNDECIDED:
+                low, high = ends.of_sets(state, distance)
+                open_ = f"; {_deciding(self.uncertainty, float(high - low) / 2, gap)}"
             a_named = places.named(state, closest.body_a, closest.point_a)
             b_named = places.named(state, closest.body_b, closest.point_b)
             deeper = " (overlap, at least this deep)" if closest.kind == DistanceKind.DEPTH_AT_LEAST else ""
@@ -81,34 +99,9 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
                 label = figures.worded(distance, self.limit, self.unit, at_most=False)
                 return (Segment(start=start, end=end, label=label, verdict=verdict),)
 
-            return Result(
-                name=self.name,
-                value=distance,
-                unit=self.unit,
-                limit=self.limit,
-                at_most=False,
-                verdict=verdict,
-                reason=f"{a_named} ↔ {b_named}{deeper}{open_}",
-                interval=interval if interval[0] < interval[1] else None,
-                markers=drawn(draw),
-            )
+            return Shown(f"{a_named} ↔ {b_named}{deeper}{open_}", draw)
 
-        return evaluate
-
-    def batch(self, model: Model) -> EvaluateMany:
-        """Return the function that judges many instants at once, or None where there is none."""
-        gap, either = self._gap(model), self.uncertainty
-
-        def evaluate(states: States) -> Answers:
-            closest = states.closest(gap)
-            low, high = closest.distance - gap.deviation - either, closest.distance + either
-            found = Answers.against(closest.distance, self.limit, at_most=False)
-            if gap.deviation + either > 0:
-                found = found.between(low, high, at_most=False)
-            crossing = closest.kind == DistanceKind.DEPTH_AT_LEAST
-            return found if self.limit is None else found.exceeded(crossing)
-
-        return evaluate
+        return present
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how much nearer the two sets can come between two instants at which this is asked."""

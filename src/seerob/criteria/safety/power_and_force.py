@@ -17,6 +17,7 @@ from seerob.core.quantities import Coordinate, Tolerance
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.tolerances import Spread, deciding
 from seerob.core.transforms import Array
+from seerob.core.verdict import worst
 from seerob.criteria.contact import collision
 from seerob.criteria.contact import limits as contact_limits
 from seerob.criteria.contact import shape as contact_shape
@@ -28,7 +29,7 @@ from seerob.criteria.contact.measured import Measurements, with_measured
 from seerob.criteria.contact.regions import REGIONS, HeightReach, Person, reach_inputs, without_limit
 from seerob.criteria.contact.rows import NOT_MODELLED, ContactMarkers, ContactRows, area_results, margin
 from seerob.criteria.contact.shape import given_contacts
-from seerob.criteria.criterion import Criterion, Evaluate, Lowest, worst
+from seerob.criteria.criterion import Criterion, Evaluate, Lowest
 from seerob.criteria.partly_seen import seen_first
 from seerob.description.humans.anthropometry import STATURE_RANGE
 from seerob.description.norms import body_limits

@@ -9,7 +9,8 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Input, Origin, Result
-from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.criteria.sensors.sensing import Names, bodies_of, names_of
 from seerob.model import provenance
 from seerob.model.model import Model

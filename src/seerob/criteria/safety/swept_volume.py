@@ -8,7 +8,8 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Hull, Input, Origin, Result, Verdict
-from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.distance.voxels import check_room
 from seerob.model import provenance
 from seerob.model.model import Model

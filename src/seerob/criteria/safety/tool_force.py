@@ -20,7 +20,8 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, Lowest, judge, judge_interval
+from seerob.core.verdict import judge, judge_interval
+from seerob.criteria.criterion import Criterion, Evaluate, Lowest
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques

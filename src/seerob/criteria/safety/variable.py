@@ -9,7 +9,8 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
-from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.core.verdict import judge
+from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.spans import Fall, Falls, Points

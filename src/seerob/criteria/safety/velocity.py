@@ -2,8 +2,7 @@ r"""Speed of a point, or of the fastest point of a set of bodies, [Weistroffer20
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -12,21 +11,19 @@ from msgspec import Meta
 from seerob.core import figures
 from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError
-from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
-from seerob.core.snapshot import Arrow, Basis, Input, Result, Verdict
+from seerob.core.snapshot import Arrow, Basis, Input
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import NOISE
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.recording.answers import Answers
 from seerob.twin.moving_base import velocity_of
 from seerob.twin.spans import Falls, Points, speeding
 from seerob.twin.state import State
-from seerob.twin.states import States
 
-NO_NOISE = np.zeros(0)
 DRAWN = 0.5
 """Length of the arrow of a speed of 1 m/s [m]."""
 
@@ -51,14 +48,14 @@ def speed_noise(J: Array, error: Array) -> Array:
 
     Args:
         J: Linear rows, shape (..., 3, n) [m/rad or 1].
-        error: δ of each joint, shape (n,) [rad/s or m/s].
+        error: δ of each joint, shape (..., n) [rad/s or m/s].
 
     Returns:
         [m/s], shape (...).
     """
     error = at_least("error", error, unit="rad/s or m/s")
-    agree(n=(J.shape[-1], *error.shape))
-    return np.asarray(np.sqrt(((J * error) ** 2).sum(axis=(-2, -1))))
+    agree(n=(J.shape[-1], error.shape[-1]))
+    return np.asarray(np.sqrt(((J * error[..., None, :]) ** 2).sum(axis=(-2, -1))))
 
 
 class Velocity(Criterion, frozen=True, kw_only=True):
@@ -95,26 +92,25 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         """Say what no shape shows of the robots; a point needs no shape."""
         return super().unshaped(model) if self.of else ""
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        return self._bind_point(model) if self.at is not None else self._bind_set(model)
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the speed."""
+        return self._of_point(model) if self.at is not None else self._of_set(model)
 
-    def _bind_point(self, model: Model) -> Evaluate:
+    def _of_point(self, model: Model) -> Compute:
         frame = model.frame(self.at or "")
         mechanism = model.carrier(frame)
         offset = np.array(self.offset)
 
-        def evaluate(state: State) -> Result:
-            v = velocity_of(state, frame, mechanism, offset)[:3]
-            place = state.drawn_point(frame, offset)
-            speed, interval = math.sqrt(float(v @ v)), None
-            error = state.speed_error(mechanism)
+        def compute(twin: Twin) -> Figure:
+            v = velocity_of(twin, frame, mechanism, offset)[..., :3]
+            speed, interval = np.sqrt(np.vecdot(v, v)), None
+            error = twin.speed_error(mechanism)
             if error is not None:
-                off = float(speed_noise(state.jacobian(frame, mechanism, offset)[:3], error))
-                interval = max(speed - off, 0.0), speed + off
-            return self._result(speed, place, v, interval=interval)
+                off = speed_noise(twin.jacobian(frame, mechanism, offset)[..., :3, :], error)
+                interval = np.maximum(speed - off, 0.0), speed + off
+            return Figure(speed, self.limit, interval, beside=v)
 
-        return evaluate
+        return compute
 
     def _bodies(self, model: Model) -> tuple[int, ...]:
         bodies = tuple(i for i in model.select(self.of or "") if model.bodies[i].carrier)
@@ -122,7 +118,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             raise InputError.at(self.name, "of", f"nothing of {self.of!r} moves", "name a robot or human")
         return bodies
 
-    def _bind_set(self, model: Model) -> Evaluate:
+    def _of_set(self, model: Model) -> Compute:
         bodies = self._bodies(model)
         movers = [model.bodies[i].carrier for i in bodies]
         rows_of = {
@@ -130,63 +126,59 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         }
         moving = [(model.mechanisms[name], rows) for name, rows in rows_of.items()]
 
-        def noise(state: State, points: Array) -> Array:
-            """Of the fastest point of each body [m/s], shape (b,); of none where nobody says how far."""
-            errors = [state.speed_error(mechanism) for mechanism, _ in moving]
-            if not any(error is not None for error in errors):
-                return NO_NOISE
-            found = np.zeros(len(bodies))
-            for (mechanism, rows), error in zip(moving, errors, strict=True):
+        def noise(twin: Twin, points: Array) -> Array:
+            """Of the fastest point of each body [m/s], shape (..., b)."""
+            found = np.zeros(points.shape[:-1])
+            for mechanism, rows in moving:
+                error = twin.speed_error(mechanism)
                 if error is None:
                     continue
                 own = tuple(bodies[k] for k in rows)
-                axes = (np.tile(axis, (len(rows), 1)) for axis in np.eye(3))
-                J = np.stack([state.along(own, mechanism, points[rows], u) for u in axes], axis=-2)
-                found[rows] = speed_noise(J, error)
+                axes = (np.broadcast_to(axis, points[..., rows, :].shape) for axis in np.eye(3))
+                J = np.stack([twin.along(own, mechanism, points[..., rows, :], u) for u in axes], axis=-2)
+                found[..., rows] = speed_noise(J, error[..., None, :])
             return found
 
-        def evaluate(state: State) -> Result:
-            speeds, points, velocities = state.fastest_points(bodies)
-            k = int(speeds.argmax())
+        def compute(twin: Twin) -> Figure:
+            fastest = speeds, points, _ = twin.fastest_points(bodies)
             interval = None
-            off = noise(state, points)
-            if off is not NO_NOISE and off.any():
-                low, high = np.maximum(speeds - off, 0.0), speeds + off
-                interval = float(low.max()), float(high.max())
-            where = model.bodies[bodies[k]].name
-            point, v = points[k], velocities[k]
-            return self._result(float(speeds[k]), lambda: point, v, where, interval=interval)
+            if any(twin.speed_error(mechanism) is not None for mechanism, _ in moving):
+                off = noise(twin, points)
+                interval = np.maximum(speeds - off, 0.0).max(axis=-1), (speeds + off).max(axis=-1)
+            return Figure(speeds.max(axis=-1), self.limit, interval, beside=fastest)
 
-        return evaluate
+        return compute
 
-    def _result(
-        self,
-        speed: float,
-        place: Callable[[], Array],
-        v: Array,
-        where: str = "",
-        *,
-        interval: tuple[float, float] | None = None,
-    ) -> Result:
-        verdict = judge(speed, self.limit) if interval is None else judge_interval(interval, self.limit)
-        if interval is not None and verdict is Verdict.UNDECIDED:
-            where = f"{where}: {NOISE}".removeprefix(": ")
+    def present(self, model: Model) -> Present:
+        """Return the function that names the fastest body and draws the velocity."""
+        point, offset = None if self.at is None else model.frame(self.at), np.array(self.offset)
+        bodies = () if point is not None else self._bodies(model)
 
-        def draw() -> tuple[Arrow, ...]:
-            label = figures.worded(speed, self.limit, self.unit, at_most=True)
-            origin, vector = tuple(place().tolist()), tuple((DRAWN * v).tolist())
-            return (Arrow(origin=origin, vector=vector, label=label, verdict=verdict),)
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            speed, where = figure.number, ""
+            if point is not None:
+                place, v = state.drawn_point(point, offset), figure.beside
+            else:
+                speeds, points, velocities = figure.beside
+                k = int(speeds.argmax())
+                where, v = model.bodies[bodies[k]].name, velocities[k]
+                place = partial(points.__getitem__, k)
+            if figure.interval is not None and verdict is Verdict.UNDECIDED:
+                where = f"{where}: {NOISE}".removeprefix(": ")
 
-        return Result(
-            name=self.name,
-            value=speed,
-            unit=self.unit,
-            limit=self.limit,
-            verdict=verdict,
-            reason=where,
-            interval=interval,
-            markers=drawn(draw),
-        )
+            def draw() -> tuple[Arrow, ...]:
+                label = figures.worded(speed, self.limit, self.unit, at_most=True)
+                origin, vector = tuple(place().tolist()), tuple((DRAWN * v).tolist())
+                return (Arrow(origin=origin, vector=vector, label=label, verdict=verdict),)
+
+            return Shown(where, draw)
+
+        return present
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so of a point whose robot is carried by something that moves."""
+        alone = self.at is None or model.carrier(model.frame(self.at)).alone
+        return "" if alone else "something that moves carries the robot"
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how much faster the bodies or the point can be between two instants."""
@@ -195,25 +187,6 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         frame = model.frame(self.at)
         local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
         return speeding([points.add(frame.mj, local)])
-
-    def batch(self, model: Model) -> EvaluateMany | None:
-        """Judge many instants at once; None for a point when something that moves carries its robot."""
-        if self.at is None:
-            bodies = self._bodies(model)
-            return lambda states: self._answers(states.fastest_points(bodies)[0].max(axis=1))
-        frame, offset = model.frame(self.at), np.array(self.offset)
-        mechanism = model.carrier(frame)
-        if not mechanism.alone:
-            return None
-
-        def evaluate(states: States) -> Answers:
-            v = point_velocity(states.jacobian(frame, mechanism, offset), states.qd(mechanism))[:, :3]
-            return self._answers(np.sqrt(np.einsum("ij,ij->i", v, v)))
-
-        return evaluate
-
-    def _answers(self, speed: Array) -> Answers:
-        return Answers.against(speed, self.limit, at_most=self.at_most)
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

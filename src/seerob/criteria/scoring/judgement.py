@@ -11,7 +11,7 @@ import numpy as np
 
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Highlight, Level, Result, Row, Verdict
-from seerob.criteria.criterion import judge, judge_interval
+from seerob.core.verdict import judge, judge_interval
 from seerob.criteria.scoring.score_rows import ANGLES_OF, BONES_OF, Edges, component_rows, total_row
 from seerob.criteria.scoring.spans import Ints, Span, Thresholds
 from seerob.description.humans.angles import SIDED, Angles

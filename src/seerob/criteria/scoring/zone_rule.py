@@ -9,7 +9,8 @@ from msgspec import Meta
 
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Aspect, Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
-from seerob.criteria.criterion import Evaluate, judge, judge_interval
+from seerob.core.verdict import judge, judge_interval
+from seerob.criteria.criterion import Evaluate
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, entered, posture_quality
 from seerob.criteria.scoring.phases import Phase, Sides, on_sides, phase_at, shared_phases
 from seerob.criteria.scoring.rule import PostureRule, bind_posture

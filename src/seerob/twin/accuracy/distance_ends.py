@@ -9,6 +9,8 @@ Only pairs within :math:`\max e - \min e` of the least can make an end, so no ot
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from seerob.core.transforms import Array
@@ -16,6 +18,9 @@ from seerob.distance.least import Per, Query, Survey
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.state import State
+from seerob.twin.states import States
+
+Ends = float | Array
 
 
 class DistanceEnds:
@@ -48,9 +53,12 @@ class DistanceEnds:
         low, high = (found - own[:, None]).min(axis=0), (found + own[:, None]).min(axis=0)
         return low - others, high + others
 
-    def of_sets(self, state: State, distance: float) -> tuple[float, float]:
-        """Least and largest distance between ``gap.a`` and ``gap.b`` [m]; the twin's is ``distance``."""
-        if self._off.none(state):
+    def of_sets(self, twin: State | States, distance: Ends) -> tuple[Ends, Ends]:
+        """Least and largest distance between ``gap.a`` and ``gap.b`` [m]; the twin's is ``distance``.
+
+        Of many instants they are the same: whom a device sees is asked of instant by instant.
+        """
+        if twin.many or self._off.none(state := cast("State", twin)):
             return distance, distance
         own, others = self._errors(state)
         off = own[:, None] + others

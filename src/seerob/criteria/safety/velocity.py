@@ -134,8 +134,8 @@ class Velocity(Criterion, frozen=True, kw_only=True):
                 if error is None:
                     continue
                 own = tuple(bodies[k] for k in rows)
-                axes = (np.broadcast_to(axis, points[..., rows, :].shape) for axis in np.eye(3))
-                J = np.stack([twin.along(own, mechanism, points[..., rows, :], u) for u in axes], axis=-2)
+                at = np.ascontiguousarray(points[..., rows, :])
+                J = np.stack([twin.along(own, mechanism, at, axis + 0 * at) for axis in np.eye(3)], axis=-2)
                 found[..., rows] = speed_noise(J, error[..., None, :])
             return found
 

@@ -9,13 +9,14 @@ URI = "urn:another:maker"
 
 
 @contextmanager
-def foreign_opcua(values, writable=(), more=lambda server: None):
+def foreign_opcua(values, writable=(), more=lambda server: None, port=0):
     """A PLC of another maker.
 
     Args:
         values: First value of each node, by name.
         writable: Those that clients may write.
         more: Adds what else there is to the server (`asyncua.sync.Server`).
+        port: Where it listens; any that is free when 0.
 
     Yields:
         Address, and nodes by name: ``nodes["lamp"].write_value(True)``.
@@ -24,7 +25,7 @@ def foreign_opcua(values, writable=(), more=lambda server: None):
 
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+        port = port or free.getsockname()[1]
     server = Server()
     try:
         server.set_endpoint(f"opc.tcp://127.0.0.1:{port}/")

@@ -11,7 +11,7 @@ from msgspec import structs
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.samples import Quality
 from seerob.core.verdict import Verdict
-from seerob.criteria.as_heard import AsHeard, _no_farther
+from seerob.criteria.as_heard import AGAIN, LASTS, AsHeard, _no_farther
 from seerob.criteria.judging import Judge
 from seerob.devices.sources.csv import Csv
 from seerob.devices.sources.joint_angles import JointAngleFile
@@ -82,6 +82,18 @@ def test_what_is_plausible_once_is_not_held_any_more(tmp_path):
     verdicts = [verdict for verdict, _ in found]
     assert set(verdicts[:120]) == {Verdict.UNDECIDED}
     assert set(verdicts[210:240]) == set(verdicts[330:]) == {Verdict.WITHIN}
+
+
+@pytest.mark.parametrize("away", [0.6, -0.6])
+def test_who_floats_later_is_held_until_there_is_ground_again(tmp_path, away):
+    """A capture that drifts up or down, long after feet were on the floor; what lasts a moment is a step."""
+    found = results(tmp_path, [[0, 0, 0], [0, 0, away], [0, 0, 0], *[[0, 0, away]] * 4, *[[0, 0, 0]] * 2])
+    verdicts = [verdict for verdict, _ in found]
+    assert set(verdicts[30:120] + verdicts[150:240] + verdicts[270:360]) == {Verdict.WITHIN}
+    held = found[360 + round(100 * (LASTS + AGAIN)) + 1 : 840]
+    assert {verdict for verdict, _ in held} == {Verdict.UNDECIDED}
+    assert all("humans[0].feet" in reason for _, reason in held)
+    assert set(verdicts[-100:]) == {Verdict.WITHIN}
 
 
 @pytest.mark.parametrize(("value", "verdict"), [(20.0, Verdict.WITHIN), (12.0, Verdict.UNDECIDED)])

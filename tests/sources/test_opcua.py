@@ -6,6 +6,7 @@ import asyncio
 import datetime
 import math
 import time
+from contextlib import ExitStack
 from uuid import UUID
 
 import numpy as np
@@ -21,6 +22,7 @@ from relay import Stream
 from seerob.app.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.devices.live.device_clock import RESTART_HOLD
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.opcua_robot import OpcuaRobot, another_robot
@@ -114,6 +116,52 @@ def test_what_arrives_late_is_as_old_as_the_newest_question_that_was_answered(se
                 time.sleep(0.01)
     finally:
         wire.close()
+
+
+def test_values_that_are_played_again_over_a_new_connection_are_not_relied_on(monkeypatch):
+    """By a server of another maker that says in the place of the first one what that one said, and when."""
+    from asyncua import ua
+
+    from foreign_opcua import URI as MAKER
+    from foreign_opcua import foreign_opcua
+
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.05)
+    way = Variable(name="way", source="plc", unit="m", address=f"nsu={MAKER};s=way", timeout=60)
+    began = datetime.datetime.now(datetime.UTC).replace(tzinfo=None)
+    said = [(0.01 * k, began + datetime.timedelta(seconds=0.05 * k)) for k in range(40)]
+
+    def words(k):
+        return ua.DataValue(ua.Variant(said[k][0], ua.VariantType.Double), SourceTimestamp=said[k][1])
+
+    nodes = []
+
+    def made(server):
+        index = server.register_namespace(MAKER)
+        node = server.nodes.objects.add_variable(f"ns={index};s=way", f"{index}:way", 0.0)
+        node.write_value(words(0))
+        nodes.append(node)
+
+    def tells(heard, since):
+        for k in range(since, len(said)):
+            nodes[-1].write_value(words(k))
+            wait_for(lambda k=k: heard and heard[-1].values.get("way") == said[k][0])
+
+    with ExitStack() as stack:
+        with foreign_opcua({}, more=made) as (url, _):
+            heard = stack.enter_context(listening(Opcua(name="plc", url=url), target(way)))
+            wait_for(lambda: good(heard, "way"))
+            tells(heard, 1)
+            assert "way" not in heard[-1].doubts
+        with foreign_opcua({}, more=made, port=int(url.rstrip("/").rpartition(":")[2])):
+            wait_for(lambda: heard[-1].values.get("way") == said[0][0])
+            before = len(heard) - 1
+            # Longer than a device that was started again is waited for.
+            end = time.monotonic() + RESTART_HOLD + 1.0
+            tells(heard, 1)
+            wait_for(lambda: time.monotonic() > end)
+            again = [s for s in list(heard)[before:] if "way" in s.values]
+    assert len(again) > 40
+    assert {s.doubts.get("way", "")[:27] for s in again} == {"way: says again what it sai"}
 
 
 def test_a_server_that_is_killed_is_found_again(monkeypatch):

@@ -2,8 +2,9 @@
 
 Where a file puts somebody is asked before a run (`seerob.model.mounting.in_place`); where a device does is
 known only once it was heard. What is implausible then (nobody within 10 m, feet off the floor, a person
-inside a thing) is held until it is plausible once: a wrong unit or frame stays, a step on a chair does not.
-It is confirmed for all that is no farther beyond than the value in the file: no two sessions tell the same.
+inside a thing) is held until it is plausible once: a wrong unit or frame stays. Feet are looked at for ever:
+a step on a chair, or a jump, does not last, and a capture that drifts up or down does. It is confirmed for
+all that is no farther beyond than the value in the file: no two sessions tell the same.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
-from seerob.model.mounting.in_place import placed
+from seerob.model.mounting.in_place import FEET, placed
 from seerob.twin.state import State
 from seerob.workstation.plausibility.ranges import Quantity, canonical, findings, scaled
 
 AGAIN = 1.0
-"""Period at which what is implausible is asked again [s] of run time."""
+"""Period at which what is implausible, and where feet are, is asked again [s] of run time."""
+LASTS = 3.0
+"""Feet that were on something, and are so long on nothing, are not where they are said to be [s]: nobody
+jumps for longer, and what somebody stands on for longer is part of the workstation."""
 
 
 class AsHeard:
@@ -34,6 +38,7 @@ class AsHeard:
         self._model = model
         people = {human.name for human in model.workstation.humans}
         robots = {robot.name for robot in model.workstation.robots}
+        self._people = people
         self._waiting = {
             source.target()
             for source in model.workstation.sources
@@ -43,6 +48,8 @@ class AsHeard:
         """Whom such a source moves; once they were heard, nobody."""
         self._where: dict[str, Array] = {}
         self._plausible: set[str] = set()
+        self._off: dict[str, float] = {}
+        """Whose feet left what they stood on, and when [s] of run time."""
         self._found: tuple[Finding, ...] = ()
         self._due = 0.0
 
@@ -53,16 +60,17 @@ class AsHeard:
 
     def at(self, state: State) -> tuple[Finding, ...] | None:
         """What is implausible now; None where nothing is new."""
-        if not self._waiting and not self._found:
+        standing = not self._people.isdisjoint(self._where)
+        if not self._waiting and not self._found and not standing:
             return None
         new = [name for name in sorted(self._waiting) if _placed(state, name)]
-        if not new and not (self._found and state.t >= self._due):
+        if not new and not ((self._found or standing) and state.t >= self._due):
             return None
         for name in new:
             self._waiting.discard(name)
             self._where[name] = state.joint_positions(self._model.mechanisms[name])
         before, self._due = self._found, state.t + AGAIN
-        self._found = tuple(self._implausible(self._now(state)))
+        self._found = tuple(self._implausible(self._now(state), state.t, feet=not new and not self._found))
         return None if self._found == before else self._found
 
     def _now(self, state: State) -> Mapping[str, Array]:
@@ -74,16 +82,25 @@ class AsHeard:
                 self._where[name] = here if captured is None else captured
         return self._where
 
-    def _implausible(self, q: Mapping[str, Array]) -> list[Finding]:
+    def _implausible(self, q: Mapping[str, Array], t: float, *, feet: bool) -> list[Finding]:
+        """What is implausible.
+
+        Args:
+            q: Joint positions of everybody who was heard.
+            t: Of the run [s].
+            feet: All else is known to be plausible.
+        """
         found: list[Finding] = []
-        for quantity in placed(self._model, q):
-            if quantity.key in self._plausible:
+        for quantity in placed(self._model, q, feet=feet):
+            key, again = quantity.key, quantity.key in self._plausible
+            if again and quantity.kind != FEET:
                 continue
             told = [f for f in findings([quantity], ()) if f.holds]
             if not told or self._confirmed(quantity):
-                told = []
-                self._plausible.add(quantity.key)
-            found += told
+                self._plausible.add(key)
+                self._off.pop(key, None)
+            elif not again or t - self._off.setdefault(key, t) >= LASTS:
+                found += told
         return found
 
     def _confirmed(self, quantity: Quantity) -> bool:

@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Mapping
 from contextlib import aclosing
+from contextvars import ContextVar
 from pathlib import Path
 from typing import ClassVar, NamedTuple, Self
 
@@ -33,6 +34,8 @@ LONGEST_PULSE = 0.25
 as the last answer, and a change is a motion since then."""
 BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""
+REMEMBERED = 1 << 16
+"""Stamps of which it is known what was said with them."""
 PULSES = 4
 """A device that says nothing is asked so often within its source's time-out whether it is there."""
 
@@ -176,7 +179,11 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Everything that is known, whenever something changes and at least every `BEAT`."""
         variables = () if target is None else target.variables
-        picture = Picture(variables, by_exception=self.by_exception, bounds=self._bounds(variables))
+        stamps = _STAMPS.get(None)
+        if stamps is None:
+            _STAMPS.set(stamps := Stamps())
+        bounds = self._bounds(variables)
+        picture = Picture(variables, by_exception=self.by_exception, bounds=bounds, stamps=stamps)
         folder = Path("" if target is None else target.folder)
         read = tuple(v for v in variables if not v.write)
         alive = time.monotonic()
@@ -196,6 +203,62 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         return dict.fromkeys(late, self.delay or 0.0)
 
 
+class Stamps:
+    """When variables were what they were said to be, by the device: whether that can be so now."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, float] = {}
+        self._newest: dict[str, float] = {}
+        self._said: dict[tuple[str, float], int] = {}
+        """What was said of a variable with a stamp."""
+        self._back: dict[str, tuple[float, str]] = {}
+        """Variables whose time went back: until when nothing rests on them [s], and why."""
+        self._restarted: dict[str, float] = {}
+
+    def is_old(self, change: Change, stamp: float, now: float) -> bool:
+        """Whether a value was overtaken on the way; time that goes back by more is a restart, then a loop.
+
+        What is said again with the stamp that it had is a recording, also over a new connection. As
+        `seerob.devices.live.device_clock.DeviceClock` has it of samples.
+
+        Args:
+            change: What is said.
+            stamp: When it was so, by the device's clock [s].
+            now: Host's monotonic time [s].
+        """
+        name, said = change.name, hash(repr(change.raw))
+        back = self._last.get(name, -math.inf) - stamp
+        if 0 < back <= REORDERED:
+            return True
+        ago = self._newest.get(name, -math.inf) - stamp
+        self._last[name] = stamp
+        self._newest[name] = max(stamp, self._newest.get(name, -math.inf))
+        if ago > REORDERED and self._said.get((name, stamp)) == said:
+            why = f"says again what it said {ago:.3g} s before: is a recording played to it?"
+            self._back[name] = now + AGAIN, why
+        elif back > 0:
+            what = f"its time went back by {back:.3g} s"
+            if now - self._restarted.get(name, -math.inf) < AGAIN:
+                hold, why = AGAIN, f"{what}, not for the first time within {AGAIN:g} s: a loop?"
+            else:
+                hold, why = RESTART_HOLD, f"{what}: it seems to have started again"
+            until, before = self._back.get(name, (now, ""))
+            self._back[name] = (until, before) if until > now + hold else (now + hold, why)
+            self._restarted[name] = now
+        if len(self._said) >= REMEMBERED:
+            del self._said[next(iter(self._said))]
+        self._said[name, stamp] = said
+        return False
+
+    def doubts(self, now: float) -> list[tuple[str, str]]:
+        """Variables on which nothing rests at ``now`` [s], each with the reason."""
+        return [(name, why) for name, (until, why) in self._back.items() if now <= until]
+
+
+_STAMPS: ContextVar[Stamps] = ContextVar("stamps")
+"""Of whoever listens, over all its connections."""
+
+
 class Picture:
     """What is known of a device's variables.
 
@@ -203,6 +266,7 @@ class Picture:
         variables: Of the dictionary.
         by_exception: Whether a value stands until the device says another.
         bounds: How much older than it seems a variable may be [s], by name.
+        stamps: What was said when, over connections before this one too.
     """
 
     def __init__(
@@ -211,6 +275,7 @@ class Picture:
         *,
         by_exception: bool,
         bounds: Mapping[str, float] | None = None,
+        stamps: Stamps | None = None,
     ) -> None:
         self._variables = {v.name: v for v in variables}
         self._bounds = bounds or {}
@@ -220,10 +285,7 @@ class Picture:
         self._said: dict[str, float] = {}
         self._values: dict[str, Value] = {}
         self._bad: dict[str, str] = {}
-        self._stamps: dict[str, float] = {}
-        self._back: dict[str, tuple[float, str]] = {}
-        """Variables whose time went back: until when nothing rests on them [s], and why."""
-        self._restarted: dict[str, float] = {}
+        self._stamps = Stamps() if stamps is None else stamps
         self.begun = False
         """Whether the device has said anything yet."""
 
@@ -243,7 +305,7 @@ class Picture:
                 continue
             self.begun = True
             stamp = None if change.invalid_reason else change.stamp
-            if stamp is not None and self._is_old(change.name, stamp, now):
+            if stamp is not None and self._stamps.is_old(change, stamp, now):
                 continue
             self._said[change.name] = now - change.age
             self._bad.pop(change.name, None)
@@ -264,9 +326,8 @@ class Picture:
         """
         t = now if heard is None else heard
         doubts = dict(self._bad)
-        for name, (until, why) in self._back.items():
-            if now <= until:
-                doubts.setdefault(name, f"{name}: {why}")
+        for name, why in self._stamps.doubts(now):
+            doubts.setdefault(name, f"{name}: {why}")
         for name, variable in self._variables.items():
             if variable.write or name in doubts:
                 continue
@@ -277,24 +338,6 @@ class Picture:
                 doubts[name] = f"{name}: not heard for {now - said:.2f} s (time-out {variable.timeout:g} s)"
         ages = {name: age for name in self._values if (age := self._age(name, t)) > 0}
         return SignalSample(source="", seq=0, t=t, values=dict(self._values), doubts=doubts, ages=ages)
-
-    def _is_old(self, name: str, stamp: float, now: float) -> bool:
-        """Whether a value was overtaken on the way; time that goes back by more is a restart, then a loop.
-
-        As `seerob.devices.live.device_clock.DeviceClock` has it of samples.
-        """
-        back = self._stamps.get(name, -math.inf) - stamp
-        if 0 < back <= REORDERED:
-            return True
-        self._stamps[name] = stamp
-        if back > 0:
-            what = f"its time went back by {back:.3g} s"
-            if now - self._restarted.get(name, -math.inf) < AGAIN:
-                hold, why = AGAIN, f"{what}, not for the first time within {AGAIN:g} s: a loop?"
-            else:
-                hold, why = RESTART_HOLD, f"{what}: it seems to have started again"
-            self._back[name], self._restarted[name] = (now + hold, why), now
-        return False
 
     def _age(self, name: str, t: float) -> float:
         """How much older than ``t`` what is known of a variable may be [s]."""

@@ -27,6 +27,8 @@ from seerob.workstation.workstation import Thing as GivenThing
 
 SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
 """Bones that a person stands, sits or kneels with."""
+FEET = "humans.feet"
+"""Kind of the quantity that says how far somebody is from what they stand or sit on."""
 LEVEL = 0.05
 """What is not farther from z = 0 stands there [m]."""
 TOUCHES = 0.01
@@ -85,18 +87,20 @@ def implausible_motion(model: Model, q: Mapping[str, Sequence[Array]]) -> tuple[
     return tuple(findings(every, model.workstation.confirmed))
 
 
-def placed(model: Model, q: Mapping[str, Array]) -> Iterator[Quantity]:
+def placed(model: Model, q: Mapping[str, Array], *, feet: bool = False) -> Iterator[Quantity]:
     """What can be implausible of where robots and people are, of whom that was heard.
 
     Args:
         model: The compiled workstation.
         q: Joint positions by robot or human, shape (n,).
+        feet: Only of what people stand on.
     """
     place = _Home(model, q)
     people = q.keys() & {human.name for human in model.workstation.humans}
     yield from _feet(model, place, people)
-    yield from _overlaps(model, place, people)
-    yield from _nobody(model, [place], "where they are heard to be")
+    if not feet:
+        yield from _overlaps(model, place, people)
+        yield from _nobody(model, [place], "where they are heard to be")
 
 
 def _most(q: Mapping[str, Sequence[Array]]) -> int:
@@ -350,7 +354,7 @@ def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity
             on = place.distance(feet, under, gap)
             if on < gap:
                 gap, said = max(on, 0.0), f"from what {human.name} stands or sits on"
-        yield Quantity(f"humans[{i}].feet", "humans.feet", "m", (gap,), (human.name,), said, human.name)
+        yield Quantity(f"humans[{i}].feet", FEET, "m", (gap,), (human.name,), said, human.name)
 
 
 def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:

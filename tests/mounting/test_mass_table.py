@@ -11,7 +11,12 @@ import trimesh
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import Undecided
+from seerob.core.snapshot import Origin
 from seerob.criteria.contact.impact_mass import moving_masses
+from seerob.description.description import Description, Joint, JointKind, Mimic, Quantity
+from seerob.model.mounting.chains import couple
+from seerob.model.mounting.mechanisms import MechanismDraft, Riders
+from seerob.model.mounting.specification import Entry
 from seerob.outputs.report.evidence import masses
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
@@ -185,6 +190,7 @@ def test_the_table_has_every_link_and_everything_on_it(tmp_path):
         table = rows(cell)
         assert [table[f"arm/{name}"].mass for name in ("base", "l1", "l2", "tip")] == [0, 1, 1, 0]
         assert table["grip"].mass == (mass and pytest.approx(mass))
+        assert (table["grip"].note != "") is (table["grip"].origin == "missing") is (mass is None)
         (info,) = (m for m in cell.scene().mechanisms if m.name == "arm")
         assert info.masses == cell.model.robot("arm").masses
 
@@ -345,3 +351,44 @@ def test_the_links_are_compared_with_what_the_maker_weighed(tmp_path, published,
         assert "2 kg of" in found[0].text
         assert "data sheet of 2024" in found[0].text
         assert found[0].holds == ("arm",)
+
+
+def test_joints_that_follow_one_that_follows_another():
+    """b = 2 a + 0.5 and c = 0.25 − 3 b = −1.25 − 6 a, in whichever order they stand."""
+    follows = {"a": None, "b": Mimic("a", 2.0, 0.5), "c": Mimic("b", -3.0, 0.25)}
+    exact = {"a": (1.0, 0.0), "b": (2.0, 0.5), "c": (-6.0, -1.25)}
+    for order in ("abc", "cba", "bca"):
+        every = [
+            Joint(name, JointKind.REVOLUTE, np.array([0.0, 0, 1]), mimic=follows[name]) for name in order
+        ]
+        coupling, offset = couple(every, [joint for joint in every if joint.mimic is None])
+        np.testing.assert_array_equal(np.column_stack([coupling, offset]), [exact[name] for name in order])
+
+
+def test_a_machine_weighs_what_all_its_links_do_or_nobody_knows():
+    """Beside a tool on it, and another machine beside the robot."""
+
+    def entry(owner, mass, carrier="arm", role="machine"):
+        given = None if mass is None else Quantity(mass, Origin.GIVEN, "label")
+        return Entry(owner, role, owner, carrier, (), given, None, 0)
+
+    bare = Description(name="x", links=(), tip="", source="")
+    chains = {name: MechanismDraft(bare, role, np.zeros(0), True, on=on) for name, role, on in (
+        ("arm", "robot", ""), ("hand", "machine", "arm/tip"), ("cart", "machine", ""))}  # fmt: skip
+    carriers = {"arm/tip": "arm", "hand/left": "hand"}
+    for left, right, both in ((0.5, 0.25, 0.75), (None, 0.25, None), (0.5, None, None)):
+        entries = [entry("hand", left, "hand"), entry("pen", 2.0, "hand", "tool"), entry("cart", 9.0, "cart")]
+        entries += [
+            entry("hand", right, "hand"),
+            entry("post", 9.0, "arm", "part"),
+            entry("gun", None, role="tool"),
+        ]
+        riders = Riders(chains, carriers, entries)
+        assert riders.things("arm") == {"hand": both, "pen": 2.0, "gun": None}
+        said = {row.name: (row.mass, row.origin, row.source, bool(row.note)) for row in riders.weighed("arm")}
+        nobody = (None, Origin.MISSING, "", True)
+        assert said == {
+            "hand": nobody if both is None else (both, Origin.GIVEN, "label", False),
+            "pen": (2.0, Origin.GIVEN, "label", False),
+            "gun": nobody,
+        }

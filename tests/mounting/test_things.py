@@ -119,6 +119,7 @@ def test_a_mass_from_density_is_said_with_method_and_error(tmp_path, shape, mass
     ("mass", "level", "words"),
     [
         ("mass = 2\n", "note", "carries 2.5 kg: grip 2 kg, part 0.5 kg"),
+        ("mass = 499.5\n", "note", "carries 500 kg"),
         ("mass = 600\n", "warning", "carries 600.5 kg"),
         ("", "note", "carries at least 0.5 kg: grip unknown, part 0.5 kg"),
     ],

@@ -135,8 +135,6 @@ def _heaviest(link: Link) -> float:
     """What a link of its shape weighs at most [kg]: the box around it in the heaviest metal."""
     solids = (*link.solids, *(Solid(mesh=mesh) for mesh in link.visual))
     points, radius = extreme_points(solids)
-    if not len(points):
-        return 0.0
     stands_out = max(solid.deviation for solid in solids)
     return float(DENSITIES[1] * (np.ptp(points, axis=0) + 2 * (radius + stands_out)).prod())
 

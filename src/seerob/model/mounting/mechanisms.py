@@ -75,16 +75,10 @@ class Riders:
         riders = self.of(name)
         things: dict[str, float | None] = {}
         for entry in self._entries:
-            rides = entry.owner in riders
-            if rides or (entry.carrier in (name, *riders) and entry.role in THINGS):
+            if entry.owner in riders or (entry.carrier in (name, *riders) and entry.role in THINGS):
                 mass = None if entry.mass is None else entry.mass.value
-                known = things.get(entry.owner)
-                if entry.owner not in things:
-                    things[entry.owner] = mass
-                elif rides:
-                    things[entry.owner] = None if known is None or mass is None else known + mass
-                elif mass is not None:
-                    things[entry.owner] = mass
+                known = things.setdefault(entry.owner, 0.0)
+                things[entry.owner] = None if known is None or mass is None else known + mass
         return things
 
     def weighed(self, name: str) -> tuple[LinkMass, ...]:
@@ -93,11 +87,11 @@ class Riders:
         rows = [*weighed(chain.description, carried=bool(chain.on))]
         given = {e.owner: e.mass for e in self._entries if e.mass is not None}
         for thing, mass in self.things(name).items():
-            stated = given.get(thing)
-            note = "" if mass is not None else NOT_WEIGHED
-            known = Origin.MISSING if stated is None or mass is None else stated.origin
-            source = "" if stated is None else stated.source
-            rows.append(LinkMass(name=thing, mass=mass, origin=known, source=source, note=note))
+            stated = None if mass is None else given[thing]
+            if stated is None:
+                rows.append(LinkMass(name=thing, origin=Origin.MISSING, note=NOT_WEIGHED))
+            else:
+                rows.append(LinkMass(name=thing, mass=mass, origin=stated.origin, source=stated.source))
         return tuple(rows)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import traceback
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -21,10 +21,12 @@ from seerob.core.verdict import ROUNDING, admitted, keeps
 from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
+from seerob.criteria.figure import Twin
 from seerob.criteria.noisy_speeds import shaken
 from seerob.model.model import Model
 from seerob.recording.series import INFORMS
 from seerob.twin.state import VARIABLE, State
+from seerob.twin.states import Reasons
 from seerob.twin.validity.hearing import SLACK
 
 _log = logging.getLogger(__name__)
@@ -352,8 +354,8 @@ class _Kept(NamedTuple):
 
 
 @dataclass(slots=True, eq=False)
-class _Question:
-    """A criterion of a run, and what the judge knows of it."""
+class Question:
+    """A criterion, and what is known of it before it is asked, of one instant or of many."""
 
     bound: Bound
     criterion: Criterion
@@ -376,6 +378,37 @@ class _Question:
     """Another one of it, for what errors of speeds would change; none of one that remembers."""
     why: str = ""
     """Why nothing that it said last is within."""
+    held_names: Mapping[str, str] = field(default_factory=dict)
+    """By name that findings hold, why nothing that depends on it is within."""
+
+    def hold(self, model: Model, findings: Iterable[Finding], names: Mapping[str, str]) -> bool:
+        """Take note of what is held by findings, and by shapes that are missing; whether anything is.
+
+        Args:
+            model: The compiled workstation.
+            findings: See `held`.
+            names: What they hold, by name (`held_names`).
+        """
+        self.held, self.held_names = held(self.criterion, model, findings), names
+        return bool(self.held or self.unmentioned or names)
+
+    def held_for(self, asked: Collection[str]) -> str:
+        """Why nothing is within that it said when it asked for these; empty for nothing."""
+        if not self.held_names and not self.unmentioned:
+            return self.held
+        every = (*self.held_names.items(), *self.unmentioned.items())
+        texts = (text for name, text in every if name in asked)
+        return "; ".join(dict.fromkeys(filter(None, (self.held, *(t for t in texts if t not in self.held)))))
+
+    def doubts(self, twin: Twin) -> Iterator[str | Reasons]:
+        """Why what it has just said of the twin is not within, by what it asked for: empty where it is.
+
+        The rules of a run and of arrays; of N instants each is a text, of all of them, or has the shape (N,).
+        """
+        if twin.speeds_asked and (still := [name for name in twin.speeds_asked if not twin.moved(name)]):
+            yield unmoved(still)
+        for name in self.relied_on:
+            yield twin.heard_doubt(name)
 
 
 def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
@@ -384,11 +417,12 @@ def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
         return evaluate(own)
 
 
-def _question(bound: Bound, model: Model) -> _Question:
+def question_of(bound: Bound, model: Model) -> Question:
+    """What is known of a criterion before it is asked."""
     names, bodies = needed(bound.criterion, model)
     declared = _all_declared(bound.criterion, model)
     shapeless, rests = unmentioned(bound.criterion, model), relied_on(bound.criterion, model)
-    return _Question(bound, bound.criterion, names, bodies, declared, shapeless, rests)
+    return Question(bound, bound.criterion, names, bodies, declared, shapeless, rests)
 
 
 class Judge:
@@ -401,10 +435,9 @@ class Judge:
 
     def __init__(self, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> None:
         self._bound = bound
-        self._questions: list[_Question] = []
+        self._questions: list[Question] = []
         """Of every criterion, once the model is known."""
         self._findings = tuple(findings)
-        self._held_names: dict[str, str] = {}
         self._holds = False
         """Whether anything is held."""
         self._as_heard: AsHeard | None = None
@@ -419,7 +452,7 @@ class Judge:
         """Results at this state, in the order of the file."""
         if self._as_heard is None:
             model = state.model
-            self._questions = [_question(one, model) for one in self._bound]
+            self._questions = [question_of(one, model) for one in self._bound]
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
             self._hold(model, findings)
             self._as_heard = AsHeard(model)
@@ -459,28 +492,27 @@ class Judge:
 
     def _hold(self, model: Model, findings: Sequence[Finding]) -> None:
         """Resolve what is held by findings, and by shapes that are missing."""
-        self._held_names = held_names(findings, model)
-        self._holds = self._holds or bool(self._held_names)  # and stays so for what was said meanwhile
+        names = held_names(findings, model)
         for question in self._questions:
-            question.held = held(question.criterion, model, findings)
-            self._holds = self._holds or bool(question.held or question.unmentioned)
+            holds = question.hold(model, findings, names)
+            self._holds = self._holds or holds  # and stays so for what was said meanwhile
 
-    def _one(self, question: _Question, state: State) -> Result:
+    def _one(self, question: Question, state: State) -> Result:
         kept = question.kept
         if kept is not None and self._lasts(kept, question.criterion, state):
             if self._holds:  # also what was found out since it was asked
-                question.why = self._reason(question, kept.asked)
+                question.why = question.held_for(kept.asked)
             return kept.result
         result = self._now(question, question.bound.evaluate, state)
         if self._holds:
-            question.why = self._reason(question, state.asked)
+            question.why = question.held_for(state.asked)
         if (every := question.criterion.every) is not None:
             result = replace(result, t=state.t)
             asked = tuple(sorted(state.asked))
             question.kept = _Kept(result, state.t, state.t + every, result.muted, asked)
         return result
 
-    def _at_least(self, question: _Question, evaluate: Evaluate, state: State, reason: str) -> Result:
+    def _at_least(self, question: Question, evaluate: Evaluate, state: State, reason: str) -> Result:
         """What the known masses of a robot exceed, when others are not known; else undecided."""
         criterion = question.criterion
         if criterion.heavier_is_worse:
@@ -493,7 +525,7 @@ class Judge:
                 _log.debug("%s: %s", criterion.name, error)
         return _unknown(criterion, reason)
 
-    def _now(self, question: _Question, evaluate: Evaluate, state: State, *, applies: bool = False) -> Result:
+    def _now(self, question: Question, evaluate: Evaluate, state: State, *, applies: bool = False) -> Result:
         """What a criterion says of a state, muted where it does not apply there; as if it ``applies``."""
         criterion = question.criterion
         try:
@@ -511,7 +543,7 @@ class Judge:
             # One's own criterion that fails must not end a run that others are judged in.
             return _unknown(criterion, self._failed(question.bound, error))
 
-    def _asked(self, question: _Question, evaluate: Evaluate, state: State) -> Result:
+    def _asked(self, question: Question, evaluate: Evaluate, state: State) -> Result:
         """What a criterion says, as far as it may be green.
 
         Raises:
@@ -545,19 +577,15 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if value is not None and not math.isfinite(value):
             raise Undecided(f"the value is {value}, not a finite number")
-        if result.verdict is _WITHIN and state.speeds_asked:
-            still = unmoved([name for name in state.speeds_asked if not state.moved(name)])
-            if still:
-                return undecided(result, still)
-        if question.relied_on and (
-            doubt := next(filter(None, map(state.heard_doubt, question.relied_on)), "")
-        ):
-            return undecided(result, doubt)
+        if result.verdict is _WITHIN or question.relied_on:
+            for doubt in question.doubts(state):
+                if doubt:
+                    return undecided(result, str(doubt))
         if not criterion.by_speed and state.speed_errors:
             return self._shaken(question, result, state)
         return result
 
-    def _rely_on_undeclared(self, question: _Question, state: State) -> None:
+    def _rely_on_undeclared(self, question: Question, state: State) -> None:
         """Require whom a criterion asked for without having said so, at this instant or before.
 
         Raises:
@@ -571,7 +599,7 @@ class Judge:
             if reason := doubt(name):
                 raise Undecided(f"{reason}; it depends on that and does not declare it (depends, variables)")
 
-    def _shaken(self, question: _Question, result: Result, state: State) -> Result:
+    def _shaken(self, question: Question, result: Result, state: State) -> Result:
         """A result with the noise of speeds that it asked for in its interval; undecided across a limit."""
         criterion = question.criterion
         if question.again is None:
@@ -594,15 +622,6 @@ class Judge:
         if bound.criterion.name not in self._warned:
             self._warned.add(bound.criterion.name)
             _log.warning("%s: %s", bound.criterion.name, what)
-
-    def _reason(self, question: _Question, asked: Collection[str]) -> str:
-        """Why nothing is within that a criterion said when it asked for these; empty for nothing."""
-        reason = question.held
-        if not self._held_names and not question.unmentioned:
-            return reason
-        every = (*self._held_names.items(), *question.unmentioned.items())
-        texts = (text for name, text in every if name in asked)
-        return "; ".join(dict.fromkeys(filter(None, (reason, *(t for t in texts if t not in reason)))))
 
     @staticmethod
     def _lasts(kept: _Kept, criterion: Criterion, state: State) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 
 import mujoco
@@ -24,7 +24,7 @@ from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.criterion import Criterion, EvaluateMany
-from seerob.criteria.judging import Judge, held, held_names, needed, relied_on, unmentioned, unmoved, worded
+from seerob.criteria.judging import Judge, Question, held_names, question_of, worded
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
@@ -256,7 +256,7 @@ def judged(
     walked |= {name: _joined(answers) for name, answers in found.items()}
     for one in bound:
         name = one.criterion.name
-        if name in asked and asked[name].own and n:
+        if name in asked and one.own and n:
             walked[name] = _confirmed(model, one, motion, findings, walked[name])
     again = {name: np.concatenate([np.zeros(0, bool), *left[name]]) for name in asked}
     if motion.ways and asked:
@@ -384,20 +384,22 @@ def _able(
     names = held_names(findings, model)
     notes: dict[str, str] = {}
     for one in bound:
-        criterion = one.criterion
+        criterion, question = one.criterion, question_of(one, model)
         many = criterion.batch(model)
+        question.hold(model, findings, names)
         if many is None:
             notes[criterion.name] = f"asked instant by instant: {criterion.one_by_one(model)}"
-        elif held(criterion, model, findings) or unmentioned(criterion, model):
+        elif question.held or question.unmentioned:
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
             notes[criterion.name] = "asked instant by instant: masses are not known"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
-            needs, rests = _movers(criterion, model), relied_on(criterion, model)
+            movers = filter(None, (model.bodies[i].mover for i in question.bodies))
+            needs = tuple(dict.fromkeys((*question.names, *movers)))
             widens = criterion.by_speed and not criterion.one_by_one(model)
-            able[criterion.name] = _Able(criterion, many, names, needs, rests, widens)
+            able[criterion.name] = _Able(question, many, needs, widens)
     return able, notes
 
 
@@ -405,29 +407,17 @@ def _able(
 class _Able:
     """A criterion that judges many instants at once."""
 
-    criterion: Criterion
+    question: Question
     many: EvaluateMany
-    held: Mapping[str, str]
-    """By name that findings hold, why nothing that depends on it is within."""
     needs: tuple[str, ...]
-    """Who must be where the motion says, whatever it asks (`seerob.criteria.judging.needed`)."""
-
-    relied_on: tuple[str, ...]
-    """Of whom something must be heard where it is within."""
+    """Who must be where the motion says, whatever it asks."""
     widens: bool
     """Whether its intervals hold what noise makes of speeds, of many instants as of one."""
 
-    @cached_property
-    def own(self) -> bool:
-        """Whether its function is one of the user's, which does not ship."""
-        return not type(self.criterion).__module__.startswith("seerob.")
-
-
-def _movers(criterion: Criterion, model: Model) -> tuple[str, ...]:
-    """Robots, people and machines that a criterion needs, and whoever moves the bodies that it needs."""
-    names, bodies = needed(criterion, model)
-    movers = (model.bodies[i].mover for i in bodies if model.bodies[i].mover)
-    return tuple(dict.fromkeys((*names, *movers)))
+    @property
+    def criterion(self) -> Criterion:
+        """What is asked."""
+        return self.question.criterion
 
 
 Stretch = dict[str, tuple[Answers, Reasons]]
@@ -472,15 +462,11 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
             if motion.doubts[who].any():
                 reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
         answers = _doubted(answers, one.criterion, reasons)
-        for who in one.relied_on:
-            reasons = np.where(answers.verdict == WITHIN, motion.doubts[who], reasons)
-            answers = answers.open(motion.doubts[who] != "")
-        if still := motion.still & states.speeds_asked:
-            reasons = np.where(answers.verdict == WITHIN, unmoved(still), reasons)
-            answers = answers.open()
-        if texts := [text for held_name, text in one.held.items() if held_name in states.asked]:
-            reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
-            answers = answers.open()
+        for doubt in (*one.question.doubts(states), one.question.held_for(states.asked)):
+            there = np.asarray(doubt, object) != ""
+            if there.any():
+                reasons = np.where((answers.verdict == WITHIN) & there, doubt, reasons)
+                answers = answers.open(there)
         found[name] = answers, reasons, states.alone
     # Only what is within, and so has a limit, is to stay so on the way.
     kept = any((answers.verdict == WITHIN).any() for answers, _, _ in found.values())
@@ -495,7 +481,7 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
     states.require(*one.needs)
     reasons = np.full(n, "", object)
     try:
-        if one.own:
+        if one.question.bound.own:
             with states.set_apart(criterion.name) as own:
                 answers = one.many(own)
         else:

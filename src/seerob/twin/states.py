@@ -263,6 +263,14 @@ class States:
         """Say that what follows depends on robots or humans."""
         self.asked.update(names)
 
+    def moved(self, name: str) -> bool:
+        """Whether anything tells how fast somebody is (`seerob.twin.validity.validity.Validity.moved`)."""
+        return name not in self._motion.still
+
+    def heard_doubt(self, name: str) -> Reasons:
+        """Why what was heard of somebody may not be relied on, shape (N,); empty where it may."""
+        return self._motion.doubts[name]
+
     def everywhere(self) -> tuple[Array, Array]:
         """Rotations and positions [m] of all bodies, whoever was heard: for bounds, never for a verdict.
 

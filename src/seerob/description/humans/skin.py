@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from seerob.description.humans.body_areas import eyes, in_front, outer_shoulder
 from seerob.description.humans.skeleton import without_side
 
 Vector = Array
+
+NEARLY = 1e-12
+"""Share of a radius, far beyond rounding and far below what matters, within which halving begins to ask."""
 
 BODY_REGION: dict[str, tuple[str | None, str | None]] = {
     "pelvis": ("Pelvis", "Pelvis"),
@@ -91,25 +95,47 @@ def dilated_volume(a: float, b: float, r: float) -> float:
 
 def skin(body: Body) -> dict[str, tuple[Solid, ...]]:
     """Solids of every bone, in the bone's frame; left is the mirror image of right."""
-    return {bone: (_solid(body, bone),) for bone in body.share}
+    radii: dict[tuple[str, float], float] = {}
+    solids: dict[str, tuple[Solid, ...]] = {}
+    for bone in body.share:
+        target = body.bone_mass(bone) / density(bone)
+        key = without_side(bone), target
+        if key not in radii:
+            radii[key] = _matched(partial(_excess, body, bone, target), limit=0.5)
+        solids[bone] = (_shape(body, bone, radii[key]),)
+    return solids
 
 
-def _solid(body: Body, bone: str) -> Solid:
-    target = body.bone_mass(bone) / density(bone)
-    return _matched(target, lambda r: _shape(body, bone, r), limit=0.5)
+def _excess(body: Body, bone: str, target: float, r: float) -> float:
+    """By how much a bone of a radius [m] is larger than a volume [m³]."""
+    return volume(_shape(body, bone, r)) - target
 
 
-def _matched(target: float, shape: Callable[[float], Solid], *, limit: float) -> Solid:
-    """The shape whose volume is the target [m³]; its volume must grow with the radius."""
+def _matched(excess: Callable[[float], float], *, limit: float) -> float:
+    """Where a function that grows gets over zero: an interval from 0 on, halved until no number lies between.
+
+    False position finds the place nearly first, so that few of the halves need the function.
+    """
+    below, above, at, side = 0.0, limit, limit, 0
+    less, more = excess(below), excess(above)
+    for _ in range(20):
+        last, at = at, below - less * (above - below) / (more - less)
+        if abs(at - last) <= NEARLY / 10 * at:
+            break
+        if (found := excess(at)) < 0:
+            below, less, more, side = at, found, more / 2 if side < 0 else more, -1
+        else:
+            above, more, less, side = at, found, less / 2 if side > 0 else less, 1
+    sure = at * (1 - NEARLY), at * (1 + NEARLY)
+    if not (excess(sure[0]) < 0 < excess(sure[1])):
+        sure = 0.0, limit
     low, high = 0.0, limit
-    while True:  # until no number lies between the two
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            return shape(high)
-        if volume(shape(middle)) < target:
+    while low < (middle := (low + high) / 2) < high:
+        if middle <= sure[0] or (middle < sure[1] and excess(middle) < 0):
             low = middle
         else:
             high = middle
+    return high
 
 
 def _shape(body: Body, bone: str, r: float) -> Solid:

@@ -37,7 +37,6 @@ from seerob.app.emulators.rtde import RtdeServer
 from seerob.core.samples import SignalSample, key
 from seerob.devices.live import listening_process, receivers, source_process
 from seerob.devices.live.listening import Listener, LiveSource, name_of
-from seerob.session.opening import source_target
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "plc_cell"
 KUKA = """
@@ -281,6 +280,9 @@ def main() -> None:
         sys.exit(emulate(options.emulate[0], options.emulate[1:], nice=0 if options.smoke else 10))
     if options.listen:
         sys.exit(listen(options.listen))
+    # Emulators and listeners, which are this file too, do without it as those of a run do.
+    from seerob.session.opening import source_target
+
     seconds = 0.5 if options.smoke else options.seconds
     print(f"work that waits on this machine before: {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores")
     fri = free_port()

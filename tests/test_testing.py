@@ -115,6 +115,11 @@ def everything(tmp_path_factory):
             text += f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{rest}'
         for kind, rest in ERGONOMICS.items():
             text += f'[[ergonomics]]\nkind = "{kind}"\nname = "{kind}"\nhuman = "op"\n{rest}'
+        # Whatever somebody scores is admissible: only what is not known keeps these from being within.
+        for i, kind in enumerate(ERGONOMICS):
+            if rest := ERGONOMICS[kind] if "action" in ERGONOMICS[kind] else "":
+                key = f'key = "ergonomics[{i}].{rest.split()[0]}"'
+                text += f'[[confirmed]]\n{key}\nof = "{kind}"\nvalue = 4\nwhy = "anything will do"\n'
         files = {"arm.urdf": two_r(), "v.toml": VARIABLES, "s.csv": "t,x\n0,1\n1,1\n"}
         yield made(tmp_path_factory.mktemp("everything"), text, files)
 

@@ -33,9 +33,11 @@ RULES = {
     "table": 'kind = "posture_table"\ntable = "rules.csv"\ncombine = "sum"\nfrom_rest = true\nlimit = 3',
 }
 TABLE = """angle,from_deg,to_deg,score,either_way,side,per_minute
-shoulder elevation,20,60,1,,,
+shoulder elevation,20,,1,,,
 shoulder elevation,60,,3,,left,
 elbow flexion,30,90,2,,right,2
+elbow flexion,90,,0,,right,
+elbow flexion,,30,0,,right,
 neck twist,10,,1,yes,,
 trunk side bend,5,,2,yes,,
 knee flexion,40,,1.5,,,

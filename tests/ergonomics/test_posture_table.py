@@ -104,10 +104,54 @@ def test_a_table_as_people_write_it(tmp_path, name):
     rows = [
         ["Angle", "From [°]", "To [°]", "Points", "Hold [s]", "Color", "Remark"],
         ["Trunk flexion", "20", "45°", 1, "4 s", "yellow", "ask the works council"],
+        ["Trunk flexion", "45", None, 2, None, "red", None],
     ]
-    (row,) = read_zones(written(tmp_path, name, rows, above=(["Our rules, 2026"], [])), name).rows
+    row, _ = read_zones(written(tmp_path, name, rows, above=(["Our rules, 2026"], [])), name).rows
     assert (row.angle, row.score, row.hold, row.colour) == ("trunk_flexion", 1, 4, "yellow")
     assert np.degrees([row.low, row.high]) == pytest.approx([20, 45])
+
+
+WELL = "trunk flexion,20,60,1,\ntrunk flexion,60,,2,\n"
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (WELL, None),
+        (WELL.replace("60,,2", "60,90,2"), "points from 60° to 90°, and no row from 90° to 180°"),
+        (WELL.replace("60,,2", "80,,2"), "points from 20° to 60°, and no row from 60° to 80°"),
+        (WELL + "trunk flexion,-20,-5,1,\n", "points from -20° to -5°, and no row from -180° to -20°"),
+        ("elbow flexion,,60,1,\nelbow flexion,100,,1,\n", None),
+        ("elbow flexion,20,60,1,\nelbow flexion,100,,1,\n", "no row from -180° to 20°"),
+        ("neck twist,10,30,1,yes\n", "no row from 30° to 180°"),
+        ("neck twist,10,30,1,yes\nneck twist,30,,0,yes\n", None),
+        ("trunk flexion,,20,0,\ntrunk flexion,200,,1,\n", "trunk_flexion never is 200°"),
+    ],
+)
+def test_beyond_a_row_with_points_no_angle_scores_nothing_because_nobody_wrote_a_row(tmp_path, rows, words):
+    (tmp_path / "t.csv").write_text("angle,from_deg,to_deg,score,either_way\n" + rows)
+    if words is None:
+        assert read_zones(tmp_path / "t.csv", "t.csv").rows
+        return
+    with pytest.raises(InputError, match=words):
+        read_zones(tmp_path / "t.csv", "t.csv")
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "most"),
+    [
+        ("posture_table", 'table = "t.csv"\n', 2),
+        ("posture_table", 'table = "t.csv"\ncombine = "sum"\n', 5),
+        ("iso_11226", "", 2),
+        ("en_1005_4", "", 2),
+    ],
+)
+def test_a_limit_that_no_posture_exceeds_is_refused(tmp_path, kind, more, most):
+    twist = "neck twist,10,,3,yes\n" if "sum" in more else ""
+    (tmp_path / "t.csv").write_text("angle,from_deg,to_deg,score,either_way\n" + WELL + twist)
+    assert bind(station(tmp_path, f"{more}limit = {most - 1}", kind).model)
+    with pytest.raises(InputError, match=f"no posture scores more than {most} by this table"):
+        bind(station(tmp_path, f"{more}limit = {most}", kind).model)
 
 
 @pytest.mark.parametrize("name", ["t.csv", "t.xlsx"])

@@ -207,6 +207,11 @@ name = "owas"
 human = "op"
 action_category = 4
 phases = [{{ load = 0, legs = "standing" }}]
+[[confirmed]]
+key = "ergonomics[0].action_category"
+of = "owas"
+value = 4
+why = "only what is not known keeps it from being within"
 """
     )
     stage = Station(read(folder / "cell.toml"))

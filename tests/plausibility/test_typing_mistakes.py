@@ -315,6 +315,59 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "ergonomics[0].thresholds.trunk_twist",
         {"speed", "distance", "separation"},
     ),
+    "degrees in a threshold in radians": (
+        {
+            "more": '[[ergonomics]]\nkind = "rula"\nname = "posture"\nhuman = "operator"\n'
+            "thresholds = { trunk_twist = 3 }\n"
+        },
+        "ergonomics[0].thresholds.trunk_twist",
+        {"speed", "distance", "separation"},
+    ),
+    "degrees in a threshold of OWAS": (
+        {
+            "more": '[[ergonomics]]\nkind = "owas"\nname = "posture"\nhuman = "operator"\n'
+            "thresholds = { bent = 2 }\n"
+        },
+        "ergonomics[0].thresholds.bent",
+        {"speed", "distance", "separation"},
+    ),
+    "degrees in a movement": (
+        {
+            "more": '[[ergonomics]]\nkind = "reba"\nname = "posture"\nhuman = "operator"\n'
+            "detect = { movement = 3 }\n"
+        },
+        "ergonomics[0].detect.movement",
+        {"speed", "distance", "separation"},
+    ),
+    "radians in a tolerance in degrees": (
+        {
+            "more": '[[ergonomics]]\nkind = "rula"\nname = "posture"\nhuman = "operator"\n'
+            "detect = { tolerance_deg = 0.0873 }\n"
+        },
+        "ergonomics[0].detect.tolerance",
+        {"speed", "distance", "separation"},
+    ),
+    "an action level that nothing exceeds": (
+        {"more": '[[ergonomics]]\nkind = "rula"\nname = "posture"\nhuman = "operator"\naction_level = 4\n'},
+        "ergonomics[0].action_level",
+        {"speed", "distance", "separation"},
+    ),
+    "a category that nothing exceeds": (
+        {
+            "more": '[[ergonomics]]\nkind = "owas"\nname = "posture"\nhuman = "operator"\n'
+            "action_category = 4\n"
+        },
+        "ergonomics[0].action_category",
+        {"speed", "distance", "separation"},
+    ),
+    "points in another scale": (
+        {
+            "more": '[[ergonomics]]\nkind = "eaws_posture"\nname = "posture"\nhuman = "operator"\n'
+            "cycle = 60\nlimit = 100\n"
+        },
+        "ergonomics[0].limit",
+        {"speed", "distance", "separation"},
+    ),
     "a radius of a body's size": (
         {
             "more": '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "ur5"\n'

@@ -82,6 +82,34 @@ def test_a_run_is_as_good_as_its_worst_tick(rows, expected):
     assert log["speed"].verdict == log.verdict == expected
 
 
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_part_is_not_within_where_the_whole_was_undecided_and_did_not_speak_of_it(order):
+    """Of a hand nobody heard anything in half of the run: its row was WITHIN, undecided in 0 %."""
+    said = (
+        result(parts=(result(name="hand"), result(name="head", parts=(result(name="left"),)))),
+        result(None, U, parts=(result(name="head"),)),
+    )
+    series = log_of(tick(k, said[i]) for k, i in enumerate(order))["speed"]
+    assert series.verdict is U
+    assert (series.parts["hand"].verdict, series.parts["head"].verdict) == (U, W)
+    assert series.parts["hand"].worst().verdict is U
+    series = log_of(tick(k, (said[0], result(None, U))[i]) for k, i in enumerate(order))["speed"]
+    assert [series.parts["head"].verdict, series.parts["head"].parts["left"].verdict] == [U, U]
+    # Muted, or with nothing to judge, it had nothing to say of it; and what is exceeded stays so.
+    other = (result(parts=(result(name="hand"),)), result(None, None, limit=None, muted=True))
+    assert log_of(tick(k, other[i]) for k, i in enumerate(order))["speed"].parts["hand"].verdict is W
+    beyond = (result(3.0, E, parts=(result(3.0, E, name="hand"),)), said[1])
+    assert log_of(tick(k, beyond[i]) for k, i in enumerate(order))["speed"].parts["hand"].verdict is E
+
+
+def test_a_part_is_not_within_where_nothing_bounds_the_whole_between_its_instants():
+    said = result(parts=(result(name="hand"),))
+    for between, verdict in (("", W), ("nothing bounds it", U), ("accepted: it stands", W)):
+        info = CriterionInfo(name="speed", kind="velocity", group="safety", title="", between=between)
+        log = log_of([tick(k, said) for k in range(3)], [info])
+        assert log["speed"].verdict is log["speed"].parts["hand"].verdict is verdict
+
+
 def test_without_a_limit_there_is_no_verdict():
     log = log_of([tick(0, result(1.0, None, limit=None))])
     assert (log.verdict, log["speed"].worst().verdict) == (None, None)

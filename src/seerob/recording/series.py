@@ -280,6 +280,7 @@ class Series:
         tracker: WorstTracker | None = None,
         spill: Spill | None = None,
         between: str | None = None,
+        whole: Series | None = None,
     ) -> None:
         """Begin.
 
@@ -290,6 +291,7 @@ class Series:
             tracker: Of its worst instant; a part has none.
             spill: Takes full blocks.
             between: As of `CriterionInfo`; None of what no run announced, whose instants are all there is.
+            whole: What it is a part of.
         """
         self.between = between
         self._seconds = [0.0] * 6
@@ -307,6 +309,9 @@ class Series:
         self._reasons = Column("i", spill)
         self._reason_of: dict[str, int] = {"": 0}
         self._parts: dict[str, Series] = {}
+        self._whole = whole
+        self._passed_over = whole is not None and CODES[Verdict.UNDECIDED] in whole._said
+        """Of a part: whether it was not spoken of when the whole was undecided."""
         self._last_t: float | None = None
         self._last_verdict: Verdict | None = None
         self._said: set[int] = set()
@@ -394,9 +399,15 @@ class Series:
         for part in result.parts:
             series = self._parts.get(part.name)
             if series is None:
-                series = Series(name=part.name, unit=part.unit, at_most=part.at_most, spill=self._spill)
+                series = Series(
+                    name=part.name, unit=part.unit, at_most=part.at_most, spill=self._spill, whole=self
+                )
                 self._parts[part.name] = series
             series.append(part, t)
+        if result.verdict is Verdict.UNDECIDED:
+            said = {part.name for part in result.parts}
+            for name, series in self._parts.items():
+                series._passed_over = series._passed_over or name not in said
         self._said.add(CODES[result.verdict])
         self._has_limit = self._has_limit or result.limit is not None
         self._verdicts.append(CODES[result.verdict])
@@ -448,8 +459,12 @@ class Series:
         found = worst_verdict(v for v, code in CODES.items() if code in self._said)
         if found is None and (self._never_judged() or self._never_applied() or self._unseen):
             return Verdict.UNDECIDED
-        open_ = self._is_open or self._is_one_instant
-        return Verdict.UNDECIDED if found is Verdict.WITHIN and open_ else found
+        return Verdict.UNDECIDED if found is Verdict.WITHIN and self._unknown() else found
+
+    def _unknown(self) -> bool:
+        """Whether something is not known of it, or of the whole, beside the instants that are there."""
+        known = not (self._is_open or self._is_one_instant or self._passed_over)
+        return not known or (self._whole is not None and self._whole._unknown())
 
     def _never_applied(self) -> bool:
         return self._instants[_MUTED] > 0 and self._instants[_MUTED] == sum(self._instants)
@@ -525,7 +540,7 @@ class Series:
             -1,
             None if math.isnan(value) else value,
             None if math.isnan(limit) else limit,
-            verdict,
+            Verdict.UNDECIDED if verdict is Verdict.WITHIN and self._unknown() else verdict,
             self.reasons[i],
             "",
         )

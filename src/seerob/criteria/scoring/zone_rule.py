@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
+from seerob.core.errors import InputError
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Aspect, Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
 from seerob.core.verdict import judge, judge_interval
@@ -65,6 +66,7 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, SupportPhase.from_task)
         rows, error = self.zones(model).rows, self.error()
+        self._refuse_idle(rows)
         watch = ZoneWatch(rows, from_rest=self.from_rest)
 
         def evaluate(state: State) -> Result:
@@ -74,6 +76,19 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
             return self._result(rows, angles, scores)
 
         return evaluate
+
+    def _refuse_idle(self, rows: tuple[ZoneRow, ...]) -> None:
+        """Refuse a limit that no posture exceeds.
+
+        Raises:
+            InputError: The table has no score beyond the limit.
+        """
+        join = max if self.combination() == "max" else sum
+        most = join([max(r.score for r in rows if r.angle == angle) for angle in {r.angle for r in rows}])
+        if self.limit is not None and self.limit >= most:
+            what = f"no posture scores more than {most:g} by this table: nothing exceeds {self.limit:g}"
+            remedy = "give less, or leave it out to be told the score alone"
+            raise InputError.at(self.name, "limit", what, remedy)
 
     def _result(self, rows: tuple[ZoneRow, ...], angles: Angles, scores: Scores) -> Result:
         joined = [self._joined(scores, side) for side in range(2)]

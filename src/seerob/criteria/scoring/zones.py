@@ -24,6 +24,7 @@ from seerob.criteria.scoring.held_work import GAP, QUICK, WINDOW, Hidden
 from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.spans import ROUNDING
 from seerob.description.humans.angles import NEEDS, SIDED, Angles
+from seerob.description.humans.skeleton import SIDES
 from seerob.files.tables.grid import Cell, Grid, blank, number, place
 from seerob.files.tables.mapping import Mapping as TableMapping
 from seerob.files.tables.table_files import candidates
@@ -41,6 +42,8 @@ MEASURES = (*NEEDS, *DERIVED)
 """Every angle that a row may name."""
 RANGES = {"trunk_flexion": (-math.pi, math.pi), "shoulder_flexion": (-math.pi / 2, 1.5 * math.pi)}
 """Least and greatest value [rad] where it is not ±π."""
+NEUTRAL = {"elbow_flexion": math.radians(80), "arm_rise": math.radians(-80)}
+"""Where a posture is neutral [rad], where that is not at 0."""
 
 
 class ZoneRow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -114,6 +117,11 @@ def mistakes(row: ZoneRow) -> list[tuple[str, str, str]]:
     if row.low is not None and row.high is not None and row.high <= row.low:
         what = f"the range ends at {_deg(row.high)}, not after its begin at {_deg(row.low)}"
         found.append(("high", what, "let it end later"))
+    least, most = RANGES.get(row.angle, (-math.pi, math.pi))
+    if row.low is not None and row.low >= most:
+        found.append(("low", f"{row.angle} never is {_deg(row.low)}", "give degrees in the columns …_deg"))
+    if row.high is not None and row.high <= least:
+        found.append(("high", f"{row.angle} never is {_deg(row.high)}", "give degrees in the columns …_deg"))
     if row.either_way and row.low is not None and row.low < 0:
         found.append(("low", f"{_deg(row.low)} is no size", "give 0 or more, or drop either_way"))
     if row.allowed_at_end is not None and (row.allowed is None or row.low is None or row.high is None):
@@ -121,6 +129,30 @@ def mistakes(row: ZoneRow) -> list[tuple[str, str, str]]:
     if row.allowed is not None and (row.hold is not None or row.per_minute is not None):
         found.append(("allowed", "stands beside hold or per_minute", "give two rows"))
     return found
+
+
+def falls(rows: Sequence[ZoneRow]) -> list[tuple[str, str]]:
+    """Where an angle that grows away from neutral leaves a row with points for none: what, and the remedy.
+
+    Nothing would be said against it there.
+    """
+    found: dict[tuple[str, str], None] = {}
+    for name, side in {
+        (row.angle, at): None for row in rows for at in (SIDES if sided(row.angle) else ("",))
+    }:
+        own = [row for row in rows if row.angle == name and row.side in (None, side)]
+        least, most = RANGES.get(name, (-math.pi, math.pi))
+        edges = sorted({least, most, *(e for row in own for e in row.edges() if least < e < most)})
+        parts = [(a, b, [r.score for r in own if r.within((a + b) / 2)]) for a, b in pairwise(edges)]
+        middle = NEUTRAL.get(name, 0.0)
+        for (a, b, scores), (c, d, others) in (*pairwise(parts), *pairwise(parts[::-1])):
+            away = c >= middle - ROUNDING if c > a else d <= middle + ROUNDING
+            if away and not others and max(scores, default=0.0) > 0:
+                what = (
+                    f"{name} has points from {_deg(a)} to {_deg(b)}, and no row from {_deg(c)} to {_deg(d)}"
+                )
+                found[what, "let the row go on, or give one with a score of 0"] = None
+    return list(found)
 
 
 def sided(angle: str) -> bool:
@@ -400,6 +432,8 @@ def zones_of(table: Mapping[str, Any], name: str) -> ZoneTable:
             problems += [
                 Problem(name, f"rows[{i}].{key}", what, remedy) for key, what, remedy in mistakes(row)
             ]
+    if not problems:
+        problems += [Problem(name, "rows", what, remedy) for what, remedy in falls(rows)]
     head = convert({**rest, "rows": []}, ZoneTable, file=name, key="", problems=problems)
     if problems or head is None:
         raise InputError(problems)
@@ -470,6 +504,8 @@ def _rows(grid: Grid, header: int, names: Mapping[int, str]) -> tuple[ZoneRow, .
             rows.append(row)
     if not rows and not problems:
         problems.append(Problem(grid.file, place(grid, header), "no row below the header", "write one"))
+    if not problems:
+        problems += [Problem(grid.file, place(grid, header), what, remedy) for what, remedy in falls(rows)]
     if problems:
         raise InputError(problems)
     return tuple(rows)

@@ -22,7 +22,7 @@ from seerob.recording.answers import Answers, Flags
 from seerob.twin.state import State
 from seerob.twin.states import States
 
-_EXCEEDED, _UNDECIDED = Verdict.EXCEEDED, Verdict.UNDECIDED
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 Twin = State | States
 """The twin at one instant, or at N; accessors of both have the same names, with instants in front."""
 
@@ -41,6 +41,8 @@ class Figure(Struct, frozen=True, eq=False):
     """Whether there is nothing to judge, and `Shown.reason` says why."""
     exceeded: bool | Flags = False
     """Whether a limit is exceeded whatever the value, which is a bound."""
+    open: bool | Flags = False
+    """Whether more may be than what is known: it may exceed, and is never within."""
     beside: Any = None
     """What computing it found besides, for `Criterion.present`: where, in which direction."""
 
@@ -78,8 +80,10 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
         return _UNDECIDED
     if figure.interval is not None:
         low, high = figure.interval
-        return judge_interval((float(low), float(high)), limit, at_most=at_most)
-    return judge(float(value), limit, at_most=at_most)
+        verdict = judge_interval((float(low), float(high)), limit, at_most=at_most)
+    else:
+        verdict = judge(float(value), limit, at_most=at_most)
+    return _UNDECIDED if verdict is _WITHIN and figure.open else verdict
 
 
 def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Result) -> Result:
@@ -126,5 +130,5 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
             found = found.between(low, high, at_most=at_most)
     if limit is not None and np.any(figure.exceeded):
         found = found.exceeded(np.broadcast_to(figure.exceeded, (n,)))
-    found = found.finite()
+    found = found.finite().open(figure.open) if np.any(figure.open) else found.finite()
     return found.without_verdict(np.broadcast_to(figure.nothing, (n,))) if np.any(figure.nothing) else found

@@ -9,7 +9,7 @@ hazard. See `seerob.description.norms.iso_13855` for the editions and how sure t
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 import mujoco
 import numpy as np
@@ -17,10 +17,11 @@ from msgspec import Meta
 
 from seerob.core import figures
 from seerob.core.errors import InputError, Undecided, UnknownName
-from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
+from seerob.core.snapshot import Basis, Input, Origin, Segment
 from seerob.core.transforms import Array
-from seerob.core.verdict import judge
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.sensors.sensing import Names, bodies_of, carriers_of, names_of
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import Approach, Edition
@@ -94,8 +95,8 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
             raise InputError.at(self.name, "edges", f"{list(self.edges)} are no edges of the field", right)
         return sensor, next(b.index for b in model.bodies if b.name == name), corners
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the distance."""
         sensor, plane, corners = self._device(model)
         hazard = bodies_of(model, self.hazard)
         carriers = carriers_of(model, (*hazard, plane))
@@ -103,40 +104,37 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         border = None if corners is None else self._border(model, plane, np.asarray(corners, float), hazard)
         deviation = max(model.bodies[i].deviation for i in hazard)
 
-        def evaluate(state: State) -> Result:
+        def compute(twin: Twin) -> Figure:
+            state = cast("State", twin)
             state.require(*carriers)
             S = self._required(sensor, state, plane)
             if gap is not None:
                 found = state.closest(gap)
-                value, who = found.distance, model.bodies[found.body_b].name
+                value, who = found.distance, found.body_b
                 ends = found.point_a, found.point_b
             else:
                 assert border is not None
-                value, body, ends = border(state)
-                who = model.bodies[body].name
-            verdict = judge(value - deviation, S, at_most=False)
-            if verdict is not judge(value, S, at_most=False):
-                verdict = Verdict.UNDECIDED
-            shown = figures.against(value, S, self.unit, at_most=False)
-            line = Segment(
-                start=tuple(ends[0].tolist()),
-                end=tuple(ends[1].tolist()),
-                label=f"{shown.value} m, S {shown.limit} m",
-                verdict=verdict,
-            )
-            return Result(
-                name=self.name,
-                value=value,
-                unit=self.unit,
-                limit=S,
-                at_most=False,
-                verdict=verdict,
-                reason=who,
-                interval=(value - deviation, value) if deviation else None,
-                markers=(line,),
-            )
+                value, who, ends = border(state)
+            return Figure(value, S, (value - deviation, value), beside=(model.bodies[who].name, ends))
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that names what is nearest, and draws the distance."""
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            who, (start, end) = figure.beside
+            value, S = figure.number, float(cast("float", figure.limit))
+            start, end = tuple(start.tolist()), tuple(end.tolist())
+
+            def draw() -> tuple[Segment, ...]:
+                shown = figures.against(value, S, self.unit, at_most=False)
+                label = f"{shown.value} m, S {shown.limit} m"
+                return (Segment(start=start, end=end, label=label, verdict=verdict),)
+
+            return Shown(who, draw)
+
+        return present
 
     def _way(self, sensor: Sensor) -> Approach:
         if self.approach is not None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 import mujoco
 import numpy as np
@@ -16,12 +16,12 @@ from msgspec.structs import replace
 
 from seerob.core import figures
 from seerob.core.errors import InputError, Undecided
-from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
-from seerob.core.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
+from seerob.core.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere
 from seerob.core.transforms import Array
-from seerob.core.verdict import judge
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.polytope import Polytope, free_moment, torque_box, zero_moment
 from seerob.description.norms import body_limits
 from seerob.description.norms.limit_inputs import force_inputs, pushed_region
@@ -29,7 +29,6 @@ from seerob.kernels.contact_forces import drawn_corners
 from seerob.kernels.polytope import largest
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
-from seerob.recording.answers import Answers
 from seerob.twin import joint_torques
 from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, coupling_of, down_to
 from seerob.twin.state import State
@@ -97,53 +96,79 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         force = pushed_region(self._table(model), self.body_region).force
         return replace(self, limit=force.value, body_region=None, limits=None)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        if self.body_region is not None:
-            return self._against(model).bind(model)
-        frame = model.frame(self.at)
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the largest force."""
+        frame, limit = model.frame(self.at), self._against(model).limit
         robot = model.carrier(frame)
         if self.load != "none":
             robot.require_masses(self.name)
         offset = np.array(self.offset)
         lower, upper, unknown = self._torques(model, robot)
 
-        def evaluate(state: State) -> Result:
-            state.require(robot.name)
+        def compute(twin: Twin) -> Figure:
+            twin.require(robot.name)
             if unknown:
                 raise Undecided(unknown)
-            held = self._held(state, robot)
-            J = state.jacobian(frame, robot, offset)
+            held, J = self._held(twin, robot), twin.jacobian(frame, robot, offset)
+            if twin.many:
+                # Without the surface, which only one instant draws. Empty is nan, and undecided.
+                left = (np.broadcast_to(side - held, (len(J), len(lower))).copy() for side in (lower, upper))
+                norm, _, _ = largest(np.ascontiguousarray(J[:, :3]), *left)
+                return Figure(norm, limit)
             polytope = self._polytope(J, lower - held, upper - held)
             if polytope.empty:
                 raise Undecided(
                     f"{robot.name}: the torque limits cannot hold it in this pose, with any force"
                 )
-            rotation, position = state.pose(frame)
-            return self._result(polytope, position + rotation @ offset)
+            # Unbounded is infinite: no force is too large for the structure then, so it exceeds any limit.
+            return Figure(polytope.largest, limit, beside=polytope)
 
-        return evaluate
+        return compute
 
-    def batch(self, model: Model) -> EvaluateMany | None:
-        """Judge many instants at once; only ``zero_moment`` can, whose corners are found without a hull."""
+    def one_by_one(self, model: Model) -> str:
+        """Say so unless it is ``zero_moment``, whose corners are found without a hull."""
         if self.definition != "zero_moment" or self.load == "motion":
-            return None
-        frame, offset = model.frame(self.at), np.array(self.offset)
-        robot = model.carrier(frame)
-        limit = self._against(model).limit
-        lower, upper, unknown = self._torques(model, robot)
+            return "only zero_moment without velocity products is made for batches"
+        return ""
 
-        def evaluate(states: States) -> Answers:
-            states.require(robot.name)
-            if unknown:
-                raise Undecided(unknown)
-            held = states.held(robot) if self.load == "gravity" else np.zeros((len(states), len(lower)))
-            J_v = np.ascontiguousarray(states.jacobian(frame, robot, offset)[:, :3])
-            norm, _, _ = largest(J_v, lower - held, upper - held)
-            # Unbounded is infinite: it exceeds any limit and is no figure. Empty is nan, and undecided.
-            return Answers.against(norm, limit, at_most=self.at_most).finite()
+    def present(self, model: Model) -> Present:
+        """Return the function that names the direction of the largest force, and draws the polytope."""
+        frame, offset, limit = model.frame(self.at), np.array(self.offset), self._against(model).limit
 
-        return evaluate
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            polytope: Polytope = figure.beside
+            rotation, position = state.pose(frame)
+            at, unbounded, farthest = (
+                position + rotation @ offset,
+                polytope.free.shape[1] > 0,
+                polytope.farthest,
+            )
+            across = math.sqrt(float(farthest @ farthest))
+            if unbounded:
+                direction = polytope.free[:, 0]
+                along = f"along ±{_vector(direction)}, only the structure does"
+                reason = f"singular: no torque limits the force {along}"
+            else:
+                direction = farthest / across if across > 0 else np.zeros(3)
+                reason = f"largest along {_vector(direction)}"
+                if polytope.inscribed < 0:
+                    reason += "; without any force the torque limits cannot hold the robot"
+            inscribed = polytope.inscribed if np.isfinite(polytope.inscribed) else None
+
+            def draw() -> tuple[Marker, ...]:
+                return self._markers(polytope, at, direction, None if unbounded else across, limit, verdict)
+
+            parts = (
+                Result(name="in every direction", value=inscribed, unit="N"),
+                *((Result(name="across that direction", value=across, unit="N"),) if unbounded else ()),
+                *(
+                    Result(name=f"direction {axis}", value=u, unit="")
+                    for axis, u in zip("xyz", direction.tolist(), strict=True)
+                ),
+            )
+            return Shown(reason, draw, parts)
+
+        return present
 
     def falls(self, model: Model, points: Points) -> Falls | None:
         r"""Bound the force between instants; only of ``zero_moment``, without velocity products in the load.
@@ -196,59 +221,26 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
 
         return falls
 
-    def _held(self, state: State, robot: Mechanism) -> Array:
+    def _held(self, twin: Twin, robot: Mechanism) -> Array:
         if self.load == "gravity":
-            return joint_torques.gravity(state, robot)
-        return joint_torques.bias(state, robot) if self.load == "motion" else np.zeros(len(robot.joints))
+            many, one = cast("States", twin), cast("State", twin)
+            return many.held(robot) if twin.many else joint_torques.gravity(one, robot)
+        n = len(robot.joints)
+        return joint_torques.bias(cast("State", twin), robot) if self.load == "motion" else np.zeros(n)
 
     def _polytope(self, J: Array, low: Array, high: Array) -> Polytope:
         if self.definition == "zero_moment":
             return zero_moment(J[:3], low, high)
         return free_moment(J, low, high) if self.definition == "free_moment" else torque_box(J[:3], low, high)
 
-    def _result(self, polytope: Polytope, at: Array) -> Result:
-        unbounded = polytope.free.shape[1] > 0
-        farthest = polytope.farthest
-        across = math.sqrt(float(farthest @ farthest))
-        if unbounded:
-            # No force is too large for the structure here, so every limit is exceeded.
-            value, verdict = None, None if self.limit is None else Verdict.EXCEEDED
-            direction = polytope.free[:, 0]
-            reason = (
-                f"singular: no torque limits the force along ±{_vector(direction)}, only the structure does"
-            )
-        else:
-            value, verdict = across, judge(across, self.limit)
-            direction = farthest / across if across > 0 else np.zeros(3)
-            reason = f"largest along {_vector(direction)}"
-            if polytope.inscribed < 0:
-                reason += "; without any force the torque limits cannot hold the robot"
-        inscribed = polytope.inscribed if np.isfinite(polytope.inscribed) else None
-
-        def draw() -> tuple[Marker, ...]:
-            return self._markers(polytope, at, direction, value, verdict)
-
-        return Result(
-            name=self.name,
-            value=value,
-            unit=self.unit,
-            limit=self.limit,
-            verdict=verdict,
-            nothing=unbounded and verdict is None,
-            reason=reason,
-            parts=(
-                Result(name="in every direction", value=inscribed, unit="N"),
-                *((Result(name="across that direction", value=across, unit="N"),) if unbounded else ()),
-                *(
-                    Result(name=f"direction {axis}", value=u, unit="")
-                    for axis, u in zip("xyz", direction.tolist(), strict=True)
-                ),
-            ),
-            markers=drawn(draw),
-        )
-
     def _markers(
-        self, polytope: Polytope, at: Array, direction: Array, value: float | None, verdict: Verdict | None
+        self,
+        polytope: Polytope,
+        at: Array,
+        direction: Array,
+        value: float | None,
+        limit: float | None,
+        verdict: Verdict | None,
     ) -> tuple[Marker, ...]:
         center = tuple(at.tolist())
         markers: list[Marker] = []
@@ -262,11 +254,11 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
                     verdict=verdict,
                 )
             )
-        if self.limit is not None:
-            radius = min(DRAWN * self.limit, LARGEST_DRAWN)
-            markers.append(Sphere(center=center, radius=radius, label=f"limit {self.limit:g} N"))
+        if limit is not None:
+            radius = min(DRAWN * limit, LARGEST_DRAWN)
+            markers.append(Sphere(center=center, radius=radius, label=f"limit {limit:g} N"))
         length = LARGEST_DRAWN if value is None else min(DRAWN * value, LARGEST_DRAWN)
-        label = "unbounded" if value is None else figures.worded(value, self.limit, self.unit, at_most=True)
+        label = "unbounded" if value is None else figures.worded(value, limit, self.unit, at_most=True)
         arrow = tuple((length * direction).tolist())
         markers.append(Arrow(origin=center, vector=arrow, label=label, verdict=verdict))
         return tuple(markers)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Undecided
-from seerob.core.snapshot import Basis, Hull, Input, Origin, Result, Verdict
-from seerob.core.verdict import judge
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.snapshot import Basis, Hull, Input, Origin, Result
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.distance.voxels import check_room
 from seerob.model import provenance
 from seerob.model.model import Model
@@ -45,7 +46,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         """What was swept before counts."""
         return True
 
-    def bind(self, model: Model) -> Evaluate:
+    def compute(self, model: Model) -> Compute:
         """Look up the bodies and return the function that marks voxels; refuses more than memory allows."""
         bodies = model.select(self.of)
         carriers = _carriers(model, bodies)
@@ -61,30 +62,28 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         )
         unshaped = self.every is not None and self.every > model.workstation.engine.tick * 1.5
 
-        def evaluate(state: State) -> Result:
+        def compute(twin: Twin) -> Figure:
+            state = cast("State", twin)
             state.require(*carriers)
             way.follow(state)
-            swept = way.sweep.swept
-            verdict, doubts = judge(swept.volume, self.limit), list(way.unheard)
+            swept, doubts = way.sweep.swept, list(way.unheard)
             if unshaped:
                 doubts.append(f"seen every {self.every:g} s only: what lies between is not known")
-            if doubts and verdict is Verdict.WITHIN:
-                verdict = Verdict.UNDECIDED
-            how = (
-                f"not more than this; dilated by up to {swept.dilation * 1e3:.1f} mm for motion between ticks"
-            )
-            return Result(
-                name=self.name,
-                value=swept.volume,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=verdict,
-                reason="; ".join([*doubts[:3], how]),
-                parts=(Result(name="dilation for motion", value=swept.dilation, unit="m"),),
-                markers=(way.hull(state.t, self.redraw, verdict),),
-            )
+            return Figure(swept.volume, self.limit, open=bool(doubts), beside=(way, swept.dilation, doubts))
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what is not known of it, and draws its hull."""
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            way, dilation, doubts = figure.beside
+            how = f"not more than this; dilated by up to {dilation * 1e3:.1f} mm for motion between ticks"
+            hull = way.hull(state.t, self.redraw, verdict)
+            parts = (Result(name="dilation for motion", value=dilation, unit="m"),)
+            return Shown("; ".join([*doubts[:3], how]), lambda: (hull,), parts)
+
+        return present
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

@@ -532,7 +532,8 @@ def test_digits_are_told_by_a_short_step_and_by_none_that_are_equal():
         assert not held((step, step), (dt, (dt, 2 * dt, 3 * dt)))
     assert not held((1e-9, 0.003, 0.003), (1e-3, (1e-3, 2e-3, 3e-3)))
     assert held((2e-9, 0.003, 0.003), (1e-3, (1e-3, 2e-3, 3e-3)))
-    assert held((0.01, 0.001, 0.0045), (5e-4, (5e-4, 1e-3, 1.5e-3)))
+    for way in (1, -1):
+        assert held((0.01, 0.001, 0.0045), (5e-4, (5e-4, 1e-3, 1.5e-3)), way=way)
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -752,6 +753,18 @@ def test_a_recorded_source_whose_own_time_does_not_go_on_is_in_doubt_for_a_while
     assert found[:4] == [False] * 4
     assert found[4:9] == [True] * 5
     assert not any(found[10:])
+
+
+def test_a_recorded_source_is_looked_at_by_its_own_time_and_may_stop_dead():
+    """Its own time is the device's, where it has one; a motion that was planned brakes as it likes."""
+    assert doubts([sample(0.0), sample(0.01, 0.5)]) == [False, True]
+    assert doubts([sample(0.0, 0.0, 50.0), sample(0.1, 0.5, 50.01)]) == [False, True]
+    places = (0.0, 0.003, 0.00593, *[0.00593] * 6)
+    assert last([said(0.01 * k, (q,)) for k, q in enumerate(places)])
+    assert not any(doubts([sample(0.01 * k, q) for k, q in enumerate(places)]))
+    # What it contradicts later ends no doubt about its time.
+    rows = ((0.0, 0.0), (0.1, 0.0), (0.05, 0.0), (0.2, 99.0), (0.3, 99.0), (99.0, 99.0))
+    assert doubts([sample(t, q) for t, q in rows]) == [False, True, True, True, True]
 
 
 def test_what_a_recorded_source_contradicts_holds_for_a_while_and_no_longer():

@@ -919,7 +919,7 @@ def test_quaternions_about_z_with_w_last() -> None:
     ("values", "value", "more", "words"),
     [
         ((2.5,), 2.5, {}, "parts[0].x = 2.5 m: more than 2 m, which"),
-        ((-2.5,), -2.5, {}, "parts[0].x = -2.5 m: more than 2 m, which"),
+        ((-2.5,), -2.5, {"twice": True}, "parts[0].x = -2.5 m: more than 2 m, which"),
         ((0.5,), 0.5, {}, "parts[0].x = 0.5 m: less than 1 m, which"),
         ((1.5, 2.5), 2.5, {}, "parts[0].x = [1.5, 2.5] m: 2.5 is more than 2 m, which"),
         (

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
 from seerob.recording.result_log import ResultLog, log_of, result_named
-from seerob.recording.series import CODES, MAX_REASONS, severity, worst_verdict
+from seerob.recording.series import CODES, MAX_REASONS, Series, margin, severity, worst_verdict
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
@@ -140,6 +140,37 @@ def test_the_worst_names_the_part_that_governs():
     assert log["speed"].worst().part == "skull"
     assert log["speed"].parts["face"].worst().value == 3.0
     assert log["speed"].parts["hand"].verdict == W
+
+
+@pytest.mark.parametrize(("verdict", "part"), [(E, W), (W, E), (None, None), (U, None)])
+def test_a_part_with_another_verdict_or_none_governs_nothing(verdict, part):
+    log = log_of([tick(0, result(5.0, verdict, parts=(result(1.0, part, name="hand"),)))])
+    assert log["speed"].worst().part == ""
+
+
+def test_a_margin_is_to_the_limit_or_to_nought_and_what_is_judged_comes_before_what_is_not():
+    cases = {(2.0, True): 0.5, (2.0, False): -0.5, (None, True): -1.5, (None, False): 1.5}
+    for (limit, at_most), expected in cases.items():
+        assert margin(result(1.5, W, limit=limit, at_most=at_most)) == expected
+    assert math.isnan(margin(result(None, U)))
+    log = log_of([tick(0, result(1.0, W)), tick(1, result(9.0, None))])
+    assert log["speed"].worst().seq == 0
+    assert repr(log["speed"]) == "<Series 'speed': 2 instants, within>"
+    assert "no verdict" in repr(log_of([tick(0, result(1.0, None, limit=None))])["speed"])
+
+
+def test_instants_are_counted_where_no_time_passes_and_are_seen():
+    """Of a criterion that nothing bounds: that nobody was near, known at an instant, hides nothing."""
+    said = Series(name="v", unit="m", at_most=True, between="nothing bounds it")
+    for verdict in (W, E):
+        said.pass_time(result(1.0, verdict), 0.0)
+    assert (said.times().within, said.times().exceeded) == (0.5, 0.5)
+    for dt, verdict in ((0.0, None), (0.1, U)):
+        said = Series(name="v", unit="m", at_most=True, between="nothing bounds it")
+        nobody = Result(name="v", nothing=True, reason="nobody is near")
+        said.append(nobody, 0.0)
+        said.pass_time(nobody, dt)
+        assert said.verdict is verdict
 
 
 def test_exceedance_comes_as_intervals_and_shares():

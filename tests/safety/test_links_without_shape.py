@@ -173,6 +173,35 @@ def test_what_carries_something_a_metre_ahead_is_no_frame(tmp_path, first, secon
     assert (told.level, "taken for a frame" in told.text) == ("assumed", True)
 
 
+def test_what_has_a_shape_of_its_own_is_shown_however_light_it_is(tmp_path):
+    """Half a gram in a cube of 1 cm³, with a metre and a kilogram behind it."""
+    urdf = two_r(masses=(5e-4, 1.0)).replace('size="1 0.1 0.1"', 'size="0.01 0.01 0.01"', 1)
+    result = results_at(cell(tmp_path, urdf), arm=((0.0, 0.0), (1.0, 0.0)))["minimum_distance"]
+    assert (result.verdict, "no shape shows" in result.reason) == ("within", False)
+
+
+LIGHT = """<mujoco><compiler angle="radian"/><worldbody><body name="base" pos="1 0 0"><body name="light">
+<inertial pos="0 0 0" mass="5e-4" diaginertia="1e-8 1e-8 1e-8"/>{}</body></body></worldbody></mujoco>"""
+TWO = '<joint name="{0}1" axis="0 0 1"/><joint name="{0}2" axis="0 1 0" pos="{1} 0 0"/>'
+BEHIND = '<body name="heavy">{}<geom type="box" size="0.1 0.1 0.1" mass="{}"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "shown"),
+    [
+        (TWO.format("a", 0.5), True),  # nothing hangs on it
+        (TWO.format("a", 0) + BEHIND.format(TWO.format("b", 0), 1), True),  # all joints in one place
+        (TWO.format("a", 0) + BEHIND.format(TWO.format("b", 5e-4), 1), True),
+        (TWO.format("a", 0) + BEHIND.format(TWO.format("b", 0.5), 1), False),
+        (TWO.format("a", 0.5) + BEHIND.format(TWO.format("b", 0), 1), False),
+    ],
+)
+def test_a_frame_between_joints_that_are_in_one_place_is_one(tmp_path, inside, shown):
+    text = '[[robots]]\nname = "arm"\nmodel = "arm.xml"\n'
+    robot = made(tmp_path, text, {"arm.xml": LIGHT.format(inside)}).model.robot("arm")
+    assert ("arm/light" not in robot.unshaped) is shown
+
+
 @given(
     st.lists(st.tuples(st.floats(-1, 1), st.floats(0.1, 9)), min_size=1, max_size=9),
     st.floats(-2, 2),

@@ -59,13 +59,13 @@ class Spill:
             return None
         try:
             if self._file is None:
-                roomy = DISK.is_dir() and os.access(DISK, os.W_OK)
-                self._file = tempfile.TemporaryFile(buffering=0, dir=DISK if roomy else None)  # noqa: SIM115
+                folder = DISK if os.access(DISK, os.W_OK) else None
+                self._file = tempfile.TemporaryFile(buffering=0, dir=folder)  # noqa: SIM115
                 weakref.finalize(self, self._file.close)
             begin = self._file.seek(0, os.SEEK_END)
             written = self._file.write(data)
         except OSError as error:
-            written, reason = -1, error.strerror
+            written, reason = None, error.strerror
         else:
             reason = "no space left"
         if written == len(data):
@@ -84,7 +84,7 @@ class Spill:
             raise OSError("nothing was written")
         self._file.seek(begin)
         parts = []
-        while size > 0 and (part := self._file.read(size)):
+        while part := self._file.read(size):
             parts.append(part)
             size -= len(part)
         if size:
@@ -124,13 +124,9 @@ class Column:
 
     def tobytes(self) -> bytes:
         """All of them, in the machine's own form."""
-        if not self._blocks:
-            # One step under the interpreter's lock: a reader never sees an array that is being grown.
-            newest = self._newest.tobytes()
-            if not self._blocks:
-                return newest
         with self._spill.lock:
             old = [b if isinstance(b, bytes) else self._spill.read(b, self._size) for b in self._blocks]
+            # One step under the interpreter's lock: a reader never sees an array that is being grown.
             return b"".join((*old, self._newest.tobytes()))
 
 

@@ -58,10 +58,7 @@ class Witness:
 
     def _tick(self, t: float) -> int:
         """The tick that is nearest to an instant [s]."""
-        k = int(np.clip(np.searchsorted(self.t, t), 1, max(len(self.t) - 1, 1)))
-        if k >= len(self.t):
-            return len(self.t) - 1
-        return k if self.t[k] - t < t - self.t[k - 1] else k - 1
+        return int(np.abs(np.subtract(self.t, t)).argmin())
 
     def others(self, t: float) -> tuple[Array, Array, dict[str, str]]:
         """Positions, velocities and doubts of the whole twin at the tick that is nearest to ``t`` [s]."""
@@ -79,7 +76,7 @@ class Witness:
     def moves(self, mechanism: Mechanism) -> bool:
         """Whether somebody ever moved."""
         q = np.array(self._qpos)[:, mechanism.q_address]
-        return bool((np.ptp(q, axis=0) > 1e-3).any()) if len(q) else False
+        return bool((np.ptp(q, axis=0) > 1e-3).any())
 
 
 def _heard(state: State, name: str) -> Value | Undecided:

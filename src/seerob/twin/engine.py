@@ -453,6 +453,7 @@ class Engine:
         """The twin at t = 0, placed on the first samples without being pulled there."""
         self._place(0.0)
         self._note_errors()
+        self._note_unlike()
         self.state.heard()
         return self.state
 
@@ -499,6 +500,7 @@ class Engine:
         self._show(t)
         strayed = self._strays()
         self._note_errors()
+        self._note_unlike()
         self.state.path = self._path(start, t, captured=strayed or self._strays())
         self.state.heard()
         return self.state
@@ -663,9 +665,11 @@ class Engine:
         if self._grips.follow(self.state):
             self.state.refresh(t)
 
-    def _note_errors(self) -> None:
+    def _note_unlike(self) -> None:
         for mechanism in self._mechanisms if self.controllers else ():
             self._hearings[mechanism.name].unlike = self._unlike(mechanism)
+
+    def _note_errors(self) -> None:
         for name, following in self._followings.items() if self.controllers else ():
             q = self.state.joint_positions(self.model.mechanisms[name])
             self._hearings[name].bones = following.errors(self.state.t, q)
@@ -698,8 +702,8 @@ class Engine:
         said = reference.said_speeds(t)
         if said is None:
             return None
-        if mechanism.role == "human" and self.physics:
-            moves = reference.at(t)[1]  # what holds it elsewhere is no noise
+        if self.physics and (mechanism.role == "human" or hearing.saturated):
+            moves = reference.at(t)[1]  # what holds it elsewhere, or a torque limit, is no noise
         else:
             moves = self._shown.qvel[mechanism.v_address[mechanism.own]]
         off = np.abs(moves - said)

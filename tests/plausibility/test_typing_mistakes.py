@@ -186,6 +186,27 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "areas[0].extent",
         {"speed", "distance", "separation"},
     ),
+    "an area below the floor": (
+        {
+            "more": '[[areas]]\nname = "side"\nshape = { box = [0.5, 0.5, 0.5] }\n'
+            "at = { position = [1.75, 0.5, -1] }\n"
+            '[[safety]]\nkind = "safety_area"\nname = "clear"\narea = "side"\nof = ["ur5"]\n'
+        },
+        "areas[0].below_floor",
+        {"speed", "distance", "separation"},
+    ),
+    "a scanner below the floor": (
+        {
+            "more": '[[sensors]]\nname = "s"\nresponse = 0.1\ncapability = 0.07\nsource = "data sheet"\n'
+            "at = { position = [1.75, 1, -0.3] }\n[sensors.laser_scanner]\nrange = 5\nangle = 3\n"
+            "resolution = 0.01\n"
+            'fields = [{ name = "warn", corners = [[0, -1], [1, -1], [1, 1], [0, 1]] }]\n'
+            '[[safety]]\nkind = "scanner_field"\nname = "clear"\nsensor = "s"\nfield = "warn"\n'
+            'of = ["operator"]\n'
+        },
+        "sensors[0].below_floor",
+        {"speed", "distance", "separation"},
+    ),
     "a drive force in kN": (
         {
             "more": '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "ur5"\n'

@@ -20,7 +20,15 @@ from seerob.distance.depth import Depths
 from seerob.distance.least import Query
 from seerob.model.model import Body, Mechanism, Model
 from seerob.model.mounting.chains import beyond_flange
-from seerob.workstation.plausibility.ranges import Quantity, data, entries_of, findings, listed, quantities
+from seerob.workstation.plausibility.ranges import (
+    Quantity,
+    data,
+    entries_of,
+    findings,
+    listed,
+    quantities,
+    resting,
+)
 from seerob.workstation.variables import VARIABLE
 from seerob.workstation.workstation import Body as GivenBody
 from seerob.workstation.workstation import Thing as GivenThing
@@ -65,6 +73,7 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _parts(model, place)
     yield from _apart(model, place)
     yield from _bases(model, place)
+    yield from _below(model, place)
     yield from _nobody(model, [place])
 
 
@@ -392,11 +401,41 @@ def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quan
                 )
 
 
+def _floor(model: Model, place: _Home) -> bool:
+    """Whether people or things stand at z = 0."""
+    soles = [place.lowest(_of(model, model.mechanisms[human.name])) for human in model.workstation.humans]
+    return any(abs(low) <= LEVEL for low in (*soles, *(place.lowest([b]) for b in _standing(model))))
+
+
+def _below(model: Model, place: _Home) -> Iterator[Quantity]:
+    """How far areas, and devices that watch, are below the floor, where nobody is."""
+    station = model.workstation
+    if not _floor(model, place):
+        return
+    for i, area in enumerate(station.areas):
+        own = [b for b in model.bodies if b.owner == area.name and len(b.corners)]
+        tops = [
+            float((place.rotations[b.index] @ b.corners.T)[2].max() + place.positions[b.index][2] + b.radius)
+            for b in own
+        ]
+        if area.on is None and tops and max(tops) < 0:
+            said = f"the highest point of {area.name} below z = 0"
+            key = "below_floor"
+            yield Quantity(
+                f"areas[{i}].{key}", f"areas.{key}", "m", (-max(tops),), (area.name,), said, area.name
+            )
+    entries = entries_of(station)
+    for i, sensor in enumerate(station.sensors):
+        if sensor.on is None and (at := sensor.at.position[2]) < 0:
+            said, key = f"{sensor.name} below z = 0", "below_floor"
+            about = resting("sensors", sensor, entries)
+            yield Quantity(f"sensors[{i}].{key}", f"sensors.{key}", "m", (-at,), about, said, sensor.name)
+
+
 def _bases(model: Model, place: _Home) -> Iterator[Quantity]:
     """How high bases of robots are, and how far from anything that they would stand on with another sign."""
     standing = _standing(model)
-    soles = [place.lowest(_of(model, model.mechanisms[human.name])) for human in model.workstation.humans]
-    floor = any(abs(low) <= LEVEL for low in (*soles, *(place.lowest([b]) for b in standing)))
+    floor = _floor(model, place)
     for i, robot in enumerate(model.workstation.robots):
         own = [b for b in standing if b.owner == robot.name]
         if robot.on or not own:

@@ -46,7 +46,8 @@ FOLLOWS: dict[str, tuple[str, ...]] = {
     "tools": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart", "tcp_outside"),
     "workpieces": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart"),
     "parts": ("extent", "bulk_density", "inside."),
-    "areas": ("extent",),
+    "areas": ("extent", "below_floor"),
+    "sensors": ("below_floor",),
     "machines": ("extent", "mass", "bulk_density", "com_outside", "gyration", "nobody_within"),
     "sources": ("step", "degrees", "speed"),
     "humans": ("bmi", "feet", "inside."),
@@ -67,7 +68,11 @@ def listed(entries: Entries, engine: Engine) -> Iterator[Quantity]:
     for group in LISTS:
         for i, table in entries.get(group, {}).items():
             yield from quantities(
-                table, key=f"{group}[{i}]", kind=group, about=_about(group, table, entries), of=name_of(table)
+                table,
+                key=f"{group}[{i}]",
+                kind=group,
+                about=resting(group, table, entries),
+                of=name_of(table),
             )
     for group in PLUGINS:
         for i, table in entries.get(group, {}).items():
@@ -86,7 +91,7 @@ def name_of(entry: Any) -> str:
     return str(getattr(entry, "name", "") or getattr(entry, "title", ""))
 
 
-def _about(group: str, table: Any, entries: Entries) -> tuple[str, ...]:
+def resting(group: str, table: Any, entries: Entries) -> tuple[str, ...]:
     """Names of what rests on an entry."""
     if group == "phases":
         return ("*",)

@@ -59,7 +59,9 @@ def test_what_nobody_gave_is_asked_for_and_every_mistake_is_told_at_once(model, 
     assert "[rad/s² or m/s²] with --acceleration" in second
 
 
-@pytest.mark.parametrize("wrong", [0.0, -1.0, [1.0, 0.0], [1.0, np.nan], np.inf, [[1.0, 2.0]], []])
+@pytest.mark.parametrize(
+    "wrong", [0.0, -1.0, [1.0, 0.0], [1.0, np.nan], [1.0, np.inf], np.inf, [[1.0, 2.0]], []]
+)
 @pytest.mark.parametrize("file", ["", "cell.toml"])
 def test_every_limit_is_a_number_above_nought(model, wrong, file):
     robot = model.mechanisms["arm"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
 from seerob.recording.result_log import ResultLog, log_of, result_named
-from seerob.recording.series import CODES, MAX_REASONS, Series, margin, severity, worst_verdict
+from seerob.recording.series import CODES, MAX_REASONS, Series, Times, margin, severity, worst_verdict
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
@@ -165,6 +165,10 @@ def test_instants_are_counted_where_no_time_passes_and_are_seen():
     for verdict in (W, E):
         said.pass_time(result(1.0, verdict), 0.0)
     assert (said.times().within, said.times().exceeded) == (0.5, 0.5)
+    said = Series(name="v", unit="m", at_most=True)
+    for dt, verdict in ((0.3, W), (0.1, E)):
+        said.pass_time(result(1.0, verdict), dt)
+    assert (said.times().within, said.times().exceeded) == pytest.approx((0.75, 0.25))
     for dt, verdict in ((0.0, None), (0.1, U)):
         said = Series(name="v", unit="m", at_most=True, between="nothing bounds it")
         nobody = Result(name="v", nothing=True, reason="nobody is near")
@@ -261,3 +265,91 @@ def test_a_part_has_its_own_unit_and_its_own_extremum():
         ("hand", "m"),
     ]
     assert [p.worst().value for p in parts.values()] == [4e5, 300.0, 0.4]
+
+
+def thinned(values, verdicts, most, *, limit=2.0, at_most=True):
+    rows = [
+        result(v, verdict, limit=limit, at_most=at_most) for v, verdict in zip(values, verdicts, strict=True)
+    ]
+    return log_of(tick(k, row) for k, row in enumerate(rows))["speed"].thinned(most).tolist()
+
+
+def test_of_a_long_run_each_bucket_keeps_its_first_and_its_extreme_instants():
+    """Of 31 points six buckets of 100: first, worst verdict, smallest and largest value, smallest margin."""
+    values = np.tile(np.linspace(1.0, 1.5, 100), 6)
+    verdicts: list = [W] * 600
+    for bucket in range(6):
+        values[100 * bucket + 20 : 100 * bucket + 22] = (1.9, 0.5)
+    verdicts[333], verdicts[334], verdicts[435], verdicts[540] = U, E, U, None
+    verdicts[500:600] = [None if k != 555 else W for k in range(500, 600)]
+    kept = thinned(values, verdicts, 31)
+    usual = [100 * bucket + k for bucket in range(6) for k in (0, 20, 21)]
+    assert kept == sorted({*usual, 334, 435, 555, 599})
+    # Of a limit from below the smallest margin is that of the smallest value.
+    assert thinned(values, verdicts, 31, at_most=False, limit=0.1) == kept
+    # What is no number is no extreme; a bucket of nothing else keeps its first instant.
+    empty = [None if 200 <= k < 300 or k == 20 else v for k, v in enumerate(values)]
+    assert thinned(empty, verdicts, 31) == sorted({*kept, 99} - {20, 220, 221})
+
+
+@pytest.mark.parametrize("limits", ["up", "down"])
+def test_where_the_limit_moves_the_smallest_margin_is_kept(limits):
+    """Neither the smallest nor the largest value: the limit comes nearest in the middle of the run."""
+    at_most = limits == "up"
+    near = 3.0 - 2.0 * (np.arange(600) == 333)
+    rows = [result(1.0, W, limit=1.0 + (n if at_most else -n), at_most=at_most) for n in near]
+    series = log_of(tick(k, row) for k, row in enumerate(rows))["speed"]
+    assert 333 in series.thinned(31)
+
+
+@pytest.mark.parametrize("count", [6, 7, 8])
+def test_a_run_of_no_more_instants_than_points_is_kept_whole(count):
+    assert thinned([1.0] * count, [W] * count, 7) == ([*range(count)] if count <= 7 else [0, 7])
+    with pytest.raises(ValueError, match="at least 7, not 6"):
+        thinned([1.0], [W], 6)
+
+
+def test_a_part_is_at_its_worst_where_its_verdict_and_its_margin_are():
+    """By arrays: of its own unit and direction, with sizes that are not known."""
+
+    def worst(*rows, at_most=True):
+        parts = [
+            Result(name="hand", unit="m", value=v, limit=limit, at_most=at_most, verdict=verdict)
+            for v, limit, verdict in rows
+        ]
+        return (
+            log_of(tick(k, result(parts=(part,))) for k, part in enumerate(parts))["speed"]
+            .parts["hand"]
+            .worst()
+        )
+
+    assert worst((1.0, 2.0, W), (9.0, 2.0, E), (None, 2.0, E), (5.0, 2.0, E)).t == 0.02
+    assert worst((1.0, 2.0, W), (1.5, 2.0, W), (None, 2.0, W)).t == 0.01
+    assert worst((None, 2.0, U), (1.9, 2.0, W)).t == 0.0
+    assert worst((1.0, 2.0, W), (9.0, 2.0, None)).t == 0.0
+    assert worst((1.5, 1.0, W), (1.2, 1.0, W), (9.0, 7.0, W), at_most=False).t == 0.01
+    # Without a limit by the distance to nought: 0.6 beyond it is more than 0.5 below a limit of 1.
+    assert worst((0.5, 1.0, W), (-0.6, None, W)).t == 0.0
+    found = worst((0.2, None, None))
+    assert (found.seq, found.limit, found.value, found.part) == (-1, None, 0.2, "")
+
+
+def test_times_without_announcement_are_shares_of_instants():
+    series = Series(name="v", unit="m", at_most=True)
+    for k, verdict in enumerate((W, W, E, U, None)):
+        series.append(result(1.0, verdict), 0.01 * k)
+    said = series.times()
+    assert said == Times(0.4, 0.2, 0.2, 0.0, 0.2, 0.0)
+    assert Series(name="v", unit="m", at_most=True).times() == Times(0, 0, 0, 0, 0, 0)
+    assert said.decided == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("muted", [0, 1, 2])
+def test_what_never_applied_is_undecided_and_what_applied_without_a_limit_informs(muted):
+    said = Series(name="v", unit="m", at_most=True)
+    for k in range(2):
+        row = Result(name="v", muted=True) if k < muted else Result(name="v", nothing=True, reason="nobody")
+        said.append(row, 0.1 * k)
+        said.pass_time(row, 0.1)
+    assert said.verdict is (U if muted == 2 else None)
+    assert said.times().muted == muted / 2

@@ -1,10 +1,14 @@
 r"""Does the model explain a log? Inverse dynamics against measured torques, and what would close the gap.
 
 .. math:: \tau_i = (M \ddot q + c + g)_i + Y(q, \dot q, \ddot q)_i\,\varphi
-          + F_{c,i}\,\mathrm{sgn}(\dot q_i) + F_{v,i}\,\dot q_i + o_i + \varepsilon_i
+          + F_{c,i}\,\mathrm{sgn}(\dot q_i) + F_{v,i}\,\dot q_i + o_i - d\,\dot{\hat\tau}_i + \varepsilon_i
 
 :math:`\varphi = (m, h, \Sigma)` is a payload on the flange beside what the file has there: its mass, its
-first and second moments in the flange's frame. The equation is linear in all that is fitted: weighted least
+first and second moments in the flange's frame.
+Torques that a controller filters, or logs a sample later, come :math:`d` after the motion that needs them: it
+is taken at that instant, and what is left of the delay is fitted with the rate at which the smooth part
+:math:`\hat\tau` of a first fit changes (all but Coulomb's friction), so that it is in every interval.
+The equation is linear in all that is fitted: weighted least
 squares, weights from the residuals of a first fit, per joint. Errors of neighbouring samples are alike,
 so variances are raised by (1 + ρ)/(1 − ρ), ρ their correlation per joint, as residuals of such a fit show it.
 Intervals: 95 % by Student's t.
@@ -28,6 +32,8 @@ SLOW = {"rad": 0.02, "m": 0.002}
 """Below it a joint may stick: its friction is anything up to Coulomb's, and its rows are left out."""
 HALF_WINDOW = 0.02
 """Accelerations are slopes of the speeds over so long before and after [s], or one sample either way."""
+PASSES, SETTLED, LONGEST = 4, 5e-4, 0.1
+"""Fits in which the delay of torques is found, at the most; less of it is linear, and more is none [s]."""
 MOST = 4000
 """Samples that are used, in stretches that are spread evenly."""
 LEAST = 20
@@ -326,6 +332,8 @@ class Explanation:
     """Mass that the file has there [kg]."""
     mass: float
     """Mass of all that the joints move, as the file has it [kg]."""
+    delay: Figure
+    """By which torques come after the motion that needs them [s]."""
     condition: float
 
     @property
@@ -380,19 +388,31 @@ def explain(model: Model, name: str, said: Said) -> Explanation:
     qd = said.qd if said.qd is not None else slopes(said.t, said.q, HALF_WINDOW)
     qdd = slopes(said.t, qd, HALF_WINDOW)
     rows = _spread(len(said.t), MOST)
-    q, qd, qdd, tau = (np.asarray(x[rows]) for x in (said.q, qd, qdd, said.tau))
-    dynamics = Dynamics(model, robot)
-    needed, payload = dynamics(q, qd, qdd)
-    n = len(robot.joints)
-    used = np.abs(qd) > np.array([SLOW[unit] for unit in robot.units])
-    moving = int(used.any(axis=1).sum())
-    gap = tau - needed
-    if moving < LEAST:
-        what = f"{name} moves in {moving} of {len(rows)} samples: a joint that stands may stick"
-        raise InputError.at(
-            said.file, "torques", what, f"log a motion in which joints move, {LEAST} samples or more"
+    t, tau, delay = np.asarray(said.t[rows], float), np.asarray(said.tau[rows]), 0.0
+    dynamics, n = Dynamics(model, robot), len(robot.joints)
+    slow = np.array([SLOW[unit] for unit in robot.units])
+    for _ in range(PASSES):
+        since = t - delay
+        q, qd_then, qdd_then = (
+            _then(said.t, x, since) if delay else np.asarray(x[rows]) for x in (said.q, qd, qdd)
         )
-    found = fit(np.concatenate([payload, friction(qd)], axis=-1), gap, used)
+        needed, payload = dynamics(q, qd_then, qdd_then)
+        used = (np.abs(qd_then) > slow) & ((since >= said.t[0]) & (since <= said.t[-1]))[:, None]
+        moving = int(used.any(axis=1).sum())
+        if moving < LEAST:
+            what = f"{name} moves in {moving} of {len(rows)} samples: a joint that stands may stick"
+            raise InputError.at(
+                said.file, "torques", what, f"log a motion in which joints move, {LEAST} samples or more"
+            )
+        gap = tau - needed
+        columns = np.concatenate([payload, friction(qd_then)], axis=-1)
+        first = fit(columns, gap, used).values[:-n]
+        smooth = needed + payload @ first[: len(POINTS)] + qd_then * first[-n:]
+        found = fit(np.concatenate([columns, -slopes(t, smooth, HALF_WINDOW)[..., None]], axis=-1), gap, used)
+        more = float(found.values[-1]) if found.determined[-1] else 0.0
+        if abs(more) < SETTLED or abs(delay + more) > LONGEST:
+            break
+        delay += more
     figures = [
         Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0))) if determined else float("inf"))
         for x, v, determined in zip(found.values, np.diag(found.covariance), found.determined, strict=True)
@@ -417,7 +437,7 @@ def explain(model: Model, name: str, said: Said) -> Explanation:
                 left=float(np.sqrt((r**2).mean())),
                 asked=asked,
                 payload=float(np.sqrt((added[:, j] ** 2).mean())),
-                speed=float(np.abs(qd[:, j]).max()),
+                speed=float(np.abs(qd_then[:, j]).max()),
             )
         )
     carried = {model.bodies[i].owner: model.bodies[i].mass for i in robot.carried}
@@ -431,6 +451,7 @@ def explain(model: Model, name: str, said: Said) -> Explanation:
         com=_centre(found, figures),
         carried=sum(mass.value for mass in carried.values() if mass is not None),
         mass=float(model.mj.body_mass[robot.mj_bodies].sum()),
+        delay=Figure(delay + figures[-1].value, figures[-1].half),
         condition=found.condition,
     )
 
@@ -449,6 +470,11 @@ def _centre(found: Fitted, figures: list[Figure]) -> tuple[Figure, Figure, Figur
             Figure(float(c), float(NORMAL_95 * np.sqrt(max(v, 0.0)))) if figures[k].determined else none
         )
     return parts[0], parts[1], parts[2]
+
+
+def _then(t: Array, values: Array, at: Array) -> Array:
+    """Values at other instants [s], on straight lines between those that there are, shape (m, n)."""
+    return np.stack([np.interp(at, t, column) for column in np.asarray(values).T], axis=1)
 
 
 def _spread(n: int, most: int) -> NDArray[np.int64]:

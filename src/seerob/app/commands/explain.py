@@ -58,6 +58,7 @@ def tell(found: Explanation) -> None:
     for joint in found.joints:
         line("joint", f"{joint.name}: {_joint(joint)}")
     line("payload", _payload(found))
+    line("delay", _delay(found))
     line(WORDS[found.explains], sentence(found), STYLES[found.explains])
 
 
@@ -79,6 +80,13 @@ def _payload(found: Explanation) -> str:
         place = ", ".join(f"{1e3 * f.value:.0f} ± {1e3 * f.half:.1g}" for f in found.com)
         text += f", its centre at [{place}] mm of the flange"
     return text
+
+
+def _delay(found: Explanation) -> str:
+    if not found.delay.determined:
+        return "this motion does not tell whether torques come when the motion does that needs them"
+    ms = f"{1e3 * found.delay.value:.3g} ± {1e3 * found.delay.half:.2g} ms"
+    return f"torques come {ms} after the motion that needs them, which is taken out"
 
 
 def sentence(found: Explanation) -> str:
@@ -117,6 +125,7 @@ def figures(found: Explanation) -> dict[str, Any]:
         "explains": found.explains,
         "sentence": sentence(found),
         "payload [kg]": _figure(found.payload),
+        "delay [s]": _figure(found.delay),
         "carried [kg]": found.carried,
         "centre [m]": [_figure(figure) for figure in found.com],
         "joints": [

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
+from seerob.core.errors import Undecided
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
 from seerob.core.verdict import judge_interval
-from seerob.criteria.between_ticks import Told, least_margin, watched
+from seerob.criteria.between_ticks import FEW, Told, least_margin, watched
 from seerob.criteria.contact.regions import REGIONS
 from seerob.criteria.criterion import Criterion, Follows, Moment
 from seerob.criteria.judging import bound_to
@@ -100,6 +102,7 @@ def test_what_is_passed_between_two_ticks_is_exceeded(tmp_path, what, physics):
         ([(0, 0), (0.1949, 1), (0.3, 1)], Verdict.EXCEEDED),
         ([(0, 1), (0.1985, 0), (0.3, 0)], Verdict.EXCEEDED),
         ([(0, 1), (0.1, 0), (0.192, 1), (0.198, 0), (0.3, 0)], Verdict.EXCEEDED),
+        ([(0, 1), (0.1906, 0), (0.194, 1), (0.3, 1)], Verdict.EXCEEDED),  # in the second part of a tick
         ([(0, 0), (0.1985, 1), (0.3, 1)], Verdict.WITHIN),
         ([(0, 1), (0.1915, 0), (0.3, 0)], Verdict.WITHIN),
     ],
@@ -702,6 +705,7 @@ def test_a_margin_is_nowhere_less_than_its_ends_less_half_of_what_it_loses_or_wh
     assert least((5.0, 0.7), (3.0, 0.2), 4.0, 0.5) == pytest.approx(1.8)
     assert least((3.0, 0.2), None, 1.0, np.inf) == pytest.approx(1.8)
     assert least((3.0, 0.2), None, 1.0, 0.0) == pytest.approx(1.8)
+    assert least_margin((5.0, 0.0), (3.0, 0.0), Fall(np.array([4.0, 1.0]))) == 2.0
 
 
 class Turned(Criterion, frozen=True, kw_only=True):
@@ -722,6 +726,15 @@ class Turned(Criterion, frozen=True, kw_only=True):
     """Whether its limit falls by how far the second joint is turned, of the second part by the opposite."""
     keeps: bool = False
     """Whether by the most since the run began."""
+    unknown: tuple[float, float] = (np.inf, np.inf)
+    """Of ways that begin from one instant to another [s], nobody knows how its limit falls, or its margin."""
+    hidden: tuple[float, float] = (np.inf, np.inf)
+    """From one instant to another [s], nobody sees the arm."""
+    once: bool = False
+    """Whether it says what it can lose on the whole way, so that no instant tells more."""
+
+    def bounded_once(self, model):
+        return self.once
 
     def remembers(self, model):
         return self.keeps
@@ -736,7 +749,9 @@ class Turned(Criterion, frozen=True, kw_only=True):
             return Moment(state.q(robot)[1] * np.array([1.0, -1.0])[:count])
 
         def most(span, moment):
-            return moment.figure + span.qd[robot.v_address[1]] * span.T
+            found = moment.figure + span.qd[robot.v_address[1]] * span.T
+            found[-1] += np.inf if self.unknown[0] <= span.begin < self.unknown[1] else 0.0
+            return found
 
         return Follows(now, most, 1e-4, self.keeps, lambda: self._bound(model, keeps=False))
 
@@ -754,6 +769,8 @@ class Turned(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state):
             q = state.q(robot) if self.each else state.q(robot)[:1]
+            if self.hidden[0] < state.t < self.hidden[1]:
+                raise Undecided("nobody sees the arm")
             if self.follows_other:
                 figure = state.q(robot)[1] * np.array([1.0, -1.0])[: len(q)]
                 if keeps:
@@ -799,6 +816,8 @@ class Turned(Criterion, frozen=True, kw_only=True):
 
         def lowest(state, span):
             rows = np.asarray(robot.v_address)[: 1 + self.each]
+            if self.unknown[0] <= span.begin < self.unknown[1]:
+                raise Undecided("nobody knows")
             q = state.q(robot)[: 1 + self.each]
             return self.limit - self.spread - float((q + span.qd[rows] * span.T).max())
 
@@ -843,8 +862,8 @@ def leaps(folder):
     return station, t, s[:, 0], cubics
 
 
-def judged_by(station, criteria):
-    """What each says at each tick, and how often it was asked."""
+def judged_by(station, criteria, **changed):
+    """What each says at each tick, and how often it was asked; last how often of all instants between."""
     model, points, asked = station.model, Points(station.model), [0] * len(criteria)
     bound = []
     for k, criterion in enumerate(criteria):
@@ -854,10 +873,11 @@ def judged_by(station, criteria):
             asked[k] += 1
             return evaluate(state)
 
-        bound.append(replace(one, evaluate=counted, watch=watched(criterion, model, points)))
+        watch = replace(watched(criterion, model, points), **changed)
+        bound.append(replace(one, evaluate=counted, watch=watch))
     judge, feed = Judge(bound), pump(station.sources, station.workstation.engine.tick)
-    found = [out.results for out, _ in ticks(engine_of(model), judge, feed)]
-    return [[results[k] for results in found] for k in range(len(criteria))], asked
+    found = [out.results for out, _ in islice(ticks(engine_of(model), judge, feed), 21)]
+    return [[results[k] for results in found] for k in range(len(criteria))], [*asked, judge.looks]
 
 
 HOWS = {
@@ -868,6 +888,7 @@ HOWS = {
     "without a bend": {"bends": False},
     "each without a bend": {"bends": False, "each": True},
     "by a period": {"every": 0.05},
+    "by a period with a wide spread": {"every": 0.05, "spread": 0.05},
     "each by a period": {"every": 0.05, "each": True, "spread": 0.003},
     "bounded by itself": {"bounds_itself": True},
     "both bounded by itself": {"bounds_itself": True, "each": True, "spread": 0.002},
@@ -935,3 +956,142 @@ def test_at_each_tick_what_is_said_is_true_of_all_the_time_since_the_last(tmp_pa
             seen.add(verdict)
     assert Verdict.WITHIN in seen
     assert {Verdict.EXCEEDED, Verdict.UNDECIDED} & seen or HOWS[how].get("keeps")
+
+
+@pytest.mark.parametrize("every", [{}, {"every": 0.05}])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"follows_other": True},
+        {"follows_other": True, "each": True},
+        {"follows_other": True, "keeps": True},
+        {"follows_other": True, "keeps": True, "each": True, "spread": 0.01},
+        {"bounds_itself": True},
+    ],
+)
+def test_what_nobody_knows_of_the_way_is_undecided_there_and_only_there(tmp_path, how, every):
+    """However far the limit is: that of one of two parts, or of a bound of its own, for 30 ms."""
+    station = leaps(tmp_path)[0]
+    one = Turned(name="one", limit=0.9, unknown=(0.0599999, 0.0899), **how, **every)
+    ((*results,),), _ = judged_by(station, [one])
+    undecided = [k for k, result in enumerate(results) if result.verdict is Verdict.UNDECIDED]
+    assert undecided == [7, 8, 9]
+    assert all("between two ticks" in results[k].reason for k in undecided)
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_where_there_is_room_nothing_is_asked_between_two_ticks_and_nothing_before_its_period(tmp_path, how):
+    options = {key: value for key, value in HOWS[how].items() if key != "active"}
+    _, (asked, looks) = judged_by(leaps(tmp_path)[0], [Turned(name="one", limit=0.95, **options)])
+    if "follows_other" in options:  # by how much its limit falls is bounded more closely in parts of the way
+        assert 0 < looks <= 20 * FEW
+    else:
+        assert looks == 0
+    assert asked == (round(0.2 / options["every"]) + 1 if "every" in options else 21)
+
+
+def test_instants_that_are_looked_at_are_counted_each_and_not_where_an_end_exceeds(tmp_path):
+    station, asked, looked = leaps(tmp_path)[0], [], []
+    for limit in LIMITS:
+        one = Turned(name="one", limit=limit, bends=False)
+
+        def again(one=one):
+            evaluate = one.bind(station.model)
+            return lambda state: asked.append(state.t) or evaluate(state)
+
+        asked.clear()
+        ((*results,),), (_, looks) = judged_by(station, [one], again=again)
+        looked.append(looks)
+        assert looks == len(asked)
+        for t in asked:
+            at = results[int(t / 0.01) : int(t / 0.01) + 2]
+            assert Verdict.EXCEEDED not in [result.verdict for result in at if result.t in (None, 0.0)]
+    assert max(looked) > 3
+
+
+def test_a_bound_is_told_the_least_margin_of_both_ends_less_what_it_may_be_off(tmp_path):
+    for each in (False, True):
+        station, told = leaps(tmp_path / str(each))[0], {}
+        one = Turned(name="one", limit=0.7, spread=0.02, each=each)
+        falls = one.falls(station.model, None)
+
+        def telling(span, least, falls=falls, told=told):
+            told[span.end] = least
+            return falls(span, least)
+
+        ((first, *results),), _ = judged_by(station, [one], falls=telling)
+        assert len(told) == len(results) == 20
+        for before, now, least in zip((first, *results), results, told.values(), strict=False):
+            both = [one.margin(result) for result in (before, now)]
+            assert least == pytest.approx(np.min([m - off for m, off in both], axis=0))
+
+
+def test_what_nobody_sees_between_two_ticks_is_undecided_with_that_reason(tmp_path):
+    """Where a bound does not clear it: the arm is hidden from 51 to 59 ms, and seen at each tick."""
+    station, reasons = leaps(tmp_path)[0], set()
+    limits = np.arange(0.15, 0.3, 0.0005).tolist()
+    some = [Turned(name=f"{x}", limit=x, hidden=(0.0512, 0.0588)) for x in limits]
+    same = [Turned(name=f"{x}", limit=x) for x in limits]
+    every, _ = judged_by(station, [*some, *same])
+    for hidden, seen in zip(every[: len(some)], every[len(some) :], strict=True):
+        for k, (one, other) in enumerate(zip(hidden, seen, strict=True)):
+            assert k == 6 or one.verdict is other.verdict
+        reasons.add(hidden[6].reason)
+        assert hidden[6].verdict is seen[6].verdict or hidden[6].verdict is Verdict.UNDECIDED
+    assert "between two ticks: nobody sees the arm" in reasons
+
+
+def test_what_remembers_is_not_asked_between_two_ticks_unless_its_limit_follows(tmp_path):
+    station = leaps(tmp_path)[0]
+    for follows in (False, True):
+        criteria = [Turned(name=f"{x}", limit=x, keeps=True, follows_other=follows) for x in LIMITS]
+        every, _ = judged_by(station, criteria)
+        reasons = [result.reason for results in every for result in results]
+        assert any(reason.endswith("it remembers") for reason in reasons) is not follows
+
+
+def test_what_is_picked_up_between_two_ticks_is_known_from_no_bound(tmp_path):
+    """It has the speed of the hand at once; with room enough all the same, and in a period too."""
+    for how in ({}, {"bounds_itself": True}, {"every": 0.05}, {"every": 0.05, "bounds_itself": True}):
+        station = leaps(tmp_path / str(len(str(how))))[0]
+        one = Turned(name="one", limit=0.9, **how)
+        criterion = bound_to(station.model, one, "safety")
+        judge = Judge([replace(criterion, watch=watched(one, station.model, Points(station.model)))])
+        verdicts = []
+        for out, _ in islice(ticks(engine_of(station.model), judge, pump(station.sources, 0.01)), 21):
+            verdicts.append(out.results[0].verdict)
+            if len(verdicts) == 7:
+                ids = np.frombuffer(judge._between._ids, np.int64).copy()
+                judge._between._ids = np.roll(ids, 1).tobytes()
+        assert (verdicts[7] is Verdict.UNDECIDED) is ("bounds_itself" in how), how
+        assert {*verdicts[:7], *verdicts[8:]} == {Verdict.WITHIN}
+
+
+def test_a_file_accepts_only_what_a_bound_of_its_own_leaves_open(tmp_path):
+    model, accepted = leaps(tmp_path)[0].model, "accepted: it is slow"
+    points = Points(model)
+    for how, text in (({"bounds_itself": True}, accepted), ({"once": True}, accepted), ({}, "")):
+        watch = watched(Turned(name="one", limit=1.0, between_samples=accepted, **how), model, points)
+        assert watch.accepted == text
+        assert (watch.looks == 0) is ("once" in how)
+        assert (watch.falls is None) is ("bounds_itself" in how)
+        assert watched(Turned(name="one", limit=1.0, **how), model, points).accepted == ""
+
+
+LOST = [Fall(0.0, 0.0), Fall(np.array([0.0, 1.0])), Fall(-1e-12), Fall(1.0, -1.0), Fall(np.nan)]
+LOST += [Fall(np.array([1.0, -1.0])), Fall(1.0, np.array([0.0, -1.0]))]
+
+
+@pytest.mark.parametrize("lost", LOST)
+def test_no_margin_grows_by_a_bound_of_ones_own(tmp_path, lost):
+    class Own(Turned, frozen=True, kw_only=True):
+        def falls(self, model, points):
+            return lambda span, margin: lost
+
+    model = leaps(tmp_path)[0].model
+    falls = watched(Own(name="one", limit=1.0), model, Points(model)).falls
+    if all(np.all(each >= 0) for each in lost):
+        assert falls(None, 1.0) is lost
+    else:
+        with pytest.raises(ValueError, match="no margin falls by less than nothing"):
+            falls(None, 1.0)

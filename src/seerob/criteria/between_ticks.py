@@ -205,7 +205,7 @@ class BetweenTicks:
         if not any(self._watches):
             return tuple(found)
         speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
-        if path is None or self._ids is None or self._speeds is None:
+        if path is None or self._ids is None:
             path, self._before, self._followed = None, [None] * len(found), {}
         self._way, self._asking, self._whole, self._falls = path, asking, None, None
         if path is not None:
@@ -215,12 +215,12 @@ class BetweenTicks:
             if watch is None:
                 continue
             try:
-                if not self._failed or i not in self._failed:
+                if i not in self._failed:
                     found[i] = self._one(i, watch, found[i], state, speeds)
             except Exception as error:
                 # One's own bound that fails must not end a run that others are judged in.
                 self._failed[i] = f"what bounds it between two ticks failed: {type(error).__name__}: {error}"
-            if self._failed and i in self._failed:
+            if i in self._failed:
                 found[i] = asking.take_back(found[i], self._failed[i])
         self._ids, self._speeds = ids.tobytes(), speeds
         return tuple(found)
@@ -239,7 +239,7 @@ class BetweenTicks:
         now = _end(watch.criterion, result, state.t, speeds)
         if watch.follows is not None:
             now = replace(now, figure=self._figure(watch, watch.follows, result, state.t))
-        if self._way is not None and before is not None:
+        if before is not None:
             told = (
                 self._switched(i, watch, (before, now), switches, state)
                 if switches
@@ -247,15 +247,10 @@ class BetweenTicks:
             )
             if told.exceeded is not None:
                 result = told.exceeded
-            elif told.open and not watch.accepted and self._green(watch, now):
+            elif told.open and not watch.accepted and (now.verdict is _WITHIN or now.muted or now.idle):
                 result = replace(self._asking.take_back(result, told.open), muted=False)
         self._before[i] = now
         return result
-
-    @staticmethod
-    def _green(watch: Watch, now: End) -> bool:
-        """Whether it says that all is well, or nothing."""
-        return now.verdict is _WITHIN or now.muted or (now.idle and watch.lowest is not None)
 
     def _follow(self, watch: Watch, follows: Follows, state: State, speeds: Array, *, muted: bool) -> None:
         """Bound what a limit follows from on the way to this tick."""
@@ -263,13 +258,14 @@ class BetweenTicks:
         now: Moment | None = None
         with suppress(Undecided):
             now = None if muted and follows.keeps else follows.now(state)
-        before, path = told.last, self._way
+        before = told.last
         told.last, told.open = now, True
         if now is None:
             return
         highest = [now.figure]
-        if before is not None and path is not None and self._speeds is not None:
-            ends = End(float(path.t[0]), None, None, self._speeds), End(state.t, None, None, speeds)
+        if before is not None:
+            assert self._speeds is not None
+            ends = End(self._begins, None, None, self._speeds), End(state.t, None, None, speeds)
             most = self._highest(watch, follows, ends, (before, now), told, state)
             told.open = not np.isfinite(most).all()
             highest += [] if told.open else [most]
@@ -334,9 +330,8 @@ class BetweenTicks:
             return end.margin
         told, (margin, off) = self._followed[watch], end.margin
         if told.open or end.figure is None:
-            return -np.inf if type(margin) is float else np.full(np.shape(margin), -np.inf), off
-        rise = np.maximum(told.most - end.figure, 0.0)
-        return margin - (float(rise.max(initial=0.0)) if type(margin) is float else rise), off
+            return -np.inf, off
+        return margin - np.maximum(told.most - end.figure, 0.0), off
 
     @staticmethod
     def _switches(watch: Watch, before: End | None, state: State) -> tuple[float, ...]:
@@ -379,7 +374,8 @@ class BetweenTicks:
     def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
         """What is left at this tick of a margin that was not asked for; None when that is not enough."""
         path = self._way
-        if path is None or not self._same:
+        assert path is not None
+        if not self._same:
             return None  # what was picked up has the speed of the hand at once
         if watch.lowest is not None:
             now = replace(before, t=state.t, speeds=speeds)

@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from live_story import Story, lived, open_files, wait_for
+from live_story import Story, listening, lived, open_files, wait_for
 from made_cell import made
 from reached import asked
 from seerob.app.emulators.fri import FriServer
@@ -178,3 +178,28 @@ def test_messages_are_the_clock_where_there_is_none_and_the_count_comes_round():
     assert clock(message(2)) == pytest.approx(0.005 * (2**32 + 2))
     assert clock(message(2**32 - 2)) == pytest.approx(0.005 * (2**32 - 2))
     assert clock(message(3)) == pytest.approx(0.005 * (2**32 + 3))
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_positions_that_are_said_again_with_new_stamps_are_a_recording(port, again):
+    """A period of a motion with the noise of encoders, again and again without a seam, or as it goes on."""
+    rng, period, said = np.random.default_rng(4), 1.5, []
+
+    def noisy(t):
+        k = len(said)
+        if again and k > 200:
+            said.append(said[k - 150])
+        else:
+            q = HOME + AMPLITUDE * np.sin(2 * np.pi / period * 0.01 * k) + rng.normal(0, 2e-6, 7)
+            said.append(tuple(q.tolist()))
+        return said[-1], (0.0,) * 7
+
+    source = Fri(robot="arm", host="127.0.0.1", port=port, frequency=100)
+    with FriServer(noisy, to=("127.0.0.1", port)), listening(source) as heard:
+        wait_for(lambda: len(said) > 500)
+    joints = [s for s in heard if isinstance(s, JointSample)]
+    doubted = [s for s in joints if "is a recording played" in s.reason]
+    known = {q: k for k, q in reversed([*enumerate(said)])}
+    late = [s for s in joints if known[s.q] < 200][-100:] if again else []
+    assert bool(doubted) is again
+    assert all("is a recording played" in s.reason for s in late)

@@ -83,6 +83,11 @@ TOLD_BY = {"rad": 0.01, "m": 2e-3}
 """Way between two anchors that tells of it [rad or m]: twice `NOISE`."""
 CLOSE = 0.99
 """Share of a bound up to which rounding can hide nothing: what is nearer is not compared one by one."""
+AGAIN, REMEMBERED = 10, 1 << 15
+"""So many positions of a robot that moves, one after another, are not those of before to the last bit; and of
+how many that is known."""
+FINE = 1e-6
+"""Digits no coarser than that have noise, which no robot repeats [rad or m]."""
 SILENCE = 0.5
 """After it what was before says nothing of now [s]."""
 
@@ -117,6 +122,11 @@ class _Standing:
         """Velocity said last; what they come to while it stands, and the largest of them."""
         self._window = -math.inf
         self._looked, self._dead = False, ""
+
+    @property
+    def finest(self) -> float:
+        """Least step of its digits that was seen [rad or m]."""
+        return self._finest
 
     def add(self, t: float, q: float, qd: float | None, jitter: float) -> str:
         """Why it cannot stand as it is said to; empty when it may.
@@ -201,6 +211,39 @@ class _Scale:
         return f"is off by a factor: positions move at {scale:.3g} × the velocity"
 
 
+class _Repeats:
+    """Whether a robot says again, in the same order, where it was before."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[int, int] = {}
+        """Places that it was at, told by their hashes, and which of all each was the last time."""
+        self._count = self._then = self._run = 0
+        self._at: tuple[float, ...] = ()
+
+    def add(self, q: tuple[float, ...], finest: float) -> str:
+        """Why it may be a recording; empty when it is none.
+
+        Args:
+            q: Where it is [rad or m].
+            finest: Least step of its digits that was seen [rad or m].
+        """
+        if q == self._at:
+            return ""
+        self._at, place = q, hash(q)
+        then = self._numbers.pop(place, None)
+        if then is None or then != self._then + 1:
+            self._run = 0
+        self._run += then is not None
+        self._then = -1 if then is None else then
+        self._count += 1
+        if len(self._numbers) >= REMEMBERED:
+            del self._numbers[next(iter(self._numbers))]
+        self._numbers[place] = self._count
+        if self._run < AGAIN or finest > FINE:
+            return ""
+        return f"says its last {self._run} positions again, to the last bit: is a recording played to it?"
+
+
 class Contradictions:
     """What one source says of one target, sample by sample.
 
@@ -240,6 +283,7 @@ class Contradictions:
         """Instants [s] and positions of a device that gives no velocities."""
         self._standing: list[_Standing] = []
         self._scales: list[_Scale] = []
+        self._repeats = _Repeats()
 
     def find(self, sample: Sample) -> str:
         """Why this sample and those before it are no one motion; empty when they may be."""
@@ -261,7 +305,11 @@ class Contradictions:
             jump = self._leap(before, sample, step) if isinstance(before, JointSample) else ""
             # Each is told every sample: what it looks for may begin while another one has found something.
             differs, hangs = self._compare(sample, t), self._hangs(sample, t)
-            return jump or differs or hangs
+            again = ""
+            if self._live and (sample.qd is None or sample.qd_error is not None):
+                # Measured velocities say more, and simulators that tell them repeat themselves exactly.
+                again = self._repeats.add(sample.q, min((j.finest for j in self._standing), default=math.inf))
+            return jump or differs or hangs or again
         if isinstance(sample, PoseSample):
             return _moved(before, sample, step) if isinstance(before, PoseSample) else ""
         return _flew(before, sample, step) if isinstance(before, BodySample) else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, heard, made, two_r
+from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.snapshot import Verdict
 from seerob.files.trajectories.trajectory import derive_velocities
 from seerob.recording.recording import Recording
@@ -185,3 +185,21 @@ def test_who_does_not_say_when_a_motion_ends_gets_no_verdict_past_it(tmp_path):
     station = until(tmp_path, 0.499, 3, False)
     assert station.run().verdict is Verdict.WITHIN
     assert station.run(feed=pump(station.sources, TICK)).verdict is Verdict.UNDECIDED
+
+
+def test_a_reaction_time_between_two_ticks_is_looked_ahead_to_the_tick_after_it(tmp_path):
+    """Of samples that come twice a tick the last of them was missing, so that a motion seemed to end."""
+    t = np.arange(0, 0.4001, 0.005)
+    rows = "".join(f"{a:.3f},{0.2 * a:.9f},0\n" for a in t.tolist())
+    text = (
+        FLOATING.replace("{ ", "{ physics = false, ")
+        + TWO_R
+        + person("op", 8, 0, -1)
+        + '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "arm.csv"\n[[safety]]\nkind = "separation"\n'
+        'name = "S"\nbetween = ["arm", "op"]\nintrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n'
+        "stop = { reaction = 0.082, stopping = 0.1 }\n"
+    )
+    files = {"arm.urdf": two_r(), "arm.csv": "t [s],j0 [rad],j1 [rad]\n" + rows}
+    found = made(tmp_path, text, files).run().results["S"]
+    assert not any("its motion ends" in reason for reason in found.reasons[:30])
+    assert "its motion ends" in found.reasons[-1]

@@ -15,6 +15,7 @@ from seerob.core.snapshot import Verdict
 from seerob.criteria.between_ticks import Told
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation, Stop
+from seerob.criteria.safety.velocity import Velocity
 from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import BONES, bone_poses
@@ -187,3 +188,32 @@ def test_a_robot_too_near_a_stopped_hand_is_exceeded_and_never_within():
             seen.add(tuple(r.verdict for r in results))
             assert results[1].verdict is not Verdict.WITHIN
     assert seen == {(Verdict.EXCEEDED, Verdict.UNDECIDED)} or seen == {(Verdict.EXCEEDED, Verdict.EXCEEDED)}
+
+
+def test_who_is_touched_is_as_fast_as_was_captured_until_that_is_known_to_be_elsewhere():
+    """Between the touch and the tracking limit the twin alone was asked: it stands, and the hand moves."""
+    t, q = pressing()
+    station = workstation(source(captured(frames_of(t, q))), **desk())
+    hand, limit = "operator/right_hand", 0.25
+    stage = Station(replace(station, safety=(Velocity(name="v", of=hand, limit=limit),)))
+    engine, judge = Engine(stage.model, driven={"operator": 0.2}), Judge(stage.bound)
+    index = next(body.index for body in stage.model.bodies if body.name == hand)
+    met = 0
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        (result,) = judge(state)
+        a, b = (np.array([np.interp(state.t + d, t, joint) for joint in q.T]) for d in (-5e-3, 5e-3))
+        (_, before), (_, after) = bone_poses(PERSON, a), bone_poses(PERSON, b)
+        row = BONES.index("right_hand")
+        moves = float(np.linalg.norm(after[row] - before[row])) / 0.01
+        if moves < 1.1 * limit or not 0.3 < state.t < 0.8:
+            continue
+        assert result.verdict is not Verdict.WITHIN, state.t
+        twin = (
+            float(np.linalg.norm(state.body_velocities((index,))[0][index]))
+            if not state.stray("operator")
+            else 1
+        )
+        met += twin < 0.5 * moves
+    assert met > 2

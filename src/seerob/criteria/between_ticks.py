@@ -525,7 +525,7 @@ class BetweenTicks:
         shadow = self._shadow
         shadow.columns, shadow.foresee, shadow.knots = state.columns, state.foresee, state.knots
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
-        shadow.captured_qpos = path.captured_at(t)
+        shadow.captured_between = path.captured_at(t)
         shadow.refresh(t)
         return shadow
 

@@ -52,6 +52,9 @@ NEAR = 2e-3
 """A twin that is nearer to where it is found to be is pulled there [rad or m]: at a bandwidth of 20 Hz its
 speed is off by 0.09 rad/s or m/s for a moment, as much as that of a robot that brakes at 3 rad/s² and was not
 heard for 30 ms. Ordinary jitter stays below."""
+LAGS = 0.2
+"""Share of the tracking limit by which the twin of a person whom things may touch is off where one did: what
+touched it between two ticks is not told. Own choice."""
 BEATS = 0.05
 """Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
 nobody says that it stopped."""
@@ -514,7 +517,9 @@ class Engine:
         """Whether the physics holds a person elsewhere than captured."""
         limit = self.model.workstation.engine.human_tracking_limit
         hearings = (self._hearings[name] for name in self._people)
-        return any(hearing.captured is not None and hearing.error > limit for hearing in hearings)
+        return any(
+            hearing.held or (hearing.captured is not None and hearing.error > limit) for hearing in hearings
+        )
 
     def _captured(self) -> tuple[Array, Array]:
         """As `_way`, with people where they were captured."""
@@ -723,7 +728,14 @@ class Engine:
     def _note_captured(self, person: Mechanism, hearing: Hearing) -> None:
         """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere."""
         hearing.captured = self._course.q[-1][person.q_address].copy()
-        if hearing.error > self.model.workstation.engine.human_tracking_limit:
+        rows = person.v_address
+        hearing.captured_v = self._course.v[-1][rows] + 0.5 * self._dt * self._course.a[-1][rows]
+        limit = self.model.workstation.engine.human_tracking_limit
+        own = {self.model.bodies[i].mj for i in (*person.bodies, *person.carried)}
+        if (touches := self.state.touches) is not None:
+            touched = any((one in own) != (other in own) for one, other, _ in touches)
+            hearing.held = touched or hearing.error > LAGS * limit
+        if hearing.error > limit:
             following = self._followings.get(person.name)
             hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
 

@@ -77,15 +77,15 @@ class Path:
     """Robots, people and machines that were put elsewhere meanwhile: nobody knows their way."""
     captured: tuple[Array, Array] | None = None
     """``qpos`` and ``qvel`` of the same knots with people as they were captured, where the physics holds one
-    of them elsewhere at either end (`State.stray`)."""
+    of them elsewhere at either end (`State.stray`), or touches one (`Hearing.held`)."""
 
-    def captured_at(self, t: float) -> Array | None:
-        """``qpos`` at an instant [s] of it with people as captured; None where the twin follows."""
+    def captured_at(self, t: float) -> tuple[Array, Array] | None:
+        """``qpos`` and ``qvel`` at an instant [s] of it with people as captured; None where it follows."""
         if self.captured is None:
             return None
         q, v = np.empty(self.q.shape[1]), np.empty(self.v.shape[1])
         joints_at(self.t, *self.captured, t, q, v)
-        return q
+        return q, v
 
     def at(self, t: float) -> tuple[Array, Array]:
         """``qpos`` and ``qvel`` at an instant [s] of it."""

@@ -106,9 +106,9 @@ class State(Validity):
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
         self._others_of: dict[tuple[str, ...], Others] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
-        self.captured_qpos: Array | None = None
-        """Of an instant between two ticks: ``qpos`` with people where they were captured; None at a tick,
-        and where nobody is held elsewhere (`seerob.twin.spans.Path.captured`)."""
+        self.captured_between: tuple[Array, Array] | None = None
+        """Of an instant between two ticks: ``qpos`` and ``qvel`` with people as they were captured; None at a
+        tick, and where nobody is held (`seerob.twin.spans.Path.captured`)."""
         self._wanted: Any = None
         """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
@@ -228,21 +228,25 @@ class State(Validity):
 
     def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         rows, q = self._rows_of(bodies), self._hearings[name].captured
-        if q is not None and self.captured_qpos is not None:
-            q = self.captured_qpos[self._model.mechanisms[name].q_address]
+        if q is not None and self.captured_between is not None:
+            q = self.captured_between[0][self._model.mechanisms[name].q_address]
         if q is None:
             return self._rotations[rows], self._positions[rows]
         key = ("captured", name)
         if key not in self._cache:
-            if self._wanted is None:
-                self._wanted = mujoco.MjData(self._model.mj)
-            self._wanted.qpos[:] = self._data.qpos
-            self._wanted.qpos[self._model.mechanisms[name].q_address] = q
-            mujoco.mj_kinematics(self._model.mj, self._wanted)
-            self._cache[key] = self._wanted.xmat.reshape(-1, 3, 3).copy(), self._wanted.xpos.copy()
+            mujoco.mj_kinematics(self._model.mj, wanted := self._as_captured(name, q))
+            self._cache[key] = wanted.xmat.reshape(-1, 3, 3).copy(), wanted.xpos.copy()
         R, x = self._cache[key]
         ids = self.attachments.ids[rows]
         return R[ids], x[ids]
+
+    def _as_captured(self, name: str, q: Array) -> Any:
+        """Data with all others where they are, and a person with given joints [rad or m]; no kinematics."""
+        if self._wanted is None:
+            self._wanted = mujoco.MjData(self._model.mj)
+        self._wanted.qpos[:] = self._data.qpos
+        self._wanted.qpos[self._model.mechanisms[name].q_address] = q
+        return self._wanted
 
     def contact_forces(self, name: str) -> dict[int, tuple[float, str]]:
         """Bones of a person that something touches in the twin: the normal force [N], and who presses most.
@@ -872,9 +876,43 @@ class State(Validity):
                 self._rotations, self._positions, *self._velocities(), corners, start, self._reach,
                 speed, point, velocity,
             )  # fmt: skip
+            for name, hearing in self._hearings.items():
+                if hearing.held:
+                    self._add_captured(name, hearing, speed, point, velocity)
             self._cache["fastest"] = speed, point, velocity
         speed, point, velocity = self._cache["fastest"]
         return speed, point, velocity
+
+    def _add_captured(self, name: str, hearing: Hearing, speed: Array, point: Array, velocity: Array) -> None:
+        """Put captured speeds of a person who is touched where they are larger than the twin's."""
+        person, mj = self._model.mechanisms[name], self._model.mj
+        q, v = hearing.captured, hearing.captured_v
+        if self.captured_between is not None:
+            q, v = (
+                every[rows]
+                for every, rows in zip(
+                    self.captured_between, (person.q_address, person.v_address), strict=True
+                )
+            )
+        if q is None or v is None:
+            return
+        data = self._as_captured(name, q)
+        data.qvel[:] = self._data.qvel
+        data.qvel[person.v_address] = v
+        mujoco.mj_kinematics(mj, data)
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_comVel(mj, data)
+        ids = self.attachments.ids
+        R, x = data.xmat.reshape(-1, 3, 3)[ids], data.xpos[ids]
+        linear, angular = np.empty((2, *x.shape))
+        velocities(data.cvel, data.subtree_com, x, ids, self.attachments.roots, linear, angular)
+        other = np.zeros_like(speed), np.zeros_like(point), np.zeros_like(velocity)
+        corners, start = self._corners
+        fastest(R, x, linear, angular, corners, start, self._reach, *other)
+        rows = np.array([*person.bodies, *person.carried])
+        rows = rows[other[0][rows] > speed[rows]]
+        for each, more in zip((speed, point, velocity), other, strict=True):
+            each[rows] = more[rows]
 
     # -- distances --------------------------------------------------------------------------
 

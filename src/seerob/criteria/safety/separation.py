@@ -290,11 +290,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return seen, float((speeds + state.speed_noise(people)).max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
-        """Look ahead as long as the robot takes to react [s], by its name."""
+        """Look ahead as long as the robot takes to react from this tick or the next, to a whole tick [s]."""
         if self.stop.acceleration is not None:
             return {}
         worst = self._by_device(model)[0].at_worst(model).stop.reaction
-        return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
+        return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + 2 * model.workstation.engine.tick}
 
     def claims(self, model: Model) -> Sequence[Claim]:
         """Claim that the robot gets no faster while it reacts than the file says, of points or of joints."""

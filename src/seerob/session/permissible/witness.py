@@ -95,6 +95,12 @@ class Posed(State):
         hearings = {name: Hearing(given=True, driven=False) for name in model.mechanisms}
         super().__init__(model, data, hearings)
         self._robot, self._witness = robot, witness
+        station = model.workstation
+        driven = {source.target() for source in station.sources}
+        driven |= {machine.name for machine in station.machines if machine.motion.variables()}
+        names = {machine.name for machine in station.machines} - driven
+        self._rests = {name: model.mechanisms[name].home for name in names}
+        """Machines that nothing moves, and where their joints are."""
         self.doubts: dict[str, str] = {}
         """Why somebody's place may not be relied on, by name; empty when it may."""
         self._said: dict[str, Value | Undecided] = {}
@@ -102,6 +108,9 @@ class Posed(State):
 
     def _steady(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
         """A speed that a place permits is one that is held there; the run of the plan knows better."""
+        if name in self._rests:
+            q = np.tile(self._rests[name], (len(t), 1))
+            return q, np.zeros_like(q), ""
         if name != self._robot.name:
             return None
         q, qd = self.joint_positions(self._robot), self.data.qvel[self.columns[name].own_v]

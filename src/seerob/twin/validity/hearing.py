@@ -133,6 +133,11 @@ class Hearing:
     """Of a person, what the newest samples said of bones, oldest first; empty of whom joints move."""
     captured: Array | None = None
     """Of a person whom the physics moves: the joint positions that the twin is pulled to now [rad or m]."""
+    captured_v: Array | None = None
+    """Their velocities [rad/s or m/s]."""
+    held: bool = False
+    """Something touches that person, or keeps the twin from being where it is pulled to: how fast the person
+    is, what was captured tells, too."""
     residual: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """As `bones`, of those joint positions instead of the twin's, where the twin does not follow."""
     lost: float = -np.inf
@@ -160,6 +165,7 @@ class Hearing:
             heard=deepcopy(self.heard),
             bones_heard=[*self.bones_heard],
             captured=None if self.captured is None else self.captured.copy(),
+            captured_v=None if self.captured_v is None else self.captured_v.copy(),
             bones={**self.bones},
             residual={**self.residual},
         )

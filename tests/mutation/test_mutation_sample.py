@@ -72,10 +72,8 @@ def _functions(tree):
 
 
 def test_a_default_is_changed_where_the_function_keeps_it(monkeypatch):
-    source = (PACKAGE / "criteria/criterion.py").read_text("utf-8")
-    (mutant,) = (
-        m for m in mutants(source, "criteria/criterion.py") if (m.function, m.before) == ("judge", "True")
-    )
+    source = (PACKAGE / "core/verdict.py").read_text("utf-8")
+    (mutant,) = (m for m in mutants(source, "core/verdict.py") if (m.function, m.before) == ("judge", "True"))
     monkeypatch.setattr(judge, "__kwdefaults__", dict(judge.__kwdefaults__))
     assert judge(1.0, 2.0) is Verdict.WITHIN
     put_in(mutant, source)

@@ -17,7 +17,7 @@ from seerob.criteria.judging import Judge
 from seerob.outputs.sinks import recorder
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.format import END_METADATA, SAMPLES, Tick
-from seerob.recording.recording import Recording, scan
+from seerob.recording.recording import ChunkPlace, Damaged, Recording, read_chunk, scan
 from seerob.session import run, scene
 from seerob.session.station import load, load_recorded
 
@@ -229,3 +229,13 @@ def test_what_another_version_did_not_call_within_is_not_within_now(tmp_path, mo
     stricter.write_text(CELL.replace("limit = 3", "limit = 2.5"))
     (tmp_path / "arm.urdf").write_text(two_r())
     assert load(stricter).replay(recording).verdict is Verdict.WITHIN  # another question
+
+
+@pytest.mark.parametrize(
+    ("size", "told"), [(2**28, "wrong checksum"), (2**28 + 1, "more than the 268435456")]
+)
+def test_a_chunk_of_no_more_than_256_mebibytes_is_unpacked(tmp_path, size, told):
+    file = tmp_path / "a.mcap"
+    file.write_bytes(b"none")
+    with pytest.raises(Damaged, match=told):
+        read_chunk(file, ChunkPlace(0, 1, 0, 4, size, 0, "", []))

@@ -292,14 +292,23 @@ def test_of_a_long_run_each_bucket_keeps_its_first_and_its_extreme_instants():
     assert thinned(empty, verdicts, 31) == sorted({*kept, 99} - {20, 220, 221})
 
 
-@pytest.mark.parametrize("limits", ["up", "down"])
-def test_where_the_limit_moves_the_smallest_margin_is_kept(limits):
-    """Neither the smallest nor the largest value: the limit comes nearest in the middle of the run."""
-    at_most = limits == "up"
-    near = 3.0 - 2.0 * (np.arange(600) == 333)
-    rows = [result(1.0, W, limit=1.0 + (n if at_most else -n), at_most=at_most) for n in near]
-    series = log_of(tick(k, row) for k, row in enumerate(rows))["speed"]
-    assert 333 in series.thinned(31)
+@pytest.mark.parametrize("at_most", [True, False])
+def test_where_the_limit_moves_the_smallest_margin_is_kept(at_most):
+    """Where the value is neither the smallest nor the largest."""
+    cells = {333: (1.9, 2.0 if at_most else 1.8), 340: (5.0, 9.0 if at_most else 1.0)}
+    usual = (0.2, 1.0 if at_most else -0.8)
+    rows = [cells.get(k, usual) for k in range(600)]
+    said = [result(value, W, limit=limit, at_most=at_most) for value, limit in rows]
+    assert 333 in log_of(tick(k, row) for k, row in enumerate(said))["speed"].thinned(31)
+
+
+@pytest.mark.parametrize("most", [26, 27, 28, 29, 30])
+def test_no_more_points_are_kept_than_are_asked_for(most):
+    """Five of a bucket, where the first, the worst and all extremes are apart, and the last of all."""
+    cells = {3: (1.0, 5.0, U), 5: (0.1, 5.0, W), 7: (3.0, 9.0, W), 9: (1.9, 2.0, W)}
+    rows = [cells.get(k % 20, (1.0, 5.0, W)) for k in range(900)]
+    said = log_of(tick(k, result(v, verdict, limit=limit)) for k, (v, limit, verdict) in enumerate(rows))
+    assert len(said["speed"].thinned(most)) == 26
 
 
 @pytest.mark.parametrize("count", [6, 7, 8])
@@ -327,9 +336,10 @@ def test_a_part_is_at_its_worst_where_its_verdict_and_its_margin_are():
     assert worst((1.0, 2.0, W), (1.5, 2.0, W), (None, 2.0, W)).t == 0.01
     assert worst((None, 2.0, U), (1.9, 2.0, W)).t == 0.0
     assert worst((1.0, 2.0, W), (9.0, 2.0, None)).t == 0.0
-    assert worst((1.5, 1.0, W), (1.2, 1.0, W), (9.0, 7.0, W), at_most=False).t == 0.01
-    # Without a limit by the distance to nought: 0.6 beyond it is more than 0.5 below a limit of 1.
-    assert worst((0.5, 1.0, W), (-0.6, None, W)).t == 0.0
+    assert worst((1.5, 1.0, W), (1.2, 1.0, W), (3.0, 2.9, W), at_most=False).t == 0.02
+    # Without a limit by the distance to nought.
+    assert worst((0.5, 1.0, W), (0.4, None, W)).t == 0.01
+    assert worst((0.5, 1.0, W)).verdict is W
     found = worst((0.2, None, None))
     assert (found.seq, found.limit, found.value, found.part) == (-1, None, 0.2, "")
 
@@ -353,3 +363,8 @@ def test_what_never_applied_is_undecided_and_what_applied_without_a_limit_inform
         said.pass_time(row, 0.1)
     assert said.verdict is (U if muted == 2 else None)
     assert said.times().muted == muted / 2
+    alone = Series(name="v", unit="m", at_most=True)
+    alone.append(row, 0.0)
+    assert alone.verdict is None
+    alone.pass_time(row, 0.0)
+    assert alone.verdict is (U if row.muted else None)

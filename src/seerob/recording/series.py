@@ -582,9 +582,7 @@ class Series:
 
     def thin(self, max_points: int = 2000) -> Trace:
         """For plots: at most ``max_points`` ticks, no extremum and no exceedance lost."""
-        n = len(self)
         i = self.thinned(max_points)
-        i = i[i < n]
         return Trace(
             name=self.name,
             t=self.t[i].astype("<f8").tobytes(),

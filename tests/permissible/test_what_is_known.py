@@ -8,7 +8,9 @@ import pytest
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin
+from seerob.session.permissible.ceilings import By, Ceiling
 from seerob.session.permissible.joint_limits import joint_limits
+from seerob.session.permissible.speed_map import Stations
 from seerob.session.permissible.witness import Posed, Witness
 from seerob.twin.engine import Engine
 
@@ -119,3 +121,16 @@ def test_a_robot_is_put_on_its_path_and_goes_on_as_it_is_put(tmp_path, mimic):
     assert posed.foresee("op", np.array([5.0])) is None
     posed.place(5.0, 0.0, q, qd, "it is not there")
     assert posed.invalid_place_reason("arm") == "it is not there"
+
+
+def test_between_two_stations_the_lesser_counts_and_on_one_that_of_both_its_sides():
+    """2, 1, 4 and 0.5 rad/s: of the joints, of half of them, of the joints, of a quarter."""
+    half, quarter = Ceiling("S", 0.5), Ceiling("S", 0.25)
+    s, none = np.arange(4.0), np.zeros(4)
+    stations = Stations(
+        s, s, np.array([2.0, 2.0, 4.0, 2.0]), none.astype(int), none, ((), (half,), (), (quarter, half)),
+        By.ALL, none, none, none,
+    )  # fmt: skip
+    np.testing.assert_array_equal(stations.permissible, [2.0, 1.0, 4.0, 0.5])
+    at = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
+    np.testing.assert_array_equal(stations.between(at), [1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5])

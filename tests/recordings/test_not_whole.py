@@ -1,5 +1,7 @@
 """A recording that is not what was written, all of it and in its place, is never within."""
 
+import io
+import struct
 from pathlib import Path
 
 import msgspec
@@ -17,7 +19,7 @@ from seerob.criteria.judging import Judge
 from seerob.outputs.sinks import recorder
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.format import END_METADATA, SAMPLES, Tick
-from seerob.recording.recording import ChunkPlace, Damaged, Recording, read_chunk, scan
+from seerob.recording.recording import ChunkPlace, Damaged, McapIndex, Recording, _record, read_chunk, scan
 from seerob.session import run, scene
 from seerob.session.station import load, load_recorded
 
@@ -239,3 +241,13 @@ def test_a_chunk_of_no_more_than_256_mebibytes_is_unpacked(tmp_path, size, told)
     file.write_bytes(b"none")
     with pytest.raises(Damaged, match=told):
         read_chunk(file, ChunkPlace(0, 1, 0, 4, size, 0, "", []))
+
+
+@pytest.mark.parametrize(("size", "told"), [(2**20, "cut off"), (2**20 + 1, "too long")])
+def test_a_name_of_no_more_than_a_mebibyte_is_read(size, told):
+    """A record of metadata that is no longer, too."""
+    name = struct.pack("<I", size)
+    with pytest.raises(Damaged, match=told):
+        _record(McapIndex(), io.BytesIO(name), 0x0C, 0, 2**20)
+    with pytest.raises(Damaged, match="metadata is too long"):
+        _record(McapIndex(), io.BytesIO(name), 0x0C, 0, 2**20 + 1)

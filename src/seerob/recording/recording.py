@@ -49,7 +49,7 @@ MAX_CHUNK = 256 * 2**20
 MAX_TEXT = 2**20
 """Longest name or metadata record that is read [bytes]."""
 
-_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
+_FOOTER, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x02, 0x04, 0x05, 0x06, 0x07
 _ATTACHMENT, _METADATA, _DATA_END = 0x09, 0x0C, 0x0F
 
 

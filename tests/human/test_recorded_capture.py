@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from made_capture import captured, frames_of, source, walking, workstation
 
 from seerob.core.samples import BodySample
-from seerob.description.humans.skeleton import BONES
+from seerob.core.snapshot import Verdict
+from seerob.criteria.ergonomics.owas import Owas, OwasPhase
+from seerob.description.humans.skeleton import BONES, JOINTS
 from seerob.devices.capture.options import Weights
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
@@ -44,3 +47,20 @@ def test_two_devices_are_recorded_and_replayed_bit_for_bit(tmp_path):
         assert one.joints == other.joints
         assert one.bones == other.bones
         assert one.poses == other.poses
+
+
+@pytest.mark.parametrize(
+    ("start", "verdict"),
+    [(0.5, Verdict.EXCEEDED), (500.0, Verdict.UNDECIDED), (None, Verdict.WITHIN)],
+)
+def test_a_phase_that_begins_when_the_motion_is_over_leaves_its_rule_undecided(start, verdict):
+    """Milliseconds for seconds: what is carried from 0.5 s on was judged at no instant, and was WITHIN."""
+    t, q = np.arange(0, 1.0, 0.05), np.zeros((20, len(JOINTS)))
+    phases = [OwasPhase(load=0.0, legs="standing")]
+    if start is not None:
+        phases.append(OwasPhase(title="carries", start=start, load=25.0, legs="both_knees_bent"))
+    rule = Owas(human="operator", name="owas", action_category=1, phases=tuple(phases))
+    station = Station(workstation(source(captured(frames_of(t, q))))).with_criteria(rule)
+    series = station.run().results["owas"]
+    assert series.verdict is verdict
+    assert ("the phase 'carries' begins at 500 s" in series.worst().reason) == (start == 500)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.metadata import version
 
 from seerob.core.plugin import kind_of
@@ -17,6 +17,22 @@ from seerob.twin.state import State
 from seerob.twin.validity.hearing import nobody_says
 from seerob.workstation.variables import Value, WhenStale
 from seerob.workstation.workstation import Workstation
+
+
+def unmet_phases(model: Model, bound: Sequence[Bound], end: float) -> Iterator[Finding]:
+    """Phases of a task that begin when the motion is over [s]: what they enter is judged at no instant."""
+    for rule in (one.criterion for one in bound):
+        own, human = getattr(rule, "phases", None), getattr(rule, "human", "")
+        if own is None:
+            continue
+        for phase in own or [p for p in model.workstation.phases if p.human in ("", human)]:
+            if phase.start > end + 1e-9:
+                called = f"the phase {phase.title!r}" if phase.title else "a phase"
+                text = (
+                    f"{rule.name}: {called} begins at {phase.start:g} s, and the motion ends at {end:g} s: "
+                    "it is judged at no instant; give a motion that has it, or its start in seconds"
+                )
+                yield Finding(level="warning", subject=rule.name, text=text, holds=(rule.name,))
 
 
 def scene_of(

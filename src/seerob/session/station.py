@@ -36,7 +36,7 @@ from seerob.session import run as road
 from seerob.session.opening import open_sources, reached, source_target
 from seerob.session.reading import read
 from seerob.session.run import Bound, Feed, Summary
-from seerob.session.scene import scene_of
+from seerob.session.scene import scene_of, unmet_phases
 from seerob.twin.own_words import said_by
 from seerob.twin.states import motion_of
 from seerob.workstation.allowed import Allowed
@@ -156,7 +156,10 @@ class Station:
         return scene_of(
             self.model,
             self.bound,
-            [f for _, o in opened for f in o.findings],
+            [
+                *(f for _, o in opened for f in o.findings),
+                *(unmet_phases(self.model, self.bound, road.ends_at(opened)) if with_sources else ()),
+            ],
             files=self.files,
             fed=not with_sources,
         )

@@ -124,13 +124,13 @@ def test_a_robot_is_put_on_its_path_and_goes_on_as_it_is_put(tmp_path, mimic):
 
 
 def test_between_two_stations_the_lesser_counts_and_on_one_that_of_both_its_sides():
-    """2, 1, 4 and 0.5 rad/s: of the joints, of half of them, of the joints, of a quarter."""
-    half, quarter = Ceiling("S", 0.5), Ceiling("S", 0.25)
+    """0.5, 2, 4 and 0.25 rad/s: a quarter of the joints', all of them twice, and an eighth."""
+    half, quarter, eighth = (Ceiling("S", 1 / n) for n in (2, 4, 8))
     s, none = np.arange(4.0), np.zeros(4)
     stations = Stations(
-        s, s, np.array([2.0, 2.0, 4.0, 2.0]), none.astype(int), none, ((), (half,), (), (quarter, half)),
+        s, s, np.array([2.0, 2.0, 4.0, 2.0]), none.astype(int), none, ((quarter, half), (), (), (eighth,)),
         By.ALL, none, none, none,
     )  # fmt: skip
-    np.testing.assert_array_equal(stations.permissible, [2.0, 1.0, 4.0, 0.5])
+    np.testing.assert_array_equal(stations.permissible, [0.5, 2.0, 4.0, 0.25])
     at = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
-    np.testing.assert_array_equal(stations.between(at), [1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+    np.testing.assert_array_equal(stations.between(at), [0.5, 0.5, 0.5, 2.0, 0.25, 0.25, 0.25])

@@ -28,6 +28,7 @@ from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.opcua_robot import OpcuaRobot, another_robot
 from seerob.devices.variables.live_source import Change, Picture
 from seerob.protocols.plc.opcua_client import (
+    CLOCK_STANDS,
     Address,
     Security,
     address,
@@ -162,6 +163,31 @@ def test_values_that_are_played_again_over_a_new_connection_are_not_relied_on(mo
             again = [s for s in list(heard)[before:] if "way" in s.values]
     assert len(again) > 40
     assert {s.doubts.get("way", "")[:27] for s in again} == {"way: says again what it sai"}
+
+
+@pytest.mark.parametrize("how", ["its clock stands", "it says that it failed"])
+def test_a_server_that_hangs_and_answers_is_not_heard(how):
+    """One of another maker whose values stand, as they would if all were well."""
+    from asyncua import ua
+
+    from foreign_opcua import URI as MAKER
+    from foreign_opcua import foreign_opcua
+
+    way = Variable(name="way", source="plc", unit="m", address=f"nsu={MAKER};s=way", timeout=60)
+    servers = []
+    with ExitStack() as stack:
+        url, _ = stack.enter_context(foreign_opcua({"way": 1.0}, more=servers.append))
+        with listening(Opcua(name="plc", url=url), target(way)) as heard:
+            wait_for(lambda: good(heard, "way") and heard[-1].t > heard[0].t + 4.5)
+            (server,) = servers
+            if how == "its clock stands":
+                server.aio_obj.iserver._time_task_stop = True
+            else:
+                failed = ua.Variant(int(ua.ServerState.Failed), ua.VariantType.Int32)
+                server.get_node("i=2259").write_value(failed)
+            time.sleep(CLOCK_STANDS + 2.0)
+            newest = heard[-1]
+            assert time.monotonic() - newest.t + newest.ages.get("way", 0.0) > 0.9
 
 
 def test_a_server_that_is_killed_is_found_again(monkeypatch):

@@ -241,8 +241,12 @@ BEAT = 0.5
 SILENT = ("asyncua", "asyncua.client.ua_client", "asyncua.common.subscription")
 
 
-STATE = 2259
-"""Number of Server_ServerStatus_State, which every server has (OPC 10000-6, NodeIds)."""
+STATE, CLOCK = 2259, 2258
+"""Numbers of State and CurrentTime of Server_ServerStatus, which every server has (OPC 10000-6, NodeIds)."""
+RUNNING = 0
+"""Of ServerState (OPC 10000-5, 12.6)."""
+CLOCK_STANDS = 3.0
+"""A server whose own clock stands for so long hangs [s]: some set it once a second."""
 
 
 class Security(StrEnum):
@@ -477,6 +481,10 @@ class Changes:
         self.revised: float | None = None
         """Publishing interval that the server grants [s]."""
         self._watched = time.monotonic()
+        self._clock: tuple[object, float] = None, 0.0
+        """What the server's clock said, and when it began to say that: host's monotonic time [s]."""
+        self._hangs = False
+        """Whether it answers, and does not run."""
         """When it was asked to be told."""
 
     async def watch(self, client: Client, nodes: Mapping[str, Node], interval: float) -> dict[str, str]:
@@ -543,19 +551,25 @@ class Changes:
                             await self._arrived.wait()
                 if asking is not None and asking.done():
                     asking.result()
-                    asking, shown = None, asked
+                    # Of one that answers and does not run, what it said grows old; over a new connection not.
+                    asking, shown = None, shown if self._hangs else asked
         finally:
             if asking is not None:
                 asking.cancel()
                 await asyncio.gather(asking, return_exceptions=True)
 
     async def _ask(self, client: Client) -> None:
-        """Whether the server is there."""
+        """Whether the server is there, and runs."""
         from asyncua import ua
 
         try:
             await client.check_connection()
-            await client.get_node(ua.NodeId(ua.Int32(STATE))).read_value()
+            nodes = [client.get_node(ua.NodeId(ua.Int32(number))) for number in (STATE, CLOCK)]
+            state, now = await client.read_values(nodes)
+            if now is None or now != self._clock[0]:
+                self._clock = now, time.monotonic()
+            stands = time.monotonic() - self._clock[1] > CLOCK_STANDS
+            self._hangs = stands or (isinstance(state, int) and state != RUNNING)
         finally:
             self._arrived.set()
 

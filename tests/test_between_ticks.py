@@ -706,6 +706,7 @@ def test_a_margin_is_nowhere_less_than_its_ends_less_half_of_what_it_loses_or_wh
     assert least((3.0, 0.2), None, 1.0, np.inf) == pytest.approx(1.8)
     assert least((3.0, 0.2), None, 1.0, 0.0) == pytest.approx(1.8)
     assert least_margin((5.0, 0.0), (3.0, 0.0), Fall(np.array([4.0, 1.0]))) == 2.0
+    assert least_margin((5.0, 0.0), (3.0, 0.0), Fall(4.0, np.array([np.inf, 0.5]))) == 2.0
 
 
 class Turned(Criterion, frozen=True, kw_only=True):
@@ -746,6 +747,8 @@ class Turned(Criterion, frozen=True, kw_only=True):
         count = 1 + self.each
 
         def now(state):
+            if self.hidden[0] < state.t < self.hidden[1]:
+                raise Undecided("nobody sees the arm")
             return Moment(state.q(robot)[1] * np.array([1.0, -1.0])[:count])
 
         def most(span, moment):
@@ -1095,3 +1098,24 @@ def test_no_margin_grows_by_a_bound_of_ones_own(tmp_path, lost):
     else:
         with pytest.raises(ValueError, match="no margin falls by less than nothing"):
             falls(None, 1.0)
+
+
+@pytest.mark.parametrize("how", [{}, {"each": True, "spread": 0.01}, {"keeps": True}])
+def test_a_period_hides_no_tick_at_which_nobody_knows_how_a_limit_falls(tmp_path, how):
+    one = Turned(name="one", limit=0.9, hidden=(0.065, 0.075), follows_other=True, every=0.05, **how)
+    ((*results,),), _ = judged_by(leaps(tmp_path)[0], [one])
+    assert [k for k, result in enumerate(results) if result.verdict is Verdict.UNDECIDED][:1] == [7]
+
+
+def test_what_is_bounded_is_judged_beside_what_is_not_and_in_a_run_that_begins_again(tmp_path):
+    station = leaps(tmp_path)[0]
+    one, model = Turned(name="one", limit=0.1995, bends=False), station.model
+    bounded = replace(bound_to(model, one, "safety"), watch=watched(one, model, Points(model)))
+    alone, beside = Judge([bounded]), Judge([replace(bounded, watch=None), bounded])
+    runs = []
+    for judge in (alone, beside, alone):
+        feed = pump(station.sources, 0.01)
+        runs.append([out.results[-1] for out, _ in islice(ticks(engine_of(model), judge, feed), 21)])
+    told = [[(result.verdict, result.reason) for result in results] for results in runs]
+    assert told[0] == told[1] == told[2]
+    assert any("between two ticks" in reason for _, reason in told[0])

@@ -207,6 +207,7 @@ class BetweenTicks:
         speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
         if path is None or self._ids is None:
             path, self._before, self._followed = None, [None] * len(found), {}
+            self._shadow = None  # it hears what the twin of this run does
         self._way, self._asking, self._whole, self._falls = path, asking, None, None
         if path is not None:
             self._begins, self._ends = float(path.t[0]), float(path.t[-1])

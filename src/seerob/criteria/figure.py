@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -19,11 +19,13 @@ from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict, judge, judge_interval
 from seerob.recording.answers import Answers, Flags
-from seerob.twin.state import State
-from seerob.twin.states import States
+
+if TYPE_CHECKING:
+    from seerob.twin.state import State
+    from seerob.twin.states import States
 
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
-Twin = State | States
+Twin: TypeAlias = "State | States"
 """The twin at one instant, or at N; accessors of both have the same names, with instants in front."""
 
 
@@ -64,7 +66,7 @@ class Shown(NamedTuple):
 
 Compute = Callable[[Twin], Figure]
 """May raise `Undecided`; of many instants, that is said of all of them."""
-Present = Callable[[State, Figure, Verdict | None], Shown]
+Present = Callable[["State", Figure, Verdict | None], Shown]
 """Called with what was computed of a state, and with what that says."""
 
 

@@ -2,8 +2,10 @@ r"""Kinetic energy of a robot, [Weistroffer2022]_ Eq. 5."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, cast
 
+import mujoco
 import numpy as np
 from msgspec import Meta
 
@@ -146,11 +148,32 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         bodies = [int(b) for each in every for b in each.mj_bodies]
         dofs = np.concatenate([each.v_address for each in every])
         limit, changes = self.limit, change_of_motion(model, bodies, dofs, points, tolerances.heaviest)
+        mj, data, full = model.mj, mujoco.MjData(model.mj), np.zeros((model.mj.nv, model.mj.nv))
+        heaviest = np.array([tolerances.heaviest(body) for body in bodies]).reshape(-1, 2)
+        total = math.sqrt(float(heaviest[:, 0] @ mj.body_mass[bodies]))
+
+        def noise(span: Span) -> float:
+            """How much of √(2E) noise of speeds may make at any instant [√J]: no more than joint by joint."""
+            error = span.joint_noise[dofs]
+            if not error.any():
+                return 0.0
+            data.qpos[:] = span.path.at(span.end)[0]
+            mujoco.mj_kinematics(mj, data)
+            mujoco.mj_comPos(mj, data)
+            mujoco.mj_makeM(mj, data)
+            mujoco.mj_fullM(mj, data, full)
+            # Levers are longer by what a centre of mass may be off, and by what moves until then.
+            longer = float(heaviest[:, 1].max(initial=0.0)) + 2 * float(span.fast.max(initial=0.0)) * span.T
+            each = np.sqrt(np.diagonal(full)[dofs] * heaviest[:, 0].max(initial=1.0)) + total * longer
+            return float(each @ error)
 
         def falls(span: Span, least: Array | float) -> Fall:
             change, bend = changes(span)
             if not np.isfinite(change):
                 return UNBOUNDED  # who jumps
+            # At the other end there may have been none.
+            off = noise(span)
+            change, bend = change + 2 * off, bend + off
             most = np.sqrt(2 * max(limit - float(least), 0.0))
             return Fall(float((most + change) * change), float(most * bend + bend**2 / 2))
 

@@ -65,14 +65,14 @@ score = 0
 [[rows]]
 angle = "trunk_flexion"
 low_deg = 20
-high_deg = 60
+high_deg = 180
 hold = 4.5
 score = 2
 """
 ZONE_ROWS = (
     ("angle", "from_deg", "to_deg", "score", "hold_s", "per_minute", "side"),
     ("trunk flexion", None, 20, 0, None, None, None),
-    ("shoulder elevation", 20, 60.5, 2, 4, 2, "left"),
+    ("shoulder elevation", 20.5, 180, 2, 4, 2, "left"),
 )
 BVH = """HIERARCHY
 ROOT Hips

@@ -9,6 +9,7 @@ import pytest
 
 from seerob.core.snapshot import Verdict
 from seerob.core.verdict import judge, judge_interval
+from seerob.criteria.figure import Figure, answers_of, verdict_of
 from seerob.recording.answers import Answers, judge_many
 from seerob.recording.series import CODES, NO_VERDICT
 
@@ -50,3 +51,19 @@ def test_what_is_said_of_some_instants_is_said_of_no_other():
     infinite = Answers.against(np.array([np.inf, 0.0]), 1.0, at_most=True).finite()
     assert np.isnan(infinite.value).tolist() == [True, False]
     assert infinite.verdict.tolist() == [exceeded, within]
+
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize("at_most", [True, False])
+@pytest.mark.parametrize("limit", [None, 1.0])
+@pytest.mark.parametrize("value", [0.5, 1.0, 1.5, NAN, INF])
+@pytest.mark.parametrize("ends", [None, (0.0, 0.0), (0.4, 0.6), (0.5, 1.5), (NAN, NAN), (0.4, NAN)])
+@pytest.mark.parametrize("flags", [{}, {"nothing": True}, {"exceeded": True}, {"open": True}])
+def test_a_figure_says_of_many_instants_what_it_says_of_one(at_most, limit, value, ends, flags):
+    one = verdict_of(Figure(value, limit, ends, **flags), at_most=at_most)
+    arrays = None if ends is None else tuple(np.full(3, end) for end in ends)
+    each = {name: np.full(3, flag) for name, flag in flags.items()}
+    many = answers_of(Figure(np.full(3, value), limit, arrays, **each), 3, at_most=at_most)
+    assert many.verdict.tolist() == [CODES[one]] * 3

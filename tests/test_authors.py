@@ -509,6 +509,25 @@ def test_every_method_that_takes_a_model_gives_ones_own_its_own():
 
 # -- of many instants ----------------------------------------------------------------------------
 
+STRICTER = """
+from msgspec.structs import replace
+from seerob.api import Verdict
+from seerob.criteria.safety.velocity import Velocity
+class Own(Velocity, frozen=True, kw_only=True):
+    def bind(self, model):
+        shipped = super().bind(model)
+        return lambda state: replace(shipped(state), verdict=Verdict.UNDECIDED, reason="we do not know")
+"""
+
+
+def test_a_bind_on_top_of_a_shipped_criterion_is_asked_instant_by_instant(own):
+    station = own("", more='at = "arm"\n', head=STRICTER)
+    q = np.zeros((9, len(station.model.mechanisms["arm"].joints)))
+    (column,) = station.batch({"arm": q}, {"arm": q}).values()
+    assert column.verdict is Verdict.UNDECIDED
+    assert "bind" in column.note
+
+
 MANY = (
     BIND.format("return self.result(1.0)")
     + """

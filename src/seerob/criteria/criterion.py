@@ -173,7 +173,12 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
         It depends on no instant but the one it speaks of, and says of it what that of `bind` says.
         """
-        if self.one_by_one(model):
+        order = type(self).__mro__
+        bound, computed = (
+            next(i for i, kind in enumerate(order) if name in vars(kind)) for name in ("bind", "compute")
+        )
+        # A `bind` on top of somebody else's figures says more than these.
+        if bound < computed or self.one_by_one(model):
             return None
         compute = self.compute(model)
         return lambda states: answers_of(compute(states), len(states), at_most=self.at_most)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -19,6 +20,7 @@ from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict, judge, judge_interval
 from seerob.recording.answers import Answers, Flags
+from seerob.recording.series import CODES
 
 if TYPE_CHECKING:
     from seerob.twin.state import State
@@ -78,7 +80,7 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
         return None
     if limit is not None and figure.exceeded:
         return _EXCEEDED
-    if value is None:
+    if value is None or math.isnan(value):
         return _UNDECIDED
     if figure.interval is not None:
         low, high = figure.interval
@@ -128,8 +130,10 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
     found = Answers.against(each(figure.value), limit, at_most=at_most)
     if figure.interval is not None:
         low, high = map(each, figure.interval)
-        if (low < high).any():
+        if not ((low == high) & (low == found.value)).all():  # also where one is not a number
             found = found.between(low, high, at_most=at_most)
+    unknown = np.isnan(found.value)
+    found = replace(found, verdict=np.where(unknown, CODES[_UNDECIDED], found.verdict).astype(np.uint8))
     if limit is not None and np.any(figure.exceeded):
         found = found.exceeded(np.broadcast_to(figure.exceeded, (n,)))
     found = found.finite().open(figure.open) if np.any(figure.open) else found.finite()

@@ -44,7 +44,8 @@ class Answers:
         """Judge values that lie between two ends (`seerob.criteria.criterion.judge_interval`)."""
         ends = [judge_many(end, self.limit, at_most=at_most) for end in (low, high)]
         either = np.where(ends[0] == ends[1], ends[0], UNDECIDED).astype(np.uint8)
-        verdict = np.where(np.isnan(self.limit), self.verdict, either)
+        informs = np.isnan(self.limit) & ~np.isnan(low) & ~np.isnan(high)
+        verdict = np.where(informs, self.verdict, either)
         return replace(self, verdict=verdict, interval=(low, high))
 
     def finite(self) -> Answers:

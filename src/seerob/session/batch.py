@@ -388,7 +388,8 @@ def _able(
         many = criterion.batch(model)
         question.hold(model, findings, names)
         if many is None:
-            notes[criterion.name] = f"asked instant by instant: {criterion.one_by_one(model)}"
+            why = criterion.one_by_one(model) or "its bind says more than its figure"
+            notes[criterion.name] = f"asked instant by instant: {why}"
         elif question.held or question.unmentioned:
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
@@ -398,7 +399,8 @@ def _able(
         else:
             movers = filter(None, (model.bodies[i].mover for i in question.bodies))
             needs = tuple(dict.fromkeys((*question.names, *movers)))
-            widens = criterion.by_speed and not criterion.one_by_one(model)
+            computed = type(criterion).batch is Criterion.batch and not criterion.one_by_one(model)
+            widens = criterion.by_speed and computed
             able[criterion.name] = _Able(question, many, needs, widens)
     return able, notes
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from made_cell import heard, made, person, two_r
 from seerob.core.errors import InputError
@@ -217,3 +218,27 @@ def test_what_an_arm_carries_may_get_faster_by_itself_while_it_reacts(tmp_path):
     assert not (np.array(found.verdicts)[beyond] == 0).any()
     far = made(tmp_path / "far", text.replace("3.5, 0, 0", "4.6, 0, 0"), files).run().results["arm"]
     assert (np.array(far.verdicts)[:90] == 0).all()
+
+
+SPEEDS = (
+    '[[safety]]\nkind = "velocity"\nname = "point"\nat = "arm"\nlimit = 1.2\n'
+    '[[safety]]\nkind = "velocity"\nname = "all"\nof = "arm/*"\nlimit = 1.2\n'
+    '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = {limit}\n'
+)
+
+
+def test_noise_of_what_carries_an_arm_leaves_its_speed_and_energy_open(tmp_path):
+    def said(name, limit, off):
+        criteria = SPEEDS.format(limit=limit) + separation("agv")
+        station = made(tmp_path / name, CELL + criteria, FILES)
+        engine = Engine(station.model, driven={"agv": 1.0, "arm": 1.0}, live={"agv", "arm"})
+        cart = replace(heard("agv", 0.0, (-9.0, 0.0, 0.0), (1.0, 0.0, 0.0)), qd_error=off)
+        engine.take([cart, heard("arm", 0.0, (np.pi, 0.0), (0.0, 0.0))])
+        return {r.name: r for r in Judge(station.bound, station.model.findings)(engine.start())}
+
+    value = said("first", 1e6, None)["energy"].value
+    sure, open_ = (said(str(off), 1.5 * value, off) for off in (None, (0.5, 0.0, 0.0)))
+    for name in ("point", "all", "energy"):
+        assert sure[name].verdict is Verdict.WITHIN, name
+        assert open_[name].verdict is Verdict.UNDECIDED, name
+        assert "noise" in open_[name].reason

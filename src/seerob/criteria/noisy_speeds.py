@@ -14,7 +14,7 @@ joint that is off.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,8 @@ from seerob.core.errors import Undecided
 from seerob.core.snapshot import Result, Row, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Twin
+from seerob.recording.answers import Flags
 from seerob.twin.state import State
 
 NOISE = "decided by the noise of positions that its speeds are derived from"
@@ -50,6 +52,20 @@ def noisy(state: State) -> dict[str, Array]:
     names = {above for name in state.speeds_asked for above in state.model.carriers_of(name)}
     names |= state.speeds_asked
     return {name: error for name, error in errors.items() if name in names}
+
+
+def others_noisy(twin: Twin, names: Sequence[str]) -> Flags:
+    """Whether speeds of any of these follow from noisy positions, shape (...).
+
+    A criterion that says how far its own speeds may be off asks it of what carries these, or rides on them:
+    what that changes it does not say, so it is open (`Figure.open`).
+    """
+    found = np.zeros((), bool)
+    for name in names:
+        error = twin.speed_error(twin.model.mechanisms[name])
+        if error is not None:
+            found = found | error.any(axis=-1)
+    return found
 
 
 def shaken(result: Result, criterion: Criterion, again: Evaluate | None, state: State) -> Noise:

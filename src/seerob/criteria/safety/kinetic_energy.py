@@ -18,7 +18,7 @@ from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
-from seerob.criteria.noisy_speeds import NOISE
+from seerob.criteria.noisy_speeds import NOISE, others_noisy
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
@@ -74,6 +74,8 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         for each in (robot, *aboard):
             each.require_masses(self.name)
         masses, alone = MassTolerances(model, robot), robot.alone and not aboard
+        beside = (*robot.riders, *(each.name for each in aboard))
+        others = tuple(dict.fromkeys((*model.carriers_of(robot.name), *beside)))
 
         def compute(twin: Twin) -> Figure:
             qd = twin.qd(robot)
@@ -96,7 +98,8 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 off = np.sqrt(np.einsum("...ii,...i->...", twin.mass_matrix(robot), error**2))
                 low = 0.5 * np.maximum(np.sqrt(2 * np.maximum(low, 0.0)) - off, 0.0) ** 2
                 high = 0.5 * (np.sqrt(2 * np.maximum(high, 0.0)) + off) ** 2
-            return Figure(energy, self.limit, None if low is high else (low, high))
+            interval, open_ = None if low is high else (low, high), others_noisy(twin, others)
+            return Figure(energy, self.limit, interval, open=open_)
 
         return compute
 

@@ -17,7 +17,7 @@ from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
-from seerob.criteria.noisy_speeds import NOISE
+from seerob.criteria.noisy_speeds import NOISE, others_noisy
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.moving_base import velocity_of
@@ -100,6 +100,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         frame = model.frame(self.at or "")
         mechanism = model.carrier(frame)
         offset = np.array(self.offset)
+        others = (*model.carriers_of(mechanism.name), *mechanism.riders)
 
         def compute(twin: Twin) -> Figure:
             v = velocity_of(twin, frame, mechanism, offset)[..., :3]
@@ -108,7 +109,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             if error is not None:
                 off = speed_noise(twin.jacobian(frame, mechanism, offset)[..., :3, :], error)
                 interval = np.maximum(speed - off, 0.0), speed + off
-            return Figure(speed, self.limit, interval, beside=v)
+            return Figure(speed, self.limit, interval, open=others_noisy(twin, others), beside=v)
 
         return compute
 
@@ -125,6 +126,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             name: [k for k, mover in enumerate(movers) if mover == name] for name in dict.fromkeys(movers)
         }
         moving = [(model.mechanisms[name], rows) for name, rows in rows_of.items()]
+        others = tuple({above for name in rows_of for above in model.carriers_of(name)} - rows_of.keys())
 
         def noise(twin: Twin, points: Array) -> Array:
             """Of the fastest point of each body [m/s], shape (..., b)."""
@@ -145,7 +147,8 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             if any(twin.speed_error(mechanism) is not None for mechanism, _ in moving):
                 off = noise(twin, points)
                 interval = np.maximum(speeds - off, 0.0).max(axis=-1), (speeds + off).max(axis=-1)
-            return Figure(speeds.max(axis=-1), self.limit, interval, beside=fastest)
+            open_ = others_noisy(twin, others)
+            return Figure(speeds.max(axis=-1), self.limit, interval, open=open_, beside=fastest)
 
         return compute
 
@@ -163,7 +166,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
                 k = int(speeds.argmax())
                 where, v = model.bodies[bodies[k]].name, velocities[k]
                 place = partial(points.__getitem__, k)
-            if figure.interval is not None and verdict is Verdict.UNDECIDED:
+            if verdict is Verdict.UNDECIDED:
                 where = f"{where}: {NOISE}".removeprefix(": ")
 
             def draw() -> tuple[Arrow, ...]:

@@ -701,11 +701,11 @@ class Engine:
         """
         hearing, reference = self._hearings[mechanism.name], self._references[mechanism.name]
         t = self.state.t
-        # Noise of speeds that a file's positions told is that half way between two of them.
-        if mechanism.name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
-            return None
         said = reference.said_speeds(t)
         if said is None:
+            return None
+        # Noise of speeds that a file's positions told is that half way between two of them.
+        if mechanism.name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
             return None
         if self.physics and (mechanism.role == "human" or hearing.saturated):
             moves = reference.at(t)[1]  # what holds it elsewhere, or a torque limit, is no noise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -1119,3 +1119,17 @@ def test_what_is_bounded_is_judged_beside_what_is_not_and_in_a_run_that_begins_a
     told = [[(result.verdict, result.reason) for result in results] for results in runs]
     assert told[0] == told[1] == told[2]
     assert any("between two ticks" in reason for _, reason in told[0])
+
+
+def test_nothing_to_judge_at_a_tick_hides_no_way_to_it_that_is_open(tmp_path):
+    """The arm turns back below where there is nothing to judge; what it was on the way nobody knows."""
+    station = leaps(tmp_path)[0]
+    limits = np.arange(0.1, 0.3, 0.002).tolist()
+    some = [Turned(name=f"{x}", limit=x, idle_below=x - 0.02, once=True) for x in limits]
+    every, _ = judged_by(station, some)
+    left = [now for results in every for before, now in pairwise(results) if before.verdict is Verdict.WITHIN]
+    hidden = [now for now in left if now.value is None]
+    assert hidden
+    for now in hidden:
+        assert now.nothing or (now.verdict, now.reason[:9]) == (Verdict.UNDECIDED, "not known")
+    assert any(now.verdict is Verdict.UNDECIDED for now in hidden)

@@ -701,16 +701,17 @@ class Engine:
         """
         hearing, reference = self._hearings[mechanism.name], self._references[mechanism.name]
         t = self.state.t
-        said = reference.said_speeds(t)
+        own, said = self.state.columns[mechanism.name].own_v, reference.said_speeds(t)
         if said is None:
             return None
         # Noise of speeds that a file's positions told is that half way between two of them.
         if mechanism.name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
             return None
         if self.physics and (mechanism.role == "human" or hearing.saturated):
-            moves = reference.at(t)[1]  # what holds it elsewhere, or a torque limit, is no noise
+            # What holds it elsewhere, or a torque limit, is no noise.
+            moves = self._course.v[-1][own] if self._tick else reference.at(t)[1]
         else:
-            moves = self._shown.qvel[mechanism.v_address[mechanism.own]]
+            moves = self._shown.qvel[own]
         off = np.abs(moves - said)
         return together(off) if kernel.greatest(off) > QUIET else None
 

@@ -7,6 +7,8 @@ own, so that nobody knows that they are noisy, and without. All figures are the 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +20,8 @@ from made_cell import meant
 from seerob.core.snapshot import Verdict
 from seerob.recording.series import CODES
 from seerob.session import batch
-from seerob.session.run import pump
+from seerob.session.run import engine_of, looks_ahead, pump
+from seerob.session.station import load
 
 WITHIN, UNDECIDED = CODES[Verdict.WITHIN], CODES[Verdict.UNDECIDED]
 BARELY = 1e-7
@@ -179,3 +182,13 @@ def test_slopes_between_noisy_samples_hide_no_speed_that_the_log_says(seed, phys
                 assert len(verdicts) == len(beyond)
                 assert not (beyond & (verdicts == WITHIN)).any(), (name, verdicts[beyond])
     assert could > 50
+
+
+@pytest.mark.parametrize("name", ["two_robots", "ur10_assembly"])
+def test_a_motion_without_noise_has_no_interval_however_the_twin_follows_it(name):
+    cell = load(Path(__file__).parents[2] / "workstations" / name)
+    period, engine = cell.workstation.engine.tick, engine_of(cell.model)
+    for k, samples in enumerate(islice(pump(cell.sources, period, ahead=looks_ahead(cell.model)), 60)):
+        engine.take(samples)
+        state = engine.tick() if k else engine.start()
+        assert not state.speed_errors, state.t

@@ -708,8 +708,7 @@ class Engine:
         if mechanism.name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
             return None
         if self.physics and (mechanism.role == "human" or hearing.saturated):
-            # What holds it elsewhere, or a torque limit, is no noise.
-            moves = self._course.v[-1][own] if self._tick else reference.at(t)[1]
+            moves = reference.at(t)[1]  # what holds it elsewhere, or a torque limit, is no noise
         else:
             moves = self._shown.qvel[own]
         off = np.abs(moves - said)

@@ -142,3 +142,20 @@ def test_what_is_being_written_is_read_the_next_time(ends):
         assert there.take() == ()
         here._memory[place] = kept
     assert [s.seq for s in there.take()] == [1]
+
+
+def test_a_sample_is_not_taken_for_an_older_one_that_it_overwrites(ends):
+    """Its number was read before, and all else after it was written: it would be taken twice."""
+    here, there = ends
+    for seq in range(3):
+        here.post(JointSample(source="s", seq=seq, t=0.0, target="a", q=(0.0,)))
+    start, newest = source_process._HEAD, 3
+    places = start, start + source_process._HEAD + source_process._ROOM
+    for number in (1, 0):
+        for place in places:
+            source_process._COUNT.pack_into(here._memory, place, number)
+        assert there.take() == ()
+    for place in places:
+        source_process._COUNT.pack_into(here._memory, place, newest)
+    assert [s.seq for s in there.take()] == [2]
+    assert there.take() == ()

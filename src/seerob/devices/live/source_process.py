@@ -115,7 +115,7 @@ class SharedMailbox:
         number = self._written[index] = self._written[index] + 1
         start = _HEAD + index * _SLOT
         half = start + _HEAD + (number & 1) * _ROOM
-        _HALF.pack_into(self._memory, half, number, len(data), zlib.crc32(data))
+        _HALF.pack_into(self._memory, half, number, len(data), zlib.crc32(data, number & 0xFFFFFFFF))
         self._memory[half + _HALF.size : half + _HALF.size + len(data)] = data
         _COUNT.pack_into(self._memory, start, number)
         if number == 1:
@@ -141,10 +141,11 @@ class SharedMailbox:
                 return None
             half = start + _HEAD + (number & 1) * _ROOM
             wrote, length, checksum = _HALF.unpack_from(self._memory, half)
-            if wrote != number or length > LARGEST:
+            if wrote != number or not 0 < length <= LARGEST:
                 continue
             data = self._memory[half + _HALF.size : half + _HALF.size + length]
-            if zlib.crc32(data) == checksum:
+            # With the number: what was read of two samples in turn would be taken twice.
+            if zlib.crc32(data, number & 0xFFFFFFFF) == checksum:
                 self._seen[index] = number
                 return data
         return None

@@ -6,6 +6,7 @@ import pytest
 from made_cell import judged, made, state_at
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, Verdict
+from seerob.criteria.scoring.phases import turns
 from seerob.session.run import bind
 from seerob.workstation.tables.task_phase import Phase, check_order, phase_at
 
@@ -195,3 +196,76 @@ def test_detection_needs_to_look_often_enough(tmp_path):
     rule = '[[ergonomics]]\nkind = "reba"\nhuman = "op"\nevery = 2\ndetect = {}\n'
     with pytest.raises(InputError, match="2 s is too seldom"):
         bind(made(tmp_path, HUMANS + rule).model)
+
+
+STANDS = """
+title = "stands"
+[[keyframes]]
+t = 0.0
+posture = "standing"
+[[keyframes]]
+t = 1.0
+posture = "standing"
+"""
+LIFTS = """
+[[sources]]
+kind = "keyframes"
+human = "op"
+file = "person.toml"
+[[phases]]
+title = "wait"
+start = 0
+load = 0
+legs = "standing"
+[[phases]]
+title = "lift"
+start = {0}
+load = 60
+legs = "both_knees_bent"
+[[phases]]
+title = "wait again"
+start = {1}
+load = 0
+legs = "standing"
+[[ergonomics]]
+kind = "owas"
+name = "owas"
+human = "op"
+action_category = 1
+{2}
+"""
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "more", "verdict"),
+    [
+        (0.405, 0.415, "", Verdict.EXCEEDED),
+        # Wholly between two ticks, nobody asks in it.
+        (0.403, 0.407, "", Verdict.UNDECIDED),
+        (0.4001, 0.4099, "", Verdict.UNDECIDED),
+        # One that is asked seldom is asked in each phase.
+        (0.405, 0.415, 'every = 0.6\nbetween_samples = "accepted: stands"', Verdict.EXCEEDED),
+        (0.403, 0.407, 'every = 0.6\nbetween_samples = "accepted: stands"', Verdict.UNDECIDED),
+    ],
+)
+def test_a_phase_that_nobody_asked_in_is_not_within(tmp_path, begin, end, more, verdict):
+    stage = made(tmp_path, HUMANS + LIFTS.format(begin, end, more), {"person.toml": STANDS.encode()})
+    assert stage.run().results["owas"].verdict is verdict
+    assert stage.batch()["owas"].verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("phases", "before", "now", "expected"),
+    [
+        ((phase(0), phase(1), phase(2)), 0.5, 1.5, [1]),
+        ((phase(0), phase(1), phase(2)), 0.5, 2.0, [1, 2]),
+        ((phase(0), phase(1), phase(2)), 1.0, 1.9, []),
+        ((phase(0, 1), phase(1 + 1e-12)), 0.5, 1.5, [1]),
+        ((phase(0, 1), phase(1.1)), 0.5, 1.5, [1, 1.1]),
+        ((phase(1, 2, 10), phase(3, None, 10)), 9.9, 11.5, [10, 11]),
+        ((phase(0, 5, 10), phase(5, 10, 10)), 29.0, 31.0, [30]),
+        ((phase(0, 0.1, 10),), 29.0, 31.0, [30, 30.1]),
+    ],
+)
+def test_when_what_is_entered_changes(phases, before, now, expected):
+    assert turns(phases)(before, now) == pytest.approx(expected)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import traceback
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
 from seerob.criteria.figure import Twin
 from seerob.criteria.noisy_speeds import shaken
+from seerob.criteria.scoring.phases import entered_for, turns
 from seerob.model.model import Model
 from seerob.recording.series import INFORMS
 from seerob.twin.state import VARIABLE, State
@@ -376,6 +377,11 @@ class Question:
     kept: _Kept | None = None
     again: tuple[Evaluate | None] | None = None
     """Another one of it, for what errors of speeds would change; none of one that remembers."""
+    turns: Callable[[float, float], Sequence[float]] | None = None
+    """When what its phases enter changes between two instants (`seerob.criteria.scoring.phases.turns`)."""
+    seen: tuple[float, str] | None = None
+    """The last instant [s], and why nothing is within there: a phase that began and ended since the one
+    before."""
     why: str = ""
     """Why nothing that it said last is within."""
     held_names: Mapping[str, str] = field(default_factory=dict)
@@ -410,6 +416,21 @@ class Question:
         for name in self.relied_on:
             yield twin.heard_doubt(name)
 
+    def passed_over(self, t: float) -> str:
+        """Why nothing is within at an instant [s]: a phase began and ended since the last one."""
+        if self.turns is None:
+            return ""
+        if self.seen is None or self.seen[0] != t:
+            edges = () if self.seen is None else self.turns(self.seen[0], t)
+            text = ""
+            if len(edges) > 1:
+                text = (
+                    f"what is entered from {edges[0]:.6g} s to {edges[1]:.6g} s lies between two ticks, and "
+                    "is judged at no instant: give a shorter engine.tick"
+                )
+            self.seen = t, text
+        return self.seen[1]
+
 
 def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
     """What one's own says of a state, of which it is given the accessors, and nothing that others read."""
@@ -422,7 +443,9 @@ def question_of(bound: Bound, model: Model) -> Question:
     names, bodies = needed(bound.criterion, model)
     declared = _all_declared(bound.criterion, model)
     shapeless, rests = unmentioned(bound.criterion, model), relied_on(bound.criterion, model)
-    return Question(bound, bound.criterion, names, bodies, declared, shapeless, rests)
+    phases = entered_for(model, bound.criterion)
+    changes = turns(phases) if phases else None
+    return Question(bound, bound.criterion, names, bodies, declared, shapeless, rests, turns=changes)
 
 
 class Judge:
@@ -499,11 +522,14 @@ class Judge:
 
     def _one(self, question: Question, state: State) -> Result:
         kept = question.kept
-        if kept is not None and self._lasts(kept, question.criterion, state):
+        passed_over = question.passed_over(state.t)
+        if kept is not None and self._lasts(kept, question, state):
             if self._holds:  # also what was found out since it was asked
                 question.why = question.held_for(kept.asked)
             return kept.result
         result = self._now(question, question.bound.evaluate, state)
+        if passed_over and not result.muted:
+            result = undecided(result, passed_over)
         if self._holds:
             question.why = question.held_for(state.asked)
         if (every := question.criterion.every) is not None:
@@ -624,11 +650,14 @@ class Judge:
             _log.warning("%s: %s", bound.criterion.name, what)
 
     @staticmethod
-    def _lasts(kept: _Kept, criterion: Criterion, state: State) -> bool:
+    def _lasts(kept: _Kept, question: Question, state: State) -> bool:
         """Whether a result between two evaluations holds: what it rests on is heard, and not switched since.
 
-        Set back before its instant it says nothing.
+        Set back before its instant it says nothing; nor in another phase of the task.
         """
+        criterion = question.criterion
+        if question.turns is not None and question.turns(kept.since, state.t):
+            return False
         if not kept.since - SLACK <= state.t < kept.due - SLACK or any(map(state.input_reason, kept.asked)):
             return False
         return criterion.active is None or bool(state.signal(criterion.active)) is not kept.muted

@@ -394,6 +394,8 @@ def _able(
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
             notes[criterion.name] = "asked instant by instant: masses are not known"
+        elif question.turns is not None:
+            notes[criterion.name] = "asked instant by instant: it judges by phases of a task"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from seerob.core.plugin import kind_of
 from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
 from seerob.criteria.judging import Bound
+from seerob.criteria.scoring.phases import entered_for
 from seerob.description.norms.editions import headline
 from seerob.model.model import Model
 from seerob.recording.format import content_hash
@@ -22,10 +23,7 @@ from seerob.workstation.workstation import Workstation
 def unmet_phases(model: Model, bound: Sequence[Bound], end: float) -> Iterator[Finding]:
     """Phases of a task that begin when the motion is over [s]: what they enter is judged at no instant."""
     for rule in (one.criterion for one in bound):
-        own, human = getattr(rule, "phases", None), getattr(rule, "human", "")
-        if own is None:
-            continue
-        for phase in own or [p for p in model.workstation.phases if p.human in ("", human)]:
+        for phase in entered_for(model, rule):
             if phase.start > end + 1e-9:
                 called = f"the phase {phase.title!r}" if phase.title else "a phase"
                 text = (

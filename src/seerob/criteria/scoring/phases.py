@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
@@ -11,6 +13,7 @@ from seerob.core.errors import InputError
 from seerob.criteria.scoring.spans import Span, between, exactly
 from seerob.model.model import Model
 from seerob.workstation.tables.task_phase import (
+    ROUNDING,
     Kilograms,
     Period,
     Phase,
@@ -31,9 +34,11 @@ __all__ = [
     "Stance",
     "TaskPhase",
     "check_order",
+    "entered_for",
     "on_sides",
     "phase_at",
     "shared_phases",
+    "turns",
 ]
 
 P = TypeVar("P", bound=Phase)
@@ -67,6 +72,46 @@ def shared_phases(
         file = next(iter(model.workstation.files), "workstation")
         raise InputError.at(file, "phases", f"of {human}: {error}") from error
     return tuple(map(read, mine))
+
+
+def entered_for(model: Model, criterion: object) -> tuple[Phase, ...]:
+    """Phases by which a criterion judges: its own, or the shared ones of its person; none of one without."""
+    own, human = getattr(criterion, "phases", None), getattr(criterion, "human", "")
+    if own is None:
+        return ()
+    return tuple(own) or tuple(p for p in model.workstation.phases if p.human in ("", human))
+
+
+def turns(phases: Sequence[Phase]) -> Callable[[float, float], Sequence[float]]:
+    """Resolve when what is entered changes.
+
+    Args:
+        phases: In their order, of one cycle if any.
+
+    Returns:
+        From two instants of the run [s] to when it changes after the first one, up to the second [s]: of
+        three changes or more the first ones.
+    """
+    cycle = phases[0].cycle if phases else None
+    edges: list[float] = []
+    for given in sorted(each for p in phases for each in (p.start, p.end) if each is not None):
+        # The end of a cycle is the beginning of the next.
+        edge = 0.0 if cycle is not None and given >= cycle - ROUNDING else given
+        if all(abs(edge - known) > ROUNDING for known in edges):
+            edges.append(edge)
+    if cycle is not None and phases[-1].end is None and 0.0 not in edges:
+        edges.append(0.0)  # the last phase ends with its cycle
+    edges.sort()
+
+    def between(before: float, now: float) -> list[float]:
+        first, last = before + ROUNDING, now + ROUNDING
+        if cycle is None:
+            return edges[bisect_right(edges, first) : bisect_right(edges, last)][:3]
+        k = max(math.floor(first / cycle), 0)
+        every = [edge + i * cycle for i in range(k, k + 3) for edge in edges]
+        return [edge for edge in every if first < edge <= last][:3]
+
+    return between
 
 
 def on_sides(sides: Sides | None) -> Span:

@@ -27,7 +27,8 @@ Stance = Literal[
     "climbing",
     "posture",
 ]
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
+"""By so much a phase may seem to begin later than an instant that it has [s]."""
 
 
 class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -53,7 +54,7 @@ class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 "let it end later"
             )
         last = self.start if self.end is None else self.end
-        if self.cycle is not None and (last > self.cycle + _ROUNDING or self.start >= self.cycle):
+        if self.cycle is not None and (last > self.cycle + ROUNDING or self.start >= self.cycle):
             raise ValueError(f"phases: one reaches to {last:g} s, beyond its cycle of {self.cycle:g} s")
 
     @classmethod
@@ -117,7 +118,7 @@ def check_order(phases: Sequence[Phase]) -> None:
                 f"phases: one that starts at {after.start:g} s follows one at {before.start:g} s; "
                 "let each start after the one before"
             )
-        if before.end is not None and before.end > after.start + _ROUNDING:
+        if before.end is not None and before.end > after.start + ROUNDING:
             raise ValueError(
                 f"phases: one that ends at {before.end:g} s overlaps the next, from {after.start:g} s on; "
                 "let it end before"
@@ -131,6 +132,6 @@ def phase_at(phases: Sequence[P], t: float, unknown: P) -> P:
     if not phases:
         return unknown
     cycle = phases[0].cycle
-    at = t + _ROUNDING if cycle is None else (t + _ROUNDING) % cycle
+    at = t + ROUNDING if cycle is None else (t + ROUNDING) % cycle
     found = next((phase for phase in reversed(phases) if phase.start <= at), unknown)
     return unknown if found.end is not None and at >= found.end else found

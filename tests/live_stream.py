@@ -39,7 +39,7 @@ class Stream:
         patch.setattr(receivers, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
         (source,) = station.workstation.sources
         self.box = Mailbox()
-        self.ears = Listener(source, None, self.box.post)
+        self.listener = Listener(source, None, self.box.post)
         self.delay = delay_of([source])
         self.target, self.packets, self.again = target, list(packets), list(again)
         self.pauses = pauses or {}
@@ -58,8 +58,8 @@ class Stream:
             arrived, device, (q, qd) = self.packets.pop(0)
             while self.again and self.again[0] <= arrived:
                 self.again.pop(0)
-                self.ears._clock.reconnect()
-            self.ears._take(
+                self.listener._clock.reconnect()
+            self.listener._take(
                 JointSample(
                     source="", seq=0, target=self.target, t=BEGIN + arrived, t_device=device,
                     q=tuple(q), qd=None if qd is None else tuple(qd),

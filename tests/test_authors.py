@@ -358,7 +358,7 @@ BESIDE = {
     "whose speeds": "state.speeds_asked.clear()",
     "asks again itself": "state.asking().__enter__()",
     "known masses": "state.known_masses_alone().__enter__()",
-    "another author": "state.set_apart('').__enter__()",
+    "another author": "state.for_author('').__enter__()",
     "time": "state.t = 0.0",
     "forgets": "state.heard()",
     "another instant": "state.refresh(0.0)",
@@ -383,7 +383,7 @@ def test_every_name_of_a_state_is_given_or_refused(own):
     state = state_at(station, arm=((0, 0), (0, 0)))
     names = {name for name in dir(state) if not name.startswith("_")}
     assert names > OF_AN_INSTANT
-    with state.asking(), state.set_apart("own") as view:
+    with state.asking(), state.for_author("own") as view:
         for name in names - OF_AN_INSTANT:
             with pytest.raises(NotAsked):
                 getattr(view, name)
@@ -544,7 +544,7 @@ RAW_OF_MANY = (
     "states.motion.q[0, 0]",
     "states.everywhere()[1][0, 0, 0]",
     "states.largest_speeds()[0, 0]",
-    "len(states.doubts)",
+    "len(states.invalid_reasons)",
     "states.elsewhere(None) and 1.0",
     "len(kept[0]) if kept else kept.append(states) or 1.0",
 )

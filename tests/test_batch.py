@@ -303,7 +303,7 @@ def test_a_file_is_followed_in_arrays_as_sample_by_sample(tmp_path, monkeypatch,
     assert not isinstance(one_by_one.ways, Ways)
     for key in ("t", "q", "v"):
         np.testing.assert_array_equal(getattr(together, key), getattr(one_by_one, key))
-    for key in ("doubts", "speed_errors"):
+    for key in ("invalid_reasons", "speed_errors"):
         found, wanted = getattr(together, key), getattr(one_by_one, key)
         assert found.keys() == wanted.keys()
         for name, rows in wanted.items():

@@ -13,7 +13,7 @@ from made_cell import TWO_R, UR10, heard, made, person, two_r
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
 from seerob.core.verdict import judge_interval
-from seerob.criteria.between_ticks import FEW, Told, least_margin, watched
+from seerob.criteria.between_ticks import FEW, SpanResult, least_margin, watched
 from seerob.criteria.contact.regions import REGIONS
 from seerob.criteria.criterion import Criterion, Follows, Moment
 from seerob.criteria.judging import bound_to
@@ -409,7 +409,7 @@ def contact_bounds(station):
             asked = judged.near[:, known] & permitted
             used = np.where(asked, judged.v[:, known] / judged.speeds.permissible, 0.0).max()
             told.append((low, 1 - used))
-        return Told()
+        return SpanResult()
 
     judge = Judge(station.bound)
     between = judge._between

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from seerob import criteria
 from seerob.core.markers import Marker, changed, drawn, plain
-from seerob.core.shapes import cut_ears
+from seerob.core.shapes import ear_clipping
 from seerob.core.snapshot import Highlight, Label, Polyline, Prism, Rays, Result, Verdict
 from seerob.core.transforms import Array
 
@@ -103,7 +103,7 @@ def test_triangles_cover_a_concave_polygon_exactly_whichever_way_round(seed: int
         else star(rng, 4 + seed)
     )
     for outline in (corners, corners[::-1]):
-        triangles = cut_ears(outline)
+        triangles = ear_clipping(outline)
         assert len(triangles) == len(outline) - 2
         pieces = [area(outline[list(t)]) for t in triangles]
         assert min(pieces) > 0
@@ -111,7 +111,12 @@ def test_triangles_cover_a_concave_polygon_exactly_whichever_way_round(seed: int
 
 
 def test_what_encloses_nothing_has_no_triangles() -> None:
-    assert cut_ears(np.zeros((0, 2))) == cut_ears(np.zeros((2, 2))) == cut_ears(np.zeros((5, 2))) == []
+    assert (
+        ear_clipping(np.zeros((0, 2)))
+        == ear_clipping(np.zeros((2, 2)))
+        == ear_clipping(np.zeros((5, 2)))
+        == []
+    )
 
 
 def test_a_prism_is_a_closed_solid_of_its_volume_where_its_frame_is() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import heard, made
 from seerob.core.snapshot import Verdict
-from seerob.criteria.between_ticks import Told
+from seerob.criteria.between_ticks import SpanResult
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
 
@@ -57,7 +57,7 @@ def test_no_torque_or_force_between_two_ticks_is_above_its_bound(tmp_path):
             for t in np.linspace(ends[0].t, ends[1].t, 21).tolist():
                 _, there, _ = between._look(i, watch, between._way, t, state)
                 room[watch.criterion.name].append(there.margin[0] - there.margin[1] - low)
-            return Told()
+            return SpanResult()
 
         return judged
 

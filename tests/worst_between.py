@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seerob.criteria.between_ticks import Told
+from seerob.criteria.between_ticks import SpanResult
 from seerob.session.run import Judge, engine_of, looks_ahead, pump, ticks
 
 
@@ -17,7 +17,7 @@ def worst_found(station, looks):
 
     def watching(i, watch, ends, state):
         if ends[0].margin is None or ends[1].margin is None:
-            return Told()
+            return SpanResult()
         low = between._low(watch, between._way, ends, state)
         path = between._way
         instants = np.union1d(np.linspace(path.t[0], path.t[-1], looks + 2), path.t)
@@ -34,7 +34,7 @@ def worst_found(station, looks):
                 rise = largest[watch] - there.figure
             met.append(np.min(there.margin[0] - rise - there.margin[1]))
         room.setdefault(watch.criterion.name, []).append(min(met) - low)
-        return Told()
+        return SpanResult()
 
     between._judge = watching
     ahead = looks_ahead(station.model)

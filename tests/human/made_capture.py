@@ -70,10 +70,10 @@ def workstation(
     return replace(made, sources=sources, folder=".")
 
 
-Told = tuple[float, str, dict[str, tuple[float | None, float | None]], float, np.ndarray]
+Played = tuple[float, str, dict[str, tuple[float | None, float | None]], float, np.ndarray]
 
 
-def play(*sources: CaptureFile, **tables: object) -> list[Told]:
+def play(*sources: CaptureFile, **tables: object) -> list[Played]:
     """Tick by tick: time, doubt, errors per bone, largest joint speed, positions of the joints."""
     station = Station(workstation(*sources, **tables))
     engine = Engine(station.model, driven={"operator": 0.2})

@@ -8,7 +8,7 @@ from made_capture import PERSON, captured, frames_of, source, walking, workstati
 
 from seerob.core.samples import BodyPoint
 from seerob.criteria.scoring.rule import bind_posture
-from seerob.description.capture.estimated import ENDS, aimed, bare, swing, turned, untold
+from seerob.description.capture.estimated import ENDS, aimed, bare, swing, turned, undetermined
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import AXES, BONES, bone_poses
 from seerob.session import run as road
@@ -71,7 +71,7 @@ ROLL = {("forearm_rotation", 0)}
 )
 def test_places_on_one_line_leave_the_turn_about_it_open(points, open_angles):
     left = [seen("left_hand", wxyz=(1.0, 0, 0, 0)), seen("head", wxyz=(1.0, 0, 0, 0))]
-    assert untold(turned([*points, *left])) == open_angles
+    assert undetermined(turned([*points, *left])) == open_angles
 
 
 def bare_of(*points):
@@ -101,7 +101,7 @@ def test_two_points_of_a_head_do_not_tell_all_of_the_neck():
     hands = [seen(f"{side}_hand", wxyz=(1.0, 0, 0, 0)) for side in ("right", "left")]
 
     def open_angles(*places):
-        return untold(turned([*hands, *(seen("head", at=at) for at in places)]))
+        return undetermined(turned([*hands, *(seen("head", at=at) for at in places)]))
 
     assert open_angles((0.0, 0.15, 0.0)) == {("neck_twist", 0)}
     assert open_angles((0.0, 0.01, 0.08), (0.0, 0.01, -0.08)) == {("neck_flexion", 0)}

@@ -12,7 +12,7 @@ from test_touching import desk, pressing
 from seerob.core.errors import Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
-from seerob.criteria.between_ticks import Told
+from seerob.criteria.between_ticks import SpanResult
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation, Stop
 from seerob.criteria.safety.velocity import Velocity
@@ -95,7 +95,7 @@ def test_between_two_ticks_a_stopped_hand_may_be_where_it_was_captured():
 
     def watching(i, watch, ends, state):
         if not (state.stray("operator") and ends[0].margin):
-            return Told()
+            return SpanResult()
         low, found = between._low(watch, between._way, ends, state), []
         for instant in np.linspace(ends[0].t, ends[1].t, 5).tolist():
             data.qpos[person.q_address] = engine._references["operator"].at(instant)[0]
@@ -106,7 +106,7 @@ def test_between_two_ticks_a_stopped_hand_may_be_where_it_was_captured():
         off.append(np.linalg.norm(looked.captured("operator", (hand,))[1][0] - found[2]))
         span = between._span(watch, between._way, ends, state)
         ways.append((np.linalg.norm(found[-1] - found[0]), span.fast[hand] * span.T, between._way))
-        return Told()
+        return SpanResult()
 
     between._judge = watching
     for seq, samples in enumerate(road.pump(stage.sources, 0.01)):

@@ -163,7 +163,7 @@ def test_a_weight_of_nought_is_as_good_as_not_mapped():
     unobserved = dict.fromkeys((bone for bone in BONES if bone not in UPPER), 0.0)
     named, _ = seen_only(UPPER, ticks=40)
     state, _ = seen_only(UPPER, ticks=40, weights=unobserved)
-    assert state.bones_in_doubt("operator") == named.bones_in_doubt("operator") == estimated(UPPER)
+    assert state.invalid_bones("operator") == named.invalid_bones("operator") == estimated(UPPER)
     assert state.input_reason("operator") == ""
 
 

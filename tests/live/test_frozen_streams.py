@@ -152,9 +152,9 @@ def said(k, places):
 
 def listened(samples):
     posted = []
-    ears = Listener(Kinect(human="op", timeout=TIMEOUT), None, posted.append)
+    listener = Listener(Kinect(human="op", timeout=TIMEOUT), None, posted.append)
     for sample in samples:
-        ears._take(sample)
+        listener._take(sample)
     return posted
 
 

@@ -58,7 +58,7 @@ def joint(t=None, device=None):
     )
 
 
-class Ears:
+class Collector:
     def __init__(self, script):
         self.samples = []
         self.listener = Listener(Made(script=script, name="made"), None, self.samples.append)
@@ -80,12 +80,12 @@ def test_what_is_heard_is_numbered_named_and_put_on_the_hosts_clock():
         yield SignalSample(source="", seq=0, t=1001.0, values={"on": True})
         await asyncio.sleep(60)
 
-    with Ears(script) as ears:
-        until(lambda: len(ears.samples) == 6)
-    assert [s.seq for s in ears.samples] == [0, 1, 2, 3, 4, 5]
-    assert {s.source for s in ears.samples} == {"made"}
-    assert [s.t for s in ears.samples] == pytest.approx([1000, 1000.1, 1000.2, 1000.3, 1000.4, 1001.0])
-    found = ears.listener.statistics()
+    with Collector(script) as collector:
+        until(lambda: len(collector.samples) == 6)
+    assert [s.seq for s in collector.samples] == [0, 1, 2, 3, 4, 5]
+    assert {s.source for s in collector.samples} == {"made"}
+    assert [s.t for s in collector.samples] == pytest.approx([1000, 1000.1, 1000.2, 1000.3, 1000.4, 1001.0])
+    found = collector.listener.statistics()
     assert (found.count, found.repeated, found.offset) == (5, 5, pytest.approx(995))
 
 
@@ -99,9 +99,9 @@ def test_what_a_source_doubts_itself_stays_a_doubt():
             await asyncio.sleep(0.01)
         await asyncio.sleep(60)
 
-    with Ears(script) as ears:
-        until(lambda: len(ears.samples) == 40)
-    heard = ears.samples
+    with Collector(script) as collector:
+        until(lambda: len(collector.samples) == 40)
+    heard = collector.samples
     assert all(s.reason and s.quality is not Quality.GOOD for s in heard[1::2])
     assert any(doubt in s.reason for s in heard[1::2])
     assert not any(doubt in s.reason for s in heard[::2])
@@ -120,13 +120,13 @@ def test_one_line_per_loss_and_one_per_return_whatever_ends_it(caplog, error):
         if error:
             raise error
 
-    with caplog.at_level(logging.INFO, "seerob.devices.live.listening"), Ears(script) as ears:
-        until(lambda: len(ears.samples) == 2)
+    with caplog.at_level(logging.INFO, "seerob.devices.live.listening"), Collector(script) as collector:
+        until(lambda: len(collector.samples) == 2)
     lines = [r.getMessage() for r in caplog.records if "mistake in the source" not in r.getMessage()]
     assert len(lines) == 2
     assert lines[0].startswith("made: not heard: ")
     assert lines[1] == "made: heard again"
-    assert ears.listener.statistics().losses == 1
+    assert collector.listener.statistics().losses == 1
 
 
 def test_it_is_tried_again_less_and_less_often(monkeypatch):
@@ -139,7 +139,7 @@ def test_it_is_tried_again_less_and_less_often(monkeypatch):
         raise OSError
         yield
 
-    with Ears(script):
+    with Collector(script):
         until(lambda: len(tried) >= 8)
     pauses = [b - a for a, b in itertools.pairwise(tried)]
     for pause, least in zip(pauses, [0.01, 0.02, 0.04, 0.08, 0.08, 0.08], strict=False):
@@ -158,8 +158,8 @@ def test_a_source_that_waits_is_stopped_at_once_and_its_thread_ends():
             left.set()
 
     before = set(threading.enumerate())
-    with Ears(script) as ears:
-        until(lambda: ears.samples)
+    with Collector(script) as collector:
+        until(lambda: collector.samples)
     assert left.is_set()
     assert set(threading.enumerate()) <= before
 
@@ -265,8 +265,8 @@ def test_a_cancellation_that_a_library_forgets_is_a_stop_all_the_same():
             with contextlib.suppress(asyncio.CancelledError):  # as asyncio.wait_for may, until Python 3.12
                 await asyncio.sleep(0.01)
 
-    with Ears(script) as ears:
-        until(lambda: ears.samples)
+    with Collector(script) as collector:
+        until(lambda: collector.samples)
 
 
 def test_what_is_as_true_of_the_next_connection_is_said_once(caplog):
@@ -278,7 +278,7 @@ def test_what_is_as_true_of_the_next_connection_is_said_once(caplog):
         yield joint()
         raise OSError
 
-    with caplog.at_level(logging.INFO, "made"), Ears(script):
+    with caplog.at_level(logging.INFO, "made"), Collector(script):
         until(lambda: len(sessions) > 2)
     assert [r.getMessage() for r in caplog.records if r.name == "made"] == ["no torques"]
     with caplog.at_level(logging.INFO, "made"):
@@ -336,7 +336,7 @@ def test_a_mistake_in_a_source_is_told_with_its_place_once(monkeypatch, caplog):
         raise KeyError("gone")
         yield
 
-    with Ears(script):
+    with Collector(script):
         until(lambda: len(sessions) > 3)
     said = [
         (r.getMessage(), bool(r.exc_info))

@@ -117,7 +117,7 @@ class Stream:
         patch.setattr(receivers, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
         (self.source,) = station.workstation.sources
         self.box, self.station = Mailbox(), station
-        self.ears = Listener(self.source, source_target(station.model, self.source), self.box.post)
+        self.listener = Listener(self.source, source_target(station.model, self.source), self.box.post)
         self.delay = delay_of([self.source])
         self._lie = lie
         self._waiting = list(said)
@@ -136,9 +136,9 @@ class Stream:
                 if self._lie is not None and sample.t >= BEGIN + LIES_AT:
                     sample = self._lie.said(sample, BEGIN + LIES_AT)
                 if sample is not None:
-                    self.ears._take(sample)
+                    self.listener._take(sample)
             except Exception:  # as `Listener._session` ends, and is begun anew
-                self.ears._clock.reconnect()
+                self.listener._clock.reconnect()
         return self.box.take()
 
     def verdicts(self):

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-import told_sources
+import scripted_sources
 from live_story import open_files, wait_for
+from scripted_sources import AtOnce, Delayed, Large, Missing, Mistaken, Scripted, Stubborn
 from seerob.core.plugin import kinds, load
 from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.live import source_process
@@ -23,7 +24,6 @@ from seerob.devices.live.receivers import Receivers
 from seerob.devices.live.source_process import pickled_source
 from seerob.devices.sources.headset import Headset
 from seerob.workstation.source import Source
-from told_sources import AtOnce, Delayed, Large, Missing, Mistaken, Stubborn, Told
 
 
 def taken(listening, kind=JointSample):
@@ -48,7 +48,7 @@ def is_there(pid):
 
 def test_it_is_heard_from_another_process_whose_end_is_waited_for():
     before = open_files()
-    with Receivers([(Told(name="controller"), None)]) as listening:
+    with Receivers([(Scripted(name="controller"), None)]) as listening:
         pid = process_of(listening)
         first, later = taken(listening)[-1], taken(listening)[-1]
     assert pid != os.getpid()
@@ -60,7 +60,7 @@ def test_it_is_heard_from_another_process_whose_end_is_waited_for():
 
 
 def test_each_has_a_process_of_its_own_and_what_drives_something_is_waited_for():
-    sources = [(Told(name="a", robot="left"), None), (Told(name="b", robot="right"), None)]
+    sources = [(Scripted(name="a", robot="left"), None), (Scripted(name="b", robot="right"), None)]
     with Receivers(sources) as listening:
         heard = listening.first(patience=60.0)
         assert {s.target for s in heard if isinstance(s, JointSample)} == {"left", "right"}
@@ -81,12 +81,15 @@ def test_the_newest_wins_and_nothing_queues():
 def test_what_it_logs_is_logged_here_with_its_place_and_what_a_library_prints_is_not_taken_for_it(caplog):
     with (
         caplog.at_level(logging.INFO),
-        Receivers([(Told(name="a"), None), (Mistaken(name="b", robot="other"), None)]) as listening,
+        Receivers([(Scripted(name="a"), None), (Mistaken(name="b", robot="other"), None)]) as listening,
     ):
         wait_for(lambda: taken(listening)[-1].seq > 3)
         wait_for(lambda: any(r.getMessage().startswith("b: not heard") for r in caplog.records))
     lines = {r.getMessage(): r for r in caplog.records}
-    assert (lines["one line\nand another"].name, lines["one line\nand another"].levelname) == ("told", "INFO")
+    assert (lines["one line\nand another"].name, lines["one line\nand another"].levelname) == (
+        "scripted",
+        "INFO",
+    )
     assert "raise KeyError" in lines["b: a mistake in the source itself"].exc_text
     assert lines["b: not heard: KeyError: 'gone'"].levelname == "WARNING"
     assert any(line.startswith("a: ") and "samples at" in line for line in lines)  # at the end
@@ -94,7 +97,7 @@ def test_what_it_logs_is_logged_here_with_its_place_and_what_a_library_prints_is
 
 
 def test_a_process_that_is_killed_is_started_again_with_one_line_each(caplog):
-    with caplog.at_level(logging.WARNING), Receivers([(Told(name="arm"), None)]) as listening:
+    with caplog.at_level(logging.WARNING), Receivers([(Scripted(name="arm"), None)]) as listening:
         for k in range(3):
             pid = process_of(listening)
             # Its signals come first, and what drives a robot is heard by its joints: who is killed in between
@@ -125,8 +128,8 @@ def test_a_delay_that_came_while_nobody_listened_stays_one(tmp_path):
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
 def test_it_ends_with_the_run_however_that_ends(how):
     run = subprocess.Popen(
-        [sys.executable, "-c", "import told_sources; told_sources.run()"],
-        cwd=Path(told_sources.__file__).parent,
+        [sys.executable, "-c", "import scripted_sources; scripted_sources.run()"],
+        cwd=Path(scripted_sources.__file__).parent,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -140,7 +143,7 @@ def test_it_ends_with_the_run_however_that_ends(how):
 
 
 def test_an_interrupt_of_the_terminal_is_not_for_it():
-    with Receivers([(Told(), None)]) as listening:
+    with Receivers([(Scripted(), None)]) as listening:
         assert os.getpgid(process_of(listening)) != os.getpgid(0)
 
 
@@ -149,7 +152,7 @@ def test_one_that_does_not_end_is_not_waited_for_long(monkeypatch):
     begun = 0.0
     with Receivers([(Stubborn(), None)]) as listening:
         taken(listening)
-        (process,) = [p._process for p in listening._apart]
+        (process,) = [p._process for p in listening._processes]
         begun = time.monotonic()
     assert time.monotonic() - begun < 30
     assert process.returncode is not None
@@ -158,8 +161,8 @@ def test_one_that_does_not_end_is_not_waited_for_long(monkeypatch):
 def test_one_that_is_stopped_while_it_begins_ends():
     before = open_files()
     for pause in (0.0, 0.02, 0.1):
-        listening = Receivers([(Told(), None)])
-        (process,) = listening._apart
+        listening = Receivers([(Scripted(), None)])
+        (process,) = listening._processes
         process.start()
         time.sleep(pause)
         process.ask_to_stop()
@@ -173,17 +176,17 @@ def test_an_interrupt_while_it_begins_leaves_nothing_behind(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(source_process.SourceProcess, "wait", interrupted)
-    listening = Receivers([(Told(), None), (Told(robot="other"), None)])
+    listening = Receivers([(Scripted(), None), (Scripted(robot="other"), None)])
     with pytest.raises(KeyboardInterrupt), listening:
         listening.first()
-    assert not any(process._thread.is_alive() for process in listening._apart)
+    assert not any(process._thread.is_alive() for process in listening._processes)
 
 
 def test_what_only_this_process_has_listens_here():
-    class Local(Told, frozen=True, kw_only=True):
+    class Local(Scripted, frozen=True, kw_only=True):
         """Defined where no other process finds it."""
 
-    assert pickled_source(Told(), None)
+    assert pickled_source(Scripted(), None)
     for source in (Local(), Headset(human="operator")):
         assert pickled_source(source, None) is None
     with Receivers([(Local(), None)]) as listening:
@@ -194,7 +197,7 @@ def test_modules_of_the_folder_it_is_started_in_are_not_taken(tmp_path, monkeypa
     for name in ("msgspec", "pickle", "seerob", "sitecustomize"):
         (tmp_path / f"{name}.py").write_text("import os\nopen('taken', 'w')\nos._exit(7)\n")
     monkeypatch.chdir(tmp_path)
-    with Receivers([(Told(), None)]) as listening:
+    with Receivers([(Scripted(), None)]) as listening:
         taken(listening)
     assert not (tmp_path / "taken").exists()
 

@@ -289,7 +289,7 @@ def test_who_sends_no_time_is_as_old_as_the_file_allows(station, monkeypatch):
     blind = Spoiled(station, monkeypatch, packets, ticks=150)
     assert all("give a bound as delay" in tick.reason for tick in blind.live())
     bounded = Spoiled(station, monkeypatch, packets, ticks=300)
-    bounded.ears._source = replace(bounded.ears._source, delay=0.05)
+    bounded.listener._source = replace(bounded.listener._source, delay=0.05)
     told = bounded.live()
     assert [tick.decided for tick in told[10:190]] == [True] * 180
     silent = next(tick.t for tick in told if "not heard for" in tick.reason)

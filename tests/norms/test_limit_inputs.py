@@ -51,9 +51,9 @@ def test_a_table_of_another_edition_or_with_unusual_figures_says_so():
     same, none = table_input(shipped(), shipped().edition)
     assert (same.value, same.origin, none) == ("iso_ts_15066_2016.toml", "stated", ())
     assert same.source == f"ISO/TS 15066:2016; {shipped().title}"
-    other, doubts = table_input(shipped(), "ISO 10218-2:2025")
+    other, undecided_reasons = table_input(shipped(), "ISO 10218-2:2025")
     assert other.source == f"{same.source}; used for ISO 10218-2:2025"
-    assert [doubt.split(":2025:")[0] for doubt in doubts] == ["ISO 10218-2"]
+    assert [doubt.split(":2025:")[0] for doubt in undecided_reasons] == ["ISO 10218-2"]
     own, _ = table_input(replace(shipped(), reviewed_by="A. Engineer"), shipped().edition)
     assert own.source == f"{same.source}; figures outside the usual ranges: A. Engineer"
 

@@ -88,9 +88,9 @@ def test_others_are_seen_at_the_nearest_tick(model, ticks):
     address = model.mechanisms["arm"].q_address[0]
     for t in np.concatenate([np.arange(-1.3, ticks + 1, 0.4) * 0.01, [9.0]]):
         k = int(np.abs(np.array(witness.t) - t).argmin())
-        positions, _, doubts = witness.others(t)
+        positions, _, invalid_reasons = witness.others(t)
         assert positions[address] == pytest.approx(0.01 * k)
-        assert doubts["arm"] == ""
+        assert invalid_reasons["arm"] == ""
         assert witness.heard(t) == ({}, {})
 
 

@@ -225,11 +225,11 @@ def test_live_torques_are_judged_from_five_on_where_masses_are_known(
         for k in range(12):  # every second of which is looked at
             tau = tuple(-t for t in torques)
             assert words.invalid_reason(heard("arm", 0.0625 * k, q, qd, tau=tau)) == ""
-            assert ("the opposite sign" in words.torque_doubt) is (told and k >= 8), k
+            assert ("the opposite sign" in words.invalid_torque_reason) is (told and k >= 8), k
         right = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
         for k in range(6):
             right.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=torques))
-        assert right.torque_doubt == ""
+        assert right.invalid_torque_reason == ""
 
 
 def test_a_speed_that_is_a_third_low_shows_over_half_a_second_only(tmp_path) -> None:
@@ -617,4 +617,4 @@ def test_live_words_in_a_turned_base_say_which_tool_would_fit_and_torques_are_he
         place = tuple(turn @ tip + [0.5, -0.3, 0.2])
         why = words.invalid_reason(heard("arm", 0.11 * k, (a, 0.0), (1.0, 0.0), tcp=place))
     assert "a tool centre point at [0, 400, 300] mm of the flange would fit" in why
-    assert words.torque_doubt == ""
+    assert words.invalid_torque_reason == ""

@@ -12,7 +12,7 @@ from random_cells import files, random_cell
 
 from made_cell import TWO_R, made, person, two_r
 from seerob.core.snapshot import Verdict
-from seerob.criteria.between_ticks import Told
+from seerob.criteria.between_ticks import SpanResult
 from seerob.files.trajectories.path_map import (
     GIVEN,
     PERMISSIBLE,
@@ -130,7 +130,7 @@ def risen(station, looks):
     def watching(i, watch, ends, state):
         path, own = between._way, watch.criterion
         if ends[0].margin is None or ends[1].margin is None:
-            return Told()
+            return SpanResult()
         bound = own.rises(model)(between._span(watch, path, ends, state))
         S_p = []
         for t in np.union1d(np.linspace(path.t[0], path.t[-1], looks), path.t).tolist():
@@ -140,7 +140,7 @@ def risen(station, looks):
         rise = S_p.max(axis=0) - (S_p[[0, -1]].max(axis=0) if own.lasts(model) else S_p.min(axis=0))
         room.setdefault(own.name, []).append(float((bound - rise).min()))
         most[own.name] = max(most.get(own.name, 0.0), float(rise.max()))
-        return Told()
+        return SpanResult()
 
     between._judge = watching
     engine, ahead = engine_of(model), looks_ahead(model)

@@ -11,10 +11,10 @@ import threading
 import pytest
 
 from live_story import open_files, wait_for
+from scripted_sources import Scripted
 from seerob.core.samples import JointSample, SignalSample
 from seerob.devices.live.receivers import Receivers
 from soak.test_live_sources import KILLS, SPARE, load
-from told_sources import Told
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
@@ -43,7 +43,7 @@ def kill_and_hear(monkeypatch, kills):
         log.addFilter(lines)
     settled = None
     try:
-        with Receivers([(Told(), None)]) as listening:
+        with Receivers([(Scripted(), None)]) as listening:
             for k in range(kills):
                 found = {}
                 wait_for(

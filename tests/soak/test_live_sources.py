@@ -74,7 +74,7 @@ class Ears(logging.Filter):
 
 
 @pytest.fixture
-def ears(monkeypatch):
+def listen(monkeypatch):
     monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.002)
     monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.02)
     # A clock that starts again ten times a second is not relied on; here only whether it is heard is asked.
@@ -92,11 +92,11 @@ def ears(monkeypatch):
         log.removeFilter(each)
 
 
-def kill_and_restart(monkeypatch, ears, kind, kills):
+def kill_and_restart(monkeypatch, listen, kind, kills):
     """What was in use after a fifth of the kills, and at the end."""
     before = load()
     server, source, target = KINDS[kind](monkeypatch)
-    heard = ears(source)
+    heard = listen(source)
     listener = Listener(source, target, heard.hear)
     listener.start()
     settled = None
@@ -143,23 +143,23 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pro
 
 
 @pytest.mark.parametrize("kind", [make.__name__ for make in OWN])
-def test_every_kill_is_survived(monkeypatch, ears, kind):
-    kill_and_restart(monkeypatch, ears, kind, 1)
+def test_every_kill_is_survived(monkeypatch, listen, kind):
+    kill_and_restart(monkeypatch, listen, kind, 1)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", CHOSEN)
-def test_a_thousand_kills_leave_nothing_behind(monkeypatch, ears, kind):
-    settled, end = kill_and_restart(monkeypatch, ears, kind, KILLS)
+def test_a_thousand_kills_leave_nothing_behind(monkeypatch, listen, kind):
+    settled, end = kill_and_restart(monkeypatch, listen, kind, KILLS)
     assert end[2] < settled[2] + SPARE
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", [make.__name__ for make in FOREIGN])
-def test_a_server_that_is_held_still_is_silent_within_the_time_out(monkeypatch, ears, kind):
+def test_a_server_that_is_held_still_is_silent_within_the_time_out(monkeypatch, listen, kind):
     """Its connection stays, and it must not seem that nothing has changed."""
     server, source, target = KINDS[kind](monkeypatch)
-    heard = ears(source)
+    heard = listen(source)
     listener = Listener(source, target, heard.hear)
     listener.start()
     try:
@@ -178,11 +178,11 @@ def test_a_server_that_is_held_still_is_silent_within_the_time_out(monkeypatch, 
 
 
 @pytest.mark.soak
-def test_a_robot_that_stands_still_is_known_as_long_as_its_server_is_there(ears):
+def test_a_robot_that_stands_still_is_known_as_long_as_its_server_is_there(listen):
     """OPC UA speaks of changes only, and a standing robot has none."""
     server = Elsewhere("opcua_standing").start()
     source = OpcuaRobot(robot="arm", url=f"opc.tcp://127.0.0.1:{server.port}")
-    heard = ears(source)
+    heard = listen(source)
     listener = Listener(source, None, heard.hear)
     listener.start()
     try:

@@ -16,7 +16,7 @@ DOOR = Variable(name="door", source="plc", address=2, type=Kind.BOOL)
 LAMP = Variable(name="lamp", source="plc", address=3, type=Kind.BOOL, write=True)
 
 
-class Told(VariablesSource, frozen=True, kw_only=True):
+class Scripted(VariablesSource, frozen=True, kw_only=True):
     """Says what it is given."""
 
     said: tuple[tuple[float, tuple[Change, ...]], ...]
@@ -64,7 +64,7 @@ def test_old_news_is_as_old_as_it_says():
 
 
 def test_silence_with_a_connection_is_heard_as_beats_and_the_end_ends():
-    source = Told(name="plc", said=((0.0, (Change("speed", 500),)), (0.2, (Change("door", False),))))
+    source = Scripted(name="plc", said=((0.0, (Change("speed", 500),)), (0.2, (Change("door", False),))))
     target = Target(
         name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=(SPEED, DOOR, LAMP)
     )

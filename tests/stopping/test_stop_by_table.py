@@ -132,7 +132,7 @@ def test_where_the_figures_are_from(tmp_path):
     assert own["rated payload of the stopping table"] == (5.0, "kg", "stated")
     assert own["payload of arm"] == (0.0, "kg", "computed")
     assert "T_s of joints without a table" not in own
-    assert stop.doubts == ()
+    assert stop.undecided_reasons == ()
     assert stop.formula.startswith("S_s from each joint's way")
     assert "the lesser of its first way" in stop.not_modelled[1]
     silent, _ = inputs(tmp_path / "silent", table(joint(0), rated_payload=None), stopping=0.7)
@@ -143,4 +143,4 @@ def test_where_the_figures_are_from(tmp_path):
     _, stop = inputs(tmp_path / "tool", "ur10_cb3")
     assert stop.formula == "S_s = v_s T_s(v_s)"
     assert "the lesser of its first way" not in stop.not_modelled[1]
-    assert stop.doubts
+    assert stop.undecided_reasons

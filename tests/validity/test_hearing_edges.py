@@ -77,10 +77,10 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
 def test_angles_that_nothing_tells_count_between_the_samples_beside_an_instant() -> None:
     hearing = heard(0.0)
     wrist, neck = ("wrist_flexion", 1), ("neck_twist", 0)
-    hearing.bones_heard = said(untold=[frozenset({wrist}), frozenset(), frozenset(), frozenset({neck})])
-    assert hearing.untold_angles(0.5) == {wrist}
-    assert hearing.untold_angles(1.0 - SLACK) == hearing.untold_angles(1.5) == frozenset()
-    assert hearing.untold_angles(2.5) == hearing.untold_angles(9.0) == {neck}
+    hearing.bones_heard = said(undetermined=[frozenset({wrist}), frozenset(), frozenset(), frozenset({neck})])
+    assert hearing.undetermined_angles(0.5) == {wrist}
+    assert hearing.undetermined_angles(1.0 - SLACK) == hearing.undetermined_angles(1.5) == frozenset()
+    assert hearing.undetermined_angles(2.5) == hearing.undetermined_angles(9.0) == {neck}
 
 
 def test_a_joint_beyond_which_nothing_is_seen_tells_nothing_of_its_bone() -> None:

@@ -123,21 +123,21 @@ def test_a_blend_stays_within_its_radius_does_not_stop_and_its_speed_does_not_ju
 
 def test_a_blend_of_moves_that_are_too_short_is_cut_and_said(arm):
     found = made(arm, joints(HOME), to(-0.7, 0.0, 0.5), to(-0.7, 0.02, 0.5, blend=0.1), to(-0.7, 0.02, 0.52))
-    assert any("cut to half" in d for d in found.doubts)
+    assert any("cut to half" in d for d in found.deviations)
 
 
 def test_joint_speed_limits_slow_a_linear_move_down_and_say_so(arm):
     slow = JointLimits.of(6, speed=(0.05,))
     found = made(arm, joints(HOME), to(-0.7, -0.2, 0.5), limits=slow)
     assert np.abs(found.trajectory.qd).max() <= 0.05 * (1 + 1e-6)
-    assert any("slowed from 0.25" in d for d in found.doubts)
+    assert any("slowed from 0.25" in d for d in found.deviations)
 
 
 def test_a_tool_that_turns_fast_on_a_short_way_is_pointed_out_or_slowed(arm):
     turn = ToolPose((-0.7, 0.0, 0.5), (0.0, np.cos(0.6), np.sin(0.6), 0.0))
     way = joints(HOME), to(-0.72, 0.0, 0.5, move=Move.JOINT), Waypoint(place="t", move=Move.LINEAR, pose=turn)
     free = made(arm, *way, wish=Wish(**{**vars_of(WISH), "tool_acceleration": 5.0, "tool_jerk": 500.0}))
-    assert any("the tool turns at up to" in d for d in free.doubts)
+    assert any("the tool turns at up to" in d for d in free.deviations)
     slow = made(arm, *way, wish=Wish(**{**vars_of(WISH), "tool_turn": 0.5}))
     at = arm.posture(slow.trajectory.q[:-1])
     near = np.linalg.norm(at.position - [-0.71, 0.0, 0.5], axis=1) < 0.009
@@ -210,7 +210,7 @@ def test_seven_joints_are_a_doubt():
     w = Waypoint(place="b", move=Move.LINEAR, pose=ToolPose(tuple(position), DOWN))
     found = continuous(Program("p", (joints(q), w)), seven, WISH, limits=JointLimits.of(7, speed=(9.0,)))
     np.testing.assert_allclose(seven.posture(found.at[-1]).position, position, atol=1e-7)
-    assert any("7 joints for a pose of 6" in d for d in found.doubts)
+    assert any("7 joints for a pose of 6" in d for d in found.deviations)
 
 
 def test_what_nobody_gave_is_asked_for_all_at_once(arm):

@@ -132,7 +132,7 @@ def test_a_move_that_is_slowed_for_a_joint_says_for_which_and_how_much(arm):
     points = Waypoint(place="a", q=tuple(HOME)), Waypoint(place="b", move=Move.LINEAR, pose=goal)
     own = JointLimits.of(6, acceleration=(0.4,), jerk=(4.0,))
     found, free = (continuous(Program("p", points), arm, WISH, limits=each) for each in (own, FREE))
-    (doubt,) = [text for text in found.doubts if "slowed by" in text]
+    (doubt,) = [text for text in found.deviations if "slowed by" in text]
     assert "keeps its limit of" in doubt
     k = float(doubt.split("slowed by ")[1].split()[0])
     assert found.trajectory.duration == pytest.approx(k * free.trajectory.duration, rel=1e-2)

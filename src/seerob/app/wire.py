@@ -97,13 +97,13 @@ def _enum(cls: type[StrEnum], *, docs: bool) -> str:
     if not docs:
         return text
     lines = [inspect.getdoc(cls) or "", ""]
-    told = _field_docs(cls)
-    lines += [f"- `{m.value}`: {told[m.name]}" for m in cls if m.name in told]
+    texts = _field_docs(cls)
+    lines += [f"- `{m.value}`: {texts[m.name]}" for m in cls if m.name in texts]
     return _comment("\n".join(lines).strip()) + text
 
 
 def _interface(cls: type[Struct], aliases: dict[Any, str], *, docs: bool) -> str:
-    told = _field_docs(cls) if docs else {}
+    texts = _field_docs(cls) if docs else {}
     hints = get_type_hints(cls)
     lines = [f"export interface {cls.__name__} {{\n"]
     config = cls.__struct_config__
@@ -111,8 +111,8 @@ def _interface(cls: type[Struct], aliases: dict[Any, str], *, docs: bool) -> str
     if tag is not None:
         lines.append(f"  type: {_string(str(tag))};\n")
     for field in msgspec.structs.fields(cls):
-        if field.name in told:
-            lines.append(_comment(told[field.name], indent="  "))
+        if field.name in texts:
+            lines.append(_comment(texts[field.name], indent="  "))
         left_out = cls in FROM_PAGE or (config.omit_defaults and cls not in COMPLETED)
         optional = "?" if left_out and not field.required else ""
         lines.append(f"  {field.encode_name}{optional}: {_type(hints[field.name], aliases)};\n")

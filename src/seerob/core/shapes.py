@@ -95,7 +95,7 @@ def dilated_rectangle(corner: Array, u: Array, v: Array, radius: float, *, name:
     return Solid(points=np.array([corner, corner + u, corner + v]), radius=radius, name=name)
 
 
-def cut_ears(outline: Array) -> list[tuple[int, int, int]]:
+def ear_clipping(outline: Array) -> list[tuple[int, int, int]]:
     """Triangles of a simple polygon, counter-clockwise, by cutting ears; shape (n, 2) to indices.
 
     What is left of an outline that crosses itself is not covered.
@@ -220,13 +220,13 @@ def triangulate(corners: Sequence[Corner]) -> NDArray[np.int32]:
         left.reverse()
     triangles = []
     while len(left) > 3:
-        i = _ear(corners, left)
+        i = _next_ear(corners, left)
         triangles.append((left[i - 1], left[i], left[(i + 1) % len(left)]))
         del left[i]
     return np.array([*triangles, left], np.int32)
 
 
-def _ear(corners: Sequence[Corner], left: Sequence[int]) -> int:
+def _next_ear(corners: Sequence[Corner], left: Sequence[int]) -> int:
     for i in range(len(left)):
         a, b, c = (corners[left[k % len(left)]] for k in (i - 1, i, i + 1))
         if turn(a, b, c) <= 0:

@@ -95,12 +95,12 @@ class AsHeard:
             key, again = quantity.key, quantity.key in self._plausible
             if again and quantity.kind != FEET:
                 continue
-            told = [f for f in findings([quantity], ()) if f.holds]
-            if not told or self._confirmed(quantity):
+            implausible = [f for f in findings([quantity], ()) if f.holds]
+            if not implausible or self._confirmed(quantity):
                 self._plausible.add(key)
                 self._off.pop(key, None)
             elif not again or t - self._off.setdefault(key, t) >= LASTS:
-                found += told
+                found += implausible
         return found
 
     def _confirmed(self, quantity: Quantity) -> bool:
@@ -119,4 +119,4 @@ def _no_farther(value: float, confirmed: float) -> bool:
 
 def _placed(state: State, name: str) -> bool:
     """Whether it was heard where it is."""
-    return not state.heard_doubt(name) and not state.hearings[name].unplaced(state.t)
+    return not state.invalid_source_reason(name) and not state.hearings[name].unplaced(state.t)

@@ -149,7 +149,7 @@ class Asking(NamedTuple):
     """Makes what is within undecided, with a reason."""
 
 
-class Told(Struct, frozen=True, eq=False):
+class SpanResult(Struct, frozen=True, eq=False):
     """What a way between two instants came to."""
 
     exceeded: Result | None = None
@@ -158,7 +158,7 @@ class Told(Struct, frozen=True, eq=False):
     """Why it is not known; empty when all of it is within or something is exceeded."""
 
 
-NOTHING = Told()
+NOTHING = SpanResult()
 """Of a way on which all is within, or where no margin says anything."""
 
 
@@ -344,24 +344,24 @@ class BetweenTicks:
 
     def _switched(
         self, i: int, watch: Watch, ends: tuple[End, End], switches: tuple[float, ...], state: State
-    ) -> Told:
+    ) -> SpanResult:
         """The way between two ticks, of which a criterion applied in parts: each of these by itself."""
         active, path = watch.criterion.active, self._way
         assert active is not None
         assert path is not None
         before, now = ends
-        opened = Told()
+        opened = SpanResult()
         for begin, end in pairwise((before.t, *switches, now.t)):
             known = state.signals.at(active, begin)
             if end <= begin or (known.value is False and not known.invalid_reason):
                 continue
             if watch.remembers:
-                return Told(open=f"{active} switched between two ticks, and what is asked remembers")
+                return SpanResult(open=f"{active} switched between two ticks, and what is asked remembers")
             a, b = before, now
             if begin != before.t:
                 result, a, _ = self._look(i, watch, path, begin, state)
                 if a.verdict is _EXCEEDED:
-                    return Told(exceeded=_between(result, begin))
+                    return SpanResult(exceeded=_between(result, begin))
             if end != now.t or now.muted:
                 _, b, _ = self._look(i, watch, path, end, state, applies=True)
                 # It does not apply there any more: what it would say is known, and is no verdict.
@@ -394,7 +394,9 @@ class BetweenTicks:
         assert left is not None
         return end if np.all(left[0] - left[1] >= 0) else None
 
-    def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State, *, cut: bool = False) -> Told:
+    def _judge(
+        self, i: int, watch: Watch, ends: tuple[End, End], state: State, *, cut: bool = False
+    ) -> SpanResult:
         """The way between two instants at which a criterion was asked.
 
         At one of them it began or ceased to apply when it is ``cut``.
@@ -413,7 +415,9 @@ class BetweenTicks:
             # Nothing was known at one end, which is said there, and from the other nothing follows.
             return NOTHING
         if not np.isfinite(low) and self._way.broken:
-            return Told(open=f"{', '.join(self._way.broken)} jumped: its way between two ticks is not known")
+            return SpanResult(
+                open=f"{', '.join(self._way.broken)} jumped: its way between two ticks is not known"
+            )
         return self._search(i, watch, ends, low, state)
 
     def _span(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Span:
@@ -470,14 +474,14 @@ class BetweenTicks:
         assert one is not None
         return least_margin(one, other, fall)
 
-    def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> Told:
+    def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> SpanResult:
         path = self._way
         assert path is not None
         begin, end = (f"{each.t:.4g} s" for each in ends)
         remembers = watch.remembers and watch.follows is None
         if remembers or not self._same:
             what = "it remembers" if remembers else "something was picked up or let go"
-            return Told(open=f"not known to be within from {begin} to {end}: {what}")
+            return SpanResult(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
         invalid_reason = ""
         for _ in range(watch.looks):
@@ -487,7 +491,7 @@ class BetweenTicks:
             t = path.middle(a.t, b.t)
             result, middle, shadow = self._look(i, watch, path, t, state)
             if middle.verdict is _EXCEEDED:
-                return Told(exceeded=_between(result, t))
+                return SpanResult(exceeded=_between(result, t))
             for pair in ((a, middle), (middle, b)):
                 if pair[0].margin or pair[1].margin or (watch.lowest and (pair[0].idle or pair[1].idle)):
                     low = self._low(watch, path, pair, shadow)
@@ -498,9 +502,9 @@ class BetweenTicks:
         if not spans and not invalid_reason:
             return NOTHING
         if not spans:
-            return Told(open=f"between two ticks: {invalid_reason}")
+            return SpanResult(open=f"between two ticks: {invalid_reason}")
         _, _, a, b = spans[0]
-        return Told(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
+        return SpanResult(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
 
     def _look(
         self, i: int, watch: Watch, path: Path, t: float, state: State, *, applies: bool = False

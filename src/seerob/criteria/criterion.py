@@ -127,7 +127,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         super().__init_subclass__()
         if not cls.__module__.startswith("seerob."):
             for name in GIVEN_A_MODEL & vars(cls).keys():
-                setattr(cls, name, _apart(vars(cls)[name]))
+                setattr(cls, name, _own_model(vars(cls)[name]))
 
     def compute(self, model: Model) -> Compute:
         """Resolve every name once and return the function that computes the figure of an instant.
@@ -265,7 +265,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return model.unshaped(self.depends(model)) if self.by_shape else ""
 
 
-def _apart(method: Callable[..., Any]) -> Callable[..., Any]:
+def _own_model(method: Callable[..., Any]) -> Callable[..., Any]:
     """A method of a criterion, given the copy of the model that is its own."""
 
     @wraps(method)

@@ -406,7 +406,7 @@ class Question:
         texts = (text for name, text in every if name in asked)
         return "; ".join(dict.fromkeys(filter(None, (self.held, *(t for t in texts if t not in self.held)))))
 
-    def doubts(self, twin: Twin) -> Iterator[str | Reasons]:
+    def undecided_reasons(self, twin: Twin) -> Iterator[str | Reasons]:
         """Why what it has just said of the twin is not within, by what it asked for: empty where it is.
 
         The rules of a run and of arrays; of N instants each is a text, of all of them, or has the shape (N,).
@@ -414,7 +414,7 @@ class Question:
         if twin.speeds_asked and (still := [name for name in twin.speeds_asked if not twin.moved(name)]):
             yield unmoved(still)
         for name in self.relied_on:
-            yield twin.heard_doubt(name)
+            yield twin.invalid_source_reason(name)
 
     def passed_over(self, t: float) -> str:
         """Why nothing is within at an instant [s]: a phase began and ended since the last one."""
@@ -434,7 +434,7 @@ class Question:
 
 def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
     """What one's own says of a state, of which it is given the accessors, and nothing that others read."""
-    with state.set_apart(bound.criterion.name) as own:
+    with state.for_author(bound.criterion.name) as own:
         return evaluate(own)
 
 
@@ -604,9 +604,9 @@ class Judge:
         if value is not None and not math.isfinite(value):
             raise Undecided(f"the value is {value}, not a finite number")
         if result.verdict is _WITHIN or question.relied_on:
-            for doubt in question.doubts(state):
-                if doubt:
-                    return undecided(result, str(doubt))
+            for why in question.undecided_reasons(state):
+                if why:
+                    return undecided(result, str(why))
         if not criterion.by_speed and state.speed_errors:
             return self._shaken(question, result, state)
         return result
@@ -621,8 +621,10 @@ class Judge:
         undeclared |= state.asked - question.declared
         whole = question.criterion.whole
         for name in sorted(undeclared):
-            doubt = state.invalid_reason if whole or name.startswith(VARIABLE) else state.heard_doubt
-            if reason := doubt(name):
+            reason_of = (
+                state.invalid_reason if whole or name.startswith(VARIABLE) else state.invalid_source_reason
+            )
+            if reason := reason_of(name):
                 raise Undecided(f"{reason}; it depends on that and does not declare it (depends, variables)")
 
     def _shaken(self, question: Question, result: Result, state: State) -> Result:

@@ -16,7 +16,7 @@ from seerob.core.quantities import LENGTHS
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.description.mesh_files import MeshSource, RawFile, RawMesh, apart
+from seerob.description.mesh_files import MeshSource, RawFile, RawMesh, in_parser_process
 from seerob.description.meshes import collada, gltf, obj, off, ply, stl, threemf
 from seerob.description.shapes.mesh_bodies import tidied
 from seerob.description.shapes.mesh_mending import sided
@@ -31,11 +31,11 @@ FARTHEST = 1e6
 READERS: dict[str, Callable[[MeshSource], RawFile]] = {
     ".stl": stl.read,
     ".obj": obj.read,
-    ".ply": apart(ply.read),
+    ".ply": in_parser_process(ply.read),
     ".off": off.read,
     ".glb": gltf.read,
     ".gltf": gltf.read,
-    ".dae": apart(collada.read),
+    ".dae": in_parser_process(collada.read),
     ".3mf": threemf.read,
 }
 """File name ending → reader."""

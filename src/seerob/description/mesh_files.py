@@ -197,14 +197,14 @@ class MeshSource:
 Reader = Callable[[MeshSource], RawFile]
 
 
-def apart(read: Reader) -> Reader:
+def in_parser_process(read: Reader) -> Reader:
     """A reader that works in the parsers' process.
 
     Args:
         read: A function of a module, which that process calls by its name.
     """
 
-    def read_apart(source: MeshSource) -> RawFile:
+    def read_in_process(source: MeshSource) -> RawFile:
         given = source.path, source.data, source.max_bytes, source.max_faces
         meshes, meters, up, findings, files = parsed(_plain, read, *given, file=str(source.path))
         source.findings.extend(
@@ -213,7 +213,7 @@ def apart(read: Reader) -> Reader:
         source.files.update(files)
         return RawFile(tuple(_mesh(*mesh) for mesh in meshes), meters, up)
 
-    return read_apart
+    return read_in_process
 
 
 def _plain(read: Reader, path: Path, data: bytes, max_bytes: int, max_faces: int) -> tuple[Any, ...]:

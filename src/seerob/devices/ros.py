@@ -147,7 +147,7 @@ def driven(target: Target, at: str, where: str) -> str:
     return at
 
 
-APART = 2.0
+MOST_SKEW = 2.0
 """Periods by which the joints of one sample may be apart before it is no longer judged."""
 
 
@@ -207,7 +207,7 @@ class JointGather:
         instants = stamps if stamped else [last.arrived for last in every]
         q = tuple(last.q for last in every)
         quality = Quality.GOOD
-        if max(instants) - min(instants) > APART * self._period:
+        if max(instants) - min(instants) > MOST_SKEW * self._period:
             quality = Quality.DEGRADED
         if not all(map(math.isfinite, q)):
             quality = Quality.INVALID

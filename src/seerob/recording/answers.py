@@ -81,16 +81,16 @@ class Answers:
         kept &= ~np.isinf(self.limit)
         if not (wordless or (within & (nothing | ~kept)).any()):
             return np.full(len(self.value), "", object)
-        told = np.where(
+        reason = np.where(
             np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
         )
-        told = np.where(np.isinf(self.limit), "it is within, and nothing could exceed its limit", told)
-        told = np.where(np.isfinite(self.value), told, "it is within, and has no value")
-        told = np.where(nothing, "it is within, and says that there is nothing to judge", told)
-        told = np.where(within & (nothing | ~kept), told, "")
+        reason = np.where(np.isinf(self.limit), "it is within, and nothing could exceed its limit", reason)
+        reason = np.where(np.isfinite(self.value), reason, "it is within, and has no value")
+        reason = np.where(nothing, "it is within, and says that there is nothing to judge", reason)
+        reason = np.where(within & (nothing | ~kept), reason, "")
         empty = np.isnan(self.value) & np.isnan(low)
-        told = np.where(silent & ~np.isnan(self.limit), "it has a limit and no verdict", told)
-        return np.where(silent & empty, "it says nothing, neither a figure nor a verdict", told).astype(
+        reason = np.where(silent & ~np.isnan(self.limit), "it has a limit and no verdict", reason)
+        return np.where(silent & empty, "it says nothing, neither a figure nor a verdict", reason).astype(
             object
         )
 

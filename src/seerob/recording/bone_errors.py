@@ -84,7 +84,7 @@ class BoneErrors:
     def bones(self) -> tuple[BoneError, ...]:
         """Every bone that was seen, first all positions, then all angles."""
         return tuple(
-            _told(bone, k, counted)
+            _bone_error(bone, k, counted)
             for what in range(len(_WHAT))
             for (bone, k), counted in tuple(self._of.items())
             if k == what
@@ -93,13 +93,13 @@ class BoneErrors:
     def all(self) -> tuple[BoneError, ...]:
         """Errors of all bones together: position and angle, as far as they were seen."""
         return tuple(
-            _told("", k, _together(counted))
+            _bone_error("", k, _together(counted))
             for k in range(len(_WHAT))
             if (counted := [c for (_, what), c in tuple(self._of.items()) if what == k])
         )
 
 
-def _told(bone: str, k: int, counted: _Counted) -> BoneError:
+def _bone_error(bone: str, k: int, counted: _Counted) -> BoneError:
     what, unit = _WHAT[k]
     return BoneError(
         bone=bone,

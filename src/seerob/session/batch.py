@@ -158,7 +158,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     engine.end = end
     t, q, v = [], [], []
     ways: list[Path] = []
-    doubts: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}
+    reasons_of: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}
     noise: dict[str, list[Array | None]] = {name: [] for name in engine.model.mechanisms}
     seen: dict[str, list[Seen]] = {name: [] for name in engine.model.mechanisms}
     for seq, samples in enumerate(heard):
@@ -170,13 +170,15 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         if state.path is not None:
             ways.append(state.path)
         implausible |= dict.fromkeys(as_heard.at(state) or ())
-        for name, found in doubts.items():
+        for name, found in reasons_of.items():
             hearing = state.hearings[name]
             # Of bones that are in doubt `Seen` tells, and the others may be relied on.
-            found.append(state.heard_doubt(name) if hearing.bones_heard else state.invalid_reason(name))
+            found.append(
+                state.invalid_source_reason(name) if hearing.bones_heard else state.invalid_reason(name)
+            )
             noise[name].append(hearing.speed_error(state.t))
             seen[name].append(Seen.of(hearing))
-    reasons = {name: np.array(found, object) for name, found in doubts.items()}
+    reasons = {name: np.array(found, object) for name, found in reasons_of.items()}
     n = {name: len(mechanism.joints) for name, mechanism in engine.model.mechanisms.items()}
     errors = {
         name: np.array([np.zeros(n[name]) if one is None else one for one in every])
@@ -463,13 +465,13 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
         if some := sorted(motion.seen.keys() & asked_of):
             alone[name] = f"more is known of {some[0]} than where it is"
         for who in sorted(states.asked):
-            if motion.doubts[who].any():
-                reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
-        answers = _doubted(answers, one.criterion, reasons)
-        for doubt in (*one.question.doubts(states), one.question.held_for(states.asked)):
-            there = np.asarray(doubt, object) != ""
+            if motion.invalid_reasons[who].any():
+                reasons = np.where(motion.invalid_reasons[who] != "", motion.invalid_reasons[who], reasons)
+        answers = _undecided_where(answers, one.criterion, reasons)
+        for reason in (*one.question.undecided_reasons(states), one.question.held_for(states.asked)):
+            there = np.asarray(reason, object) != ""
             if there.any():
-                reasons = np.where((answers.verdict == WITHIN) & there, doubt, reasons)
+                reasons = np.where((answers.verdict == WITHIN) & there, reason, reasons)
                 answers = answers.open(there)
         found[name] = answers, reasons, states.alone
     # Only what is within, and so has a limit, is to stay so on the way.
@@ -486,7 +488,7 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
     reasons = np.full(n, "", object)
     try:
         if one.question.bound.own:
-            with states.set_apart(criterion.name) as own:
+            with states.for_author(criterion.name) as own:
                 answers = one.many(own)
         else:
             answers = one.many(states)
@@ -520,17 +522,17 @@ def _misshapen(answers: Answers, n: int) -> str:
     return ""
 
 
-def _doubted(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
+def _undecided_where(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
     """Make answers undecided, without a figure, at the instants that are in doubt."""
     if not reasons.any():
         return answers
-    doubted = reasons != ""
+    invalid = reasons != ""
     nothing = _nothing(criterion, len(reasons))
     return Answers(
-        np.where(doubted, nothing.value, answers.value),
-        np.where(doubted, nothing.limit, answers.limit),
-        np.where(doubted, nothing.verdict, answers.verdict).astype(np.uint8),
-        None if answers.interval is None else _blanked(answers.interval, doubted),
+        np.where(invalid, nothing.value, answers.value),
+        np.where(invalid, nothing.limit, answers.limit),
+        np.where(invalid, nothing.verdict, answers.verdict).astype(np.uint8),
+        None if answers.interval is None else _blanked(answers.interval, invalid),
     )
 
 
@@ -632,7 +634,7 @@ def _hear(hearings: Mapping[str, Hearing], motion: Motion, k: int) -> None:
     for name, every in motion.seen.items():
         every[k].tell(hearings[name])
     for name, hearing in hearings.items():
-        said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
+        said = [motion.invalid_reasons[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
         errors = motion.speed_errors.get(name)
         hearing.heard = [
             Heard(float(motion.t[i]), why, speed_error=None if errors is None else errors[i])
@@ -654,7 +656,7 @@ def _foresee(
         if motion.ways is not None and row > 0 and motion.t[row - 1] + SLACK < t[i] < motion.t[row] - SLACK:
             every = motion.ways[row - 1].at(float(t[i]))
             q[i], qd[i] = every[0][columns.own_q], every[1][columns.own_v]
-    why = next(filter(None, motion.doubts[name][rows].tolist()), "")
+    why = next(filter(None, motion.invalid_reasons[name][rows].tolist()), "")
     if beyond and np.abs(motion.v[-1][columns.own_v]).max(initial=0.0) > STANDS:
         why = why or "the motion ends, and what it does after is not known"
     return q, qd, why

@@ -26,7 +26,7 @@ from seerob.workstation.workstation import PLUGINS, file_among, locate
 
 LARGEST = 64 * 2**20
 """A description that is larger [byte] is not looked into."""
-APART = {
+PARSERS = {
     ".xacro": "xacro, which evaluates expressions",
     ".dae": "the parser of COLLADA",
     ".xlsx": "the parser of workbooks",
@@ -79,7 +79,7 @@ def _of_recording(recording: Recording) -> list[Fact]:
     nowhere = recording.path.parent / "…"
     found = (outside for outside in _outside(table, file, nowhere) if not outside.key.startswith("sources["))
     facts += [_refused(outside) for outside in found]
-    facts += [fact for name in recording.files for fact in _apart(name)]
+    facts += [fact for name in recording.files for fact in _parser(name)]
     live = [fact for fact in _rest(table, Path(file)) if fact.does not in ("connects", "listens", "sends")]
     return _shortened([*facts, *live])
 
@@ -118,7 +118,7 @@ def _files(table: Mapping[str, Any], file: Path, folder: Path) -> Iterator[Fact]
             path = folder / text
             if path.is_file():
                 yield Fact("reads", f"{text} ({key})")
-                yield from _apart(text)
+                yield from _parser(text)
                 if path.suffix.lower() in _DESCRIPTIONS:
                     yield from _named_in(path, text, folder)
             elif path.is_dir() and path.resolve() != folder.resolve():
@@ -127,8 +127,8 @@ def _files(table: Mapping[str, Any], file: Path, folder: Path) -> Iterator[Fact]
             continue  # no name of a file
 
 
-def _apart(name: str) -> Iterator[Fact]:
-    if (what := APART.get(Path(name).suffix.lower())) is not None:
+def _parser(name: str) -> Iterator[Fact]:
+    if (what := PARSERS.get(Path(name).suffix.lower())) is not None:
         yield _started(what, name)
 
 
@@ -152,7 +152,7 @@ def _named_in(path: Path, shown: str, folder: Path) -> Iterator[Fact]:
             yield Fact("outside", f"{real} (named in {shown}): refused without --allow-outside")
         else:
             yield Fact("reads", f"{found} (named in {shown})")
-            yield from _apart(found)
+            yield from _parser(found)
 
 
 # -- what runs, who is connected to, what is written --------------------------------------------

@@ -62,12 +62,12 @@ def known_motion(engine: Engine, feed: Sequence[tuple[Sample, ...]], end: float)
                 return None
             tracks[name] = track
     ways = _ways(model, tracks, ticks)
-    doubts = _doubts(engine, tracks, ticks)
+    invalid_reasons = _invalid_reasons(engine, tracks, ticks)
     noise = {
         name: error for name, track in tracks.items() if (error := track.speed_errors(ticks)) is not None
     }
     first = ways.first
-    return Motion(ticks, ways.q[first], ways.v[first], doubts, True, ways, noise)
+    return Motion(ticks, ways.q[first], ways.v[first], invalid_reasons, True, ways, noise)
 
 
 def _is_plain(model: Model) -> bool:
@@ -163,7 +163,7 @@ class _Track:
         v[places[last]] = self.v[newest]
         return q, v
 
-    def may_be_in_doubt(self, hearing: Hearing, ticks: Array, *, stands: bool) -> Flags:
+    def may_be_invalid(self, hearing: Hearing, ticks: Array, *, stands: bool) -> Flags:
         """At which ticks what was heard is to be looked at: at no other is there a doubt, shape (N,)."""
         k, last = self.past, np.maximum(self.past - 1, 0)
         following = self._following
@@ -171,8 +171,8 @@ class _Track:
         found = (k == 0) | (since + self.older[self.received - 1] > longest)
         found |= self.t[following] - self.t[last] > longest
         if any(self.reasons):
-            doubted = np.array([bool(reason) for reason in self.reasons])
-            found |= doubted[last] | doubted[following]
+            invalid = np.array([bool(reason) for reason in self.reasons])
+            found |= invalid[last] | invalid[following]
         if stands and np.abs(self.v[-1]).max(initial=0.0) > STANDS:
             found |= (k == self.received) & (since > hearing.grace + SLACK)
         return np.asarray(found)
@@ -229,7 +229,7 @@ def _ways(model: Model, tracks: dict[str, _Track], ticks: Array) -> Ways:
     return Ways(knots, q, v, first)
 
 
-def _doubts(engine: Engine, tracks: dict[str, _Track], ticks: Array) -> dict[str, Reasons]:
+def _invalid_reasons(engine: Engine, tracks: dict[str, _Track], ticks: Array) -> dict[str, Reasons]:
     """Why each robot, person and machine may not be where it is found, shape (N,) of texts each."""
     state = engine.state
     reasons: dict[str, Reasons] = {name: np.full(len(ticks), "", object) for name in engine.model.mechanisms}
@@ -237,7 +237,7 @@ def _doubts(engine: Engine, tracks: dict[str, _Track], ticks: Array) -> dict[str
     for name, hearing in state.hearings.items():
         if name in tracks:
             hearing.driven = True
-            look |= tracks[name].may_be_in_doubt(hearing, ticks, stands=name in engine.ahead)
+            look |= tracks[name].may_be_invalid(hearing, ticks, stands=name in engine.ahead)
         elif hearing.driven or not hearing.given:
             look[:] = True
     for i in np.flatnonzero(look).tolist():

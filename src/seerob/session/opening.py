@@ -244,10 +244,12 @@ def _contradicted(model: Model, opened: Sequence[tuple[Source, Opened]]) -> Iter
         t, q, qd = motion.t[some], motion.q[some], samples.qd[some]
         places = motion_of(model, {name: q}, {name: qd}, t - t[0])
         errors = {} if samples.qd_error is None else {name: np.tile(samples.qd_error, (len(t), 1))}
-        doubts = dict(places.doubts)
+        invalid_reasons = dict(places.invalid_reasons)
         if motion.invalid is not None:
-            doubts[name] = np.where(motion.invalid[some], "invalid", doubts[name]).astype(object)
-        places = changed(places, doubts=doubts, speed_errors=errors)
+            invalid_reasons[name] = np.where(motion.invalid[some], "invalid", invalid_reasons[name]).astype(
+                object
+            )
+        places = changed(places, invalid_reasons=invalid_reasons, speed_errors=errors)
         for claim in claims:
             found = claim.of_motion(places, f"in {_file(source)} ")
             yield from () if found is None else (found,)

@@ -95,7 +95,7 @@ class _Words:
         text = _MAIL.sub(_UNNAMED, _URL.sub(rf"\g<1>{NOWHERE}/", text))
         return _IP6.sub(_UNNAMED, _IP.sub(NOWHERE, text))
 
-    def told(self, text: str) -> str:
+    def without_paths(self, text: str) -> str:
         """A sentence, in which whatever looks like a path is one."""
         return _ANY_PATH.sub(_UNNAMED, self.named(text))
 
@@ -146,7 +146,10 @@ def _run(station: Station, recording: Recording, words: _Words, folder: Path) ->
     """
     findings = [
         replace(
-            f, subject=words.named(f.subject), text=words.told(f.text), holds=tuple(map(words.named, f.holds))
+            f,
+            subject=words.named(f.subject),
+            text=words.without_paths(f.text),
+            holds=tuple(map(words.named, f.holds)),
         )
         for f in recording.scene.findings
         if f.holds or f.level != "note"
@@ -156,7 +159,9 @@ def _run(station: Station, recording: Recording, words: _Words, folder: Path) ->
     scene = scene_of(
         station.model, station.bound, _new(findings, station.model.findings), files=station.files, fed=fed
     )
-    scene = replace(scene, findings=tuple(replace(f, text=words.told(f.text)) for f in scene.findings))
+    scene = replace(
+        scene, findings=tuple(replace(f, text=words.without_paths(f.text)) for f in scene.findings)
+    )
     summary = station.run(
         folder=folder,
         sinks=[Recorder(lossless=True)],
@@ -352,18 +357,18 @@ class Renamed:
 
     def __call__(self, sample: Sample) -> Sample:
         """A sample."""
-        named, told = self._words.named, self._words.told
+        named, without_paths = self._words.named, self._words.without_paths
         more: dict[str, Any] = {}
         if isinstance(sample, SignalSample):
-            values = {k: told(v) if isinstance(v, str) else v for k, v in sample.values.items()}
-            more = {"values": values, "doubts": _each(sample.doubts, told)}
+            values = {k: without_paths(v) if isinstance(v, str) else v for k, v in sample.values.items()}
+            more = {"values": values, "doubts": _each(sample.doubts, without_paths)}
         else:
             more = {"target": named(sample.target)}
         if isinstance(sample, BodySample):
             points = tuple(replace(p, name=self._count(self._names, p.name, "point")) for p in sample.points)
             subject = self._count(self._people, sample.subject, "subject") if sample.subject else ""
             more |= {"points": points, "subject": subject}
-        return replace(sample, source=named(sample.source), reason=told(sample.reason), **more)
+        return replace(sample, source=named(sample.source), reason=without_paths(sample.reason), **more)
 
     @staticmethod
     def _count(known: dict[str, str], name: str, word: str) -> str:

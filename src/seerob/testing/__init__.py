@@ -531,8 +531,8 @@ class _Harness:
                 engine.take([*self._signals(k, values)])
             state: State = engine.tick() if k else engine.start()
             if hidden:
-                doubt = "seerob.testing", tuple(bones)
-                state.hearings[hidden].bones_heard = [BonesHeard(state.t, parts=(doubt,))]
+                invalid = "seerob.testing", tuple(bones)
+                state.hearings[hidden].bones_heard = [BonesHeard(state.t, parts=(invalid,))]
             if anew and k == TICKS - 1:
                 judges = bound()
             results = []

@@ -12,7 +12,7 @@ from seerob.twin.joint_columns import moving_dofs
 Indices = NDArray[np.int64]
 
 
-def untold(body: Body) -> str:
+def unknown_place(body: Body) -> str:
     """Why nobody knows where a body is that a gripper picks up, without a run."""
     return f"{body.owner}: {body.holder} picks it up and lets it go, and only a run tells where it is"
 
@@ -37,18 +37,18 @@ class Attachments:
         self.roots = model.mj.body_rootid[self.ids].astype(np.int64)
         self.drawn = np.arange(len(model.bodies))
         self.away: set[int] = set()
-        self.unknown = {b.index: untold(b) for b in model.bodies if b.holder}
+        self.unknown = {b.index: unknown_place(b) for b in model.bodies if b.holder}
         self._moves: dict[tuple[int, ...], NDArray[np.bool_]] = {}
 
-    def put(self, mj: mujoco.MjModel, index: int, bearer: int) -> None:
+    def put(self, mj: mujoco.MjModel, index: int, carrier: int) -> None:
         """From now on a body rides on another one of MuJoCo's.
 
         Args:
             mj: The `mujoco.MjModel`.
             index: The body.
-            bearer: MuJoCo's.
+            carrier: MuJoCo's.
         """
-        self.ids[index], self.roots[index] = bearer, mj.body_rootid[bearer]
+        self.ids[index], self.roots[index] = carrier, mj.body_rootid[carrier]
         self._moves.clear()
 
     def moves(self, mj: mujoco.MjModel, bodies: tuple[int, ...]) -> NDArray[np.bool_]:

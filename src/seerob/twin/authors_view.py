@@ -21,10 +21,10 @@ Indices = NDArray[np.int64]
 
 OF_AN_INSTANT = frozenset(
     {
-        "along", "asked", "attachments", "body_velocities", "bones_in_doubt", "bones_turned_in_doubt",
+        "along", "asked", "attachments", "body_velocities", "invalid_bones", "invalid_orientations",
         "captured", "closest", "closest_per_body", "columns", "contact_forces", "data_of", "distances",
         "drawn_point", "fastest_point", "fastest_points", "fastest_speed", "fastest_speeds", "foresee",
-        "heard_doubt", "hearing", "in_body", "input_reason",
+        "invalid_source_reason", "hearing", "in_body", "input_reason",
         "inverse_effective_mass", "many", "singular_values", "invalid_bodies", "invalid_place_reason",
         "invalid_reason", "jacobian", "joint_noise", "joint_positions", "knots", "largest_speeds",
         "mass_ellipsoid", "mass_matrix", "measured_torques", "model", "moved", "once", "placed", "pose",

@@ -301,7 +301,7 @@ class Engine:
             self._said[sample.target] = own_words.LiveWords(self.model, sample.target)
         said = self._said[sample.target]
         found = said.invalid_reason(sample)
-        self._hearings[sample.target].torque_doubt = said.torque_doubt
+        self._hearings[sample.target].invalid_torque_reason = said.invalid_torque_reason
         return found
 
     def _silent(self, name: str) -> bool:
@@ -326,7 +326,7 @@ class Engine:
             if off > NEAR:
                 reference.land(now)
             if off > self._limit:
-                self._hearings[name].lost = now
+                self._hearings[name].reset_at = now
         return taken
 
     def _move(self, moved: Moved) -> None:
@@ -427,7 +427,7 @@ class Engine:
         if name not in self.ahead:
             return None
         q, qd, _ = self._references[name].course(t)
-        return q, qd, hearing.doubt_ahead(self.state.t, float(t[-1]) if len(t) else self.state.t)
+        return q, qd, hearing.invalid_ahead_reason(self.state.t, float(t[-1]) if len(t) else self.state.t)
 
     def _knots_of(self, name: str, begin: float, end: float) -> Array:
         """Tell between which instants that is one cubic (`seerob.twin.spans.Knots`)."""
@@ -657,7 +657,7 @@ class Engine:
             if not kernel.tame(self._data.qvel[mechanism.v_address], WILD):
                 self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
                 self._data.qacc_warmstart[mechanism.v_address] = 0.0
-                self._hearings[mechanism.name].lost = t
+                self._hearings[mechanism.name].reset_at = t
                 self._broken.add(mechanism.name)
 
     def _show(self, t: float) -> None:

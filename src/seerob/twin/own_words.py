@@ -248,7 +248,7 @@ class LiveWords:
         self._looked = -math.inf
         self._postures: deque[tuple[Array, Array, Array]] = deque(maxlen=ROWS)
         self._data: mujoco.MjData | None = None
-        self.torque_doubt = ""
+        self.invalid_torque_reason = ""
         """Why its torques may not be relied on; empty when they may."""
 
     def invalid_reason(self, sample: JointSample) -> str:
@@ -326,7 +326,7 @@ class LiveWords:
         self._torques.append((np.array(sample.tau), bias))
         if len(self._torques) >= FEWEST:
             measured, needed = (np.array(part) for part in zip(*self._torques, strict=True))
-            self.torque_doubt = sign_or_unit(measured, needed)
+            self.invalid_torque_reason = sign_or_unit(measured, needed)
 
 
 def _past(every: Sequence[_Ways]) -> tuple[Array, Array, Array]:

@@ -82,7 +82,7 @@ class Signals:
         timeout = self._timeouts[name]
         if age > timeout + SLACK:
             return Known(value, f"{name}: {source} not heard for {age:.2f} s (time-out {timeout:g} s)")
-        return Known(value, doubt_of(picture, name))
+        return Known(value, invalid_value_reason(picture, name))
 
     def value(self, name: str, t: float) -> Value:
         """The value of a variable of the dictionary at an instant [s].
@@ -105,7 +105,7 @@ class Signals:
         found = []
         for picture in self._heard.get(source, ()):
             if begin + SLACK < picture.t < t - SLACK:
-                if invalid_reason := doubt_of(picture, name):
+                if invalid_reason := invalid_value_reason(picture, name):
                     raise Undecided(f"{invalid_reason}, at {picture.t:.3f} s")
                 found.append(picture.values[name])
         return tuple(found)
@@ -135,7 +135,7 @@ class Signals:
         return values, {name: k.invalid_reason for name, k in known.items() if k.invalid_reason}
 
 
-def doubt_of(picture: SignalSample, name: str) -> str:
+def invalid_value_reason(picture: SignalSample, name: str) -> str:
     """Why a variable of a picture may not be relied on; empty when it may."""
     if name in picture.doubts:
         return picture.doubts[name]

@@ -214,16 +214,16 @@ class State(Validity):
             Undecided: What was heard of the person may not be relied on.
         """
         self.asked.add(name)
-        if reason := self.heard_doubt(name):
+        if reason := self.invalid_source_reason(name):
             raise Undecided(reason)
         R, x = self._captured(name, bodies)
         if not self._author:
             return R, x
         names = [self._model.bodies[i].name.removeprefix(f"{name}/") for i in bodies]
-        R[np.isin(names, self.bones_turned_in_doubt(name))] = np.nan
+        R[np.isin(names, self.invalid_orientations(name))] = np.nan
         if posture:
             return R, x - x[0]
-        x[np.isin(names, self._bones_in_doubt(name))] = np.nan
+        x[np.isin(names, self._invalid_bones(name))] = np.nan
         return R, x
 
     def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
@@ -257,11 +257,11 @@ class State(Validity):
             Undecided: What was heard of the person may not be relied on, or no contact is calculated.
         """
         self.asked.add(name)
-        if reason := self.heard_doubt(name):
+        if reason := self.invalid_source_reason(name):
             raise Undecided(reason)
         if self.touches is None:
             raise Undecided(f"{name}: no contacts are calculated (engine.physics, [[contacts]])")
-        if self._hearings[name].lost > self.t - 2 * self._period:
+        if self._hearings[name].reset_at > self.t - 2 * self._period:
             raise Undecided(f"{name}: the twin had to be put back to what was heard")
         own = {body.mj: body.index for body in self._model.bodies if body.owner == name}
         others = {body.mj: body.name for body in self._model.bodies}
@@ -309,7 +309,7 @@ class State(Validity):
         bodies: tuple[int, ...],
         *,
         allow_estimated: bool = False,
-        doubted: bool = False,
+        allow_invalid: bool = False,
         strayed: bool = False,
     ) -> tuple[Array, Array]:
         """Where bodies are: world from body, and the world position of their origins [m].
@@ -317,8 +317,8 @@ class State(Validity):
         Args:
             bodies: By index.
             allow_estimated: As in `require_bodies`.
-            doubted: Also bones in doubt of people of whom the others may be relied on, as they are shown: for
-                whoever judges bone by bone (`bones_in_doubt`). For one's own criteria they are NaN.
+            allow_invalid: Also invalid bones of people of whom the others may be relied on, as shown:
+                for whoever judges bone by bone (`invalid_bones`). For one's own criteria they are NaN.
             strayed: As in `require_bodies`.
 
         Returns:
@@ -328,7 +328,7 @@ class State(Validity):
         Raises:
             Undecided: One of them may be elsewhere.
         """
-        if doubted:
+        if allow_invalid:
             owners = self._owners(bodies)
             self.require(*owners.others)
             for name in owners.people:
@@ -347,7 +347,7 @@ class State(Validity):
         if key not in self._cache:
             rows = self._rows_of(bodies)
             R[rows], x[rows] = self._rotations[rows], self._positions[rows]
-            if doubted and self._author:
+            if allow_invalid and self._author:
                 lost = list(self.invalid_bodies(bodies))
                 R[lost], x[lost] = np.nan, np.nan
             self._cache[key] = True
@@ -392,7 +392,7 @@ class State(Validity):
         return without(self._model.mj, self._data, self._others_of[names])
 
     @contextmanager
-    def set_apart(self, author: str) -> Iterator[State]:
+    def for_author(self, author: str) -> Iterator[State]:
         """While a criterion of one's own is asked: what it is given is its own, and nobody else reads it.
 
         For the judge: whatever an author writes into an array changes no other criterion and no motion.
@@ -560,8 +560,8 @@ class State(Validity):
         around = [said.torques for said in heard if said.torques is not None]
         if not around or len(around) < len(heard):
             raise Undecided(f"{mechanism.name}: its source measures no joint torques")
-        if hearing.torque_doubt:
-            raise Undecided(f"{mechanism.name}: {hearing.torque_doubt}")
+        if hearing.invalid_torque_reason:
+            raise Undecided(f"{mechanism.name}: {hearing.invalid_torque_reason}")
         # Outside its range np.interp holds the last value, as the reference does.
         times = [said.t for said in heard]
         return np.array([np.interp(t, times, joint) for joint in np.transpose(around)])

@@ -1,7 +1,7 @@
 """The twin at many instants at once, and what follows from it: `seerob.twin.state.State` in arrays.
 
 The accessors are those of `State` with a dimension of instants in front, and their figures are the same
-to rounding. Who was not heard at an instant is in `States.doubts`: whoever asks depends on it, and
+to rounding. Who was not heard at an instant is in `States.invalid_reasons`: whoever asks depends on it, and
 `States.asked` says on whom.
 
 Their motion may be said by arrays instead of sources (`motion_of`).
@@ -29,7 +29,7 @@ from seerob.kernels.chain import along, held_many, jacobians
 from seerob.kernels.speed import fastest_many, stacked, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
-from seerob.twin.attachments import untold
+from seerob.twin.attachments import unknown_place
 from seerob.twin.authors_view import OF_MANY, AuthorsView
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path, Ways
@@ -68,7 +68,7 @@ class Motion:
     """MuJoCo's positions, shape (N, nq)."""
     v: Array
     """MuJoCo's velocities, shape (N, nv)."""
-    doubts: Mapping[str, Reasons]
+    invalid_reasons: Mapping[str, Reasons]
     """Why a robot or human may not be there, by name."""
     foreseen: bool = False
     """Whether one instant leads to the next: a motion, and not a collection of places."""
@@ -100,7 +100,7 @@ class Motion:
             t=self.t[begin:end],
             q=self.q[begin:end],
             v=self.v[begin:end],
-            doubts={name: found[begin:end] for name, found in self.doubts.items()},
+            invalid_reasons={name: found[begin:end] for name, found in self.invalid_reasons.items()},
             ways=None if self.ways is None else self.ways[begin : end - 1],
             speed_errors={name: found[begin:end] for name, found in self.speed_errors.items()},
             seen={name: found[begin:end] for name, found in self.seen.items()},
@@ -196,7 +196,7 @@ class States:
     many: ClassVar[bool] = True
 
     def __init__(self, bench: Bench, motion: Motion) -> None:
-        self.model, self._motion, self.doubts = bench.model, motion, motion.doubts
+        self.model, self._motion, self.invalid_reasons = bench.model, motion, motion.invalid_reasons
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.speeds_asked: set[str] = set()
@@ -220,8 +220,8 @@ class States:
         return States(self._bench, motion)
 
     @contextmanager
-    def set_apart(self, author: str) -> Iterator[States]:
-        """While a criterion of one's own is asked: as `seerob.twin.state.State.set_apart`."""
+    def for_author(self, author: str) -> Iterator[States]:
+        """While a criterion of one's own is asked: as `seerob.twin.state.State.for_author`."""
         apart = States(self._bench, self._motion)
         apart.model = self.model.own_of(author)
         view = AuthorsView(apart, OF_MANY)
@@ -267,9 +267,9 @@ class States:
         """Whether anything tells how fast somebody is (`seerob.twin.validity.validity.Validity.moved`)."""
         return name not in self._motion.still
 
-    def heard_doubt(self, name: str) -> Reasons:
+    def invalid_source_reason(self, name: str) -> Reasons:
         """Why what was heard of somebody may not be relied on, shape (N,); empty where it may."""
-        return self._motion.doubts[name]
+        return self._motion.invalid_reasons[name]
 
     def everywhere(self) -> tuple[Array, Array]:
         """Rotations and positions [m] of all bodies, whoever was heard: for bounds, never for a verdict.
@@ -466,7 +466,7 @@ class States:
         """Refuse what a gripper picks up."""
         for body in (self.model.bodies[i] for i in bodies):
             if body.holder:
-                raise Undecided(untold(body))
+                raise Undecided(unknown_place(body))
 
     def _distances(self, gap: Gap, per: Per) -> Closests:
         self.require(*gap.carriers)
@@ -533,7 +533,7 @@ def motion_of(
 
 def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) -> Motion:
     q, v = np.tile(model.mj.qpos0, (len(t), 1)), np.zeros((len(t), model.mj.nv))
-    doubts: dict[str, Reasons] = {}
+    invalid_reasons: dict[str, Reasons] = {}
     for mechanism in model.mechanisms.values():
         name = mechanism.name
         position, velocity = given.get(name) or _at_home(mechanism, len(t))
@@ -543,13 +543,13 @@ def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) ->
         velocity = np.where(finite[:, None], velocity, 0.0)
         q[:, mechanism.q_address] = position @ mechanism.coupling.T + mechanism.offset
         v[:, mechanism.v_address] = velocity @ mechanism.coupling.T
-        doubts[name] = np.where(finite, "", f"{name}: {NOT_FINITE}").astype(object)
+        invalid_reasons[name] = np.where(finite, "", f"{name}: {NOT_FINITE}").astype(object)
         if name not in given and not mechanism.home_given:
-            doubts[name][:] = f"{name}: {NOWHERE}"
+            invalid_reasons[name][:] = f"{name}: {NOWHERE}"
     robots = [m.name for m in model.mechanisms.values() if m.role == "robot"]
     still = {name for name in robots if given.keys().isdisjoint((name, *model.carriers_of(name)))}
     moved = frozenset(name for name in given if model.mechanisms[name].role == "machine")
-    return Motion(t, q, v, doubts, still=frozenset(still), unforeseen=moved)
+    return Motion(t, q, v, invalid_reasons, still=frozenset(still), unforeseen=moved)
 
 
 def _at_home(mechanism: Mechanism, n: int) -> tuple[Array, Array]:

@@ -179,7 +179,7 @@ def _rounds(opened: Opened, pause: float) -> Iterator[Sample]:
     while True:
         for k, sample in enumerate(opened.samples):
             quality = sample.quality
-            if k == 0 and last is not None and _apart(last, sample):
+            if k == 0 and last is not None and _jumps(last, sample):
                 # Nobody drove this way back: it may be looked at, not judged.
                 quality = Quality.DEGRADED
             elif k == 0 and last is not None:
@@ -203,7 +203,7 @@ def _held(last: Sample, start: float, pause: float) -> Iterator[Sample]:
         yield replace(last, t=start - pause + k * HOLD, qd=still)
 
 
-def _apart(last: Sample | None, first: Sample) -> bool:
+def _jumps(last: Sample | None, first: Sample) -> bool:
     if isinstance(last, JointSample) and isinstance(first, JointSample):
         return max((abs(a - b) for a, b in zip(last.q, first.q, strict=True)), default=0.0) > SAME_PLACE
     if isinstance(last, PoseSample) and isinstance(first, PoseSample):

@@ -155,8 +155,8 @@ def run(options: argparse.Namespace) -> int:
         _write(station, found, cut, working, options.period)
     code = exit_code(found.verdict)
     if options.json:
-        told = permissible_json(found, cut, bounds, folder)
-        OUT.print(json.dumps(told, ensure_ascii=False, indent=1), markup=False)
+        report = permissible_json(found, cut, bounds, folder)
+        OUT.print(json.dumps(report, ensure_ascii=False, indent=1), markup=False)
         return code
     tell_permissible(found, cut, bounds)
     for name in FILES:

@@ -41,11 +41,11 @@ def tell_heard(source: VariablesSource, nodes: Sequence[Node], wait: float) -> N
         OSError: The device is gone.
         SeerobError: What it says cannot be understood.
     """
-    arrivals, doubts = asyncio.run(_heard(source, nodes, wait))
-    line("heard", f"{arrivals.statistics()}; {len(doubts)} of {len(nodes)} variables")
+    arrivals, reasons = asyncio.run(_heard(source, nodes, wait))
+    line("heard", f"{arrivals.statistics()}; {len(reasons)} of {len(nodes)} variables")
     for node in nodes:
-        if (doubt := doubts.get(node.address, "not heard")) != "":
-            line("doubt", f"{node.address}: {doubt}", "yellow")
+        if (reason := reasons.get(node.address, "not heard")) != "":
+            line("reason", f"{node.address}: {reason}", "yellow")
 
 
 async def _heard(
@@ -58,7 +58,7 @@ async def _heard(
         for k, node in enumerate(nodes)
     )
     addresses = {variable.name: node.address for variable, node in zip(variables, nodes, strict=True)}
-    arrivals, doubts = Arrivals(), dict[str, str]()
+    arrivals, reasons = Arrivals(), dict[str, str]()
     clock = asyncio.get_running_loop()
     try:
         async with (
@@ -69,10 +69,10 @@ async def _heard(
                 told = [change for change in changes if isinstance(change, Change)]
                 if told:
                     arrivals.add(time.monotonic(), None)
-                doubts |= {addresses[change.name]: change.invalid_reason for change in told}
+                reasons |= {addresses[change.name]: change.invalid_reason for change in told}
     except TimeoutError:
         pass  # of the listening, or of a device that has nothing to say
-    return arrivals, doubts
+    return arrivals, reasons
 
 
 def _address(shown: str) -> Any:
@@ -364,8 +364,8 @@ def _tell(sample: Sample) -> None:
     elif isinstance(sample, SignalSample):
         for name, value in sample.values.items():
             line("signal", f"{name} = {value:.4f}" if isinstance(value, float) else f"{name} = {value}")
-        for doubt in sample.doubts.values():
-            line("doubt", doubt, "yellow")
+        for reason in sample.doubts.values():
+            line("reason", reason, "yellow")
 
 
 def _snippet(kind: str, given: dict[str, Any]) -> str:

@@ -142,7 +142,7 @@ def pinch_pairs(
     shapes: Shapes,
     moving: Sequence[int],
     surfaces: Sequence[int],
-    apart: frozenset[tuple[int, int]],
+    excluded: frozenset[tuple[int, int]],
     *,
     others: Sequence[int] = (),
     still: Sequence[int] = (),
@@ -155,7 +155,7 @@ def pinch_pairs(
         moving: Bodies that the robot's joints move.
         surfaces: Bodies around that stand.
         others: Bodies of other robots and of machines, which move.
-        apart: Pairs of the robot's own bodies that are one, or that are judged place by place.
+        excluded: Pairs of the robot's own bodies that are one, or that are judged place by place.
         still: The robot's own bodies that its joints do not move.
         cap: Largest gap that matters [m].
     """
@@ -177,7 +177,9 @@ def pinch_pairs(
     own = [*moving, *still]
     for row, body in enumerate(moving):
         others = [
-            k for k in range(row + 1, len(own)) if (body, own[k]) not in apart and (own[k], body) not in apart
+            k
+            for k in range(row + 1, len(own))
+            if (body, own[k]) not in excluded and (own[k], body) not in excluded
         ]
         if others:
             queries.append((Query(shapes, [own[k] for k in others], [body], cap=cap), Per.PAIR))
@@ -312,8 +314,8 @@ def robot_pinch_pairs(
     }
     one = ((pair, next(iter(of))) for pair, of in between.items() if len(of) == 1 and pair not in always)
     placed = [(*pair, coordinate) for pair, coordinate in one]
-    apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in always)
-    pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
+    excluded = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in always)
+    pairs = pinch_pairs(model.shapes, robot.moving, surfaces, excluded, others=others, still=still, cap=cap)
     opens = np.full(len(pairs.first), np.inf)
     poses: list[tuple[Array, Array]] = []
     for gap in np.flatnonzero(pairs.inner).tolist():

@@ -133,7 +133,7 @@ class Measured:
     """F_S [N]; None when not measured, or when the record ends before."""
     pressure: float | None
     """Peak [Pa]; None when not measured."""
-    doubts: tuple[str, ...]
+    undecided_reasons: tuple[str, ...]
     """Why it leaves open what it says, whatever the robot does."""
     stiff: str
     """Why it may say more than a body part would feel."""
@@ -215,19 +215,21 @@ def missing(t: Array, force: Array) -> tuple[str, ...]:
     return tuple(found)
 
 
-def judged(value: float, limit: float, *, doubts: Sequence[str], above: Sequence[str]) -> tuple[Verdict, str]:
+def judged(
+    value: float, limit: float, *, undecided_reasons: Sequence[str], above: Sequence[str]
+) -> tuple[Verdict, str]:
     """Verdict on a measured figure and why.
 
     Args:
         value: What was measured.
         limit: What is permitted.
-        doubts: Why it may be more than that.
+        undecided_reasons: Why it may be more than that.
         above: Why it may be less.
     """
     if not keeps(value, limit):
         open_ = tuple(above)
         return (Verdict.UNDECIDED, "; ".join(open_)) if open_ else (Verdict.EXCEEDED, "")
-    return (Verdict.UNDECIDED, "; ".join(doubts)) if doubts else (Verdict.WITHIN, "")
+    return (Verdict.UNDECIDED, "; ".join(undecided_reasons)) if undecided_reasons else (Verdict.WITHIN, "")
 
 
 def with_measured(predicted: Result, measured: Sequence[Result]) -> Result:
@@ -292,22 +294,26 @@ class Measurements:
         pressure = None if said.pressure_N_cm2 is None else said.pressure_N_cm2 * 1e4
         rows = tuple(k for k, body in enumerate(robot.moving) if body in bodies)
         k = float(self._arrays.stiffness[column])
-        doubts, stiff = list(_undated(said)), ""
+        undecided_reasons, stiff = list(_undated(said)), ""
         if not said.pad:
-            doubts.append("the pad of the device is not told (pad)")
+            undecided_reasons.append("the pad of the device is not told (pad)")
         if said.spring_N_mm is None:
-            doubts.append("the spring constant of the device is not told (spring_N_mm)")
+            undecided_reasons.append("the spring constant of the device is not told (spring_N_mm)")
         elif said.spring_N_mm * 1e3 < (1 - SPRING) * k:
-            doubts.append(f"its spring, {said.spring_N_mm:g} N/mm, is softer than {k / 1e3:g} N/mm")
+            undecided_reasons.append(
+                f"its spring, {said.spring_N_mm:g} N/mm, is softer than {k / 1e3:g} N/mm"
+            )
         elif said.spring_N_mm * 1e3 > (1 + SPRING) * k:
             stiff = f"its spring, {said.spring_N_mm:g} N/mm, is stiffer than {k / 1e3:g} N/mm"
         if said.tools is None:
-            doubts.append("what the robot carried is not told (tools)")
+            undecided_reasons.append("what the robot carried is not told (tools)")
         elif sorted(set(said.tools)) != self._carried:
             now, then = (", ".join(those) or "nothing" for those in (self._carried, sorted(said.tools)))
-            doubts.append(f"the robot carried {then}, and carries {now} here")
+            undecided_reasons.append(f"the robot carried {then}, and carries {now} here")
         odd = tuple(_implausible(said, transient, pressure))
-        return Measured(said, rows, column, transient, static, pressure, tuple(doubts), stiff, unshown, odd)
+        return Measured(
+            said, rows, column, transient, static, pressure, tuple(undecided_reasons), stiff, unshown, odd
+        )
 
     def results(self, column: int, v: Array, near: Flags, clamped: Flags) -> tuple[Result, ...]:
         """What was measured of a body region, against its limits.
@@ -347,14 +353,17 @@ class Measurements:
         said, arrays, column = one.said, self._arrays, one.column
         multiplier, F = float(arrays.multiplier[column]), float(arrays.force[column])
         free = said.contact == "free"
-        doubts, above = [*one.doubts, *one.odd], [*(d for d in one.doubts if "softer" not in d)]
+        undecided_reasons, above = (
+            [*one.undecided_reasons, *one.odd],
+            [*(d for d in one.undecided_reasons if "softer" not in d)],
+        )
         above += [one.stiff] if one.stiff else []
         if v > said.speed * (1 + ROUNDING):
-            doubts.append(f"measured at {said.speed:g} m/s, and it moves at {v:.3g} m/s here")
+            undecided_reasons.append(f"measured at {said.speed:g} m/s, and it moves at {v:.3g} m/s here")
         if v < said.speed * (1 - ROUNDING):
             above.append(f"measured at {said.speed:g} m/s, and it moves at {v:.3g} m/s here")
         if clamped and free:
-            doubts.append("measured where a body part gives way, and it is clamped here")
+            undecided_reasons.append("measured where a body part gives way, and it is clamped here")
         if not clamped and not free:
             above.append("measured where a body part is clamped, and it is free here")
         own = arrays.pressure[arrays.owner == column]
@@ -375,7 +384,9 @@ class Measurements:
                 verdict, reason = Verdict.UNDECIDED, "not measured"
             else:
                 more = one.unshown if unit == "N" else ()
-                verdict, reason = judged(value, limit, doubts=(*doubts, *more), above=above)
+                verdict, reason = judged(
+                    value, limit, undecided_reasons=(*undecided_reasons, *more), above=above
+                )
             found.append(
                 Result(name=label, value=value, unit=unit, limit=limit, verdict=verdict, reason=reason)
             )

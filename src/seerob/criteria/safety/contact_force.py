@@ -122,7 +122,7 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
-        table, doubts = table_input(self._table(model), "2016")
+        table, undecided_reasons = table_input(self._table(model), "2016")
         area = () if self.area is None else (provenance.given("contact area", self.area, "m²"),)
         force = Input(
             name="contact forces",
@@ -136,7 +136,7 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
             source="physics of the twin; limits of the table",
             inputs=(*provenance.motion(model, self.human), force, table, *area),
             not_modelled=(
-                *doubts,
+                *undecided_reasons,
                 "the shape and softness of what touches, and the contact area where none is given",
                 "impacts between two ticks, and transient limits",
                 "contacts that no [[contacts]] asks for",

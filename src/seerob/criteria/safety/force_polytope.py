@@ -291,10 +291,10 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot = model.carrier(model.frame(self.at))
         limit = provenance.limit(self.limit, "N")
-        doubts: tuple[str, ...] = ()
+        undecided_reasons: tuple[str, ...] = ()
         if self.body_region is not None:
             edition, own = model.workstation.edition, self.limits is not None
-            limit, doubts = force_inputs(self._table(model), self.body_region, edition, own=own)
+            limit, undecided_reasons = force_inputs(self._table(model), self.body_region, edition, own=own)
         return Basis(
             formula=f"largest |f| of {FORMULA[self.definition]}; {LOAD[self.load]}",
             source="Weistroffer et al. 2022, section 2.2.2.4; Chiacchio et al. 1997",
@@ -303,7 +303,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             + (() if self.load == "none" else provenance.masses(model, robot))
             + limit,
             not_modelled=(
-                *doubts,
+                *undecided_reasons,
                 "static: no force of an impact, no inertia of the moving robot",
                 "friction in joints and gears, which a pushing robot must overcome and a pushed one adds",
                 "torques beyond the stated limits, and force monitoring of the controller below them",

@@ -124,12 +124,12 @@ class _Curtain:
                 sights[i] = self._seen(int(beams.sum()), float(np.ptp(on)) if len(on) else 0.0)
         blocked = self.cast(self.rest, state, self.heights)
         found, counts = np.unique(blocked[blocked >= 0], return_counts=True)
-        doubts = tuple(
+        undecided_reasons = tuple(
             f"{count} of {len(blocked)} beams are interrupted by {self.model.bodies[i].name}"
             for i, count in zip(found.tolist(), counts.tolist(), strict=True)
         )
         markers = self._beams(state, met)
-        return self.presence.result(name, state, sights, doubts=doubts, markers=markers)
+        return self.presence.result(name, state, sights, undecided_reasons=undecided_reasons, markers=markers)
 
     def _seen(self, beams: int, height: float) -> Sight:
         capability = self.sensor.capability

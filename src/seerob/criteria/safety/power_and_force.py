@@ -197,7 +197,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         robot, limits = model.mover(self.robot), self.table(model)
         people = [] if self.human is None else [human.name for human in model.workstation.humans]
         names = (self.robot, *people)
-        table, doubts = table_input(limits, model.workstation.edition)
+        table, undecided_reasons = table_input(limits, model.workstation.edition)
         return Basis(
             formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), "
             f"m_R = {self._whole(robot)}; clamped: m_H → ∞ and quasi-static limits; "
@@ -230,7 +230,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             ),
             not_modelled=(
                 "a design estimate: power and force limiting needs measurement at the real robot",
-                *doubts,
+                *undecided_reasons,
                 *NOT_MODELLED,
                 *(
                     ()
@@ -568,8 +568,8 @@ class Contacts:
                 row = int(touched[:, k].argmax())
                 reason = f"{part.reason}, and {invalid_reason or f'touched by {self.names[row]} here'}"
                 part = replace(part, verdict=Verdict.UNDECIDED, reason=reason)
-            if told := self._measured(k, judged):
-                part, measured[part.name] = with_measured(part, told), told
+            if parts := self._measured(k, judged):
+                part, measured[part.name] = with_measured(part, parts), parts
             found.append((part, row))
         found += self._out_of_reach(judged)
         known = projected[np.isfinite(projected)]

@@ -129,11 +129,11 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         else:
             # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not outside.
             least, close, deviation = perhaps
-            doubtful = not keeps(least, 0.0, at_most=False)
-            verdict = Verdict.UNDECIDED if doubtful else Verdict.WITHIN
+            open_ = not keeps(least, 0.0, at_most=False)
+            verdict = Verdict.UNDECIDED if open_ else Verdict.WITHIN
             reason = (
                 f"{close} is within {deviation * 1e3:.1f} mm, what its shape and its place may be off by"
-                if doubtful
+                if open_
                 else who
             )
             interval = (least, room) if least < room else None

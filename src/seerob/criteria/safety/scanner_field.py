@@ -122,12 +122,14 @@ class _Scan:
         farthest = max(float(np.hypot(x, y)) for x, y in chosen.corners)
         self.spacing = farthest * self.scanner.resolution
         capability = sensor.capability
-        self.doubts: tuple[str, ...] = ()
+        self.undecided_reasons: tuple[str, ...] = ()
         if capability is None:
-            self.doubts = ("detection capability not given",)
+            self.undecided_reasons = ("detection capability not given",)
         elif self.spacing > capability:
             what = f"beams are {self.spacing * 1e3:.0f} mm apart at the end of the field"
-            self.doubts = (f"{what}, more than the detection capability of {capability * 1e3:.0f} mm",)
+            self.undecided_reasons = (
+                f"{what}, more than the detection capability of {capability * 1e3:.0f} mm",
+            )
 
     def cast(
         self, state: State, beams: Array, before: tuple[Array, NDArray[np.int64]] | None = None
@@ -183,7 +185,9 @@ class _Scan:
             ),
             Result(name="blind area now", value=now, unit="m²"),
         )
-        result = self.presence.result(name, state, sights, doubts=self.doubts, parts=parts)
+        result = self.presence.result(
+            name, state, sights, undecided_reasons=self.undecided_reasons, parts=parts
+        )
         return replace(result, markers=(*result.markers, self._picture(state, distance, hit, result)))
 
     def _look_at_what_stands(self, state: State) -> None:

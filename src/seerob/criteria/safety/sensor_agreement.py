@@ -61,15 +61,17 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
             if last is not None and state.t < last:
                 since = None
             last = state.t
-            told = bool(state.signal(self.variable)) == self.free
+            device_sees = bool(state.signal(self.variable)) == self.free
             seen = state.closest(gap).distance > 0
-            if told == seen:
+            if device_sees == seen:
                 since = None
             elif since is None:
                 since = state.t
             lasted = 0.0 if since is None else state.t - since
             words = {True: "free", False: "interrupted"}
-            reason = "" if told == seen else f"the device says {words[told]}, the twin {words[seen]}"
+            reason = (
+                "" if device_sees == seen else f"the device says {words[device_sees]}, the twin {words[seen]}"
+            )
             return Result(
                 name=self.name,
                 value=lasted,

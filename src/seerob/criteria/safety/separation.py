@@ -214,7 +214,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
         device = device_of(model, self.name, self.sensor, self.detection)
         stop = replace(self.stop, reaction=self.stop.reaction + device.response)
         detection = device.detection if self.intrusion is None else None
-        return replace(self, stop=stop, detection=detection, sensor=None), device.doubts, device.inputs
+        return (
+            replace(self, stop=stop, detection=detection, sensor=None),
+            device.undecided_reasons,
+            device.inputs,
+        )
 
     def _terms(self) -> tuple[tuple[float, float, float], list[str]]:
         """C, Z_d and Z_r [m], 0 where not known, and what is not known."""
@@ -228,13 +232,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def unknown(self, model: Model) -> str:
         """Why S_p may be larger than what is computed; empty when it is not."""
-        own, doubts, _ = self._by_device(model)
-        return self._unknown([*own._terms()[1], *doubts], own._stop(model))
+        own, undecided_reasons, _ = self._by_device(model)
+        return self._unknown([*own._terms()[1], *undecided_reasons], own._stop(model))
 
     @staticmethod
     def _unknown(missing: list[str], stop: StopModel) -> str:
         reasons = [f"not given: {', '.join(missing)}"] if missing else []
-        return "; ".join([*reasons, *stop.doubts])
+        return "; ".join([*reasons, *stop.undecided_reasons])
 
     @property
     def _approach(self) -> float:
@@ -673,8 +677,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
         S_p = most = self._distance(now, K, seen)
         if now.most is not None or seen_most > seen:
             most = np.maximum(self._distance(now.most or now, K, seen_most), S_p)
-        doubts = (now.unbounded_reason, "" if now.most is None else now.most.unbounded_reason)
-        return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))) if any(doubts) else "")
+        unbounded = (now.unbounded_reason, "" if now.most is None else now.most.unbounded_reason)
+        return Required(
+            S_p, most, "; ".join(dict.fromkeys(filter(None, unbounded))) if any(unbounded) else ""
+        )
 
     def required(self, model: Model) -> Callable[[State], Required]:
         """S_p of each of `moving`, in that order; to be asked at every tick."""

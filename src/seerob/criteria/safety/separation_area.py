@@ -119,7 +119,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             may = off.at(state) + gap.deviation + float((most - S_p).max())
             surely = float((least - may).min())
             k, perhaps = int(least.argmin()), int((least - may).argmin())
-            unbounded_reason = self._doubt(
+            unbounded_reason = self._unbounded_reason(
                 model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown
             )
             verdict = (
@@ -171,7 +171,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     @staticmethod
-    def _doubt(model: Model, body: int, room: float, deviation: float, unknown: str) -> str:
+    def _unbounded_reason(model: Model, body: int, room: float, deviation: float, unknown: str) -> str:
         """Why somebody who is outside may be inside all the same."""
         if unknown:
             return f"{unknown}; the area is at least what is drawn"

@@ -66,10 +66,15 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
             state = cast("State", twin)
             state.require(*carriers)
             way.follow(state)
-            swept, doubts = way.sweep.swept, list(way.unheard)
+            swept, undecided_reasons = way.sweep.swept, list(way.unheard)
             if unshaped:
-                doubts.append(f"seen every {self.every:g} s only: what lies between is not known")
-            return Figure(swept.volume, self.limit, open=bool(doubts), beside=(way, swept.dilation, doubts))
+                undecided_reasons.append(f"seen every {self.every:g} s only: what lies between is not known")
+            return Figure(
+                swept.volume,
+                self.limit,
+                open=bool(undecided_reasons),
+                beside=(way, swept.dilation, undecided_reasons),
+            )
 
         return compute
 
@@ -77,11 +82,11 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         """Return the function that says what is not known of it, and draws its hull."""
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
-            way, dilation, doubts = figure.beside
+            way, dilation, undecided_reasons = figure.beside
             how = f"not more than this; dilated by up to {dilation * 1e3:.1f} mm for motion between ticks"
             hull = way.hull(state.t, self.redraw, verdict)
             parts = (Result(name="dilation for motion", value=dilation, unit="m"),)
-            return Shown("; ".join([*doubts[:3], how]), lambda: (hull,), parts)
+            return Shown("; ".join([*undecided_reasons[:3], how]), lambda: (hull,), parts)
 
         return present
 

@@ -60,8 +60,8 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             now = judged(state.signal(self.variable))
             # What was told since the last tick counts too: the first of it that exceeds.
-            told = (judged(value) for value in state.signals_meanwhile(self.variable))
-            return next((result for result in told if result.verdict is Verdict.EXCEEDED), now)
+            results = (judged(value) for value in state.signals_meanwhile(self.variable))
+            return next((result for result in results if result.verdict is Verdict.EXCEEDED), now)
 
         def judged(value: Value) -> Result:
             if self.expected is not None:

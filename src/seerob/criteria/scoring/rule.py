@@ -70,17 +70,17 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
     bones = tuple(bone_rows(model, human))
 
     def read(state: State) -> Angles:
-        doubted = state.bones_turned_in_doubt(human.name)
+        invalid = state.invalid_orientations(human.name)
         hearing = state.hearing(human.name, strayed=True)
         # How a hand is turned of which only the wrist is seen is a guess, too.
-        doubted = (*doubted, *hearing.unaimed(state.t))
+        invalid = (*invalid, *hearing.unaimed(state.t))
         # What was captured, not where a table or a robot stops the twin.
         found = angles(*state.captured(human.name, bones, posture=True))
         # What devices see changes with time: of a leg that nobody sees no score is made.
-        lost = (*unmeasured, *doubted) if doubted else unmeasured
+        lost = (*unmeasured, *invalid) if invalid else unmeasured
         found = found.without(lost) if lost else found
-        untold = hearing.untold_angles(state.t)
-        return found.untold(untold) if untold else found
+        undetermined = hearing.undetermined_angles(state.t)
+        return found.masked(undetermined) if undetermined else found
 
     return read
 

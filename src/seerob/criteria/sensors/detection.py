@@ -81,7 +81,7 @@ class Device:
 
     response: float
     """[s]; 0 where it is not known."""
-    doubts: tuple[str, ...]
+    undecided_reasons: tuple[str, ...]
     """What is not known of it."""
     detection: Detection
     inputs: tuple[Input, ...]
@@ -127,7 +127,7 @@ def device_of(model: Model, criterion: str, name: str, detection: Detection | No
     )
     return Device(
         response=sensor.response or 0.0,
-        doubts=() if known else (f"response of {name} (part of T_r)",),
+        undecided_reasons=() if known else (f"response of {name} (part of T_r)",),
         detection=detection,
         inputs=(response,),
     )

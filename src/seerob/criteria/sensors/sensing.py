@@ -136,7 +136,7 @@ class Presence:
         state: State,
         sights: Mapping[int, Sight],
         *,
-        doubts: tuple[str, ...] = (),
+        undecided_reasons: tuple[str, ...] = (),
         parts: tuple[Result, ...] = (),
         markers: tuple[Marker, ...] = (),
     ) -> Result:
@@ -146,7 +146,7 @@ class Presence:
             name: Of the criterion.
             state: The twin.
             sights: What it makes of each body that it saw or should have seen.
-            doubts: Why nobody in the field may be wrong all the same.
+            undecided_reasons: Why nobody in the field may be wrong all the same.
             parts: More figures.
             markers: More to draw.
         """
@@ -169,13 +169,13 @@ class Presence:
             for i, sight in sights.items()
         )
         if sights:
-            verdict, reason = Verdict.EXCEEDED, self._told(sights)
+            verdict, reason = Verdict.EXCEEDED, self._worst_sight(sights)
         elif not keeps(found.distance[perhaps] - may[perhaps], 0.0, at_most=False):
             verdict = Verdict.UNDECIDED
             mm = f"{may[perhaps] * 1e3:.1f} mm"
             reason = f"{self._name(perhaps)} is within {mm}, what its shape and its place may be off by"
-        elif doubts:
-            verdict, reason = Verdict.UNDECIDED, "; ".join(doubts)
+        elif undecided_reasons:
+            verdict, reason = Verdict.UNDECIDED, "; ".join(undecided_reasons)
         else:
             verdict, reason = Verdict.WITHIN, self._name(nearest)
         lit = [Highlight(body=self.model.bodies[i].name, verdict=Verdict.EXCEEDED) for i in sights]
@@ -201,7 +201,7 @@ class Presence:
     def _name(self, nearest: int) -> str:
         return self.model.bodies[self.bodies[nearest]].name
 
-    def _told(self, sights: Mapping[int, Sight]) -> str:
+    def _worst_sight(self, sights: Mapping[int, Sight]) -> str:
         """The worst first: who is not detected although in the field."""
         if all(sight.seen is Seen.MISSED for sight in sights.values()):
             i, sight = next(iter(sights.items()))

@@ -135,8 +135,8 @@ def _by_tool_speed(
         top, end = float(onset.v_s.max()), tool.speed[-1]
         beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
         T_s = interpolate([tool.speed], np.array(tool.time), [min(top, end)])
-        doubts = (onset.unbounded_reason, unknown, beyond if top > end * (1 + 1e-9) else "")
-        return braking(replace(onset, unbounded_reason="; ".join(filter(None, doubts))), T_s)
+        unbounded_reasons = (onset.unbounded_reason, unknown, beyond if top > end * (1 + 1e-9) else "")
+        return braking(replace(onset, unbounded_reason="; ".join(filter(None, unbounded_reasons))), T_s)
 
     return after
 
@@ -190,9 +190,9 @@ def _by_joint(
         total = np.array([travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains])
         # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
         beside = np.maximum(total - onset.S_r, 0.0)
-        doubts = dict.fromkeys((onset.unbounded_reason, *(why for _, _, why in stops)))
+        unbounded_reasons = dict.fromkeys((onset.unbounded_reason, *(why for _, _, why in stops)))
         longest = max(time for _, time, _ in stops)
-        return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, doubts)))
+        return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, unbounded_reasons)))
 
     def bound(state: State) -> Callable[[Onset, float], Course]:
         chains = levers.at(state)

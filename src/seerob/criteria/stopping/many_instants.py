@@ -108,10 +108,10 @@ class _Ahead:
         count = int(on_time[0]) if len(on_time) else len(whole.t)
         ends = np.ceil((motion.t + T_r + period) / period - 1e-6).astype(np.int64)
         k = np.arange(begin, begin + n)
-        doubted = np.cumsum([0, *(whole.doubts[self._robot.name] != "")])
+        invalid = np.cumsum([0, *(whole.invalid_reasons[self._robot.name] != "")])
         known = (k < count) & (ends < count)
         top = np.minimum(ends, len(whole.t) - 1)
-        known &= doubted[top + 1] == doubted[k]
+        known &= invalid[top + 1] == invalid[k]
         if not known.any():
             return nothing
         a, b = int(ways.first[begin]), int(ways.first[top[known][-1]])
@@ -122,7 +122,7 @@ class _Ahead:
         speeds = np.empty((len(t), len(self._parts)))
         speeds[own] = v_r[: len(own)]
         if len(others):
-            elsewhere = states.elsewhere(Motion(t[others], q[others], v[others], whole.doubts))
+            elsewhere = states.elsewhere(Motion(t[others], q[others], v[others], whole.invalid_reasons))
             speeds[others] = elsewhere.largest_speeds()[:, self._parts]
         joint_q, joint_v = (np.ascontiguousarray(each[:, chains.dofs]) for each in (q, v))
         bounds = np.empty((len(t) - 1, 2, len(self._parts)))

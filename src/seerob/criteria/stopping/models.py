@@ -154,7 +154,7 @@ class StopModel(Struct, frozen=True, eq=False):
     formula: str
     """Formula of S_s."""
     inputs: tuple[Input, ...]
-    doubts: tuple[str, ...] = ()
+    undecided_reasons: tuple[str, ...] = ()
     """Why ways may be longer than it says."""
     not_modelled: tuple[str, ...] = ()
     inverse: Inverse | None = None
@@ -178,7 +178,7 @@ class _Brakes(Struct, frozen=True, eq=False):
     braking: Braking
     formula: str
     inputs: tuple[Input, ...]
-    doubts: tuple[str, ...] = ()
+    undecided_reasons: tuple[str, ...] = ()
     not_modelled: tuple[str, ...] = ()
     by_onset: Callable[[Onset], Course] | None = None
     """Course by the onset of braking alone; None where other things count, too."""
@@ -212,7 +212,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         unbounded_reason = (
             f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
         )
-        found = replace(found, doubts=(*found.doubts, unbounded_reason))
+        found = replace(found, undecided_reasons=(*found.undecided_reasons, unbounded_reason))
     by_onset, given = found.by_onset, by_speed(stop.reaction, stop.acceleration or 0.0)
     asked, how = bind_reaction(
         model, robot, gap, stop.reaction, stop.acceleration,
@@ -238,12 +238,12 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             try:
                 if brake is not None:
                     return brake(onset, scale)
-                doubts = (onset.unbounded_reason, why)
+                unbounded = (onset.unbounded_reason, why)
             except Undecided as reason:
-                doubts = (onset.unbounded_reason, str(reason))
+                unbounded = (onset.unbounded_reason, str(reason))
             # It reacts before it brakes: so far it gets whatever the stop is like.
             least = np.zeros_like(onset.S_r)
-            return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, doubts)))
+            return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, unbounded)))
 
         ways, restless = (np.zeros(0), "") if by_themselves is None else by_themselves(state)
         # Who stops within a stroke takes no longer than with the given deceleration over all of it.
@@ -256,8 +256,8 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             top = None if most is None else after(most(scale), scale)
             if restless or ways.any():
                 top = top or course
-                doubts = "; ".join(filter(None, (top.unbounded_reason, restless)))
-                top = replace(top, S_r=top.S_r + ways, T_s=top.T_s + longer, unbounded_reason=doubts)
+                unbounded = "; ".join(filter(None, (top.unbounded_reason, restless)))
+                top = replace(top, S_r=top.S_r + ways, T_s=top.T_s + longer, unbounded_reason=unbounded)
             return course if top is None else replace(course, most=top)
 
         return at
@@ -267,7 +267,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         reactions,
         found.formula,
         (*found.inputs, how),
-        found.doubts,
+        found.undecided_reasons,
         found.not_modelled,
         _inverse(stop) if found.timed and not carries else None,
         None if by_onset is None else lambda v: by_onset(given(v)),
@@ -388,7 +388,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         by_table,
         formula,
         (named, *inputs, *rest),
-        doubts=(unbounded_reason,) if unbounded_reason else (),
+        undecided_reasons=(unbounded_reason,) if unbounded_reason else (),
         not_modelled=(
             f"stop category {table.category} only, as tabulated",
             "below the table's first speed, payload and extension its first stopping time holds"
@@ -460,7 +460,7 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         bound,
         f"S_r + S_s: {way} from M q̈ + c + g = τ, |τ_j| ≤ B_j against q̇_j, until standstill",
         inputs,
-        doubts=(
+        undecided_reasons=(
             *(
                 ()
                 if robot.rotor_inertia_known

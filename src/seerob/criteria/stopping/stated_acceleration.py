@@ -166,7 +166,9 @@ class StatedAcceleration:
                 off = shape.of_bodies(bench.data, bench.ids, R[0], x[0], rows, errors)
                 noise = np.maximum(noise, off)
         v = np.concatenate(speeds)
-        known = np.all([motion.doubts[name] == "" for name in movers if name in motion.doubts], axis=0)
+        known = np.all(
+            [motion.invalid_reasons[name] == "" for name in movers if name in motion.invalid_reasons], axis=0
+        )
         gains = [self._gain(motion.t[run], v[run], 2 * noise) for run in _runs(known)]
         worst = max(filter(None, gains), key=lambda found: found.least, default=None)
         return None if worst is None else self._finding(worst, what)
@@ -249,8 +251,8 @@ class JointAccelerations:
         if errors is not None and len(errors):
             noise = noise + 2 * errors.max(axis=0)
         known = (
-            np.asarray(motion.doubts[robot.name] == "")
-            if robot.name in motion.doubts
+            np.asarray(motion.invalid_reasons[robot.name] == "")
+            if robot.name in motion.invalid_reasons
             else np.ones(len(qd), bool)
         )
         both = np.hstack([qd, -qd]) + float(np.abs(qd).max(initial=0.0))

@@ -26,7 +26,7 @@ from seerob.description.humans.skeleton import AXES, BONES, PARENTS, SIDES, with
 
 ENDS = frozenset({"head", *(f"{side}_{bone}" for side in SIDES for bone in ("hand", "foot"))})
 """Bones beyond which no joint says where they point; a foot may have its toes."""
-APART = 0.02
+LEAST_LEVER = 0.02
 """Places on a bone that are nearer to each other, or to one line, than this [m] do not tell how it is
 turned, or not about that line."""
 OPEN = 0.4
@@ -69,21 +69,21 @@ def turned(points: Iterable[BodyPoint]) -> set[Turn]:
         if after in places:
             places[bone].add(there)
     for bone in _TURNING & places.keys():
-        found |= {(bone, axis) for axis in _told(frozenset(places[bone]))}
+        found |= {(bone, axis) for axis in _fixed_axes(frozenset(places[bone]))}
     return found
 
 
 @lru_cache(maxsize=1024)
-def _told(places: frozenset[Vec3]) -> tuple[int, ...]:
+def _fixed_axes(places: frozenset[Vec3]) -> tuple[int, ...]:
     """Axes of a bone about which places on it, and its joint, tell how it is turned."""
     spots = np.array([(0.0, 0.0, 0.0), *sorted(places)])
     lengths = np.linalg.norm(spots[:, None] - spots, axis=2)
     i, j = np.unravel_index(lengths.argmax(), lengths.shape)
-    if lengths[i, j] <= APART:
+    if lengths[i, j] <= LEAST_LEVER:
         return ()
     line = (spots[j] - spots[i]) / lengths[i, j]
     beside = float(np.linalg.norm(np.cross(spots - spots[i], line), axis=1).max())
-    return tuple(axis for axis in range(3) if beside > APART or abs(line[axis]) < OPEN)
+    return tuple(axis for axis in range(3) if beside > LEAST_LEVER or abs(line[axis]) < OPEN)
 
 
 def aimed(turns: Collection[Turn]) -> set[str]:
@@ -134,7 +134,7 @@ def bare(observed: Collection[str], placed: Collection[str], turns: Collection[T
     )
 
 
-def untold(turns: Collection[Turn]) -> frozenset[tuple[str, int]]:
+def undetermined(turns: Collection[Turn]) -> frozenset[tuple[str, int]]:
     """Angles of `humans.angles` that nothing tells, each with its side: 0 right or none, 1 left.
 
     A wrist bends forward or sideways only to somebody who knows how the forearm is turned about itself: by
@@ -234,7 +234,7 @@ LIMBS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes", "head
 """Bones at whose beginning the bone before them ends: without the one, the direction of the other is open."""
 
 
-def in_doubt_with(lost: str, seen: Collection[str]) -> tuple[str, ...]:
+def invalid_with(lost: str, seen: Collection[str]) -> tuple[str, ...]:
     """Bones that may be anywhere when one is not seen any more.
 
     Itself; of a limb the bone before it, whose direction it showed; and what hangs on it and is not seen.
@@ -243,11 +243,11 @@ def in_doubt_with(lost: str, seen: Collection[str]) -> tuple[str, ...]:
         lost: The bone.
         seen: Bones that are seen.
     """
-    doubted = [lost]
+    invalid = [lost]
     for bone, parent in PARENTS.items():
         # A parent stands before its children in the order of the bones.
-        if parent in doubted and bone not in seen and bone not in doubted:
-            doubted.append(bone)
+        if parent in invalid and bone not in seen and bone not in invalid:
+            invalid.append(bone)
     if without_side(lost) in LIMBS and without_side(PARENTS[lost]) in (*LIMBS, "clavicle", "neck"):
-        doubted.append(PARENTS[lost])
-    return tuple(doubted)
+        invalid.append(PARENTS[lost])
+    return tuple(invalid)

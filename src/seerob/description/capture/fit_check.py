@@ -130,7 +130,7 @@ def registered(
         away = {name: float(np.linalg.norm(place - nominal[name])) for name, place in found.items()}
     else:
         away = fit.away
-    findings += _told(fit, subject)
+    findings += _fit_findings(fit, subject)
     findings += _elsewhere(away, subject)
     findings += _mounts(fit, frames, observer, description, root_from_world, subject)
     return observer, tuple(findings)
@@ -160,8 +160,8 @@ def _placed(
         f"joints that this device places as it likes, moved on their bones to where the recording has them: "
         f"{shifts}"
     )
-    told = (Finding(level="assumed", subject=subject, text=text),) if near else ()
-    return with_places(observer, near), told
+    findings = (Finding(level="assumed", subject=subject, text=text),) if near else ()
+    return with_places(observer, near), findings
 
 
 def _in_bone(seen: Pulls, k: int, R: Array, p: Array) -> Array:
@@ -169,7 +169,7 @@ def _in_bone(seen: Pulls, k: int, R: Array, p: Array) -> Array:
     return np.asarray(R[bone].T @ (seen.position[k] - p[bone]))
 
 
-def _told(fit: Fit, subject: str) -> Iterable[Finding]:
+def _fit_findings(fit: Fit, subject: str) -> Iterable[Finding]:
     if not fit.away and not fit.turned:
         return
     worst = sorted(fit.away, key=lambda name: -fit.away[name])[:3]

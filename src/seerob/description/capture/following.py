@@ -29,11 +29,11 @@ from seerob.description.capture.estimated import (
     aimed,
     bare,
     estimated,
-    in_doubt_with,
+    invalid_with,
     located,
     swing,
     turned,
-    untold,
+    undetermined,
 )
 from seerob.description.capture.fitting import Fitter, Pulls, pulls
 from seerob.description.capture.frozen import Frozen
@@ -77,7 +77,7 @@ ELSEWHERE = 0.1
 
 
 K = TypeVar("K")
-PartDoubt = tuple[str, tuple[str, ...]]
+InvalidPart = tuple[str, tuple[str, ...]]
 """Why some bones may not be relied on, and which."""
 
 
@@ -91,7 +91,7 @@ class Followed:
     """Joint reference [rad or m], shape (53,)."""
     reason: str
     """Why it may not be relied on; empty when it may."""
-    parts: tuple[PartDoubt, ...]
+    parts: tuple[InvalidPart, ...]
     """Why single bones may not be, and which, when the others may."""
     anew: bool
     """Nobody knows how the person came here: it is to be put there."""
@@ -104,8 +104,8 @@ class Followed:
     unaimed: Mapping[str, float] = field(default_factory=dict)
     """Hands, feet and heads of which nothing but the joint is seen: bone → bound on the angle between how
     the twin's is turned and how the person's may be [rad]."""
-    untold: frozenset[tuple[str, int]] = frozenset()
-    """Angles of the posture that nothing tells, with their side; see `ends.untold`."""
+    undetermined: frozenset[tuple[str, int]] = frozenset()
+    """Angles of the posture that nothing tells, with their side, by `estimated.undetermined`."""
     unplaced: frozenset[str] = frozenset()
     """Bones that point as they are seen, or as the bones beside them tell, and nobody says where they are."""
     displaced: frozenset[str] = frozenset()
@@ -117,13 +117,13 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class _Told:
+class _DeviceReading:
     """What one device says of an instant."""
 
     points: list[BodyPoint]
     reason: str = ""
     """Why all of it may not be relied on."""
-    part: PartDoubt | None = None
+    part: InvalidPart | None = None
     jumped: bool = False
     """Something was left out because it jumped."""
 
@@ -257,13 +257,13 @@ class Following:
             device.forget(min(t, np.inf if self._last is None else self._last.t))
 
     def _at(self, t: float) -> Followed | None:
-        told = [self._device_at(device, name, t) for name, device in self._devices.items()]
-        points = [each.points for each in told]
-        reasons = [each.reason for each in told if each.reason]
-        parts = [each.part for each in told if each.part is not None]
+        readings = [self._device_at(device, name, t) for name, device in self._devices.items()]
+        points = [each.points for each in readings]
+        reasons = [each.reason for each in readings if each.reason]
+        parts = [each.part for each in readings if each.part is not None]
         chosen, last = self._handover.choose(points, t), self._last
         if not chosen:
-            if last is None or not any(each.jumped for each in told):
+            if last is None or not any(each.jumped for each in readings):
                 return None
             self._waits = True
             reasons += [why for why, _ in parts]
@@ -301,19 +301,21 @@ class Following:
         reason = "; ".join(reasons[:4])
         bones = bare(observed, placed, turns)
         anchored = self._seen(t, lambda device: device.anchored)
-        ages = _told_ages(observed, placed, anchored, turns)
+        ages = _located_ages(observed, placed, anchored, turns)
         unplaced = frozenset(BONES).difference(ages, estimated(observed, bones))
         displaced = unplaced & self._placed_before if ages else unplaced
         self._placed_before |= anchored.keys()
-        apart = self._apart(told, t, q)
-        parts += [(f"devices see it {far:.2f} m apart: {bone}", (bone,)) for bone, far in apart if far > FAR]
+        disagreements = self._disagreements(readings, t, q)
+        parts += [
+            (f"devices see it {far:.2f} m apart: {bone}", (bone,)) for bone, far in disagreements if far > FAR
+        ]
         slack = {bone: held_speed(bone) * age for bone, age in ages.items() if age > SLACK}
-        for bone, far in apart:
+        for bone, far in disagreements:
             slack[bone] = max(far, slack.get(bone, 0.0))
         # Wherever the twin waited, nobody knows how a person who is seen for the first time came.
         anew = last is None or elsewhere
         return Followed(
-            t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed, untold(turns),
+            t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed, undetermined(turns),
             unplaced, displaced, slack,
         )  # fmt: skip
 
@@ -324,15 +326,15 @@ class Following:
             return found
         return self._handover.eased(found, t, *self._fitter.bones(before), self._root_from_world)
 
-    def _device_at(self, device: _Device, name: str, t: float) -> _Told:
+    def _device_at(self, device: _Device, name: str, t: float) -> _DeviceReading:
         """What a device sees at ``t``: between two samples, or the newest while it counts."""
         k = bisect_right(device.times, t) - 1
         if k < 0:
-            return _Told([])
+            return _DeviceReading([])
         sample = device.samples[k]
         age = t - device.times[k]
         if age > sample.hold:
-            return _Told([], part=(f"{name} was not heard for {age:.2f} s", tuple(device.seen)))
+            return _DeviceReading([], part=(f"{name} was not heard for {age:.2f} s", tuple(device.seen)))
         points: Sequence[BodyPoint] = sample.points
         instant = device.times[k]
         if age > 0 and k + 1 < len(device.times) and device.times[k + 1] - device.times[k] <= sample.hold:
@@ -341,12 +343,12 @@ class Following:
             points = between(points, device.samples[k + 1].points, share)
         reason = sample.invalid_reason(name)
         if sample.quality is Quality.INVALID:
-            return _Told([], reason)
+            return _DeviceReading([], reason)
         return self._believed(device, points, instant, reason, placed=sample.placed)
 
     def _believed(
         self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str, *, placed: bool
-    ) -> _Told:
+    ) -> _DeviceReading:
         """Without what cannot have moved so far; what is believed is remembered."""
         out: list[BodyPoint] = []
         jumped: dict[str, str] = {}
@@ -375,12 +377,12 @@ class Following:
                 out.append(point)
         device.turned |= dict.fromkeys(turned(out), t)
         if not jumped:
-            return _Told(out, reason)
+            return _DeviceReading(out, reason)
         why = ", ".join(list(jumped)[:4]) + (" …" if len(jumped) > 4 else "") + " jumped"
         if len(jumped) > MANY * max(1, len(points)):
             # What a device loses so much of, it has lost altogether.
-            return _Told([], "; ".join(filter(None, (reason, why))), jumped=True)
-        return _Told(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
+            return _DeviceReading([], "; ".join(filter(None, (reason, why))), jumped=True)
+        return _DeviceReading(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
 
     def _hold(self, device: _Device) -> float:
         """Age from which on what a device saw does not count [s]."""
@@ -396,17 +398,19 @@ class Following:
                     found[bone] = max(t - seen, 0.0)
         return found
 
-    def _apart(self, told: Sequence[_Told], t: float, q: Array) -> list[tuple[str, float]]:
+    def _disagreements(
+        self, readings: Sequence[_DeviceReading], t: float, q: Array
+    ) -> list[tuple[str, float]]:
         """Bones that several devices see, and how far from the posture ``q`` one of them sees it [m]."""
-        if sum(bool(each.points) for each in told) < 2:
+        if sum(bool(each.points) for each in readings) < 2:
             return []
-        every = pulls([point for each in told for point in each.points], self._root_from_world)
-        names = [{BONES.index(p.bone) for p in each.points if p.position is not None} for each in told]
+        every = pulls([point for each in readings for point in each.points], self._root_from_world)
+        names = [{BONES.index(p.bone) for p in each.points if p.position is not None} for each in readings]
         twice = {bone for k, own in enumerate(names) for bone in own if any(bone in n for n in names[:k])}
         found = self._fitter.errors(every, q)
         return [(BONES[bone], found[BONES[bone]][0] or 0.0) for bone in twice if BONES[bone] in found]
 
-    def _lost(self, t: float) -> list[PartDoubt]:
+    def _lost(self, t: float) -> list[InvalidPart]:
         """Bones that a device has and that nobody has seen for too long."""
         newest: dict[str, tuple[float, float]] = {}
         for device in self._devices.values():
@@ -459,7 +463,7 @@ def held_speed(bone: str) -> float:
     return SWUNG_SPEED if without_side(bone) in LEGS else HELD_SPEED
 
 
-def _told_ages(
+def _located_ages(
     observed: Mapping[str, float],
     placed: Mapping[str, float],
     anchored: Mapping[str, float],
@@ -481,7 +485,7 @@ def _told_ages(
 
 def _with_others(bones: Sequence[str], seen: Collection[str]) -> tuple[str, ...]:
     """Bones in doubt with all that are in doubt for want of them."""
-    return tuple(dict.fromkeys(other for bone in bones for other in in_doubt_with(bone, seen)))
+    return tuple(dict.fromkeys(other for bone in bones for other in invalid_with(bone, seen)))
 
 
 def _counts(point: BodyPoint) -> bool:

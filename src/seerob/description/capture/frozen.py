@@ -148,7 +148,7 @@ class _Whole:
         while len(past) > 2 and past[1][0] <= t - 2 * SPAN - SLACK:
             past.popleft()
         if self._hung is not None:
-            if not _apart(places, self._hung) > GOES_ON:
+            if not _rms_distance(places, self._hung) > GOES_ON:
                 return True
             self._hung = None
             past.clear()
@@ -161,7 +161,7 @@ class _Whole:
         ways = np.linalg.norm(steps, axis=1)
         way = float(np.linalg.norm(steps.sum(axis=0)))
         evenly = ways.min() >= EVENLY * ways.mean()
-        if not (way >= WALKS * SPAN and evenly and _apart(places, past[stood][1]) <= STANDS * way):
+        if not (way >= WALKS * SPAN and evenly and _rms_distance(places, past[stood][1]) <= STANDS * way):
             return False
         self._hung = places
         return True
@@ -173,7 +173,7 @@ def _way(a: Array, b: Array) -> Array:
     return (b[both] - a[both]).mean(axis=0) if both.any() else np.zeros(3)
 
 
-def _apart(a: Array, b: Array) -> float:
+def _rms_distance(a: Array, b: Array) -> float:
     """How far the points seen at both instants are from each other [m], RMS; none when there are none."""
     both = ~np.isnan(a + b).any(axis=1)
     return float(np.sqrt(((a[both] - b[both]) ** 2).sum(axis=1).mean())) if both.any() else 0.0

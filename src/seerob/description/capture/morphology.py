@@ -107,7 +107,7 @@ def measure(
     seen = _joint_centres(frames, observer)
     measured: dict[str, Length] = {}
     for key, ends in BETWEEN.items():
-        found = _length([_apart(seen, *(end.format(side=side) for end in ends)) for side in SIDES])
+        found = _length([_distances(seen, *(end.format(side=side) for end in ends)) for side in SIDES])
         if found is not None:
             measured[key] = found
     hips, shoulders = (_pair(seen, bone) for bone in ("thigh", "upper_arm"))
@@ -132,7 +132,9 @@ def measure(
         scale = measured["trunk"].value / sum(usual[key] for key in TRUNK)
         own |= {key: usual[key] * scale for key in TRUNK}
     body(name=name, stature=tall, mass=mass, sex=sex, lengths=lengths, own_lengths=own)  # may refuse
-    return Morphology(tall, stature is not None, own, measured, tuple(_told(measured, tall, stature, name)))
+    return Morphology(
+        tall, stature is not None, own, measured, tuple(_length_findings(measured, tall, stature, name))
+    )
 
 
 def _joint_centres(frames: Iterable[CaptureFrame], observer: Observer) -> dict[str, Array]:
@@ -146,7 +148,7 @@ def _joint_centres(frames: Iterable[CaptureFrame], observer: Observer) -> dict[s
     return {bone: np.array(points).reshape(-1, 3) for bone, points in gathered.items()}
 
 
-def _apart(seen: dict[str, Array], one: str, other: str) -> Array:
+def _distances(seen: dict[str, Array], one: str, other: str) -> Array:
     if one not in seen or other not in seen:
         return np.empty(0)
     return np.asarray(np.linalg.norm(seen[one] - seen[other], axis=1))
@@ -197,7 +199,9 @@ def _stature(measured: dict[str, Length], sex: str, mass: float, lengths: str, n
     return found
 
 
-def _told(measured: dict[str, Length], tall: float, given: float | None, name: str) -> Iterable[Finding]:
+def _length_findings(
+    measured: dict[str, Length], tall: float, given: float | None, name: str
+) -> Iterable[Finding]:
     for key, each in measured.items():
         text = (
             f"{key} {1e3 * each.value:.0f} mm, spread {1e3 * each.spread:.0f} mm, P5…P95 "

@@ -91,7 +91,7 @@ class Angles:
                 changed[name] = values
         return replace(self, **changed) if changed else self
 
-    def untold(self, angles: Collection[tuple[str, int]]) -> Angles:
+    def masked(self, angles: Collection[tuple[str, int]]) -> Angles:
         """Set the angles named, by name and side (0 right, 1 left), to NaN: they are not assessed."""
         changed = {name: np.array(getattr(self, name), float) for name, _ in angles}
         for name, side in angles:

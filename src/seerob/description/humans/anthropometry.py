@@ -165,7 +165,7 @@ class Body:
     share: dict[str, float]
     """Bone → share of the body mass; they sum to 1."""
     findings: tuple[Finding, ...]
-    by_hand: bool = False
+    overridden: bool = False
     """Whether lengths or masses were given beside the tables."""
 
     def bone_mass(self, bone: str) -> float:

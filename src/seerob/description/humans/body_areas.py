@@ -32,10 +32,10 @@ def words(bone: str, region: str | None, *, front: bool, dominant: bool, area: s
         dominant: Whether on the side of the dominant hand.
         area: Of Table A.2; None where that has none.
     """
-    told = [FEET] if region is None else [region, "front" if front else "rear"]
-    told += [area.partition(",")[0]] if area else []
-    told += ["dominant side"] if dominant else []
-    return f"{bone} ({', '.join(told)})"
+    bones = [FEET] if region is None else [region, "front" if front else "rear"]
+    bones += [area.partition(",")[0]] if area else []
+    bones += ["dominant side"] if dominant else []
+    return f"{bone} ({', '.join(bones)})"
 
 
 def area_in(reason: str, human: str) -> tuple[str, str]:

@@ -84,7 +84,7 @@ def inertials(body: Body) -> dict[str, Inertial]:
             shift = -body.offset["head"] if piece == "neck" else body.offset[piece]
             taken.append((result[piece].mass, result[piece].com + shift, result[piece].inertia))
         result[bone] = remainder(result[bone], taken)
-    if body.by_hand:
+    if body.overridden:
         result = {bone: each if _possible(each) else _mended(each) for bone, each in result.items()}
     if not all(map(_possible, result.values())):
         raise unfit(body.name, body.mass, body.stature)

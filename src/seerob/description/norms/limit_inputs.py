@@ -20,16 +20,16 @@ def table_input(limits: BodyLimits, edition: str) -> tuple[Input, tuple[str, ...
         edition: Of the norm that the workstation file asks for.
     """
     label = f"{limits.edition}; {limits.title}"
-    doubts: tuple[str, ...] = ()
+    undecided_reasons: tuple[str, ...] = ()
     if edition != limits.edition:
         label += f"; used for {edition}"
-        doubts = (
+        undecided_reasons = (
             f"{edition}: whether any figure of its Annex M differs is not known row by row; "
             f"the figures are those of {limits.edition}",
         )
     if limits.reviewed_by:
         label += f"; figures outside the usual ranges: {limits.reviewed_by}"
-    return Input(name="limits", value=limits.file, origin=Origin.STATED, source=label), doubts
+    return Input(name="limits", value=limits.file, origin=Origin.STATED, source=label), undecided_reasons
 
 
 def excluded_input(region: str) -> Input:
@@ -120,6 +120,6 @@ def force_inputs(
         edition: Of the norm that the workstation file asks for.
         own: Whether the table is the user's own file.
     """
-    table, doubts = table_input(limits, edition)
+    table, undecided_reasons = table_input(limits, edition)
     force = tuple(i for i in limit_inputs(limits, own=own) if i.name == f"{region}: F_s")
-    return (table, *force), doubts
+    return (table, *force), undecided_reasons

@@ -221,9 +221,9 @@ def _content(solids: Sequence[Solid], visual: Sequence[Mesh]) -> bytes:
             None if mesh is None else mesh.faces,
             None if solid is None else solid.points,
         )
-        told = [None if array is None else (array.shape, array.dtype.str) for array in arrays]
+        shapes = [None if array is None else (array.shape, array.dtype.str) for array in arrays]
         plain = None if solid is None else solid.radius, None if mesh is None else mesh.color
-        content.update(repr((plain, told)).encode())
+        content.update(repr((plain, shapes)).encode())
         for array in arrays:
             if array is not None:
                 content.update(array.tobytes())

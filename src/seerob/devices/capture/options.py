@@ -166,7 +166,7 @@ def observer(
         orientation=options.weights.orientation,
         bones=options.weights.bones,
     )
-    return bound, (*findings, *_told(layout, bound, subject, options.calibration))
+    return bound, (*findings, *_calibration_findings(layout, bound, subject, options.calibration))
 
 
 def calibrated(
@@ -247,7 +247,9 @@ def _bare(bound: Observer, calibration: Calibration) -> frozenset[str]:
     return bare({row.bone for row in bound.rows}, placed, turned(points))
 
 
-def _told(layout: Layout, bound: Observer, subject: str, calibration: Calibration) -> Iterable[Finding]:
+def _calibration_findings(
+    layout: Layout, bound: Observer, subject: str, calibration: Calibration
+) -> Iterable[Finding]:
     """What is used, what is not, and which bones nobody measures."""
     used = {row.name for row in bound.rows}
     text = ", ".join(f"{row.name} → {row.bone}" for row in bound.rows)

@@ -16,7 +16,7 @@ LEAP = 0.15
 """Devices that leap by more than this together, as one rigid thing [m]: the origin was set anew."""
 SPEED = 10.0
 """No part of a person at work is faster [m/s]."""
-RIGID, APART = 0.02, 3.0
+RIGID, MOST_DISTANCE = 0.02, 3.0
 """Distances between devices that differ by less [m], and by less per second [m/s], changed by moving."""
 
 
@@ -120,7 +120,7 @@ class OriginWatch:
         since = max(instant.t - self._before.t, 0.0)
         if not np.linalg.norm(now - before, axis=1).max() > LEAP + SPEED * since:
             return False
-        return bool(np.abs(_distances(now) - _distances(before)).max() < RIGID + APART * since)
+        return bool(np.abs(_distances(now) - _distances(before)).max() < RIGID + MOST_DISTANCE * since)
 
 
 def _distances(points: Array) -> Array:

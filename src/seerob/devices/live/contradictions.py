@@ -79,7 +79,7 @@ SCALE = 0.08
 trapezoidal rule make less of it than half."""
 LONG_WAY = {"rad": 1.0, "m": 0.3}
 """Of a joint, from which on that share is told [rad or m]; what was four times as long ago counts half."""
-TOLD_BY = {"rad": 0.01, "m": 2e-3}
+LEAST_WAY = {"rad": 0.01, "m": 2e-3}
 """Way between two anchors that tells of it [rad or m]: twice `NOISE`."""
 CLOSE = 0.99
 """Share of a bound up to which rounding can hide nothing: what is nearer is not compared one by one."""
@@ -92,7 +92,7 @@ SILENCE = 0.5
 """After it what was before says nothing of now [s]."""
 
 
-class _Told(NamedTuple):
+class _Motion(NamedTuple):
     t: float
     q: tuple[float, ...]
     qd: tuple[float, ...]
@@ -195,7 +195,7 @@ class _Scale:
 
     def add(self, went: float, said: float) -> None:
         """Take the way between two anchors, by positions and by velocities [rad or m]."""
-        if max(abs(went), abs(said)) < TOLD_BY[self._unit]:
+        if max(abs(went), abs(said)) < LEAST_WAY[self._unit]:
             return
         if self._way > 4 * LONG_WAY[self._unit]:
             self._went, self._said, self._way = 0.5 * self._went, 0.5 * self._said, 0.5 * self._way
@@ -271,8 +271,8 @@ class Contradictions:
         """Of a joint's speed, which no anchor contradicts that was slower by less [rad/s or m/s]."""
         self._before: Sample | None = None
         self._at = -math.inf
-        self._told: deque[_Told] = deque(maxlen=ANCHORS)
-        self._newest: _Told | None = None
+        self._anchors: deque[_Motion] = deque(maxlen=ANCHORS)
+        self._newest: _Motion | None = None
         self._bounds: list[tuple[float, float]] = []
         """Of each joint, between which its positions less the integral of its velocity lie at the anchors."""
         self._slowest: list[float] = []
@@ -295,7 +295,7 @@ class Contradictions:
             step += LOOSE
         self._at, self._before = t, sample
         if not 0 < step < SILENCE or type(before) is not type(sample):
-            self._told.clear()
+            self._anchors.clear()
             self._places.clear()
             self._newest = None
             self._standing = []
@@ -337,8 +337,8 @@ class Contradictions:
         last = self._newest
         if last is None or len(last.q) != len(q):
             zeros = (0.0,) * len(q)
-            self._told.clear()
-            self._newest = _Told(t, q, qd, zeros, zeros)
+            self._anchors.clear()
+            self._newest = _Motion(t, q, qd, zeros, zeros)
             self._anchor(self._newest)
             return ""
         half, near = 0.5 * (t - last.t), True
@@ -351,29 +351,29 @@ class Contradictions:
         if self._gains and near:
             speeds = zip(qd, self._slowest, self._gains, strict=False)
             near = all(abs(b) - slowest <= gain for b, slowest, gain in speeds)
-        now = self._newest = _Told(t, q, qd, tuple(way), tuple(length))
+        now = self._newest = _Motion(t, q, qd, tuple(way), tuple(length))
         found = ""
-        for then in () if near else self._told:
+        for then in () if near else self._anchors:
             if t - then.t <= SPAN and (found := self._differ(then, now) or self._hurries(then, now)):
                 break
-        if t - self._told[-1].t >= SPAN / ANCHORS:
-            self._scale(self._told[-1], now)
+        if t - self._anchors[-1].t >= SPAN / ANCHORS:
+            self._scale(self._anchors[-1], now)
             self._anchor(now)
         return found or self._off
 
-    def _anchor(self, now: _Told) -> None:
+    def _anchor(self, now: _Motion) -> None:
         """Compare what comes with this instant, too."""
-        self._told.append(now)
+        self._anchors.append(now)
         lags = zip(
-            *[[a - went for a, went in zip(then.q, then.way, strict=True)] for then in self._told],
+            *[[a - went for a, went in zip(then.q, then.way, strict=True)] for then in self._anchors],
             strict=True,
         )
         self._bounds = [(min(lag), max(lag)) for lag in lags]
         self._slowest = [
-            min(map(abs, rates)) for rates in zip(*[then.qd for then in self._told], strict=True)
+            min(map(abs, rates)) for rates in zip(*[then.qd for then in self._anchors], strict=True)
         ]
 
-    def _scale(self, then: _Told, now: _Told) -> None:
+    def _scale(self, then: _Motion, now: _Motion) -> None:
         if len(self._scales) != len(now.q):
             self._scales = [_Scale(unit) for unit in self._units[: len(now.q)]]
         for k, scale in enumerate(self._scales):
@@ -395,7 +395,7 @@ class Contradictions:
                 found = why.format(f"joint {k + 1}")
         return found
 
-    def _hurries(self, then: _Told, now: _Told) -> str:
+    def _hurries(self, then: _Motion, now: _Motion) -> str:
         """Whether a joint gets faster more quickly than it can; one that brakes may, it is stopped."""
         dt = now.t - then.t
         if dt < SPAN / ANCHORS:
@@ -442,7 +442,7 @@ class Contradictions:
                     )
         return ""
 
-    def _differ(self, then: _Told, now: _Told) -> str:
+    def _differ(self, then: _Motion, now: _Motion) -> str:
         for k, (a, b) in enumerate(zip(then.q, now.q, strict=True)):
             went, said = b - a, now.way[k] - then.way[k]
             off = abs(went - said)
@@ -524,7 +524,7 @@ class LookedAt:
             InputError: What is yielded is no sample of what it drives, or the source fails.
         """
         looks: dict[tuple[str, ...], Contradictions] = {}
-        told: dict[tuple[str, ...], tuple[str, float]] = {}
+        reasons: dict[tuple[str, ...], tuple[str, float]] = {}
         until: dict[tuple[str, ...], float] = {}
         clocks: dict[tuple[str, ...], float] = {}
         pending: Sample | None = None
@@ -536,13 +536,13 @@ class LookedAt:
             if not (again or newest < sample.t < math.inf):
                 # Who lies is not known, the sample whose time is ahead or the one whose time goes back,
                 # nor of which instants the source speaks from then on.
-                told[about] = f"time goes from {newest:.3f} to {sample.t:.3f} s", math.inf
+                reasons[about] = f"time goes from {newest:.3f} to {sample.t:.3f} s", math.inf
                 if pending is not None and key(pending) == about:
-                    pending = _doubted(pending, self._name, told[about][0])
+                    pending = _with_reason(pending, self._name, reasons[about][0])
                 continue
             look = looks.setdefault(about, Contradictions(self._target, live=False))
             stamped = sample if sample.t_device is not None else replace(sample, t_device=sample.t)
-            reason, holds = told.get(about, ("", -math.inf))
+            reason, holds = reasons.get(about, ("", -math.inf))
             found = look.find(stamped)
             if sample.t_device is not None:
                 clock, clocks[about] = clocks.get(about, -math.inf), sample.t_device
@@ -550,11 +550,11 @@ class LookedAt:
                     # The same sample again, or an old one, that is said to be new.
                     found = f"its own time goes from {clock:.3f} to {sample.t_device:.3f} s"
             if found and holds < math.inf:
-                reason, holds = told[about] = found, sample.t + HOLD
+                reason, holds = reasons[about] = found, sample.t + HOLD
             reason = self._beyond(sample) or (reason if sample.t <= holds else "")
             if pending is not None:
                 yield pending
-            pending = _doubted(sample, self._name, reason) if reason else sample
+            pending = _with_reason(sample, self._name, reason) if reason else sample
             until[about] = sample.t
         if pending is not None:
             yield pending
@@ -599,6 +599,6 @@ class LookedAt:
         return ""
 
 
-def _doubted(sample: Sample, name: str, reason: str) -> Sample:
+def _with_reason(sample: Sample, name: str, reason: str) -> Sample:
     quality = Quality.DEGRADED if sample.quality is Quality.GOOD else sample.quality
     return replace(sample, quality=quality, reason=sample.reason or f"{name}: {reason}")

@@ -117,7 +117,7 @@ class DeviceClock:
         self._marks: dict[float, int] = {}
         """As `_said`, of a few."""
         self._next_mark = -math.inf
-        self._doubt, self._until = "", -math.inf
+        self._reason, self._until = "", -math.inf
         self.latency = 0.0
         if known is not None:
             self._offset = self._applied = known.offset
@@ -257,11 +257,11 @@ class DeviceClock:
 
     def _hold(self, host: float, seconds: float, why: str) -> None:
         if not self._standing(host) or host + seconds >= self._until:
-            self._doubt, self._until = why, host + seconds
+            self._reason, self._until = why, host + seconds
 
     def _standing(self, host: float) -> str:
         """The doubt that holds at ``host`` [s]."""
-        return self._doubt if host <= self._until else ""
+        return self._reason if host <= self._until else ""
 
 
 def _keep(known: dict[float, int], most: int, device: float, said: int) -> None:

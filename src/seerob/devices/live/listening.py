@@ -462,7 +462,7 @@ class Listener:
             self._arrivals.repeat()
             if heard.invalid_reason and what in self._posted:
                 # No news, and a doubt about what was said before.
-                self._doubt(what, heard.invalid_reason)
+                self._invalidate(what, heard.invalid_reason)
             return
         if isinstance(sample, BodySample):
             person = self._people.setdefault(what, _Person())
@@ -470,7 +470,7 @@ class Listener:
             if stood is not None:
                 self._arrivals.repeat()
                 if stood > self._source.timeout and what in self._posted:
-                    self._doubt(what, STILL)
+                    self._invalidate(what, STILL)
                 return
             sample = replace(sample, points=person.frozen(sample.points, heard.t))
         late = (self._source.delay or 0.0) * (not self._source.asked)
@@ -510,7 +510,7 @@ class Listener:
         self._seq += 1
         self._post(sample)
 
-    def _doubt(self, what: tuple[str, ...], reason: str) -> None:
+    def _invalidate(self, what: tuple[str, ...], reason: str) -> None:
         """Say again what was said last, with a doubt: whoever has taken it would not know."""
         last = self._posted[what]
         reason = f"{self.name}: {reason}"
@@ -527,7 +527,7 @@ class Listener:
         say_once(_log, logging.WARNING, f"{self.name}: {reason}")
         for what in tuple(self._posted):
             if not isinstance(self._posted[what], SignalSample):
-                self._doubt(what, reason)
+                self._invalidate(what, reason)
 
     def _contradiction(self, sample: Sample, what: tuple[str, ...], host: float) -> str:
         """What in it contradicts what was said before, now or a moment ago."""

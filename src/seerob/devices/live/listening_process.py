@@ -64,7 +64,7 @@ def wake_promptly() -> bool:
     return bool(ctypes.CDLL(None).syscall(number, 0, ctypes.byref(wanted), 0) == 0)
 
 
-class _Told(logging.Handler):
+class _LogForwarder(logging.Handler):
     """Logs by telling the other process."""
 
     def __init__(self, to: BinaryIO) -> None:
@@ -114,12 +114,12 @@ def main() -> int:
     # What a library prints is no answer.
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0) as out:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-        told = _Told(out)
+        forwarder = _LogForwarder(out)
         try:
             order = Order(*pickle.load(sys.stdin.buffer))  # noqa: S301 - of the process that started this one
         except EOFError:  # nobody wants it already
             return 0
-        logging.basicConfig(level=order.level, handlers=[told])
+        logging.basicConfig(level=order.level, handlers=[forwarder])
         try:
             listener = _listener(order)
         except Exception:
@@ -131,7 +131,7 @@ def main() -> int:
         wake_promptly()
         listener.start()
         with contextlib.suppress(OSError):
-            told.say(Said(ready=True))
+            forwarder.say(Said(ready=True))
             sys.stdin.buffer.read(1)
         stop((listener,))
     return 0

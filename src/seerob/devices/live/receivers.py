@@ -47,7 +47,7 @@ class Receivers:
         self._awaited = {name_of(source) for source, _ in sources if source.target()}
         self._box = Mailbox()
         self._here: list[Listener] = []
-        self._apart: list[SourceProcess] = []
+        self._processes: list[SourceProcess] = []
         for source, target in sources:
             pair = pickled_source(source, target)
             if pair is None:
@@ -55,24 +55,24 @@ class Receivers:
                     source = source.taking(offers)  # noqa: PLW2901
                 self._here.append(Listener(source, target, self._box.post))
             else:
-                self._apart.append(SourceProcess(name_of(source), pair))
+                self._processes.append(SourceProcess(name_of(source), pair))
 
     def __enter__(self) -> Self:
         self._interval = sys.getswitchinterval()
         sys.setswitchinterval(min(self._interval, PROMPT))
         for listener in self._here:
             listener.start()
-        for process in self._apart:
+        for process in self._processes:
             process.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for process in self._apart:
+        for process in self._processes:
             process.ask_to_stop()
         stop(self._here)
-        for process in self._apart:
+        for process in self._processes:
             process.join()
         sys.setswitchinterval(self._interval)
 
@@ -82,7 +82,7 @@ class Receivers:
         Args:
             patience: How long that is, once everybody listens [s].
         """
-        for process in self._apart:
+        for process in self._processes:
             process.wait()
         end = time.monotonic() + patience
         self.take()
@@ -96,7 +96,7 @@ class Receivers:
 
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each; ``t`` on the host's clock."""
-        return (*self._box.take(), *(sample for process in self._apart for sample in process.take()))
+        return (*self._box.take(), *(sample for process in self._processes for sample in process.take()))
 
 
 AFTER = 1e-6
@@ -174,7 +174,7 @@ def hear(
     origin = max((sample.t for sample in heard), default=time.monotonic() - listening.delay)
     clock.begin(origin + listening.delay)
     newest: dict[tuple[str, ...], Sample] = {}
-    doubtful: set[tuple[str, ...]] = set()
+    invalid: set[tuple[str, ...]] = set()
     settled: dict[tuple[str, ...], float] = {}
     slipped = clock.slipped
     for samples in recorded:
@@ -183,7 +183,7 @@ def hear(
         came = (*heard, *listening.take())
         clock.look()
         if clock.slipped > slipped:
-            slipped, doubtful, waiting = clock.slipped, set(newest), set(newest)
+            slipped, invalid, waiting = clock.slipped, set(newest), set(newest)
             settled = {what: sample.t + SETTLE for what, sample in newest.items()}
         zero = clock.start - listening.delay
         taken: list[Sample] = []
@@ -193,11 +193,11 @@ def hear(
             if what in newest and not _is_newer(sample, t, newest[what].t):
                 continue
             quality = sample.quality
-            swings = what in doubtful or t < settled.get(what, t)
+            swings = what in invalid or t < settled.get(what, t)
             if swings and quality is Quality.GOOD:
                 # Run time stood still while the robot went on: the speed between both samples is false.
                 quality = Quality.LATE
-            doubtful.discard(what)
+            invalid.discard(what)
             waiting.discard(what)
             newest[what] = replace(sample, t=t, quality=quality)
             taken.append(newest[what])

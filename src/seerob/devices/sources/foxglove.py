@@ -63,7 +63,7 @@ class Foxglove(RosSource, frozen=True, kw_only=True):
                 arrived, data = received
                 try:
                     if isinstance(data, str):
-                        await self._told(link, foxglove.operation(data), taken, offered)
+                        await self._receive(link, foxglove.operation(data), taken, offered)
                         continue
                     message = foxglove.message(data)
                     channel = None if message is None else taken.get(message.subscription)
@@ -80,7 +80,7 @@ class Foxglove(RosSource, frozen=True, kw_only=True):
                     heard = arrived
                 yield Heard(arrived, channel.topic, said)
 
-    async def _told(
+    async def _receive(
         self, link: Link, said: Operation, taken: dict[int, ServerChannel], offered: dict[str, str]
     ) -> None:
         """Subscribe to what is wanted of an offer; say what the server complains of."""

@@ -103,7 +103,7 @@ class Frames:
         self.refused = 0
         self.assembly = Assembly()
         self._layouts: dict[tuple[str, ...], Layout] = {}
-        self._told: set[str] = set()
+        self._warned: set[str] = set()
 
     def feed(self, data: bytes, arrived: float) -> tuple[Layout, CaptureFrame] | None:
         """The frame that a datagram completes, if it does.
@@ -218,8 +218,8 @@ class Frames:
             self._tell("angles", f"character {datagram.header.character}: {text}; the segments are used")
 
     def _tell(self, about: str, text: str) -> None:
-        if about not in self._told:
-            self._told.add(about)
+        if about not in self._warned:
+            self._warned.add(about)
             level = logging.INFO if text.endswith("trunk") else logging.WARNING
             say_once(_log, level, f"{self._who}: {text}")
 

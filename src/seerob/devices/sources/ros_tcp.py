@@ -137,7 +137,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
         silence = self.silence()
         async for arrived, frame in frames:
             if frame.is_command:
-                self._told(frame)
+                self._take_system_message(frame)
             elif frame.destination in self.topics():
                 try:
                     said = decode(self.content, frame.body, edition)
@@ -153,7 +153,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
             if silence is not None and arrived - last > silence:
                 raise TimeoutError(f"connected, but nothing on {self.topics()[0]} for {silence:g} s")
 
-    def _told(self, frame: Frame) -> None:
+    def _take_system_message(self, frame: Frame) -> None:
         """What the other side says of what it was asked, or that it will publish."""
         if frame.destination in ("__log", "__warn", "__error"):
             text = str(frame.fields().get("text", ""))[:300]

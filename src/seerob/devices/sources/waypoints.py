@@ -72,7 +72,7 @@ def logged_program(kind: str, path: Path, file: str, robot: str, tolerance: floa
 
 
 Above = Annotated[float, Meta(gt=0, le=1e6)]
-BY_HAND = "points"
+IN_TABLE = "points"
 
 
 class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
@@ -136,7 +136,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         return found.trajectory, (
             *notes((text, *said), target.name, level="assumed"),
             *notes(tuple(f"{where}: {r}" for r in (*program.remarks, *found.remarks)), target.name),
-            *notes(tuple(f"{where}: {d}" for d in found.doubts), target.name, level="warning"),
+            *notes(tuple(f"{where}: {d}" for d in found.deviations), target.name, level="warning"),
         )
 
     def motion(self, program: Program, arm: Arm, limits: JointLimits) -> Continuous:
@@ -163,7 +163,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
             return logged_program(kind, path, self.file, self.robot, self.tolerance)
         if self.file:
             return read_program(path, self.file)
-        return Program(BY_HAND, tuple(p.waypoint(f"points[{i}]") for i, p in enumerate(self.points)))
+        return Program(IN_TABLE, tuple(p.waypoint(f"points[{i}]") for i, p in enumerate(self.points)))
 
     def arm(self, program: Program, target: Target) -> tuple[Arm, tuple[str, ...]]:
         """The robot up to its tool point, and what is assumed of both.
@@ -171,7 +171,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         Raises:
             InputError: No description, or a link that is not there.
         """
-        where = self.file or BY_HAND
+        where = self.file or IN_TABLE
         if target.description is None:
             raise InputError.at(where, "robot", f"nobody describes {target.name}", "name a robot")
         links = [link.name for link in target.description.links]

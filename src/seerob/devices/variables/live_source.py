@@ -250,7 +250,7 @@ class Stamps:
         self._said[name, stamp] = said
         return False
 
-    def doubts(self, now: float) -> list[tuple[str, str]]:
+    def invalid_reasons(self, now: float) -> list[tuple[str, str]]:
         """Variables on which nothing rests at ``now`` [s], each with the reason."""
         return [(name, why) for name, (until, why) in self._back.items() if now <= until]
 
@@ -326,7 +326,7 @@ class Picture:
         """
         t = now if heard is None else heard
         doubts = dict(self._bad)
-        for name, why in self._stamps.doubts(now):
+        for name, why in self._stamps.invalid_reasons(now):
             doubts.setdefault(name, f"{name}: {why}")
         for name, variable in self._variables.items():
             if variable.write or name in doubts:

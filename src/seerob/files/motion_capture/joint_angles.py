@@ -318,10 +318,10 @@ def from_table(path: Path, *, file: str) -> JointAngles:
     names, units = [], []
     problems: list[Problem] = []
     joints = [k for k, text in enumerate(header[1:]) if not OF_OUR_EXPORT.fullmatch(text)]
-    told: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     if len(joints) < values.shape[1]:
         text = f"{file}: tracking errors, and what was measured and what estimated, are not read"
-        told = (Finding(level="assumed", subject="", text=text),)
+        findings = (Finding(level="assumed", subject="", text=text),)
         header, values = [header[0], *(header[1 + k] for k in joints)], values[:, joints]
     for text in header[1:]:
         plain = understand(text)
@@ -338,7 +338,7 @@ def from_table(path: Path, *, file: str) -> JointAngles:
         problems.append(Problem(file, header[0][:60], "no time with a unit", "the first column is time [s]"))
     if problems:
         raise InputError(problems[:20])
-    return _of_names(names, units, t * TIMES[time.unit or "s"], values, told, file)
+    return _of_names(names, units, t * TIMES[time.unit or "s"], values, findings, file)
 
 
 def _of_names(

@@ -75,7 +75,7 @@ def limit_check(
     """
     joint_count_check(trajectory, target)
     slopes = _slopes(trajectory)
-    problems, findings = [], list(_doubtful_degrees(trajectory, target))
+    problems, findings = [], list(_degrees_for_radians(trajectory, target))
     for j, joint in enumerate(target.joints):
         unit = target.units[j]
         wrapped = _wrapped(trajectory, slopes, j) if unit == "rad" else None
@@ -123,7 +123,7 @@ def _slopes(trajectory: Trajectory) -> Array:
     return np.asarray(np.where((judged[1:] & judged[:-1])[:, None], slopes, 0.0))
 
 
-def _doubtful_degrees(trajectory: Trajectory, target: Target) -> Iterator[Finding]:
+def _degrees_for_radians(trajectory: Trajectory, target: Target) -> Iterator[Finding]:
     """A warning when every angle that is said to be in degrees would be plausible in radians."""
     angular = [j for j, unit in enumerate(target.units) if unit == "rad"]
     judged = _judged(trajectory)

@@ -57,7 +57,9 @@ class Leg:
     """What it is, when it is a rounding; its speeds are rates then."""
 
 
-def rounded(legs: list[Leg], program: Program, arm: Arm, joints: JointLimits, doubts: list[str]) -> list[Leg]:
+def rounded(
+    legs: list[Leg], program: Program, arm: Arm, joints: JointLimits, deviations: list[str]
+) -> list[Leg]:
     """The legs with roundings between those that do not stop.
 
     Args:
@@ -65,14 +67,14 @@ def rounded(legs: list[Leg], program: Program, arm: Arm, joints: JointLimits, do
         program: Whose blend radii count.
         arm: The robot.
         joints: What they may do.
-        doubts: What is done otherwise than asked is added.
+        deviations: What is done otherwise than asked is added.
     """
     radius = {w.shown: w.blend for w in program.waypoints}
     for k, leg in enumerate(legs):
         if leg.blend and (k + 1 == len(legs) or leg.pause > 0):
             leg.blend = False
         elif leg.blend and (leg.duration is not None or legs[k + 1].duration is not None):
-            doubts.append(f"{leg.place}: a blend beside a given duration is not modelled: it stops there")
+            deviations.append(f"{leg.place}: a blend beside a given duration is not modelled: it stops there")
             leg.blend = False
     cuts = [[0.0, leg.piece.length] for leg in legs]
     for k, leg in enumerate(legs[:-1]):
@@ -87,7 +89,7 @@ def rounded(legs: list[Leg], program: Program, arm: Arm, joints: JointLimits, do
         first, found_before = _distance_cut(arm, leg.piece, corner, r, from_end=True)
         second, found_after = _distance_cut(arm, legs[k + 1].piece, corner, r, from_end=False)
         if not (found_before and found_after):
-            doubts.append(f"{leg.place}: blend of {r:g} m is cut to half of a move that is shorter")
+            deviations.append(f"{leg.place}: blend of {r:g} m is cut to half of a move that is shorter")
         cuts[k][1], cuts[k + 1][0] = first, second
     found: list[Leg] = []
     for k, leg in enumerate(legs):
@@ -182,7 +184,7 @@ class Goals:
     ) -> None:
         self._program, self._arm, self._wanted = program, arm, branch
         self.remarks: list[str] = []
-        self.doubts: list[str] = []
+        self.deviations: list[str] = []
         self.found: list[Array] = []
         """Joint positions of each waypoint that was gone to."""
         head = program.waypoints[0]
@@ -206,7 +208,7 @@ class Goals:
             self.remarks.append(f"the motion begins in its first waypoint, {head.shown}")
         self.first: Array = self._here
         if arm.n > 6 and any(w.pose is not None or w.move.of_tool for w in program.waypoints):
-            self.doubts.append(
+            self.deviations.append(
                 f"{arm.n} joints for a pose of 6: the joint positions are not determined; those nearest to "
                 "where the robot is are taken, a controller may choose others"
             )
@@ -228,7 +230,7 @@ class Goals:
         """Where the way to the waypoint ended."""
         waypoint = self._program.waypoints[len(self.found)]
         if waypoint.move.of_tool and waypoint.q is not None and np.abs(q - self._here).max() > 1e-3:
-            self.doubts.append(
+            self.deviations.append(
                 f"{waypoint.shown}: the straight way ends in other joint positions than it has "
                 f"(off by {np.abs(q - self._here).max():.3g} rad or m): the tool is there, on another branch"
             )
@@ -301,7 +303,7 @@ class Continuous:
     at: tuple[Array, ...]
     """Joint positions of each waypoint [rad or m]."""
     remarks: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = field(default=())
+    deviations: tuple[str, ...] = field(default=())
     """What may differ on a controller, or was changed."""
 
 
@@ -320,7 +322,7 @@ def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -
     _complete(program, wish)
     goals = Goals(program, arm, start=wish.start, branch=wish.branch)
     legs: list[Leg] = []
-    doubts: list[str] = []
+    deviations: list[str] = []
     remarks: list[str] = []
     rests = 0.0
     for k, (before, waypoint, q) in enumerate(goals.steps()):
@@ -333,28 +335,28 @@ def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -
             continue
         goals.reached(piece.last)
         leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
-        _slowed(leg, limits, wish.tool_turn, arm, doubts)
+        _slowed(leg, limits, wish.tool_turn, arm, deviations)
         if piece.least < SINGULAR:
-            doubts.append(
+            deviations.append(
                 f"{waypoint.shown}: near a singularity at {100 * piece.least_at:.0f} % of the way (least "
                 f"singular value {piece.least:.2g}): joints turn fast there, and controllers differ"
             )
         if piece.turning:
             remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
         elif wish.tool_turn is None and (rate := piece.turn * leg.limits.speed) > FAST_TURN:
-            doubts.append(
+            deviations.append(
                 f"{waypoint.shown}: the tool turns at up to {rate:.2g} rad/s on this way (give tool_turn): "
                 "how fast a controller lets it turn is not modelled"
             )
         legs.append(leg)
         leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)
-    legs = rounded(legs, program, arm, limits, doubts)
+    legs = rounded(legs, program, arm, limits, deviations)
     meet(legs)
     trajectory = _sampled(legs, program.file, wish.period, goals.first, rests)
     if any(leg.piece.tool for leg in legs):
         remarks.append(_of_joints(trajectory, arm, limits))
     remarks += goals.remarks
-    return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.doubts, *doubts))
+    return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.deviations, *deviations))
 
 
 def _complete(program: Program, wish: Wish) -> None:
@@ -401,7 +403,7 @@ def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Arr
     return tool_way(arm, before, rotation, position, via=via, file=program.file, place=waypoint.shown)
 
 
-def _slowed(leg: Leg, limits: JointLimits, tool_turn: float | None, arm: Arm, doubts: list[str]) -> None:
+def _slowed(leg: Leg, limits: JointLimits, tool_turn: float | None, arm: Arm, deviations: list[str]) -> None:
     """A move in which a joint or the tool would do more than it may is slowed as a whole."""
     possible = float(np.min(limits.speed / np.maximum(leg.piece.fastest(), 1e-12)))
     if tool_turn is not None and leg.piece.turn > 0:
@@ -409,7 +411,7 @@ def _slowed(leg: Leg, limits: JointLimits, tool_turn: float | None, arm: Arm, do
     unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
     scale = 1.0 if leg.piece.tool else leg.piece.leading
     if possible < leg.limits.speed:
-        doubts.append(
+        deviations.append(
             f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, "
             "which the speed limits of the joints or tool_turn allow; a controller may do otherwise"
         )
@@ -418,7 +420,7 @@ def _slowed(leg: Leg, limits: JointLimits, tool_turn: float | None, arm: Arm, do
     if k > 1:
         was = leg.limits
         leg.limits = Limits(was.speed / k, was.acceleration / k**2, was.jerk / k**3)
-        doubts.append(
+        deviations.append(
             f"{leg.place}: slowed by {k:.3g} (to {leg.limits.speed * scale:.3g} {unit} at most), so that "
             f"{arm.joints[joint].name} keeps its limit of {what}; a controller may do otherwise"
         )

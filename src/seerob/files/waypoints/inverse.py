@@ -55,9 +55,9 @@ def is_classic(arm: Arm) -> bool:
     at = arm.posture(np.array([0.3, -0.9, 1.1, -0.7, 0.8, 0.4]))
     if (np.linalg.norm(at.axes, axis=1) < 0.5).any() or _angle(at.axes[1], at.axes[2]) > PARALLEL:
         return False
-    if _axes_apart(at, 4, 5) > MEET:
+    if _axis_distance(at, 4, 5) > MEET:
         return False
-    spherical = _axes_apart(at, 3, 4) < MEET and _axes_apart(at, 3, 5) < MEET
+    spherical = _axis_distance(at, 3, 4) < MEET and _axis_distance(at, 3, 5) < MEET
     return spherical or _angle(at.axes[2], at.axes[3]) < PARALLEL
 
 
@@ -100,7 +100,7 @@ def _meeting(p: Array, u: Array, r: Array, v: Array) -> Array:
     return np.asarray(p + along * u)
 
 
-def _axes_apart(at: Posture, i: int, j: int) -> float:
+def _axis_distance(at: Posture, i: int, j: int) -> float:
     """Distance of two axes [m]; of parallel ones too."""
     p, u, r, v = at.anchors[i], at.axes[i], at.anchors[j], at.axes[j]
     n = np.cross(u, v)
@@ -285,7 +285,7 @@ def _distinct(arm: Arm, reached: tuple[Array, Array], near: Array, *, classic: b
     found: list[Solution] = []
     for row in q[error < 1e3 * EXACT]:
         turned = _nearest_turn(arm, row, near)
-        if turned is None or any(_apart(arm, turned, other.q) < SAME for other in found):
+        if turned is None or any(_joint_distance(arm, turned, other.q) < SAME for other in found):
             continue
         found.append(Solution(turned, branch(arm.posture(turned)) if classic else None))
     return tuple(sorted(found, key=lambda s: float(np.linalg.norm(s.q - near))))
@@ -324,7 +324,7 @@ def _twist(at: Posture, rotation: Array, position: Array) -> Array:
     return np.concatenate([position - at.position, turn], axis=-1)
 
 
-def _apart(arm: Arm, a: Array, b: Array) -> float:
+def _joint_distance(arm: Arm, a: Array, b: Array) -> float:
     """Largest difference of a joint, whole turns aside."""
     d = a - b
     return float(np.abs(np.where(arm.slides, d, (d + np.pi) % (2 * np.pi) - np.pi)).max())

@@ -247,7 +247,7 @@ MOVES_OTHERWISE = re.compile(
     r"teachmode|screw_driving|tool_contact|set_conveyor)"
 )
 """Begin of calls that move the robot in ways that are not modelled."""
-APART = ("thread", "def", "sec")
+DEFINITIONS = ("thread", "def", "sec")
 """Begin of what runs beside the program, or when it is called."""
 OPENING = ("if", "while", "for", "thread")
 BETWEEN = ("elif", "else")
@@ -275,7 +275,7 @@ class Block:
 
     def __init__(self, line: int, word: str) -> None:
         self.line, self.word = line, word
-        self.apart = word in APART
+        self.defines = word in DEFINITIONS
         self.names: set[str] = set()
         """What is given another value in it."""
         self.matters = False
@@ -296,7 +296,7 @@ class Block:
         if (match := ASSIGNMENT.match(statement)) is not None:
             self.names.add(match[1])
         self.matters |= bool(moving(statement)) or word == "set_tcp"
-        self.matters |= not self.apart and (word in LEAVING or bool(ENDLESS.fullmatch(statement)))
+        self.matters |= not self.defines and (word in LEAVING or bool(ENDLESS.fullmatch(statement)))
         return self._depth == 0
 
 
@@ -379,7 +379,7 @@ class _Script:
         elif ENDLESS.fullmatch(statement) and self._round is None and self._open == self._definitions:
             self._round, self._round_line = self._open, line
             self._open += 1
-        elif statement.endswith(":") and (word in OPENING or (word in APART and begun)):
+        elif statement.endswith(":") and (word in OPENING or (word in DEFINITIONS and begun)):
             self._block = Block(line, word)
         elif DEFINITION.match(statement):
             self._definitions += 1
@@ -397,7 +397,7 @@ class _Script:
     def _leave_out(self, block: Block) -> None:
         """What a block does to the names is known to a controller alone."""
         self._names |= dict.fromkeys(block.names)
-        self._changing |= block.names if block.apart else set()
+        self._changing |= block.names if block.defines else set()
         if block.matters:
             self._wrong(block.line, f"`{block.word}`", "what is done there only a controller knows")
         else:

@@ -71,7 +71,7 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _feet(model, place, place.still)
     yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
     yield from _parts(model, place)
-    yield from _apart(model, place)
+    yield from _misplaced(model, place)
     yield from _bases(model, place)
     yield from _below(model, place)
     yield from _nobody(model, [place])
@@ -191,7 +191,7 @@ def _outside(point: Array, low: Array, high: Array) -> float:
     return float(np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0)))
 
 
-def _apart(model: Model, place: _Home) -> Iterator[Quantity]:
+def _misplaced(model: Model, place: _Home) -> Iterator[Quantity]:
     """How far tools, and what is held, are from what carries them."""
     for group in ("tools", "workpieces"):
         for i, thing in enumerate(getattr(model.workstation, group)):

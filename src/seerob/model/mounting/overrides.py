@@ -17,7 +17,7 @@ from seerob.core.transforms import Array
 from seerob.description.description import Description, Joint, JointKind, Quantity
 from seerob.description.humans import manikin
 from seerob.description.humans.anthropometry import Body, body, stature_given
-from seerob.model.mounting.things import link_by_hand
+from seerob.model.mounting.things import overridden_link
 from seerob.workstation.workstation import Human, Robot
 
 SLIPS = (
@@ -114,7 +114,7 @@ def overridden(description: Description, robot: Robot, file: str) -> Description
         if link.name in robot.masses:
             refused, impossible = "", None
             try:
-                inertial, more = link_by_hand(robot.masses[link.name], link, robot=robot.name, file=file)
+                inertial, more = overridden_link(robot.masses[link.name], link, robot=robot.name, file=file)
                 findings += more
             except InputError as error:
                 problems += error.problems

@@ -120,7 +120,7 @@ def load_thing(
         inertial, more = _inertial(thing, whole, source)
     elif thing.mass is not None and thing.com is not None:
         # It stands still, so only what the user wrote is looked at.
-        inertial = by_hand(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)
+        inertial = given_inertial(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)
     if inertial is not None:
         inertial, noticed = _possible(
             inertial, solids, thing, thing.name, file, "", lambda: _spread(thing, whole)
@@ -177,7 +177,7 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
 
 def _inertial(thing: Thing, meshes: list[Mesh], source: str) -> tuple[Inertial, tuple[Finding, ...]]:
     if thing.mass is not None and thing.com is not None and thing.inertia is not None:
-        return by_hand(thing.mass, thing.com, thing.inertia, "workstation file"), ()
+        return given_inertial(thing.mass, thing.com, thing.inertia, "workstation file"), ()
     inertial, findings = _spread(thing, meshes)
     if thing.com is not None:
         inertial = replace(inertial, com=np.array(thing.com, float))
@@ -326,7 +326,7 @@ def _proposed(spread: Spread) -> str:
     return f"give {order}; at uniform density [{', '.join(f'{x:.4g}' for x in six)}]"
 
 
-def by_hand(
+def given_inertial(
     mass: float,
     com: tuple[float, float, float],
     inertia: tuple[float, float, float, float, float, float],
@@ -342,7 +342,7 @@ def symmetric(six: tuple[float, float, float, float, float, float]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def link_by_hand(
+def overridden_link(
     table: BodyTable, link: Link, *, robot: str, file: str
 ) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties of a link from its table; what the table leaves out follows from the shape.
@@ -371,7 +371,7 @@ def link_by_hand(
         return mass_properties.from_shape(meshes, mass=table.mass, subject=f"{robot}/{link.name}")
 
     if table.com is not None and table.inertia is not None:
-        inertial = by_hand(table.mass, table.com, table.inertia, table.source)
+        inertial = given_inertial(table.mass, table.com, table.inertia, table.source)
     else:
         inertial = spread()[0]
         com = inertial.com if table.com is None else np.array(table.com, float)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.shapes import cut_ears
+from seerob.core.shapes import ear_clipping
 from seerob.core.snapshot import (
     Arrow,
     Box,
@@ -141,7 +141,7 @@ def prism(marker: Prism) -> tuple[Array, NDArray[np.int32], list[tuple[int, int]
     placed = points.reshape(-1, 3) @ rotation_from_wxyz(marker.wxyz).T + marker.position
     ring = [(i, (i + 1) % n) for i in range(n)]
     sides = [face for a, b in ring for face in ((a, b, b + n), (a, b + n, a + n))]
-    caps = cut_ears(outline)
+    caps = ear_clipping(outline)
     faces = [*((c, b, a) for a, b, c in caps), *((a + n, b + n, c + n) for a, b, c in caps), *sides]
     edges = [*ring, *((a + n, b + n) for a, b in ring), *((i, i + n) for i in range(n))]
     return np.asarray(placed), np.array(faces if caps else [], np.int32).reshape(-1, 3), edges

@@ -22,23 +22,23 @@ def assumed(report: Report) -> Html:
             finding.level, finding.level
         )
         rows.append([finding.subject, whole(mark), finding.text])
-    doubts: list[list[str | Html]] = []
+    guessed: list[list[str | Html]] = []
     for name, basis in report.bases.items():
         for item in basis.inputs:
             if item.origin in DOUBTFUL:
-                doubts.append([name, *input_row(item)])
+                guessed.append([name, *input_row(item)])
     return joined(
         [
             tag("h2", "What was assumed, and by whom"),
-            tag("p", "Nothing was assumed, repaired or found odd.") if not rows and not doubts else None,
+            tag("p", "Nothing was assumed, repaired or found odd.") if not rows and not guessed else None,
             table(["about", "kind", "what was found while the model was built"], rows) if rows else None,
             joined(
                 [
                     tag("h4", "Figures that nobody measured or stated"),
-                    table(["criterion", "input", "value", "origin", "source"], doubts),
+                    table(["criterion", "input", "value", "origin", "source"], guessed),
                 ]
             )
-            if doubts
+            if guessed
             else None,
         ]
     )

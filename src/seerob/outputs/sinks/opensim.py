@@ -35,7 +35,7 @@ class EstimatedCoordinates:
     """Counts the rows in which each coordinate is estimated."""
 
     def __init__(self) -> None:
-        self._rows = self._told = 0
+        self._rows = self._seen_rows = 0
         self._estimated: Counter[str] = Counter()
 
     def add(self, joints: Sequence[float | None]) -> None:
@@ -47,7 +47,7 @@ class EstimatedCoordinates:
         self._rows += 1
         if joints[0] is None:  # joints or keyframes move the person
             return
-        self._told += 1
+        self._seen_rows += 1
         lost: list[bool] = np.any(_follows()[:, [not v for v in joints]], axis=1).tolist()
         self._estimated.update(
             name for name, is_lost in zip(joint_angles.coordinates(), lost, strict=True) if is_lost
@@ -60,8 +60,8 @@ class EstimatedCoordinates:
             f"estimated, no device saw the bones: {', '.join(named[k : k + PER_LINE])}\n"
             for k in range(0, len(named), PER_LINE)
         ]
-        if self._told < self._rows and self._told:
-            out.append(f"no device saw the person in {self._rows - self._told} of {self._rows} rows\n")
+        if self._seen_rows < self._rows and self._seen_rows:
+            out.append(f"no device saw the person in {self._rows - self._seen_rows} of {self._rows} rows\n")
         return out
 
 

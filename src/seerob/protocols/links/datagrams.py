@@ -44,8 +44,8 @@ HEARD: ContextVar[dict[int, str]] = ContextVar("heard")
 
 def distrust(reason: str) -> None:
     """Say why what is heard may not be from whom it seems to be."""
-    if (told := DISTRUST.get(None)) is not None:
-        told(reason)
+    if (callback := DISTRUST.get(None)) is not None:
+        callback(reason)
 
 
 class Datagrams(asyncio.DatagramProtocol):

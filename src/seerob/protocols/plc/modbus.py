@@ -533,7 +533,7 @@ async def connect(host: str, port: int, number: int) -> AsyncGenerator[Device, N
     client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
     loop = asyncio.get_running_loop()
     usual = loop.get_exception_handler()
-    loop.set_exception_handler(_told_elsewhere)
+    loop.set_exception_handler(_quiet)
     try:
         if not await client.connect():
             raise ConnectionError("no connection")
@@ -543,7 +543,7 @@ async def connect(host: str, port: int, number: int) -> AsyncGenerator[Device, N
         loop.set_exception_handler(usual)
 
 
-def _told_elsewhere(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+def _quiet(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     """Bytes on which pymodbus fails end the connection, which is said as a loss; no traceback beside it."""
     if not type(context.get("protocol")).__module__.startswith("pymodbus"):
         loop.default_exception_handler(context)

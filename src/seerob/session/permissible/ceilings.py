@@ -410,8 +410,8 @@ def governing(ceilings: Sequence[Ceiling], by: By, *, below: float = 1.0) -> Cei
 
 def _least(ceilings: Sequence[Ceiling]) -> Ceiling | None:
     """What cannot be told, else the least; None when nothing limits the speed."""
-    doubts = [c for c in ceilings if c.undecided]
-    least = doubts[0] if doubts else min(ceilings, key=lambda c: c.share, default=None)
+    undecided = [c for c in ceilings if c.undecided]
+    least = undecided[0] if undecided else min(ceilings, key=lambda c: c.share, default=None)
     return None if least is None or least.share == math.inf else least
 
 

@@ -149,7 +149,7 @@ class Survey:
                 look(self._state)
 
     def _place(self, t: float, others_at: float, q: Array, qd: Array) -> None:
-        self._state.place(t, others_at, q, qd, _doubt(self._motion, t))
+        self._state.place(t, others_at, q, qd, _invalid_reason(self._motion, t))
 
     def _stations(self, piece: Piece, s: Array, others_at: Clock, progress: Progress) -> Stations:
         t = piece.when(s)
@@ -169,9 +169,9 @@ class Survey:
         """Where the tool point is [m], and its speed by path speed."""
         state, robot = self._state, self._robot
         # Whether its place may be relied on is the criteria's question, not the drawing's.
-        doubts, state.doubts = state.doubts, {}
+        invalid_reasons, state.invalid_reasons = state.invalid_reasons, {}
         J = state.jacobian(self._tip, robot)[:3]
-        state.doubts = doubts
+        state.invalid_reasons = invalid_reasons
         return state.pose(self._tip)[1], float(np.linalg.norm(J @ along))
 
 
@@ -200,7 +200,7 @@ def _merged(a: Stations, b: Stations) -> Stations:
     return Stations(**both, ceilings=tuple(ceilings[i] for i in order.tolist()), by=a.by)
 
 
-def _doubt(motion: GivenMotion, t: float) -> str:
+def _invalid_reason(motion: GivenMotion, t: float) -> str:
     k = int(motion.interval(t))
     if motion.good[k : k + 2].all():
         return ""

@@ -39,7 +39,7 @@ class Witness:
         self.t: list[float] = []
         self._qpos: list[Array] = []
         self._qvel: list[Array] = []
-        self._doubts: list[dict[str, str]] = []
+        self._invalid_reasons: list[dict[str, str]] = []
         self._heard: list[dict[str, Value | Undecided]] = []
         self._seen: list[dict[str, Seen]] = []
 
@@ -48,7 +48,7 @@ class Witness:
         self.t.append(state.t)
         self._qpos.append(np.array(state.data.qpos))
         self._qvel.append(np.array(state.data.qvel))
-        self._doubts.append({name: state.invalid_reason(name) for name in state.hearings})
+        self._invalid_reasons.append({name: state.invalid_reason(name) for name in state.hearings})
         asked = {c.active for c in state.model.workstation.safety if c.active is not None}
         self._heard.append({name: _heard(state, name) for name in asked})
         people = {name: h for name, h in state.hearings.items() if h.bones}
@@ -63,7 +63,7 @@ class Witness:
     def others(self, t: float) -> tuple[Array, Array, dict[str, str]]:
         """Positions, velocities and doubts of the whole twin at the tick that is nearest to ``t`` [s]."""
         k = self._tick(t)
-        return self._qpos[k], self._qvel[k], self._doubts[k]
+        return self._qpos[k], self._qvel[k], self._invalid_reasons[k]
 
     def heard(self, t: float) -> tuple[dict[str, Value | Undecided], dict[str, Seen]]:
         """What switches criteria, as machines said it at the tick that is nearest to ``t`` [s], or why not.
@@ -101,7 +101,7 @@ class Posed(State):
         names = {machine.name for machine in station.machines} - driven
         self._rests = {name: model.mechanisms[name].home for name in names}
         """Machines that nothing moves, and where their joints are."""
-        self.doubts: dict[str, str] = {}
+        self.invalid_reasons: dict[str, str] = {}
         """Why somebody's place may not be relied on, by name; empty when it may."""
         self._said: dict[str, Value | Undecided] = {}
         self.foresee = self._steady
@@ -116,7 +116,7 @@ class Posed(State):
         q, qd = self.joint_positions(self._robot), self.data.qvel[self.columns[name].own_v]
         return np.tile(q, (len(t), 1)), np.tile(qd, (len(t), 1)), ""
 
-    def place(self, t: float, others_at: float, q: Array, qd: Array, own_doubt: str = "") -> None:
+    def place(self, t: float, others_at: float, q: Array, qd: Array, own_reason: str = "") -> None:
         """Put everybody where they are.
 
         Args:
@@ -124,14 +124,14 @@ class Posed(State):
             others_at: When the others were seen [s].
             q: Of the robot [rad or m], shape (n,).
             qd: Likewise [rad/s or m/s].
-            own_doubt: Why the robot's position may not be relied on.
+            own_reason: Why the robot's position may not be relied on.
         """
-        qpos, qvel, doubts = self._witness.others(others_at)
+        qpos, qvel, invalid_reasons = self._witness.others(others_at)
         self.data.qpos[:], self.data.qvel[:] = qpos, qvel
         robot = self._robot
         self.data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
         self.data.qvel[robot.v_address] = robot.coupling @ qd
-        self.doubts = {**doubts, robot.name: own_doubt}
+        self.invalid_reasons = {**invalid_reasons, robot.name: own_reason}
         self._said, seen = self._witness.heard(others_at)
         for name, hearing in self.hearings.items():
             hearing.bones, unaimed, slack = seen.get(name, Seen({}, {}, {}))
@@ -142,7 +142,7 @@ class Posed(State):
 
     def invalid_place_reason(self, name: str) -> str:
         """Why nothing of a robot or person may be relied on; others as the run knew them then, bones too."""
-        return self.doubts.get(name, "")
+        return self.invalid_reasons.get(name, "")
 
     def signal(self, name: str) -> Value:
         """Value of a variable that switches criteria, in SI, as the run heard it; may raise `Undecided`."""

@@ -24,7 +24,7 @@ from seerob.session.permissible.moving_joints import KinematicChain, chains_of
 
 RESOLUTION = 1e-3
 """A span on which no point moves farther and that is not clear is given up [m]."""
-APART = 0.002
+OWN_MARGIN = 0.002
 """Of the robot's own bodies from each other, whatever the margin to others is [m]."""
 WATCHED = ("robot", "tool", "workpiece", "part", "machine", "human")
 """Roles of bodies that are kept away from; areas are looked through unless they are named."""
@@ -53,7 +53,7 @@ class _Pairs:
 
     def need(self, margin: float) -> float:
         """Distance that is enough, given the margin to others [m]."""
-        return APART if self.own else margin
+        return OWN_MARGIN if self.own else margin
 
 
 class Clearance:
@@ -140,7 +140,7 @@ class Clearance:
 
     def fault(self, q: Array, margin: float) -> str:
         """Why a posture is not clear; empty when it is."""
-        for own, least in ((False, margin), (True, APART)):
+        for own, least in ((False, margin), (True, OWN_MARGIN)):
             near = self.nearest(q, own=own)
             if near is not None and near.distance < least:
                 return f"{near.distance:.4f} m at {near.what}, less than {least:g} m"

@@ -157,9 +157,9 @@ class TrackingError:
                 position, angle = errors.get(bone, (None, None))
                 chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
                 found[row] = (position or 0.0) + max((angle or 0.0) * reach, chord)
-            told = self._inferred(state, person, errors) if errors else {}
-            for row, bone, _ in bones if told else ():
-                found[row] = max(found[row], told.get(bone, 0.0))
+            inferred = self._inferred(state, person, errors) if errors else {}
+            for row, bone, _ in bones if inferred else ():
+                found[row] = max(found[row], inferred.get(bone, 0.0))
             if stray:
                 away, turns = state.strayed(person, tuple(self._joints[person].values()))
                 place = {bone: k for k, bone in enumerate(self._joints[person])}

@@ -254,9 +254,9 @@ class _Carried:
         if m.position is not None:
             run = _number(values, m.position)
             self._zero = run - m.start if anew else self._zero
-            told = run - self._zero
+            position = run - self._zero
             # A place that the speed cannot have brought about is no motion: a counter that began again.
-            off = 0.0 if summed is None else told - summed
+            off = 0.0 if summed is None else position - summed
             self.jumped = anew or abs(off) > FAR
             if self._at_end is AtEnd.LOOP:
                 off -= self._length * round(off / self._length)  # a count of one round begins again
@@ -265,7 +265,7 @@ class _Carried:
                     f"its position leapt by {off:.3g} m at {t:.3f} s, which its speed does not explain"
                 )
                 self._until = t + HOLD
-            self._way = nearing(told, summed, t - self._t)
+            self._way = nearing(position, summed, t - self._t)
         elif anew:
             self._way, self._lost = m.start, ""
         elif summed is not None:
@@ -297,20 +297,20 @@ class _Carried:
             self._lost = f"its place on the way is not known since: {reason}; placed tells it anew"
 
 
-def nearing(told: float, summed: float | None, step: float) -> float:
+def nearing(position: float, summed: float | None, step: float) -> float:
     """Where a part is whose belt tells its position and, maybe, its speed.
 
     What arrives late or early would make the speed of the part jump; summed up, the speed that was told
     does not, and the position takes it back to where it is told within `SETTLE`.
 
     Args:
-        told: By the position [m].
+        position: As its belt gives it [m].
         summed: By the speed since the last picture [m]; None where there is none.
         step: Time since then [s].
     """
-    if summed is None or abs(told - summed) > FAR:
-        return told
-    return summed + min(1.0, step / SETTLE) * (told - summed)
+    if summed is None or abs(position - summed) > FAR:
+        return position
+    return summed + min(1.0, step / SETTLE) * (position - summed)
 
 
 def carried(way: float, length: float, at_end: AtEnd) -> float:

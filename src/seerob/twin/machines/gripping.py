@@ -137,7 +137,7 @@ class _Grip:
         solids = tuple(solid for index in self._resting for solid in model.bodies[index].solids)
         self._gap = Query(Shapes.build([("gap", (plate,)), ("piece", solids)]), (0,), (1,), cap=self._touch)
         cap = 2 * LET_GO * self._touch
-        self._apart = Query(model.shapes, *((finger.index,) for finger in self._fingers), cap=cap)
+        self._gap_query = Query(model.shapes, *((finger.index,) for finger in self._fingers), cap=cap)
         self._queries = {
             places: [Query(model.shapes, (finger.index,), places, cap=cap) for finger in self._fingers]
             for places in (tuple(self._held), tuple(self._resting))
@@ -203,7 +203,7 @@ class _Grip:
 
     def _as_if_held(self, state: State) -> bool:
         """Whether fingers that are not shut would be at it in the hand, where the file has it there."""
-        if self._apart.minimum(state.rotations, state.positions).distance <= self._touch:
+        if self._gap_query.minimum(state.rotations, state.positions).distance <= self._touch:
             return False
         R, x, held = state.rotations.copy(), state.positions.copy(), self._held
         turn, mj = state.data.xmat[self._palm].reshape(3, 3), state.model.mj
@@ -233,11 +233,11 @@ class _Grip:
     def _bring(self, state: State, *, held: bool) -> None:
         """Into the hand, or out of it."""
         here, gone = (self._held, self._resting) if held else (self._resting, self._held)
-        bearer = self._in_hand if held else self._lying
+        carrier = self._in_hand if held else self._lying
         for mj in self._models:
             self._load(mj, held)
         for index in here:
-            state.attachments.put(state.model.mj, index, bearer)
+            state.attachments.put(state.model.mj, index, carrier)
         for index in gone:
             state.attachments.put(state.model.mj, index, self._away)
         state.attachments.drawn[here] = here

@@ -17,7 +17,7 @@ import numpy as np
 from seerob.core.samples import REPEATED
 from seerob.core.transforms import Array
 from seerob.description.capture.estimated import estimated
-from seerob.description.capture.following import Followed, PartDoubt
+from seerob.description.capture.following import Followed, InvalidPart
 from seerob.description.humans.skeleton import BONES
 from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 from seerob.model.model import Model
@@ -81,7 +81,7 @@ class BonesHeard(NamedTuple):
 
     t: float
     """Its instant [s]."""
-    parts: tuple[PartDoubt, ...] = ()
+    parts: tuple[InvalidPart, ...] = ()
     """Why single bones may not be relied on when the rest may, as (reason, bones)."""
     observed: frozenset[str] | None = None
     """Bones that some device sees; None where no device is asked, as joints move the person."""
@@ -90,7 +90,7 @@ class BonesHeard(NamedTuple):
     unaimed: Mapping[str, float] = MappingProxyType({})
     """Hands, feet and heads of which only the joint is seen, with a bound on how far they may be turned from
     the twin's [rad]."""
-    untold: frozenset[tuple[str, int]] = frozenset()
+    undetermined: frozenset[tuple[str, int]] = frozenset()
     """Angles of the posture that nothing tells, each with its side."""
     places: Places = EVERYWHERE
     """Of which bones nobody says where they are."""
@@ -122,7 +122,7 @@ class Hearing:
     """[s]"""
     heard: list[Heard] = field(default_factory=list)
     """The newest samples, oldest first; some may lie ahead of the tick."""
-    torque_doubt: str = ""
+    invalid_torque_reason: str = ""
     """Why those torques may not be relied on; empty when they may."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
@@ -140,7 +140,7 @@ class Hearing:
     is, what was captured tells, too."""
     residual: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """As `bones`, of those joint positions instead of the twin's, where the twin does not follow."""
-    lost: float = -np.inf
+    reset_at: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
     """A joint's torque limit was reached: the twin cannot do what was heard."""
@@ -185,7 +185,9 @@ class Hearing:
         self.take(Heard(found.t, found.reason))
         places = Places(found.unplaced, found.displaced, found.slack)
         self.bones_heard.append(
-            BonesHeard(found.t, found.parts, found.observed, found.bare, found.unaimed, found.untold, places)
+            BonesHeard(
+                found.t, found.parts, found.observed, found.bare, found.unaimed, found.undetermined, places
+            )
         )
 
     def forget(self, t: float) -> None:
@@ -236,12 +238,12 @@ class Hearing:
         The worse of two samples, and by how much the twin is faster or slower than both say.
         """
         around = [said.speed_error for said in self.around(t) if said.speed_error is not None]
-        told = np.max(around, axis=0) if around else None
+        error = np.max(around, axis=0) if around else None
         if self.unlike is None:
-            return told
-        return self.unlike if told is None else np.asarray(told + self.unlike)
+            return error
+        return self.unlike if error is None else np.asarray(error + self.unlike)
 
-    def doubt_ahead(self, t: float, until: float) -> str:
+    def invalid_ahead_reason(self, t: float, until: float) -> str:
         """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""
         begin, end, longest = t + SLACK, until - SLACK, self.timeout + SLACK
         for before, said in pairwise(self.heard):
@@ -256,7 +258,7 @@ class Hearing:
             return f"its motion ends at {last:.3f} s, and what it does after is not known"
         return ""
 
-    def invalid_parts(self, t: float) -> tuple[PartDoubt, ...]:
+    def invalid_parts(self, t: float) -> tuple[InvalidPart, ...]:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""
         return tuple(part for said in self._said_of_bones(t) for part in said.parts)
 
@@ -287,9 +289,9 @@ class Hearing:
             found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in said.places.slack.items()}
         return found
 
-    def untold_angles(self, t: float) -> frozenset[tuple[str, int]]:
+    def undetermined_angles(self, t: float) -> frozenset[tuple[str, int]]:
         """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
-        return frozenset(angle for said in self._said_of_bones(t) for angle in said.untold)
+        return frozenset(angle for said in self._said_of_bones(t) for angle in said.undetermined)
 
     def unobserved(self, t: float) -> tuple[str, ...]:
         """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.

@@ -207,9 +207,9 @@ class Validity:
 
     def _invalid_place(self, name: str) -> str:
         hearing = self._hearings[name]
-        if reason := self.heard_doubt(name):
+        if reason := self.invalid_source_reason(name):
             return reason
-        if hearing.lost > self.t - 2 * self._period:
+        if hearing.reset_at > self.t - 2 * self._period:
             return f"{name}: the twin had to be put back to what was heard"
         limit = self._tracking_limits[name]
         if hearing.error > limit:
@@ -217,11 +217,11 @@ class Validity:
             return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
         return ""
 
-    def heard_doubt(self, name: str) -> str:
+    def invalid_source_reason(self, name: str) -> str:
         """Why what was heard may not be relied on, whether or not the twin follows it; empty when it may."""
-        return self._once("heard", name, self._heard_doubt)
+        return self._once("heard", name, self._invalid_source)
 
-    def _heard_doubt(self, name: str) -> str:
+    def _invalid_source(self, name: str) -> str:
         reason = self._hearings[name].invalid_reason(self.t)
         if reason:
             return f"{name}: {reason}"
@@ -266,10 +266,14 @@ class Validity:
 
     def _stray(self, name: str) -> str:
         hearing = self._hearings[name]
-        if hearing.captured is None or hearing.error <= self._tracking_limits[name] or self.heard_doubt(name):
+        if (
+            hearing.captured is None
+            or hearing.error <= self._tracking_limits[name]
+            or self.invalid_source_reason(name)
+        ):
             return ""
         reason = self.invalid_place_reason(name)
-        return reason if hearing.lost <= self.t - 2 * self._period else ""
+        return reason if hearing.reset_at <= self.t - 2 * self._period else ""
 
     def strays(self, bodies: tuple[int, ...]) -> str:
         """`stray` of any of the people to whom bodies belong."""
@@ -280,7 +284,7 @@ class Validity:
             else next(filter(None, map(self.stray, owners.people)), "")
         )
 
-    def bones_in_doubt(self, name: str) -> tuple[str, ...]:
+    def invalid_bones(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be where the twin shows them, when the others are.
 
         What is turned in doubt, and what nobody says the place of.
@@ -290,16 +294,16 @@ class Validity:
         """
         if reason := self.invalid_place_reason(name):
             raise Undecided(reason)
-        return self._bones_in_doubt(name)
+        return self._invalid_bones(name)
 
-    def _bones_in_doubt(self, name: str) -> tuple[str, ...]:
-        turned, key = self.bones_turned_in_doubt(name), ("placed", name)
+    def _invalid_bones(self, name: str) -> tuple[str, ...]:
+        turned, key = self.invalid_orientations(name), ("placed", name)
         if key not in self._bones:
             unplaced = self._hearings[name].unplaced(self.t)
             self._bones[key] = tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
         return self._bones[key]
 
-    def bones_turned_in_doubt(self, name: str) -> tuple[str, ...]:
+    def invalid_orientations(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be turned as the twin shows them, when the others are.
 
         What is in doubt, and what no device sees and its neighbours do not tell: enough for whoever asks
@@ -309,13 +313,13 @@ class Validity:
             Undecided: Nothing of the person may be relied on.
         """
         self.asked.add(name)
-        if reason := self.heard_doubt(name):
+        if reason := self.invalid_source_reason(name):
             raise Undecided(reason)
         key = "turned", name
         if key not in self._bones:
             hearing = self._hearings[name]
-            doubted = (bone for _, bones in hearing.invalid_parts(self.t) for bone in bones)
-            self._bones[key] = tuple(dict.fromkeys((*doubted, *hearing.unobserved(self.t))))
+            invalid = (bone for _, bones in hearing.invalid_parts(self.t) for bone in bones)
+            self._bones[key] = tuple(dict.fromkeys((*invalid, *hearing.unobserved(self.t))))
         return self._bones[key]
 
     # -- of bodies ----------------------------------------------------------------------------
@@ -346,7 +350,7 @@ class Validity:
         for name, bones in owners.people.items():
             if (reason := self.invalid_place_reason(name)) and not (strayed and reason == self.stray(name)):
                 raise Undecided(reason)
-            if bones.isdisjoint(self._bones_in_doubt(name)):
+            if bones.isdisjoint(self._invalid_bones(name)):
                 continue
             if (
                 not allow_estimated
@@ -364,7 +368,7 @@ class Validity:
             return ()
         if owners.key not in self._lost:
             known = frozenset(name for name in owners.people if not self.invalid_place_reason(name))
-            lost = {f"{name}/{bone}" for name in known for bone in self.bones_in_doubt(name)}
+            lost = {f"{name}/{bone}" for name in known for bone in self.invalid_bones(name)}
             which = tuple(i for i in bodies if self._model.bodies[i].name in lost) if lost else ()
             self._lost[owners.key] = known, which
         known, which = self._lost[owners.key]
@@ -386,7 +390,7 @@ class Validity:
         # Of whom nothing is heard bone by bone there is no other reason.
         if not self._hearings[name].bones_heard:
             return True
-        return not self.invalid_reason(name) and not self._bones_in_doubt(name)
+        return not self.invalid_reason(name) and not self._invalid_bones(name)
 
     def _owners(self, bodies: tuple[int, ...]) -> _Owners:
         last = self._owners_last.get(id(bodies))

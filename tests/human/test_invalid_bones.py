@@ -8,7 +8,7 @@ from made_capture import captured, frames_of, play, source, walking, workstation
 
 from seerob.core.errors import Undecided
 from seerob.criteria.scoring.rule import bind_posture
-from seerob.description.capture.estimated import in_doubt_with
+from seerob.description.capture.estimated import invalid_with
 from seerob.description.humans.skeleton import BONES
 from seerob.session import run as road
 from seerob.session.station import Station
@@ -88,4 +88,4 @@ def test_a_person_who_is_lost_altogether_is_not_scored():
     ],
 )
 def test_what_is_in_doubt_with_a_bone(lost, seen, doubted):
-    assert set(in_doubt_with(lost, seen)) == doubted
+    assert set(invalid_with(lost, seen)) == doubted

@@ -15,10 +15,10 @@ from seerob.core.samples import JointSample, SignalSample
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.live.receivers import Receivers
 
-_log = logging.getLogger("told")
+_log = logging.getLogger("scripted")
 
 
-class Told(LiveSource, frozen=True, kw_only=True):
+class Scripted(LiveSource, frozen=True, kw_only=True):
     """Says on and on where an arm is, and in which process it listens."""
 
     robot: str = "arm"
@@ -38,7 +38,7 @@ class Told(LiveSource, frozen=True, kw_only=True):
             await asyncio.sleep(0.001)
 
 
-class Delayed(Told, frozen=True, kw_only=True):
+class Delayed(Scripted, frozen=True, kw_only=True):
     """What the next process hears is on its way for 0.8 s; a file tells that there was one before."""
 
     been: str
@@ -57,7 +57,7 @@ class Delayed(Told, frozen=True, kw_only=True):
             await asyncio.sleep(0.002)
 
 
-class AtOnce(Told, frozen=True, kw_only=True):
+class AtOnce(Scripted, frozen=True, kw_only=True):
     """Says a lot before anybody can take it."""
 
     async def listen(self, target):
@@ -66,7 +66,7 @@ class AtOnce(Told, frozen=True, kw_only=True):
         await asyncio.sleep(60)
 
 
-class Mistaken(Told, frozen=True, kw_only=True):
+class Mistaken(Scripted, frozen=True, kw_only=True):
     """Has a mistake."""
 
     async def listen(self, target):
@@ -74,7 +74,7 @@ class Mistaken(Told, frozen=True, kw_only=True):
         yield
 
 
-class Stubborn(Told, frozen=True, kw_only=True):
+class Stubborn(Scripted, frozen=True, kw_only=True):
     """Holds the interpreter when it is to end."""
 
     async def listen(self, target):
@@ -82,14 +82,14 @@ class Stubborn(Told, frozen=True, kw_only=True):
         time.sleep(60)
 
 
-class Large(Told, frozen=True, kw_only=True):
+class Large(Scripted, frozen=True, kw_only=True):
     """Says more than there is room for."""
 
     async def listen(self, target):
         yield SignalSample(source="", seq=0, t=time.monotonic(), values={"text": "x" * 200_000})
 
 
-class Missing(Told, frozen=True, kw_only=True):
+class Missing(Scripted, frozen=True, kw_only=True):
     """Is not known where it is told."""
 
     def __reduce__(self):
@@ -104,7 +104,7 @@ def _only_here(process):
 
 def run():
     """A run that waits to be killed; prints who listens for it."""
-    with Receivers([(Told(), None)]) as listening:
+    with Receivers([(Scripted(), None)]) as listening:
         while not (pid := [s.values["process"] for s in listening.take() if isinstance(s, SignalSample)]):
             time.sleep(0.01)
         print(int(pid[0]), flush=True)

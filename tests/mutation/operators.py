@@ -66,7 +66,7 @@ DRAWN = ("Arrow", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "marker
          "UnknownName", "Meta", "np.errstate")  # fmt: skip
 """Calls whose arguments no verdict depends on."""
 SPOKEN = ("basis", "subjects", "inputs", "_markers", "_picture", "_shells", "_line", "_vector", "_rounded",
-          "_Way.hull", "_Curtain._beams", "_Scan._hidden", "Presence._told", "_limits_given",
+          "_Way.hull", "_Curtain._beams", "_Scan._hidden", "Presence._worst_sight", "_limits_given",
           "_places")  # fmt: skip
 """Functions whose result no verdict depends on, by their name or, where others are called so too, in full."""
 

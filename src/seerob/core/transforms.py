@@ -117,6 +117,14 @@ def product(p: Array, q: Array) -> Array:
     return np.hstack([w, pw * qv + qw * pv + cross(pv, qv)])
 
 
+def length(v: Array) -> Array | float:
+    """Length of vectors, shape (...), given (..., 3); a number, bit by bit the same, of a single one."""
+    if v.ndim > 1:
+        return np.asarray(np.sqrt(v[..., 0] ** 2 + v[..., 1] ** 2 + v[..., 2] ** 2))
+    x, y, z = v.tolist()
+    return math.sqrt(x * x + y * y + z * z)
+
+
 def cross(a: Array, b: Array) -> Array:
     """Vector product of vectors (3,) or rows (n, 3): for a few several times faster than `numpy.cross`."""
     (a0, a1, a2), (b0, b1, b2) = a.T, b.T

@@ -50,6 +50,11 @@ class Bound:
     """How it is judged between two ticks; None where nothing bounds it."""
 
     @cached_property
+    def computed(self) -> bool:
+        """Whether it ships, and its verdict is made of its figure where all are (`criteria.figure`)."""
+        return not self.own and type(self.criterion).compute is not Criterion.compute
+
+    @cached_property
     def own(self) -> bool:
         """Whether it is one of the user's, which does not ship."""
         return not type(self.criterion).__module__.startswith("seerob.")
@@ -590,7 +595,7 @@ class Judge:
         if result.muted or result.t is not None:
             # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
             result = replace(result, t=None, muted=False)
-        if reason := contradiction(result, criterion):
+        if not bound.computed and (reason := contradiction(result, criterion)):
             reason = f"{_where(bound)} contradicts itself: {reason}"
             self._warn(bound, reason)
             if type(result.verdict) is not Verdict:

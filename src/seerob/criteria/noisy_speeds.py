@@ -54,12 +54,14 @@ def noisy(state: State) -> dict[str, Array]:
     return {name: error for name, error in errors.items() if name in names}
 
 
-def others_noisy(twin: Twin, names: Sequence[str]) -> Flags:
+def others_noisy(twin: Twin, names: Sequence[str]) -> Flags | bool:
     """Whether speeds of any of these follow from noisy positions, shape (...).
 
     A criterion that says how far its own speeds may be off asks it of what carries these, or rides on them:
     what that changes it does not say, so it is open (`Figure.open`).
     """
+    if not names:
+        return False
     found = np.zeros((), bool)
     for name in names:
         error = twin.speed_error(twin.model.mechanisms[name])

@@ -126,6 +126,33 @@ def reciprocals(values: Array) -> Array:
     return found
 
 
+@njit("void(f8[:,:,::1], f8[:,::1], f8, f8[:,::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+def masses_along(inverse: Array, along: Array, least: float, u: Array, masses: Array) -> None:
+    """Masses felt along directions; writes into the last two arguments.
+
+    Args:
+        inverse: Inverse of the effective mass matrix [1/kg], shape (N, 3, 3).
+        along: Directions of any length, shape (N, 3).
+        least: Up to this length there is no direction.
+        u: Of unit length, shape (N, 3).
+        masses: [kg], shape (N,); NaN without a direction, infinite of what cannot be pushed that way.
+    """
+    for k in range(len(along)):
+        x, y, z = along[k, 0], along[k, 1], along[k, 2]
+        length = math.sqrt(x * x + y * y + z * z)
+        known = length > least
+        if known:
+            x, y, z = x / length, y / length, z / length
+        u[k, 0], u[k, 1], u[k, 2] = x, y, z
+        A = inverse[k]
+        square = (
+            x * (A[0, 0] * x + A[0, 1] * y + A[0, 2] * z)
+            + y * (A[1, 0] * x + A[1, 1] * y + A[1, 2] * z)
+            + z * (A[2, 0] * x + A[2, 1] * y + A[2, 2] * z)
+        )
+        masses[k] = (np.inf if square <= 0.0 else 1.0 / square) if known else np.nan
+
+
 @njit("void(f8[:,::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
 def quaternion(R: Array, found: Array) -> None:
     """Write the unit quaternion with w >= 0 of a rotation, as `seerob.core.transforms.wxyz_from_rotation`.

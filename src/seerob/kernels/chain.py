@@ -358,8 +358,8 @@ def columns_of(
 
 
 @njit(
-    "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, i8, i8[::1], b1[::1], f8[::1],"
-    " f8[:,::1], f8[:,::1], f8[::1])",
+    "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, i8, i8[::1], b1[::1], f8[::1], f8[::1],"
+    " f8[:,::1], f8[::1], f8[:,::1], f8[::1])",
     cache=True,
     nogil=True,
     error_model="numpy",
@@ -374,11 +374,13 @@ def at_point(
     dofs: Indices,
     moves: NDArray[np.bool_],
     local: Array,
+    qvel: Array,
     jacobian: Array,
+    velocity: Array,
     axes: Array,
     figures: Array,
 ) -> None:
-    """What joints do to one point now: its Jacobian and ellipsoid of velocity, in one call.
+    """What joints do to one point now: its Jacobian, velocity and ellipsoid of velocity, in one call.
 
     Args:
         xmat: MuJoCo's, world from body, row by row, shape (m, 9).
@@ -390,11 +392,14 @@ def at_point(
         dofs: Degrees of freedom that are columns, shape (n,).
         moves: Which of them move the point, shape (n,).
         local: The point in the body [m], shape (3,).
+        qvel: MuJoCo's [rad/s or m/s], shape (nv,).
         jacobian: Written: linear rows first, world axes, shape (6, n).
+        velocity: Written: that of the point, linear before angular [m/s, rad/s], shape (6,).
         axes: Written: directions of the singular values of the linear rows, shape (3, 3).
         figures: Written: singular values, and the quaternion of the axes, shape (7,).
     """
     R, n = xmat[body], len(dofs)
+    velocity[:] = 0.0
     x = xpos[body, 0] + (R[0] * local[0] + R[1] * local[1] + R[2] * local[2]) - subtree_com[root, 0]
     y = xpos[body, 1] + (R[3] * local[0] + R[4] * local[1] + R[5] * local[2]) - subtree_com[root, 1]
     z = xpos[body, 2] + (R[6] * local[0] + R[7] * local[1] + R[8] * local[2]) - subtree_com[root, 2]
@@ -408,6 +413,8 @@ def at_point(
         jacobian[1, c] = cdof[i, 4] + (wz * x - wx * z)
         jacobian[2, c] = cdof[i, 5] + (wx * y - wy * x)
         jacobian[3, c], jacobian[4, c], jacobian[5, c] = wx, wy, wz
+        for r in range(6):
+            velocity[r] += jacobian[r, c] * qvel[i]
     values, directions = np.empty((1, 3)), np.empty((1, 3, 3))
     principal_axes(jacobian[:3].copy().reshape(1, 3, n), values, directions)
     for r in range(3):

@@ -353,6 +353,26 @@ def greatest(v: Array) -> float:
     return most
 
 
+@njit(f"f8({_ROW}, {_ROW}, f8, {_ROW}, i8[::1], {_ROW})", cache=True, nogil=True)
+def unlike(before: Array, after: Array, share: float, moves: Array, rows: Indices, off: Array) -> float:
+    """How far speeds are from those on the straight line between two others; writes the last argument.
+
+    Args:
+        before: Of each joint [rad/s or m/s], shape (n,).
+        after: Likewise.
+        share: Of the way from the former to the latter.
+        moves: Speeds of all joints, shape (nv,).
+        rows: Which of them, shape (n,).
+        off: Receives how far each is off, shape (n,).
+
+    Returns:
+        The largest, as `greatest`.
+    """
+    for j in range(len(rows)):
+        off[j] = abs(moves[rows[j]] - (before[j] + share * (after[j] - before[j])))
+    return greatest(off)
+
+
 @njit(f"b1({_ROW}, f8)", cache=True, nogil=True)
 def tame(v: Array, wild: float) -> bool:
     """Whether every velocity is below ``wild``; what is not a number is not."""

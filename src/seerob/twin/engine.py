@@ -699,20 +699,20 @@ class Engine:
 
         Between two samples it moves along their positions, and those may be noisier than their speeds.
         """
-        hearing, reference = self._hearings[mechanism.name], self._references[mechanism.name]
-        t = self.state.t
-        own, said = self.state.columns[mechanism.name].own_v, reference.said_speeds(t)
+        name, t = mechanism.name, self.state.t
+        hearing, reference = self._hearings[name], self._references[name]
+        said = reference.said_speeds(t)
         if said is None:
             return None
         # Noise of speeds that a file's positions told is that half way between two of them.
-        if mechanism.name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
+        if name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
             return None
+        moves, rows = self._shown.qvel, self.state.columns[name].own_v
         if self.physics and (mechanism.role == "human" or hearing.saturated):
-            moves = reference.at(t)[1]  # what holds it elsewhere, or a torque limit, is no noise
-        else:
-            moves = self._shown.qvel[own]
-        off = np.abs(moves - said)
-        return together(off) if kernel.greatest(off) > QUIET else None
+            # What holds it elsewhere, or a torque limit, is no noise.
+            moves, rows = reference.at(t)[1], np.arange(len(rows))
+        off = np.empty(len(rows))
+        return together(off) if kernel.unlike(*said, moves, rows, off) > QUIET else None
 
     def _touches(self) -> list[tuple[int, int, float]]:
         """Every contact now: two of MuJoCo's bodies and the normal force [N]."""

@@ -69,6 +69,7 @@ class _Point(NamedTuple):
     """What joints do to a point at this tick."""
 
     jacobian: Array
+    velocity: Array
     sigma: list[float]
     wxyz: list[float]
 
@@ -697,8 +698,7 @@ class State(Validity):
         """
         self.require(mechanism.name)
         self.speeds_asked.add(mechanism.name)
-        qd = self._qvel[self.columns[mechanism.name].own_v]
-        return np.asarray(self._point(frame, mechanism, offset).jacobian @ qd)
+        return self._point(frame, mechanism, offset).velocity
 
     def singular_values(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> list[float]:
         """Singular values of the linear rows of `jacobian`, largest first; three."""
@@ -739,10 +739,11 @@ class State(Validity):
     def _point(self, frame: Frame, mechanism: Mechanism, offset: Array | None) -> _Point:
         # Not its name: a tool's working point is called like the tool.
         key = ("point", id(frame), mechanism.name, None if offset is None else offset.tobytes())
-        if key not in self._cache:
+        kept = self._cache.get(key)
+        if kept is None:
             # With the frame itself: another one may get the id of one that is forgotten.
-            self._cache[key] = frame, self._moving_point(key, frame, mechanism, offset)
-        found: _Point = self._cache[key][1]
+            kept = self._cache[key] = frame, self._moving_point(key, frame, mechanism, offset)
+        found: _Point = kept[1]
         return found
 
     def _moving_point(
@@ -760,19 +761,21 @@ class State(Validity):
                 self._points.clear()
             bound = self._points[key] = frame, root, dofs, moves, np.ascontiguousarray(local)
         _, root, dofs, moves, local = bound
-        J, axes, figures = np.empty((6, len(dofs))), np.empty((3, 3)), np.empty(7)
+        J, v, axes, figures = np.empty((6, len(dofs))), np.empty(6), np.empty((3, 3)), np.empty(7)
         at_point(
-            self._xmat, self._xpos, self._cdof, self._com, frame.mj, root, dofs, moves, local,
-            J, axes, figures,
+            self._xmat, self._xpos, self._cdof, self._com, frame.mj, root, dofs, moves, local, self._qvel,
+            J, v, axes, figures,
         )  # fmt: skip
         if columns.coupling is not None:
             # Joints that others follow: the ellipsoid is that of the commanded ones.
             J = J @ columns.coupling
+            v = J @ self._qvel[columns.own_v]
             values, directions = np.empty((1, 3)), np.empty((1, 3, 3))
             principal_axes(J[None, :3].copy(), values, directions)
             figures[:3] = np.nan if np.isnan(values).any() else values[0]
             quaternion(directions[0], figures[3:])
-        return _Point(J, figures[:3].tolist(), figures[3:].tolist())
+        sigma = figures.tolist()
+        return _Point(J, v, sigma[:3], sigma[3:])
 
     def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:
         r"""Rows :math:`u^T J_v` of points of several bodies, shape (b, n); see `jacobian`.

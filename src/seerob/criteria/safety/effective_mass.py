@@ -21,10 +21,9 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.criterion import Criterion, Lowest
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
-from seerob.kernels.axes import mobility, principal_axes, reciprocals
+from seerob.kernels.axes import masses_along, mobility, principal_axes, reciprocals
 from seerob.model import provenance
 from seerob.model.model import Frame, Mechanism, Model
-from seerob.recording.answers import Flags
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import velocity_of
 from seerob.twin.spans import Points, Span, coupling_of
@@ -75,6 +74,21 @@ def projected_mass(inverse: Array, u: Array) -> Array:
     """
     along = np.asarray((u[..., None, :] @ inverse @ u[..., :, None])[..., 0, 0])
     return reciprocals(along.reshape(-1)).reshape(along.shape)
+
+
+def felt_toward(inverse: Array, along: Array, least: float) -> tuple[Array, Array]:
+    """Unit directions, shape (..., 3), and the mass felt along them [kg], shape (...).
+
+    Args:
+        inverse: Λ⁻¹, shape (..., 3, 3) [1/kg].
+        along: Directions of any length, shape (..., 3).
+        least: Up to this length there is no direction, and the mass is NaN.
+    """
+    u, masses = np.empty_like(along).reshape(-1, 3), np.empty(along.shape[:-1])
+    masses_along(
+        inverse.reshape(-1, 3, 3), np.ascontiguousarray(along).reshape(-1, 3), least, u, masses.reshape(-1)
+    )
+    return u.reshape(along.shape), masses
 
 
 def principal_masses(inverse: Array) -> tuple[Array, Array]:
@@ -153,39 +167,37 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         robot.require_masses(self.name)
         offset, tolerances = np.array(self.offset), MassTolerances(model, robot)
         direction = self._direction(model, frame, robot)
+        least = STANDSTILL if self.toward is None else TOUCHING
+        # Without a direction there is nothing to judge, unless a limit was to hold toward somebody.
+        silent = self.toward is None or self.limit is None
 
         def compute(twin: Twin) -> Figure:
             inverse = twin.inverse_effective_mass(frame, robot, offset)
-            u, known = direction(twin, inverse)
-            mass, interval = np.where(known, projected_mass(inverse, u), np.nan), None
-            if len(tolerances) and known and np.isfinite(mass):
+            u, found = felt_toward(inverse, direction(twin, inverse), least)
+            if twin.many:
+                return Figure(found, self.limit, None, np.isnan(found) & silent)
+            mass, interval = float(found), None
+            known = not math.isnan(mass)
+            if len(tolerances) and math.isfinite(mass):
                 ends = self._ends(tolerances, cast("State", twin), frame, offset, u)
                 interval = ends.low, ends.high
-            # Without a direction there is nothing to judge, unless a limit was to hold toward somebody.
-            nothing = ~known & (self.toward is None or self.limit is None)
-            value = mass if twin.many or known else None
-            return Figure(value, self.limit, interval, nothing, beside=(u, known))
+            nothing = silent and not known
+            return Figure(mass if known else None, self.limit, interval, nothing, beside=(u, known))
 
         return compute
 
-    def _direction(
-        self, model: Model, frame: Frame, robot: Mechanism
-    ) -> Callable[[Twin, Array], tuple[Array, Flags]]:
-        """Unit vectors, shape (..., 3), and whether there is a direction, shape (...), given Λ⁻¹."""
+    def _direction(self, model: Model, frame: Frame, robot: Mechanism) -> Callable[[Twin, Array], Array]:
+        """Return the function that tells directions of any length, shape (..., 3), given Λ⁻¹."""
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
         offset = np.array(self.offset)
 
-        def direction(twin: Twin, inverse: Array) -> tuple[Array, Flags]:
+        def direction(twin: Twin, inverse: Array) -> Array:
             if gap is not None:
                 closest = twin.closest(gap)
-                along = closest.point_b - closest.point_a
-            elif self.along == "worst":
-                along = principal_masses(inverse)[1][..., -1]
-            else:
-                along = velocity_of(twin, frame, robot, offset)[..., :3]
-            length = np.sqrt(np.vecdot(along, along))
-            known = length > STANDSTILL if gap is None else length >= TOUCHING
-            return along / np.where(known, length, 1.0)[..., None], known
+                return closest.point_b - closest.point_a
+            if self.along == "worst":
+                return np.asarray(principal_masses(inverse)[1][..., -1])
+            return velocity_of(twin, frame, robot, offset)[..., :3]
 
         return direction
 

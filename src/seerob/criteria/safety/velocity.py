@@ -13,7 +13,7 @@ from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Input
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, length
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
@@ -104,7 +104,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
         def compute(twin: Twin) -> Figure:
             v = velocity_of(twin, frame, mechanism, offset)[..., :3]
-            speed, interval = np.sqrt(np.vecdot(v, v)), None
+            speed, interval = length(v), None
             error = twin.speed_error(mechanism)
             if error is not None:
                 off = speed_noise(twin.jacobian(frame, mechanism, offset)[..., :3, :], error)
@@ -148,7 +148,8 @@ class Velocity(Criterion, frozen=True, kw_only=True):
                 off = noise(twin, points)
                 interval = np.maximum(speeds - off, 0.0).max(axis=-1), (speeds + off).max(axis=-1)
             open_ = others_noisy(twin, others)
-            return Figure(speeds.max(axis=-1), self.limit, interval, open=open_, beside=fastest)
+            most = speeds.max(axis=-1) if twin.many else max(speeds.tolist())
+            return Figure(most, self.limit, interval, open=open_, beside=fastest)
 
         return compute
 

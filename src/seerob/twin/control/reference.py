@@ -186,23 +186,23 @@ class Reference:
         q, v, a = self.course(np.array([t]))
         return q[0], v[0], a[0]
 
-    def said_speeds(self, t: float) -> Array | None:
-        """Speeds at ``t`` [s] on the straight line between those that two samples say [rad/s or m/s], (n,).
+    def said_speeds(self, t: float) -> tuple[Array, Array, float] | None:
+        """Two speeds that samples say [rad/s or m/s], shape (n,) each, and where ``t`` [s] is between them.
 
-        The slope of the cubic through both is another one where their positions are noisy. None where no
-        sample says any, or a jump leads there.
+        The slope of the cubic through both is another one than the straight line between these where their
+        positions are noisy. None where no sample says any, or a jump leads there.
         """
-        k = bisect_right(self._times, t + SLACK) - 1
-        last = len(self._times) - 1
-        if k < 0 or self._guessed[k]:
+        times, guessed = self._times, self._guessed
+        k = bisect_right(times, t + SLACK) - 1
+        if k < 0 or guessed[k]:
             return None
-        times, _, speeds, jumps = self._known()
-        if k == last:
-            return speeds[k] if t - times[k] <= self._coast + SLACK else None
-        if self._guessed[k + 1] or jumps[k + 1]:
+        _, _, speeds, jumps = self._room
+        row = self._first + k
+        if k == len(times) - 1:
+            return (speeds[row], speeds[row], 0.0) if t - times[k] <= self._coast + SLACK else None
+        if guessed[k + 1] or jumps[row + 1]:
             return None
-        share = (t - times[k]) / (times[k + 1] - times[k])
-        return np.asarray(speeds[k] + share * (speeds[k + 1] - speeds[k]))
+        return speeds[row], speeds[row + 1], (t - times[k]) / (times[k + 1] - times[k])
 
     def put(self, t: float, places: tuple[Indices, Indices], qpos: Array, qvel: Array, before: Array) -> None:
         """Put it on its motion at an instant, among everybody.

@@ -19,7 +19,7 @@ from seerob.core.errors import InputError
 from seerob.description.robots import library
 from seerob.session.explanation import NORMAL_95, SLOW, Dynamics, explain, fit, friction, slopes, wider
 from seerob.session.station import load
-from seerob.twin.own_words import Said
+from seerob.twin.controller_check import ControllerLog
 
 CELL = '[[robots]]\nname = "arm"\nmodel = "library:ur5e"\nq = [0, 0, 0, 0, 0, 0]\n'
 MASS, COM, INERTIA = 2.0, np.array([0.03, -0.02, 0.08]), np.array([0.004, 0.005, 0.003])
@@ -60,11 +60,11 @@ def needed(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, mass: float = MASS) -
     return np.array([pin.rnea(model, data, *x) for x in zip(q, qd, qdd, strict=True)])
 
 
-def said(seed: int, n: int = 400, mass: float = MASS, joints: str = "111111") -> Said:
+def said(seed: int, n: int = 400, mass: float = MASS, joints: str = "111111") -> ControllerLog:
     t, q, qd, qdd = motion(seed, n, joints)
     noise = np.random.default_rng(seed + 1000).normal(size=q.shape) * NOISE
     tau = needed(q, qd, qdd, mass) + COULOMB * np.sign(qd) + VISCOUS * qd + noise
-    return Said("log.csv", t, q, qd, tau, None, True)
+    return ControllerLog("log.csv", t, q, qd, tau, None, True)
 
 
 def figures(found) -> list:
@@ -218,7 +218,10 @@ def test_a_log_of_another_arm_is_not_explained() -> None:
     [
         (lambda s: s._replace(tau=None), "measures none"),
         (lambda s: s._replace(q=s.q[:1].repeat(len(s.t), 0), qd=0 * s.q), "moves in 0 of"),
-        (lambda s: Said(s.file, s.t[:5], s.q[:5], s.qd[:5], s.tau[:5], None, True), "5 valid samples"),
+        (
+            lambda s: ControllerLog(s.file, s.t[:5], s.q[:5], s.qd[:5], s.tau[:5], None, True),
+            "5 valid samples",
+        ),
     ],
 )
 def test_too_little_is_refused(words, why) -> None:

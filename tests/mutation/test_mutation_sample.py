@@ -53,10 +53,10 @@ def test_each_mutant_is_one_change():
 
 
 def test_what_is_left_alone_is_left_alone_by_its_own_name():
-    text = "def basis(v): return v < 1\nclass Presence:\n    def _told(self, v): return v < 1\n"
-    other = "class Other:\n    def _told(self, v): return v < 1\n"
+    text = "def basis(v): return v < 1\nclass Presence:\n    def _worst_sight(self, v): return v < 1\n"
+    other = "class Other:\n    def _worst_sight(self, v): return v < 1\n"
     assert mutants(text, "made.py") == []
-    assert {m.function for m in mutants(text + other, "made.py")} == {"Other._told"}
+    assert {m.function for m in mutants(text + other, "made.py")} == {"Other._worst_sight"}
     trees = [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "criteria/sensors").glob("*.py")]
     trees += [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "criteria/safety").glob("*.py")]
     found = {name for tree in trees for name in _functions(tree)}

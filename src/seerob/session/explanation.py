@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from seerob.core.errors import InputError
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
-from seerob.twin.own_words import Said
+from seerob.twin.controller_check import ControllerLog
 
 SLOW = {"rad": 0.02, "m": 0.002}
 """Below it a joint may stick: its friction is anything up to Coulomb's, and its rows are left out."""
@@ -371,7 +371,7 @@ class Explanation:
         return True if determined and not self.held else None
 
 
-def explain(model: Model, name: str, said: Said) -> Explanation:
+def explain(model: Model, name: str, said: ControllerLog) -> Explanation:
     """Compare measured torques with those that the model needs, and fit what would close the gap.
 
     Args:
@@ -486,7 +486,7 @@ def _spread(n: int, most: int) -> NDArray[np.int64]:
     return np.unique((starts[:, None] + np.arange(stretch)).ravel()).astype(np.int64)
 
 
-def _refuse(model: Model, robot: Mechanism, said: Said) -> None:
+def _refuse(model: Model, robot: Mechanism, said: ControllerLog) -> None:
     if said.tau is None:
         remedy = "log measured torques: actual_current_as_torque of RTDE, measured torques of FRI"
         raise InputError.at(said.file, "torques", f"the source of {robot.name} measures none", remedy)

@@ -26,7 +26,7 @@ from seerob.files.waypoints.arm import Arm
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.in_place import implausible_motion
-from seerob.twin.own_words import compared, said_by
+from seerob.twin.controller_check import compared, controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.plausibility.ranges import Quantity
 from seerob.workstation.plausibility.ranges import findings as implausible
@@ -221,7 +221,7 @@ def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
             noise = noise_of_speeds(motion, model.mechanisms[name].description, name)
             found += [] if noise is None else [noise]
     robot = any(name == one.name for one in model.workstation.robots)
-    said = said_by(opened.samples, getattr(source, "file", source.name)) if robot else None
+    said = controller_log(opened.samples, getattr(source, "file", source.name)) if robot else None
     if said is not None:
         found += compared(model, name, said)
     return replace(opened, findings=tuple(found))

@@ -37,7 +37,7 @@ from seerob.session.opening import open_sources, reached, source_target
 from seerob.session.reading import read
 from seerob.session.run import Bound, Feed, Summary
 from seerob.session.scene import scene_of, unmet_phases
-from seerob.twin.own_words import said_by
+from seerob.twin.controller_check import controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
@@ -356,7 +356,7 @@ class Station:
         for source, opened in self.sources:
             if source.target() == name and not isinstance(source, LiveSource):
                 file = getattr(source, "file", source.name)
-                said = said_by(opened.samples, file)
+                said = controller_log(opened.samples, file)
                 if said is not None and said.tau is not None:
                     return explained(self.model, name, said)
         remedy = (

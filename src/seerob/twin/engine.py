@@ -31,7 +31,7 @@ from seerob.files.trajectories.trajectory import QUIET
 from seerob.kernels import pull as kernel
 from seerob.model.model import Mechanism, Model
 from seerob.model.mounting.compilation import pose_matrix
-from seerob.twin import own_words
+from seerob.twin import controller_check
 from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
 from seerob.twin.control.reference import Course, Reference
@@ -210,8 +210,8 @@ class Engine:
         self._almost = 0.999 * self._limits
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
-        self._said: dict[str, own_words.LiveWords] = {}
-        self._carried = {name: own_words.carried(model, name) for name in model.mechanisms}
+        self._said: dict[str, controller_check.ControllerCheck] = {}
+        self._carried = {name: controller_check.carried(model, name) for name in model.mechanisms}
         """By robot, what its live source says of itself."""
         self._followings: dict[str, Following] = {}
         """By person that devices see."""
@@ -275,7 +275,7 @@ class Engine:
                     contradicted = self._contradicted(sample)
                     reason = reason or beyond_limits(sample, mechanism) or contradicted
                 if sample.payload is not None:
-                    reason = reason or own_words.heavier(sample.payload, self._carried[mechanism.name])
+                    reason = reason or controller_check.heavier(sample.payload, self._carried[mechanism.name])
                 taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
             else:
                 taken, missed = self._take_pose(mechanism, sample)
@@ -298,7 +298,7 @@ class Engine:
         if sample.tcp is None and sample.tcp_speed is None and sample.tau is None:
             return ""
         if sample.target not in self._said:
-            self._said[sample.target] = own_words.LiveWords(self.model, sample.target)
+            self._said[sample.target] = controller_check.ControllerCheck(self.model, sample.target)
         said = self._said[sample.target]
         found = said.invalid_reason(sample)
         self._hearings[sample.target].invalid_torque_reason = said.invalid_torque_reason

@@ -66,10 +66,10 @@ async def _heard(
             asyncio.timeout_at(clock.time() + wait),
         ):
             async for changes in said:
-                told = [change for change in changes if isinstance(change, Change)]
-                if told:
+                changed = [change for change in changes if isinstance(change, Change)]
+                if changed:
                     arrivals.add(time.monotonic(), None)
-                reasons |= {addresses[change.name]: change.invalid_reason for change in told}
+                reasons |= {addresses[change.name]: change.invalid_reason for change in changed}
     except TimeoutError:
         pass  # of the listening, or of a device that has nothing to say
     return arrivals, reasons

@@ -154,20 +154,20 @@ def _listen(station: Station, wait: float) -> dict[str, str]:
         listener.ask_to_stop()
     for listener in listeners:
         listener.join(1.0)
-    told: dict[str, str] = {}
+    values: dict[str, str] = {}
     for variable in station.model.dictionary.values():
         picture = newest.get(variable.source)
         if variable.write:
             continue
         if picture is None:
-            told[variable.name] = f"nothing heard from {variable.source}"
+            values[variable.name] = f"nothing heard from {variable.source}"
         elif variable.name in picture.doubts:
-            told[variable.name] = picture.doubts[variable.name]
+            values[variable.name] = picture.doubts[variable.name]
         else:
             value = picture.values[variable.name]
             figure = f"{value:.6g}" if isinstance(value, float) else str(value)
-            told[variable.name] = f"heard: {figure} {variable.si_unit}".rstrip()
-    return told
+            values[variable.name] = f"heard: {figure} {variable.si_unit}".rstrip()
+    return values
 
 
 def _browse(path: Path, name: str, allow: Allowed) -> int:

@@ -74,7 +74,7 @@ TYPES = {
     "robot_status_bits": "UINT32",
     "safety_status_bits": "UINT32",
 }
-OWN_WORDS = {"actual_TCP_pose": "VECTOR6D", "actual_TCP_speed": "VECTOR6D", "payload": "DOUBLE"}
+CONTROLLER_STATE = {"actual_TCP_pose": "VECTOR6D", "actual_TCP_speed": "VECTOR6D", "payload": "DOUBLE"}
 TURNED = np.diag([-1.0, -1.0, 1.0])
 """Half a turn about z: between the base that a controller speaks of and the ``base_link`` of descriptions."""
 E_SERIES = ControllerVersion(5, 12, 4, 0)
@@ -89,7 +89,7 @@ LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
 
 
-class OwnWords:
+class ControllerState:
     """What a controller says of its arm, beside the joints.
 
     Args:
@@ -129,7 +129,7 @@ class RtdeServer(LoopEmulator):
         version: Highest version of the protocol.
         without: Fields that it does not have.
         values: Fields with another value than that of a robot at work.
-        own_words: What it says of its arm beside the joints; nothing when not given.
+        controller_state: What it says of its arm beside the joints; nothing when not given.
         messages: Said to every client that connects, before anything else.
         kinematics: What the primary interface says of how it was built; there is none when not given.
         primary_port: Of that interface; 0 is any free one.
@@ -145,7 +145,7 @@ class RtdeServer(LoopEmulator):
         version: int = 2,
         without: frozenset[str] = frozenset(),
         values: Mapping[str, Value] | None = None,
-        own_words: OwnWords | None = None,
+        controller_state: ControllerState | None = None,
         messages: tuple[str, ...] = (),
         kinematics: Kinematics | None = None,
         primary_port: int = 0,
@@ -154,8 +154,8 @@ class RtdeServer(LoopEmulator):
         self.host, self.port = host, port
         self.motion, self.controller, self.version, self.messages = motion, controller, version, messages
         self.kinematics, self.primary_port = kinematics, primary_port
-        self.own_words = own_words
-        every = TYPES | (OWN_WORDS if own_words is not None else {})
+        self.controller_state = controller_state
+        every = TYPES | (CONTROLLER_STATE if controller_state is not None else {})
         self.types = {name: kind for name, kind in every.items() if name not in without}
         self.values = dict(values or {})
         """May be changed while it runs."""
@@ -184,7 +184,7 @@ class RtdeServer(LoopEmulator):
             "actual_digital_output_bits": 0,
             "robot_status_bits": 0b11,
             "safety_status_bits": 0b1,
-            **(self.own_words(q, qd) if self.own_words is not None else {}),
+            **(self.controller_state(q, qd) if self.controller_state is not None else {}),
             **self.values,
         }
 
@@ -335,10 +335,10 @@ class Rtde(RobotOptions, frozen=True, kw_only=True):
         motion, what = self.motion(target, HOME)
         words = None
         if target.description is not None:
-            words = OwnWords(target.description, tcp=self.tcp, payload=self.payload)
+            words = ControllerState(target.description, tcp=self.tcp, payload=self.payload)
         server = RtdeServer(
             motion,
-            own_words=words,
+            controller_state=words,
             host=self.host,
             port=self.port,
             kinematics=None if self.calibration is None else _kinematics(Path(self.calibration)),

@@ -167,7 +167,7 @@ class Hub:
         await _close(socket, closing)
 
     async def _listen(self, client: Client, socket: WebSocket, visit: Visit, roles: frozenset[Role]) -> None:
-        told: Tracked | None = None
+        last_answer: Tracked | None = None
         own = {kind: Allowance(*rate) for kind, rate in RATES.items()}
         try:
             while True:
@@ -183,7 +183,7 @@ class Hub:
                     visit.refuse(f"more than {RATES[kind][0]:g} per second: {kind}")
                     await asyncio.sleep(wait)
                 if isinstance(message, Tracking):
-                    told = self._offer(client, message, told, visit, may=Role.TRACK in roles)
+                    last_answer = self._offer(client, message, last_answer, visit, may=Role.TRACK in roles)
                 elif kind == "ack":
                     client.acknowledge(int(message.value or 0))
                 else:
@@ -199,7 +199,7 @@ class Hub:
             client.end(Closing(1006, "gone"))
 
     def _offer(
-        self, client: Client, tracking: Tracking, told: Tracked | None, visit: Visit, *, may: bool
+        self, client: Client, tracking: Tracking, last_answer: Tracked | None, visit: Visit, *, may: bool
     ) -> Tracked:
         """Pass on what a headset sees; the page is told what became of it when that changes.
 
@@ -214,7 +214,7 @@ class Hub:
         answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
         if refusal:
             visit.refuse(f"tracking: {refusal}")
-        if answer != told:
+        if answer != last_answer:
             client.offer("Tracked", _encode(answer))
         return answer
 

@@ -204,7 +204,7 @@ class Live:
         """Show the newest, at most ``rate`` times a second, until cancelled."""
         said_finished = False
         last: Snapshot | None = None
-        told: tuple[object, ...] = ()
+        sent: tuple[object, ...] = ()
         again = 0.0
         while True:
             finished = self._finished  # before looking: what was published earlier comes first
@@ -222,9 +222,9 @@ class Live:
             if (
                 self.log is not None
                 and (verdicts := self.log.verdicts())
-                and (verdicts != told or now > again or (finished and not said_finished))
+                and (verdicts != sent or now > again or (finished and not said_finished))
             ):
-                told, again = verdicts, now + TELL_EVERY
+                sent, again = verdicts, now + TELL_EVERY
                 audience.tell(self.log.so_far(whole=finished))
             if finished and not said_finished:
                 audience.tell(self.transport())

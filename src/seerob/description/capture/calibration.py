@@ -120,7 +120,7 @@ def calibrate(
     if not np.isfinite(found).all(axis=1).any():
         raise InputError.at(subject, "calibration", "no sensor was seen in its window", "give another one")
     expected = positions[bones] + np.einsum("nij,nj->ni", rotations[bones], [r.at for r in observer.rows])
-    heading, shift, told = _stance(found, expected, observer)
+    heading, shift, assumptions = _stance(found, expected, observer)
     turn = np.array(
         [[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]]
     )
@@ -145,7 +145,7 @@ def calibrate(
         moved = _spread(stack[:, k], found[k])
         off = float(np.linalg.norm(away))
         residuals.append(Residual(row.name, row.bone, moved, swayed, off, angle, axis))
-    findings = (*told, *_tell(residuals, pose, heading, subject))
+    findings = (*assumptions, *_tell(residuals, pose, heading, subject))
     return Calibrated(mounts, tuple(residuals), heading, findings, places)
 
 
@@ -181,17 +181,17 @@ def _stance(found: Array, expected: Array, observer: Observer) -> tuple[float, A
     weight = weight / weight.sum()
     ma, mb = (weight * a).sum(axis=0), (weight * b).sum(axis=0)
     da, db = a - ma, b - mb
-    told: tuple[Finding, ...] = ()
+    assumptions: tuple[Finding, ...] = ()
     heading = 0.0
     if np.sqrt((weight * da[:, :2] ** 2).sum()) < SPREAD:
         text = "calibration: the sensors are too near to each other to tell the heading; facing x is assumed"
-        told = (Finding(level="assumed", subject=observer.rows[0].name, text=text),)
+        assumptions = (Finding(level="assumed", subject=observer.rows[0].name, text=text),)
     else:
         across = (weight[:, 0] * (da[:, 0] * db[:, 1] - da[:, 1] * db[:, 0])).sum()
         along = (weight[:, 0] * (da[:, 0] * db[:, 0] + da[:, 1] * db[:, 1])).sum()
         heading = float(np.arctan2(across, along))
     c, s = np.cos(heading), np.sin(heading)
-    return heading, mb - np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ ma, told
+    return heading, mb - np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ ma, assumptions
 
 
 def _difference(rotation: Array) -> tuple[float, str]:
@@ -214,17 +214,17 @@ def mounted_wrongly(turn: float) -> str:
 def _tell(
     residuals: Iterable[Residual], pose: CalibrationPose, heading: float, subject: str
 ) -> Iterable[Finding]:
-    told = tuple(residuals)
+    every = tuple(residuals)
 
     def say(text: str, level: str = "note") -> Finding:
         return Finding(level=level, subject=subject, text=f"calibration ({pose}): {text}")
 
-    offs = [r.off for r in told if np.isfinite(r.off)]
+    offs = [r.off for r in every if np.isfinite(r.off)]
     yield say(
-        f"{len(told)} sensors, {np.median(offs) * 1e3:.0f} mm median and {max(offs) * 1e3:.0f} mm largest "
+        f"{len(every)} sensors, {np.median(offs) * 1e3:.0f} mm median and {max(offs) * 1e3:.0f} mm largest "
         f"distance from where they are expected; heading {np.degrees(heading):.0f}°"
     )
-    for r in told:
+    for r in every:
         turned = "" if np.isnan(r.turn) else f", mounting {np.degrees(r.turn):.0f}° from the stated one"
         yield say(f"{r.name} on {r.bone}: {r.off * 1e3:.0f} mm off, moved {r.moved * 1e3:.0f} mm{turned}")
         if r.moved > STILL[0] or r.swayed > STILL[1]:

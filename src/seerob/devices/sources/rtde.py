@@ -61,7 +61,7 @@ SAME_TOOL = 2e-4
 """A tool that is nearer to where it should be is there [m]: a fraction of what such arms repeat to."""
 ANOTHER = 0.010
 """A tool that is farther from where it should be leaves what rests on the robot undecided [m]: as far as a
-tool centre point may be from the twin's by default, see `seerob.twin.own_words`."""
+tool centre point may be from the twin's by default, see `seerob.twin.controller_check`."""
 PRIMARY_WITHIN = 1.4
 """The primary interface says everything at least once a second [s]."""
 LEVELS = {Level.EXCEPTION: logging.ERROR, Level.ERROR: logging.ERROR, Level.WARNING: logging.WARNING}

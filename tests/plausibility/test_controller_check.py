@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from oracles.pinocchio_oracle import pinocchio_model
-from seerob.app.emulators.rtde import OwnWords
+from seerob.app.emulators.rtde import ControllerState
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding, Verdict
 from seerob.core.transforms import rotation_from_rpy
@@ -27,16 +27,16 @@ from seerob.protocols.ros.ros_messages import Content, Joints, Transform, encode
 from seerob.protocols.ros.ros_messages import Edition as RosEdition
 from seerob.session.run import Judge, bind, engine_of
 from seerob.session.station import Station, load
-from seerob.twin.engine import Engine
-from seerob.twin.own_words import (
-    LiveWords,
+from seerob.twin.controller_check import (
+    ControllerCheck,
     compared,
+    controller_log,
     fixed_offset,
     heavier,
     rigid_error,
-    said_by,
     sign_or_unit,
 )
+from seerob.twin.engine import Engine
 
 DH = {
     # a2, a3, d1, d4, d5, d6 [m]: Universal Robots, "DH Parameters for calculations of kinematics"
@@ -190,12 +190,12 @@ def test_what_the_emulated_controller_says_of_another_arm_is_found(
     tmp_path: Path, robot: str, tcp: float, payload: float, words: str
 ) -> None:
     """The emulator's tool is where the maker's parameters have it, and a live twin of another arm is told."""
-    said = OwnWords(library.load(robot), tcp=tcp, payload=payload)
+    said = ControllerState(library.load(robot), tcp=tcp, payload=payload)
     assert np.array([said(tuple(q), (0.0,) * 6)["actual_TCP_pose"][:3] for q in MOVING]) == pytest.approx(
         dh_tcp(robot, MOVING, (0, 0, tcp)), abs=1e-12
     )
     log_of(tmp_path, MOVING, None)
-    listening = LiveWords(station(tmp_path, tools=TOOL).model, "arm")
+    listening = ControllerCheck(station(tmp_path, tools=TOOL).model, "arm")
     reasons = []
     for t, q, qd in zip(T, MOVING, np.gradient(MOVING, T, axis=0), strict=True):
         fields = {"timestamp": t, "actual_q": tuple(q), "actual_qd": tuple(qd), **said(tuple(q), tuple(qd))}
@@ -286,7 +286,7 @@ def test_the_pose_that_fri_says_is_compared(tmp_path: Path, lengths: tuple[float
     message = Monitoring(edition=Edition.V2_7, sequence=0, q=q, tcp=(*said.tolist(), 1.0, 0.0, 0.0, 0.0))
     heard = decode_monitoring(encode_monitoring(message))
     sample = fri_sample(heard, target="arm", arrived=0.0, device=0.0, qd=None)
-    assert bool(LiveWords(model, "arm").invalid_reason(sample)) == doubt
+    assert bool(ControllerCheck(model, "arm").invalid_reason(sample)) == doubt
 
 
 def test_modbus_says_where_the_tool_is_while_the_robot_stands() -> None:
@@ -511,11 +511,11 @@ def test_a_source_that_says_where_its_tool_is_now_and_then_is_compared_then(
         )
         for i, (t, q, tcp) in enumerate(zip(T.tolist(), MOVING.tolist(), dh_tcp(robot, MOVING), strict=True))
     ]  # fmt: skip
-    words = said_by(said, "run.mcap")
+    words = controller_log(said, "run.mcap")
     assert words is not None
     (found,) = compared(model, "arm", words)
     assert found.holds == (() if robot == "ur5e" else ("arm",))
-    assert said_by(said[:1], "run.mcap") is None
+    assert controller_log(said[:1], "run.mcap") is None
 
 
 @pytest.mark.parametrize(("recorded", "apart"), [("ur5e", 0.0), ("ur10e", 0.0), ("ur10e", 0.003)])

@@ -175,7 +175,7 @@ def sign_or_unit(measured: Array, model: Array) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class SaidTool:
+class ControllerTool:
     """Where a robot's own TCP may be in the twin; bound once.
 
     Attributes:
@@ -230,7 +230,7 @@ class _Ways(NamedTuple):
     """Their integrals [m], likewise."""
 
 
-class LiveWords:
+class ControllerCheck:
     """What a robot's live source says of itself, sample by sample.
 
     Args:
@@ -355,7 +355,7 @@ def carried(model: Model, name: str) -> float:
     return sum(mass.value for mass in masses if mass is not None)
 
 
-def bound(model: Model, name: str) -> SaidTool | None:
+def bound(model: Model, name: str) -> ControllerTool | None:
     """Where the TCP of a robot may be; None for who is no robot, or whose joints follow others."""
     robot = next((r for r in model.workstation.robots if r.name == name), None)
     if robot is None:
@@ -372,7 +372,7 @@ def bound(model: Model, name: str) -> SaidTool | None:
         # Exports of simulators speak of the world.
         bases.append(inverse(pose_matrix(robot.base)))
     tolerance = TOLERANCE if robot.tcp_tolerance is None else robot.tcp_tolerance
-    return SaidTool(arm, _tips(model, robot, mechanism), np.array(bases), tolerance)
+    return ControllerTool(arm, _tips(model, robot, mechanism), np.array(bases), tolerance)
 
 
 def _tips(model: Model, robot: Robot, mechanism: Mechanism) -> dict[str, Array]:
@@ -406,7 +406,7 @@ FLANGE = "its flange"
 # -- a file, when it is opened ------------------------------------------------------------------
 
 
-class Said(NamedTuple):
+class ControllerLog(NamedTuple):
     """What a file says of a robot, in its valid rows; None where it says nothing.
 
     Of where the TCP is, and how fast, rows in which it is not said are NaN.
@@ -428,7 +428,7 @@ class Said(NamedTuple):
     tcp_speed: Array | None = None
     """[m/s], shape (N,)."""
 
-    def thinned(self, most: int, said: Array | None = None) -> Said:
+    def thinned(self, most: int, said: Array | None = None) -> ControllerLog:
         """At most so many rows of it, evenly; of those in which something is said, when it is given."""
         rows = np.arange(len(self.t))
         if said is not None:
@@ -439,7 +439,7 @@ class Said(NamedTuple):
         return self._replace(t=self.t[rows], q=self.q[rows], qd=qd, tau=tau, tcp=tcp, tcp_speed=speed)
 
 
-def said_by(samples: Iterable[Sample], file: str) -> Said | None:
+def controller_log(samples: Iterable[Sample], file: str) -> ControllerLog | None:
     """What a source that was opened says of itself; None when it says nothing but where the joints are."""
     if isinstance(samples, TrajectorySamples):
         motion = samples.trajectory
@@ -452,7 +452,7 @@ def said_by(samples: Iterable[Sample], file: str) -> Said | None:
             tcp = np.where(motion.tcp_said[valid, None], tcp, np.nan)
         t = motion.t[valid] - motion.t[0]
         q = motion.q[valid]
-        return Said(file, t, q, qd, tau, tcp, motion.tcp_in_base, speed) if len(t) else None
+        return ControllerLog(file, t, q, qd, tau, tcp, motion.tcp_in_base, speed) if len(t) else None
     rows = [s for s in samples if isinstance(s, JointSample) and s.quality is Quality.GOOD]
     if all(s.tau is None and s.tcp is None and s.tcp_speed is None for s in rows):
         return None
@@ -460,7 +460,11 @@ def said_by(samples: Iterable[Sample], file: str) -> Said | None:
     # Some say it only while they stand.
     tcp = np.array([UNSAID if s.tcp is None else s.tcp for s in rows])
     speed = np.array([np.nan if s.tcp_speed is None else s.tcp_speed for s in rows])
-    return None if q is None else Said(file, np.array([s.t for s in rows]), q, qd, tau, tcp, True, speed)
+    return (
+        None
+        if q is None
+        else ControllerLog(file, np.array([s.t for s in rows]), q, qd, tau, tcp, True, speed)
+    )
 
 
 UNSAID = (math.nan, math.nan, math.nan)
@@ -471,7 +475,7 @@ def _table(rows: Sequence[tuple[float, ...] | None]) -> Array | None:
     return np.array(rows) if rows and all(row is not None for row in rows) else None
 
 
-def compared(model: Model, name: str, said: Said) -> Iterator[Finding]:
+def compared(model: Model, name: str, said: ControllerLog) -> Iterator[Finding]:
     """What is found when what a file says of itself is compared with the robot that it drives."""
     robot = bound(model, name)
     if robot is None:
@@ -484,7 +488,7 @@ def compared(model: Model, name: str, said: Said) -> Iterator[Finding]:
         yield from _about_torques(model, name, said.thinned(ROWS))
 
 
-def _about_tool(model: Model, name: str, robot: SaidTool, words: Said) -> Finding:
+def _about_tool(model: Model, name: str, robot: ControllerTool, words: ControllerLog) -> Finding:
     file, t, q, said = words.file, words.t, words.q, words.tcp
     assert said is not None
     posture = robot.arm.posture(q)
@@ -518,12 +522,12 @@ def _about_tool(model: Model, name: str, robot: SaidTool, words: Said) -> Findin
     return Finding(level="warning", subject=name, text=text, holds=(name,))
 
 
-def _beside(robot: SaidTool) -> bool:
+def _beside(robot: ControllerTool) -> bool:
     """Whether the twin has a tool whose point is not at the flange."""
     return max(float(np.linalg.norm(x)) for x in robot.tips.values()) > robot.tolerance
 
 
-def _guesses(model: Model, name: str, robot: SaidTool, q: Array, said: Array) -> Iterator[str]:
+def _guesses(model: Model, name: str, robot: ControllerTool, q: Array, said: Array) -> Iterator[str]:
     """Robots of the library, and tools, that would explain what was said."""
     own = next(r.model for r in model.workstation.robots if r.name == name)
     fits = []
@@ -533,7 +537,9 @@ def _guesses(model: Model, name: str, robot: SaidTool, q: Array, said: Array) ->
         arm = _arm(library.load(other))
         if arm is None or arm.n != robot.arm.n:
             continue
-        error, tip, _ = SaidTool(arm, robot.tips, robot.bases, robot.tolerance).off(arm.posture(q), said)
+        error, tip, _ = ControllerTool(arm, robot.tips, robot.bases, robot.tolerance).off(
+            arm.posture(q), said
+        )
         if error.max() <= robot.tolerance:
             fits.append(
                 (float(error.max()), f"library:{other} would fit, with {tip}, to {1e3 * error.max():.1f} mm")
@@ -558,7 +564,7 @@ def _offset(fit: Fit) -> str:
     )
 
 
-def _about_speed(name: str, robot: SaidTool, words: Said) -> Iterator[Finding]:
+def _about_speed(name: str, robot: ControllerTool, words: ControllerLog) -> Iterator[Finding]:
     said, qd = words.tcp_speed, words.qd
     assert said is not None
     assert qd is not None
@@ -605,7 +611,7 @@ def _bias(model: Model, data: mujoco.MjData, mechanism: Mechanism, q: Array, qd:
     return np.asarray(mechanism.coupling.T @ data.qfrc_bias[mechanism.v_address])
 
 
-def _about_torques(model: Model, name: str, said: Said) -> Iterator[Finding]:
+def _about_torques(model: Model, name: str, said: ControllerLog) -> Iterator[Finding]:
     mechanism = model.mechanisms[name]
     if not _compares_torques(model, mechanism):
         return

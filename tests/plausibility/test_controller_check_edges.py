@@ -10,21 +10,21 @@ from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.samples import Quality
 from seerob.core.transforms import transform
 from seerob.files.trajectories.trajectory import Trajectory, TrajectorySamples
-from seerob.twin.own_words import (
-    LiveWords,
-    Said,
-    SaidTool,
+from seerob.twin.controller_check import (
+    ControllerCheck,
+    ControllerLog,
+    ControllerTool,
     _bias,
     _differ,
     _past,
     _Ways,
     bound,
     compared,
+    controller_log,
     fixed_offset,
     heavier,
     other_speed,
     rigid_error,
-    said_by,
     sign_or_unit,
 )
 
@@ -121,18 +121,18 @@ def test_a_unit_is_told_of_torques_that_are_alike(angle: float, told: bool) -> N
 
 
 @pytest.fixture
-def tool(tmp_path) -> SaidTool:
+def tool(tmp_path) -> ControllerTool:
     station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()})
     found = bound(station.model, "arm")
     assert found is not None
     tip = {"tool": np.array([0.0, 0.2, 0.0])}
-    return SaidTool(found.arm, tip, found.bases, found.tolerance)
+    return ControllerTool(found.arm, tip, found.bases, found.tolerance)
 
 
-def test_a_place_in_another_frame_is_turned_and_shifted(tool: SaidTool) -> None:
+def test_a_place_in_another_frame_is_turned_and_shifted(tool: ControllerTool) -> None:
     """0.2 m beside the tip, said in a frame at (3, 1, 0) of the root that is a quarter turn about z off."""
     base = transform(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([3.0, 1.0, 0.0]))
-    tool = SaidTool(tool.arm, tool.tips, np.array([np.eye(4), base]), tool.tolerance)
+    tool = ControllerTool(tool.arm, tool.tips, np.array([np.eye(4), base]), tool.tolerance)
     q = np.array([[0.3, 0.4], [-0.5, 1.0], [1.0, -0.2]])
     a, b = q[:, 0], q.sum(axis=1)
     tip = np.stack(
@@ -150,7 +150,7 @@ def test_a_place_in_another_frame_is_turned_and_shifted(tool: SaidTool) -> None:
     assert frame == int(np.argmin(each))
 
 
-def test_the_speed_beside_the_tip_is_that_of_the_closed_form(tool: SaidTool) -> None:
+def test_the_speed_beside_the_tip_is_that_of_the_closed_form(tool: ControllerTool) -> None:
     q, qd = np.array([[0.3, 0.4], [-0.5, 1.0]]), np.array([[0.7, -1.1], [0.2, 0.9]])
     a, b = q[:, 0], q.sum(axis=1)
     wa, wb = qd[:, 0], qd.sum(axis=1)
@@ -190,7 +190,7 @@ def test_ways_of_one_motion(said: float, twins: tuple[float, float], told: str) 
 
 def test_ways_begin_anew_after_half_a_second_and_of_one_instant_nothing_follows(tmp_path) -> None:
     """Of a tip at 2 m/s that is said to stand."""
-    words = LiveWords(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
+    words = ControllerCheck(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
 
     def told(t: float, speed: float = 0.0) -> str:
         return words.invalid_reason(heard("arm", t, (0.0, 0.0), (1.0, 0.0), tcp_speed=speed))
@@ -221,12 +221,12 @@ def test_live_torques_are_judged_from_five_on_where_masses_are_known(
     known = two_r()
     unknown = known[: known.index("<inertial>")] + known[known.index("</inertial>") + len("</inertial>") :]
     for name, urdf, told in (("known", known, True), ("unknown", unknown, False)):
-        words = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
+        words = ControllerCheck(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
         for k in range(12):  # every second of which is looked at
             tau = tuple(-t for t in torques)
             assert words.invalid_reason(heard("arm", 0.0625 * k, q, qd, tau=tau)) == ""
             assert ("the opposite sign" in words.invalid_torque_reason) is (told and k >= 8), k
-        right = LiveWords(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
+        right = ControllerCheck(made(tmp_path / name, engine + TWO_R, {"arm.urdf": urdf}).model, "arm")
         for k in range(6):
             right.invalid_reason(heard("arm", 0.11 * k, q, qd, tau=torques))
         assert right.invalid_torque_reason == ""
@@ -234,7 +234,7 @@ def test_live_torques_are_judged_from_five_on_where_masses_are_known(
 
 def test_a_speed_that_is_a_third_low_shows_over_half_a_second_only(tmp_path) -> None:
     """At 125 Hz, of a tip at 2 m/s: less than a fifth, 10 mm and 30 ms of the way it seems until then."""
-    words = LiveWords(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
+    words = ControllerCheck(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
     told = [
         words.invalid_reason(heard("arm", k / 125, (0.0, 0.0), (1.0, 0.0), tcp_speed=1.3)) for k in range(63)
     ]
@@ -308,7 +308,7 @@ WORDS = {
 @pytest.mark.parametrize("invalid", [None, np.array([False, True, False, False])])
 def test_of_a_file_its_valid_rows_are_compared(which: str, invalid: np.ndarray | None) -> None:
     words = {which: WORDS[which]} if which else {}
-    said = said_by(log(**words, invalid=invalid, tcp_in_base=True), "log.csv")
+    said = controller_log(log(**words, invalid=invalid, tcp_in_base=True), "log.csv")
     if not which:
         assert said is None
         return
@@ -324,7 +324,7 @@ def test_of_a_file_its_valid_rows_are_compared(which: str, invalid: np.ndarray |
         else:
             assert found is None
     assert said.frame_known
-    assert said_by(log(**words, invalid=np.ones(4, bool)), "log.csv") is None
+    assert controller_log(log(**words, invalid=np.ones(4, bool)), "log.csv") is None
 
 
 @pytest.mark.parametrize("which", ["tau", "tcp", "tcp_speed", ""])
@@ -336,10 +336,10 @@ def test_of_samples_one_by_one_the_good_ones_are_compared(which: str) -> None:
         heard("arm", 0.1 * k, (0.0, float(k)), (1.0, 2.0), quality=quality, **word)
         for k, quality in enumerate(qualities)
     ]
-    said = said_by(samples, "its stream")
+    said = controller_log(samples, "its stream")
     if not which:
         assert said is None
-        assert said_by([], "its stream") is None
+        assert controller_log([], "its stream") is None
         return
     assert said is not None
     np.testing.assert_allclose(said.t, [0.0, 0.2])
@@ -353,18 +353,18 @@ def test_of_samples_one_by_one_the_good_ones_are_compared(which: str) -> None:
             assert found is None or np.isnan(found).all()
     assert said.frame_known
     # A place that one of them does not say is compared in the others; torques are those of all or none.
-    partly = said_by([*samples, heard("arm", 0.3, (0.0, 3.0))], "its stream")
+    partly = controller_log([*samples, heard("arm", 0.3, (0.0, 3.0))], "its stream")
     assert partly is not None
     assert partly.qd is None
     told = getattr(partly, which)
     assert (told is None) if which == "tau" else np.isnan(told[2]).all() and not np.isnan(told[:2]).any()
     bad = [heard("arm", 0.0, (0.0, 0.0), quality=Quality.DEGRADED, **word)]
-    assert said_by(bad, "its stream") is None
+    assert controller_log(bad, "its stream") is None
 
 
 def test_of_a_long_file_rows_are_looked_at_evenly() -> None:
     t = np.arange(10.0)
-    said = Said("f", t, t[:, None], None, t[:, None], None, True, t)
+    said = ControllerLog("f", t, t[:, None], None, t[:, None], None, True, t)
     for most, rows in (
         (10, range(10)),
         (20, range(10)),
@@ -388,7 +388,7 @@ def told_by(folder, text: str = "", **words: object) -> list[str]:
     qd = np.tile([0.2, 0.1], (8, 1))
     speed = np.hypot(0.2 * np.sin(a) + 0.3 * np.sin(b), 0.2 * np.cos(a) + 0.3 * np.cos(b))
     weight = 9.81 * np.stack([2 * np.cos(a) + np.cos(b), np.cos(b)], axis=1)
-    said = Said("f", t, q, qd, None, None, True)
+    said = ControllerLog("f", t, q, qd, None, None, True)
     for name, of in words.items():
         said = said._replace(**{name: of({"tcp": tip, "tcp_speed": speed, "tau": weight, "qd": qd}[name])})
     return [f.text for f in compared(model, "arm", said)]
@@ -425,7 +425,7 @@ def test_a_tool_centre_point_may_be_ten_millimetres_off(tmp_path, off: float, to
 
 def test_who_is_no_robot_says_nothing(tmp_path) -> None:
     model = made(tmp_path, FLOATING + TWO_R + person("op", 3, 0, 0), {"arm.urdf": two_r()}).model
-    words = Said(
+    words = ControllerLog(
         "f",
         np.zeros(9),
         np.zeros((9, 2)),
@@ -437,14 +437,14 @@ def test_who_is_no_robot_says_nothing(tmp_path) -> None:
     )
     assert [*compared(model, "op", words)] == []
     assert bound(model, "op") is None
-    words = LiveWords(model, "op")
+    words = ControllerCheck(model, "op")
     assert words.invalid_reason(heard("op", 0.0, (0.0,), (0.0,), tcp_speed=9.0)) == ""
 
 
 def test_live_words_are_looked_at_ten_times_a_second_and_place_and_speed_by_themselves(tmp_path) -> None:
     """A stretched arm whose source has its tool 50 mm beside the tip, and then says which tool would fit."""
     model = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model
-    words, found = LiveWords(model, "arm"), []
+    words, found = ControllerCheck(model, "arm"), []
     for k in range(12):
         a = 0.05 * k
         place = (2 * np.cos(a) - 0.05 * np.sin(a), 2 * np.sin(a) + 0.05 * np.cos(a), 0.0)
@@ -454,13 +454,13 @@ def test_live_words_are_looked_at_ten_times_a_second_and_place_and_speed_by_them
     fits = ["a tool centre point at [0, 50, 0] mm" in why for why in found]
     assert fits == [k >= 8 for k in range(12)]
     assert all("another robot, tool or calibration" in why for why in found[:8])
-    right = LiveWords(model, "arm")
+    right = ControllerCheck(model, "arm")
     assert right.invalid_reason(heard("arm", 0.0, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0, 0.0))) == ""
     assert right.invalid_reason(heard("arm", 0.1, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0099, 0.0))) == ""
     assert right.invalid_reason(heard("arm", 0.2, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, 0.0101, 0.0))) != ""
     assert right.invalid_reason(heard("arm", 0.3, (0.0, 0.0), (1.0, 0.0))) == ""
     wide = TWO_R + "tcp_tolerance_mm = 125\n"
-    words = LiveWords(made(tmp_path, FLOATING + wide, {"arm.urdf": two_r()}).model, "arm")
+    words = ControllerCheck(made(tmp_path, FLOATING + wide, {"arm.urdf": two_r()}).model, "arm")
     for off, told in ((0.125, False), (0.126, True)):
         found = words.invalid_reason(heard("arm", 0.0, (0.0, 0.0), (1.0, 0.0), tcp=(2.0, off, 0.0)))
         assert bool(found) is told
@@ -473,7 +473,7 @@ def test_a_tool_is_told_of_a_flange_that_turned_and_of_places_that_fit(
     tmp_path, turned: float, off: float, fits: bool
 ) -> None:
     """0.2 of the norm is √8 sin(α/2): 0.1415 rad."""
-    words = LiveWords(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
+    words = ControllerCheck(made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model, "arm")
     for k in range(5):
         a = turned * k / 4
         place = (2 * np.cos(a) - 0.05 * np.sin(a), 2 * np.sin(a) + 0.05 * np.cos(a), off * (k == 2))
@@ -505,7 +505,7 @@ def told_of(folder, text: str, place, *, frame_known: bool = True, on: str = "",
     x = np.stack([np.cos(b), np.sin(b), 0 * b], 1)
     y = np.stack([-np.sin(b), np.cos(b), 0 * b], 1)
     tip = np.stack([np.cos(a), np.sin(a), 0 * a], 1) + x
-    said = Said("f", t, q, None, None, place(tip, x, y), frame_known)
+    said = ControllerLog("f", t, q, None, None, place(tip, x, y), frame_known)
     (found,) = compared(model, "arm", said)
     assert (found.level == "warning") is (found.holds == ("arm",)) is ("more than" in found.text)
     return found.text
@@ -583,7 +583,7 @@ def test_a_speed_that_fits_at_one_of_the_points_is_that_of_the_twin(tmp_path) ->
         (model, 1.0, False), (model, np.hypot(1.1, 0.2), False), (model, 1.8, True), (model, 0.5, True),
         (far, 1.0, False), (far, np.hypot(1.1, 2.0), False), (far, 1.6, True),
     ):  # fmt: skip
-        said = Said("f", t, q, qd, None, None, True, np.full(8, speed))
+        said = ControllerLog("f", t, q, qd, None, None, True, np.full(8, speed))
         assert bool([*compared(of, "arm", said)]) is told
 
 
@@ -596,7 +596,7 @@ def test_external_torques_of_a_robot_are_not_those_of_its_model(tmp_path) -> Non
         text = DOWN + TWO_R + OTHER + TOOLS + force
         model = made(tmp_path, text, {"arm.urdf": two_r()}).model
         q = np.zeros((8, 2))
-        said = Said("f", np.arange(8.0), q, None, np.tile([-30.0, -10.0], (8, 1)), None, True)
+        said = ControllerLog("f", np.arange(8.0), q, None, np.tile([-30.0, -10.0], (8, 1)), None, True)
         return tuple(f.holds for f in compared(model, "arm", said))
 
     assert told("arm", "external") == told("pen", "external") == ()
@@ -608,7 +608,7 @@ def test_external_torques_of_a_robot_are_not_those_of_its_model(tmp_path) -> Non
 def test_live_words_in_a_turned_base_say_which_tool_would_fit_and_torques_are_heard_by_themselves(
     tmp_path,
 ) -> None:
-    words = LiveWords(made(tmp_path, FLOATING + TWO_R + BASE, {"arm.urdf": two_r()}).model, "arm")
+    words = ControllerCheck(made(tmp_path, FLOATING + TWO_R + BASE, {"arm.urdf": two_r()}).model, "arm")
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     for k in range(6):

@@ -601,17 +601,17 @@ class Judge:
             if type(result.verdict) is not Verdict:
                 raise Undecided(reason)
             return undecided(result, reason)
-        value = result.value
-        if result.verdict is None and (silent := unsaid(result, criterion)):
-            self._warn(bound, f"{_where(bound)}: {silent}")
-            silent = f"{silent}; {result.reason}".removesuffix("; ")
-            return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
-        if value is not None and not math.isfinite(value):
-            raise Undecided(f"the value is {value}, not a finite number")
+        silent = result.verdict is None and not (bound.computed and result.value is not None)
+        if silent and (why := unsaid(result, criterion)):
+            self._warn(bound, f"{_where(bound)}: {why}")
+            why = f"{why}; {result.reason}".removesuffix("; ")
+            return replace(undecided(result, why), verdict=_UNDECIDED, nothing=False, reason=why)
+        if result.value is not None and not math.isfinite(result.value):
+            raise Undecided(f"the value is {result.value}, not a finite number")
         if result.verdict is _WITHIN or question.relied_on:
-            for why in question.undecided_reasons(state):
-                if why:
-                    return undecided(result, str(why))
+            for said in question.undecided_reasons(state):
+                if said:
+                    return undecided(result, str(said))
         if not criterion.by_speed and state.speed_errors:
             return self._shaken(question, result, state)
         return result

@@ -94,6 +94,8 @@ class Validity:
         """By question and person, bones that may not be relied on at this tick."""
         self._lost: dict[int, tuple[frozenset[str], tuple[int, ...]]] = {}
         self._relied_on: set[Hashable] = set()
+        self._moved: dict[str, bool] = {}
+        """By name, what `moved` says at this tick."""
         self._sound: frozenset[str] | None = None
         """Of whom nothing is in doubt at this tick: what is mostly everybody, and found out once."""
 
@@ -108,6 +110,7 @@ class Validity:
         self._bones.clear()
         self._lost.clear()
         self._relied_on.clear()
+        self._moved.clear()
         self._sound = None
 
     def moved(self, name: str) -> bool:
@@ -115,10 +118,12 @@ class Validity:
 
         A single position does not. People and machines that no source moves stand; of a robot nobody knows.
         """
-        every = [self._hearings[each] for each in (name, *self._model.carriers_of(name))]
-        if any(hearing.once for hearing in every):
-            return False
-        return self._model.mechanisms[name].role != "robot" or any(h.driven or h.heard for h in every)
+        found = self._moved.get(name)
+        if found is None:
+            every = [self._hearings[each] for each in (name, *self._model.carriers_of(name))]
+            found = self._model.mechanisms[name].role != "robot" or any(h.driven or h.heard for h in every)
+            found = self._moved[name] = found and not any(hearing.once for hearing in every)
+        return found
 
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 
@@ -151,7 +156,14 @@ class Validity:
         """Raise `Undecided` unless each robot or human is where the twin shows it."""
         self.asked.update(names)
         sound = self._sound
-        if (self._find_sound() if sound is None else sound).issuperset(names) or names in self._relied_on:
+        if sound is None:
+            sound = self._find_sound()
+        for name in names:
+            if name not in sound:
+                break
+        else:
+            return
+        if names in self._relied_on:
             return
         for name in names:
             if reason := self.invalid_reason(name):

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from seerob.core.snapshot import Verdict
-from seerob.core.verdict import judge, judge_interval
-from seerob.criteria.figure import Figure, answers_of, verdict_of
+from seerob.core.verdict import judge, judge_interval, worst
+from seerob.criteria.figure import Figure, Parts, answers_of, verdict_of
+from seerob.kernels import verdicts
 from seerob.recording.answers import Answers, judge_many
 from seerob.recording.series import CODES, NO_VERDICT
 
@@ -67,3 +68,44 @@ def test_a_figure_says_of_many_instants_what_it_says_of_one(at_most, limit, valu
     each = {name: np.full(3, flag) for name, flag in flags.items()}
     many = answers_of(Figure(np.full(3, value), limit, arrays, **each), 3, at_most=at_most)
     assert many.verdict.tolist() == [CODES[one]] * 3
+
+
+@pytest.mark.parametrize("at_most", [True, False])
+@pytest.mark.parametrize("open_", [False, True])
+def test_the_worst_of_parts_is_the_whole_of_one_instant_and_of_many(at_most, open_):
+    """Parts on both sides of their limits, but for rounding, with ends that are no number and infinite."""
+    assert [CODES[v] for v in Verdict] == [verdicts.WITHIN, verdicts.EXCEEDED, verdicts.UNDECIDED]
+    rng = np.random.default_rng(3)
+    limit = rng.choice([0.0, 1.0, 5e3, -2.0, INF, NAN], (400, 3), p=[0.3, 0.3, 0.2, 0.1, 0.05, 0.05])
+    at = np.where(np.isfinite(limit), limit, 0.0)
+    off = rng.choice([-1.0, -2e-9, -1e-10, 0.0, 1e-10, 2e-9, 1.0], (400, 3))
+    value = at + off * np.maximum(1.0, np.abs(at))
+    low, high = value - rng.choice([0.0, 1.0, 3.0], (400, 3)), value + rng.choice([0.0, 1.0, NAN], (400, 3))
+    many = answers_of(
+        Figure(None, parts=Parts("abc", value, limit, (low, high), open_)), 400, at_most=at_most
+    )
+    for k in range(400):
+        parts = Parts("abc", value[k], limit[k], (low[k], high[k]), open_)
+        verdict = verdict_of(Figure(None, parts=parts), at_most=at_most)
+        alone = []
+        for least, most, last in zip(low[k].tolist(), high[k].tolist(), limit[k].tolist(), strict=True):
+            told = judge_interval((least, most), last, at_most=at_most)
+            unknown = np.isnan(last) or (open_ and told is Verdict.WITHIN)
+            alone.append(Verdict.UNDECIDED if unknown else told)
+        assert list(parts.verdicts) == alone
+        assert verdict is worst(alone)
+        room = (limit[k] - value[k]) * (1 if at_most else -1)
+        as_bad = [i for i, told in enumerate(alone) if told is verdict]
+        assert not min(room[as_bad]) < room[parts.governs] or np.isnan(room[as_bad]).any()
+        assert many.verdict[k] == CODES[verdict]
+        if np.isfinite(value[k][parts.governs]):
+            assert many.value[k] == value[k][parts.governs]
+
+
+def test_a_whole_with_a_figure_of_its_own_is_no_better_than_its_parts():
+    for own, part, told in ((0.5, 0.5, "within"), (0.5, 2.0, "exceeded"), (2.0, 0.5, "exceeded")):
+        parts = Parts(["a"], np.array([part]), np.array([1.0]), whole=False)
+        assert verdict_of(Figure(own, 1.0, parts=parts), at_most=True) == told
+        assert verdict_of(Figure(own, 1.0, open=True, parts=parts), at_most=True) == told.replace(
+            "within", "undecided"
+        )

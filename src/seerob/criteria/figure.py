@@ -8,8 +8,9 @@ verdict is known.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -18,7 +19,8 @@ from msgspec import Struct
 from seerob.core.markers import Marker, drawn
 from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
-from seerob.core.verdict import Verdict, judge, judge_interval
+from seerob.core.verdict import ROUNDING, Verdict, judge, judge_interval, worst
+from seerob.kernels.verdicts import judged, judged_many
 from seerob.recording.answers import Answers, Flags
 from seerob.recording.series import CODES
 
@@ -27,26 +29,56 @@ if TYPE_CHECKING:
     from seerob.twin.states import States
 
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+_VERDICTS = {code: verdict for verdict, code in CODES.items() if verdict is not None}
 Twin: TypeAlias = "State | States"
 """The twin at one instant, or at N; accessors of both have the same names, with instants in front."""
+
+
+class Parts(Struct, eq=False):
+    """Figures of n parts of a whole, each against its own limit; of N instants with these in front.
+
+    A criterion computes them. What they say is written here by who judges, of one instant.
+    """
+
+    names: Sequence[str]
+    """Of the results of the parts."""
+    value: Array
+    """Shape (..., n)."""
+    limit: Array
+    """Shape (..., n); NaN where nobody knows it, which is undecided."""
+    interval: tuple[Array, Array] | None = None
+    """Where the true values lie, shape (..., n) each."""
+    open: bool | Flags = False
+    """Whether more may be than what is known, shape (...): then none of them is within."""
+    units: Sequence[str] | None = None
+    """Of each; that of the criterion when not given."""
+    whole: bool = True
+    """Whether the worst of them is the whole: its value, its limit and its interval."""
+    verdicts: Sequence[Verdict] = ()
+    """Of each."""
+    governs: int = 0
+    """Which is the worst: of those with the worst verdict the nearest to its limit, or farthest beyond."""
 
 
 class Figure(Struct, frozen=True, eq=False):
     """What a criterion computes of one instant; of N instants each figure has the shape (N,)."""
 
-    value: float | Array | None
-    """In the criterion's unit. None, or NaN of many instants, where there is none; infinite, which is not
-    shown, where it is beyond any limit."""
+    value: float | int | Array | None
+    """In the criterion's unit, a count as ``int``. None, or NaN of many instants, where there is none;
+    infinite, which is not shown, where it is beyond any limit."""
     limit: float | Array | None = None
     """Admissible value; None where there is none."""
     interval: tuple[float | Array, float | Array] | None = None
-    """Where the true value lies, as far as tolerances are known: that decides, then."""
+    """Where the true value lies, as far as tolerances are known: that decides, then. It is not shown where
+    an end of it is infinite."""
     nothing: bool | Flags = False
     """Whether there is nothing to judge, and `Shown.reason` says why."""
     exceeded: bool | Flags = False
     """Whether a limit is exceeded whatever the value, which is a bound."""
     open: bool | Flags = False
     """Whether more may be than what is known: it may exceed, and is never within."""
+    parts: Parts | None = None
+    """No better than the worst of them is the whole."""
     beside: Any = None
     """What computing it found besides, for `Criterion.present`: where, in which direction."""
 
@@ -64,6 +96,9 @@ class Shown(NamedTuple):
     draw: Callable[[], tuple[Marker, ...]] | None = None
     """Draws it from copies, maybe ticks later."""
     parts: tuple[Result, ...] = ()
+    """Figures that are shown beside those that are judged (`Figure.parts`), after them."""
+    where: Sequence[str] | None = None
+    """What is said of each of `Figure.parts`."""
 
 
 Compute = Callable[[Twin], Figure]
@@ -73,7 +108,20 @@ Present = Callable[["State", Figure, Verdict | None], Shown]
 
 
 def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
-    """Verdict of a figure of one instant."""
+    """Verdict of a figure of one instant, and of its parts, which is written into these."""
+    parts = figure.parts
+    if parts is None:
+        return _own_verdict(figure, at_most=at_most)
+    low, high = parts.interval or (parts.value, parts.value)
+    codes = np.empty(len(parts.limit), np.uint8)
+    parts.governs = k = judged(
+        parts.value, low, high, parts.limit, ROUNDING, at_most, bool(parts.open), codes
+    )
+    parts.verdicts = verdicts = [_VERDICTS[code] for code in codes.tolist()]
+    return verdicts[k] if parts.whole else worst([verdicts[k], _own_verdict(figure, at_most=at_most)])
+
+
+def _own_verdict(figure: Figure, *, at_most: bool) -> Verdict | None:
     limit, value = figure.limit, figure.value
     assert not isinstance(limit, np.ndarray)
     if figure.nothing:
@@ -86,7 +134,7 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
         low, high = figure.interval
         verdict = judge_interval((float(low), float(high)), limit, at_most=at_most)
     else:
-        verdict = judge(float(value), limit, at_most=at_most)
+        verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
     return _UNDECIDED if verdict is _WITHIN and figure.open else verdict
 
 
@@ -99,25 +147,64 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         shown: What is said and drawn of it.
         result: What is the same at all instants: name, unit, side of the limit.
     """
-    value = None if figure.value is None else float(figure.value)
-    known, interval = None if value is None or math.isinf(value) else value, None
+    value, limit, parts, interval = figure.value, figure.limit, shown.parts, None
+    if value is not None and type(value) is not int:
+        value = float(value)
     if figure.interval is not None:
         low, high = figure.interval
-        interval = (float(low), float(high)) if low < high else None
-    assert not isinstance(figure.limit, np.ndarray)
+        interval = (float(low), float(high)) if low < high and math.isfinite(high - low) else None
+    if figure.parts is not None:
+        told = _part_results(figure.parts, shown.where, result)
+        parts = (*told, *parts)
+        if figure.parts.whole:
+            governs = told[figure.parts.governs]
+            value, limit, interval = governs.value, governs.limit, governs.interval
+    known = None if value is None or math.isinf(value) else value
+    assert not isinstance(limit, np.ndarray)
     return Result(
         name=result.name,
         value=known,
         unit=result.unit,
-        limit=figure.limit,
+        limit=limit,
         at_most=result.at_most,
         verdict=verdict,
         reason=shown.reason,
         interval=interval,
         nothing=bool(figure.nothing) or (verdict is None and known is None),
-        parts=shown.parts,
+        parts=parts,
         markers=() if shown.draw is None else drawn(shown.draw),
     )
+
+
+def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> list[Result]:
+    unit, at_most = result.unit, result.at_most
+    ends: Iterable[tuple[float, float] | None] = repeat(None)
+    if parts.interval is not None:
+        low, high = parts.interval
+        ends = zip(low.tolist(), high.tolist(), strict=True)
+    every = zip(
+        parts.names,
+        parts.value.tolist(),
+        parts.units or repeat(unit),
+        parts.limit.tolist(),
+        parts.verdicts,
+        ends,
+        where or repeat(""),
+        strict=False,
+    )
+    return [
+        Result(
+            name=name,
+            value=value,
+            unit=own,
+            limit=None if math.isnan(limit) else limit,
+            at_most=at_most,
+            verdict=verdict,
+            interval=interval,
+            reason=reason,
+        )
+        for name, value, own, limit, verdict, interval, reason in every
+    ]
 
 
 def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
@@ -126,6 +213,8 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
     def each(given: float | Array | None) -> Array:
         return np.broadcast_to(np.asarray(np.nan if given is None else given, float), (n,))
 
+    if figure.parts is not None:
+        return _answers_of_parts(figure.parts, at_most=at_most)
     limit = None if figure.limit is None else each(figure.limit)
     found = Answers.against(each(figure.value), limit, at_most=at_most)
     if figure.interval is not None:
@@ -138,3 +227,15 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
         found = found.exceeded(np.broadcast_to(figure.exceeded, (n,)))
     found = found.finite().open(figure.open) if np.any(figure.open) else found.finite()
     return found.without_verdict(np.broadcast_to(figure.nothing, (n,))) if np.any(figure.nothing) else found
+
+
+def _answers_of_parts(parts: Parts, *, at_most: bool) -> Answers:
+    assert parts.whole
+    value, limit = np.ascontiguousarray(parts.value), np.ascontiguousarray(parts.limit)
+    low, high = (value, value) if parts.interval is None else map(np.ascontiguousarray, parts.interval)
+    verdicts, governs = np.empty(value.shape, np.uint8), np.empty(len(value), np.int64)
+    open_ = np.broadcast_to(np.asarray(parts.open), len(value)).copy()
+    judged_many(value, low, high, limit, ROUNDING, at_most, open_, verdicts, governs)
+    rows = np.arange(len(value)), governs
+    interval = None if parts.interval is None else (low[rows], high[rows])
+    return Answers(value[rows], limit[rows], verdicts[rows], interval).finite()

@@ -26,6 +26,7 @@ LOOPS = {
     "chain at_point": "",
     "spans joint_bounds": "",
     "separation separations": "",
+    "verdicts judged_many": "",
     "ahead farthest": "",
     "speed fastest": "",
     "speed carried": "(f8[:,::1], f8[:,::1], i8, f8[:,::1])",

@@ -1,0 +1,88 @@
+"""What limits say of the figures of many parts, compiled: the rule of `seerob.core.verdict`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.core.transforms import Array
+
+Codes = NDArray[np.uint8]
+
+WITHIN, EXCEEDED, UNDECIDED = 0, 1, 2
+"""Verdicts, as in `seerob.recording.series.CODES`."""
+
+_ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+
+
+@njit(f"i8({_ROW}, {_ROW}, {_ROW}, {_ROW}, f8, b1, b1, u1[::1])", cache=True, nogil=True, error_model="numpy")
+def judged(
+    value: Array,
+    low: Array,
+    high: Array,
+    limit: Array,
+    rounding: float,
+    at_most: bool,
+    open_: bool,
+    verdicts: Codes,
+) -> int:
+    """Judge parts at one instant; writes the last argument.
+
+    Args:
+        value: Of each part, shape (n,).
+        low: Least that it may be, shape (n,).
+        high: Largest, likewise.
+        limit: Of each, shape (n,); NaN where nobody knows, which is undecided.
+        rounding: Share of its limit, and of one unit where it is less, by which a figure must keep it.
+        at_most: Whether limits bound from above.
+        open_: Whether more may be than what is known: then nothing is within.
+        verdicts: Of each, shape (n,).
+
+    Returns:
+        Which part governs: of those with the worst verdict the one that keeps its limit by the least, or is
+        the farthest beyond.
+    """
+    side = 1.0 if at_most else -1.0
+    worst, least, governs = -1, math.inf, 0
+    for i in range(len(value)):
+        last = side * limit[i]
+        if not math.isinf(last):
+            last -= rounding * max(1.0, abs(last))
+        kept, also = side * low[i] <= last, side * high[i] <= last
+        if math.isnan(low[i]) or math.isnan(high[i]) or math.isnan(last) or kept != also:
+            verdicts[i], rank = UNDECIDED, 1
+        elif not kept:
+            verdicts[i], rank = EXCEEDED, 2
+        elif open_:
+            verdicts[i], rank = UNDECIDED, 1
+        else:
+            verdicts[i], rank = WITHIN, 0
+        room = side * (limit[i] - value[i])
+        if rank > worst or (rank == worst and room < least):
+            worst, least, governs = rank, room, i
+    return governs
+
+
+@njit(
+    f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, f8, b1, b1[::1], u1[:,::1], i8[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def judged_many(
+    value: Array,
+    low: Array,
+    high: Array,
+    limit: Array,
+    rounding: float,
+    at_most: bool,
+    open_: NDArray[np.bool_],
+    verdicts: Codes,
+    governs: NDArray[np.int64],
+) -> None:
+    """Judge parts at N instants by `judged`: shapes (N, n), ``open_`` (N,); writes the last two arguments."""
+    for k in range(len(value)):
+        governs[k] = judged(value[k], low[k], high[k], limit[k], rounding, at_most, open_[k], verdicts[k])

@@ -73,6 +73,7 @@ def test_what_the_model_needs_is_never_within_without_what_it_leaves_out(tmp_pat
     result = run(tmp_path, given)
     assert result.verdict is Verdict.WITHIN
     assert result.value == pytest.approx(np.abs(gravity() / LIMITS).max(), rel=1e-3)
+    assert [part.interval[1] - part.value for part in result.parts] == pytest.approx([9, 9, 9, 3, 3, 3])
     assert run(tmp_path, given + "limit = 0.05\n").verdict is Verdict.EXCEEDED
 
 

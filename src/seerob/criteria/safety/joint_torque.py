@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 from msgspec import Meta
 
 from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError, Undecided
-from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.core.snapshot import Basis, Input, Origin, Result
 from seerob.core.transforms import Array
-from seerob.core.verdict import judge_interval, worst
-from seerob.criteria.criterion import Criterion, Evaluate, Lowest
+from seerob.core.verdict import Verdict, worst
+from seerob.criteria.criterion import Criterion, Lowest
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
@@ -80,20 +81,24 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         """Look ahead to the next tick [s], for an acceleration where there was no tick before."""
         return {self.robot: model.workstation.engine.tick}
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the shares."""
         robot = model.robot(self.robot)
         limits = self._limits(model, robot)
-        uncertainty = self._per_joint(model, robot, "torque_uncertainty")
+        given = self._per_joint(model, robot, "torque_uncertainty")
+        uncertainty = np.zeros(len(limits)) if given is None else given
         largest = self._per_joint(model, robot, "largest_residual")
-        names = [joint.name for joint in robot.joints]
+        names, admitted = [joint.name for joint in robot.joints], self.limit * limits
         units = ["N·m" if unit == "rad" else "N" for unit in robot.units]
         if self.torques == "model" or largest is not None:
             robot.require_masses(self.name)
         needed = joint_torques.Needed(robot, model.workstation.engine.tick)
+        unlimited, all_unlimited = bool(np.isnan(limits).any()), bool(np.isnan(limits).all())
+        # Friction and rotors are not in the model.
+        inexact = self.torques == "model" and given is None
 
-        def evaluate(state: State) -> Result:
-            why = ""
+        def compute(twin: Twin) -> Figure:
+            state, why = cast("State", twin), ""
             model_torques: Array | None = None
             try:
                 model_torques = needed(state)
@@ -103,66 +108,54 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
                 why = str(reason)
             tau = state.measured_torques(robot) if self.torques == "measured" else model_torques
             assert tau is not None
-            share, low, high = shares(
-                tau, limits, np.zeros(len(names)) if uncertainty is None else uncertainty
+            residual = None if self.torques == "model" or model_torques is None else tau - model_torques
+            unexplained = largest is not None and (
+                residual is None or bool((np.abs(residual) > largest).any())
             )
-            parts = []
-            for j, name in enumerate(names):
-                verdict = (
-                    Verdict.UNDECIDED
-                    if np.isnan(limits[j])
-                    else judge_interval((float(low[j]), float(high[j])), self.limit)
-                )
-                parts.append(
-                    Result(
-                        name=name,
-                        value=abs(float(tau[j])),
-                        unit=units[j],
-                        limit=None if np.isnan(limits[j]) else self.limit * float(limits[j]),
-                        verdict=verdict,
-                        reason="nobody gave its limit" if np.isnan(limits[j]) else "",
-                    )
-                )
-            verdict = worst([part.verdict for part in parts])
-            reasons = [f"{part.name}: {part.reason}" for part in parts if part.reason]
-            if verdict is not Verdict.UNDECIDED and not np.isnan(share).all():
-                reasons.append(names[int(np.nanargmax(share))])
-            if self.torques == "model" and uncertainty is None and verdict is Verdict.WITHIN:
-                reasons.insert(0, "friction and rotors are not in the model: give torque_uncertainty")
-                verdict = Verdict.UNDECIDED
-            if self.torques == "measured" and model_torques is not None:
-                residual = tau - model_torques
-                parts += [
-                    Result(name=f"residual of {name}", value=float(r), unit=unit)
-                    for name, r, unit in zip(names, residual, units, strict=True)
-                ]
-                if largest is not None and (np.abs(residual) > largest).any():
-                    j = int(np.argmax(np.abs(residual) - largest))
-                    reasons.insert(
-                        0, f"{residual[j]:.3g} {units[j]} at {names[j]} are not explained by the model"
-                    )
-                    verdict = verdict if verdict is Verdict.EXCEEDED else Verdict.UNDECIDED
-            elif largest is not None:
-                reasons.insert(0, why)
-                verdict = verdict if verdict is Verdict.EXCEEDED else Verdict.UNDECIDED
-            value = float(np.nanmax(share)) if not np.isnan(share).all() else None
-            ends = (
-                None
-                if uncertainty is None or value is None
-                else (float(np.nanmax(low)), float(np.nanmax(high)))
-            )
-            return Result(
-                name=self.name,
-                value=value,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=verdict,
-                reason="; ".join(reasons),
-                interval=ends,
-                parts=tuple(parts),
-            )
+            size = np.abs(tau)
+            interval = None if given is None else (np.maximum(size - given, 0.0), size + given)
+            parts = Parts(names, size, admitted, interval, units=units, whole=False)
+            share, low, high = shares(tau, limits, uncertainty)
+            beside = share, residual, why
+            if all_unlimited:
+                return Figure(None, self.limit, parts=parts, beside=beside)
+            ends = None if given is None else (float(np.nanmax(low)), float(np.nanmax(high)))
+            open_ = unlimited or inexact or unexplained
+            return Figure(np.nanmax(share), self.limit, ends, open=open_, parts=parts, beside=beside)
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says which joint decides, and what of its torque is not explained."""
+        robot = model.robot(self.robot)
+        names, limits = [joint.name for joint in robot.joints], self._limits(model, robot)
+        units = ["N·m" if unit == "rad" else "N" for unit in robot.units]
+        largest = self._per_joint(model, robot, "largest_residual")
+        where = ["nobody gave its limit" if unknown else "" for unknown in np.isnan(limits).tolist()]
+        ever = [f"{name}: {reason}" for name, reason in zip(names, where, strict=True) if reason]
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            (share, residual, why), reasons, parts = figure.beside, list(ever), figure.parts
+            assert parts is not None
+            decided = worst(list(parts.verdicts))
+            if decided is not Verdict.UNDECIDED and figure.value is not None:
+                reasons.append(names[int(np.nanargmax(share))])
+            if self.torques == "model" and self.torque_uncertainty is None and decided is Verdict.WITHIN:
+                reasons.insert(0, "friction and rotors are not in the model: give torque_uncertainty")
+            if residual is None:
+                reasons[:0] = [why] * (largest is not None)
+                return Shown("; ".join(reasons), where=where)
+            if largest is not None and (np.abs(residual) > largest).any():
+                j = int(np.argmax(np.abs(residual) - largest))
+                what = f"{residual[j]:.3g} {units[j]} at {names[j]} are not explained by the model"
+                reasons.insert(0, what)
+            unexplained = (
+                Result(name=f"residual of {name}", value=r, unit=unit)
+                for name, r, unit in zip(names, residual.tolist(), units, strict=True)
+            )
+            return Shown("; ".join(reasons), parts=tuple(unexplained), where=where)
+
+        return present
 
     def bounded_once(self, model: Model) -> bool:
         """Say that torques that a model needs are looked at at ticks alone."""

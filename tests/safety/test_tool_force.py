@@ -11,6 +11,7 @@ from made_cell import FLOATING, TWO_R, heard, judged, made, two_r
 from oracles import pinocchio_oracle as oracle
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
+from seerob.criteria.figure import verdict_of
 from seerob.criteria.safety.tool_force import (
     ToolForce,
     largest_error,
@@ -175,6 +176,10 @@ def test_moment_is_residual_for_a_point_contact_and_found_by_a_grip(tmp_path):
     assert parts(grip)["moment"] == pytest.approx(np.linalg.norm(MOMENT), rel=1e-6)
     assert elsewhere.verdict is Verdict.UNDECIDED
     assert "elsewhere" in elsewhere.reason
+    # Known torques say nothing of a force that is elsewhere, nor that it is beyond a limit.
+    known = f"{external}largest_residual = 0.1\ntorque_uncertainty = {[0.1] * 6}\n".replace("1000", "0.1")
+    anywhere = run(tmp_path / "f", known, tau, ticks=1)[0]
+    assert (anywhere.verdict, anywhere.interval) == (Verdict.UNDECIDED, None)
     residual = parts(point)["residual"]
     on_it = run(tmp_path / "d", f"{external}largest_residual = {residual!r}\n", tau, ticks=1)[0]
     assert on_it.verdict is Verdict.WITHIN
@@ -327,9 +332,9 @@ def test_the_force_is_drawn_where_it_acts(tmp_path):
 
 def test_a_moment_that_no_torque_shows_hides_no_force():
     found = wrench_from_torques(np.diag([1.0, 1, 1, 1, 1, 0]), np.ones(6), damped_below=0.02)
-    result = ToolForce(name="f", at="arm", limit=2.0)._result(found, np.ones(6), np.zeros(3), None)
-    assert (result.verdict, result.reason) == (Verdict.WITHIN, "")
-    assert result.value == pytest.approx(np.sqrt(3))
+    figure = ToolForce(name="f", at="arm", limit=2.0)._figure(found, np.ones(6), None)
+    assert (verdict_of(figure, at_most=True), figure.interval) == (Verdict.WITHIN, None)
+    assert figure.value == pytest.approx(np.sqrt(3))
 
 
 def test_a_force_is_no_less_than_nothing():
@@ -337,9 +342,9 @@ def test_a_force_is_no_less_than_nothing():
     tau = np.array([0.1, 0, 0])
     found = wrench_from_torques(np.eye(3), tau, damped_below=0.02)
     for limit, verdict in ((3.11, "within"), (3.09, "undecided")):
-        result = ToolForce(name="f", at="arm", limit=limit)._result(found, tau, np.zeros(3), np.ones(3))
-        assert result.interval == pytest.approx((0.0, 3.1))
-        assert result.verdict == verdict
+        figure = ToolForce(name="f", at="arm", limit=limit)._figure(found, tau, np.ones(3))
+        assert figure.interval == pytest.approx((0.0, 3.1))
+        assert verdict_of(figure, at_most=True) == verdict
 
 
 def test_an_uncertainty_that_is_no_number_is_refused_whoever_gives_it(tmp_path):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from msgspec import Meta
@@ -18,10 +18,11 @@ from seerob.core import figures
 from seerob.core.domains import agree, at_least, number
 from seerob.core.errors import InputError, Undecided
 from seerob.core.quantities import Metres3
-from seerob.core.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere, Verdict
+from seerob.core.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere
 from seerob.core.transforms import Array
-from seerob.core.verdict import judge, judge_interval
-from seerob.criteria.criterion import Criterion, Evaluate, Lowest
+from seerob.core.verdict import Verdict, judge_interval
+from seerob.criteria.criterion import Criterion, Lowest
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
@@ -49,6 +50,20 @@ class Wrench(NamedTuple):
     0 (fully seen) … 1 (not at all), shape (..., 3 or 6)."""
     axes: Array
     """The axes as columns, best seen first, shape (..., 3 or 6, 3 or 6)."""
+
+
+class _Found(NamedTuple):
+    """What a force follows from."""
+
+    wrench: Wrench
+    residual: float
+    """Norm of the torques that it does not explain [N·m]."""
+    torques: float
+    """Norm of all external torques [N·m]."""
+    hidden: Array
+    """Share of a unit force that the torques do not show, along the axes of ``wrench``."""
+    error: float | None
+    """How far the force may be off by the uncertainty of the torques [N]."""
 
 
 LARGEST = 1e3
@@ -164,8 +179,8 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             return {}
         return {model.carrier(model.frame(self.at)).name: model.workstation.engine.tick}
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the force."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
         if self.torques == "measured":
@@ -183,15 +198,67 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
                 raise
             return tau if self.torques == "external" else tau - needed(state)
 
-        def evaluate(state: State) -> Result:
+        def compute(twin: Twin) -> Figure:
+            state = cast("State", twin)
             tau = external(state)
-            found = wrench_from_torques(
-                state.jacobian(frame, robot, offset)[:rows], tau, damped_below=self.damped_below
-            )
-            rotation, position = state.pose(frame)
-            return self._result(found, tau, position + rotation @ offset, uncertainty)
+            J = state.jacobian(frame, robot, offset)[:rows]
+            return self._figure(wrench_from_torques(J, tau, damped_below=self.damped_below), tau, uncertainty)
 
-        return evaluate
+        return compute
+
+    def _figure(self, found: Wrench, tau: Array, uncertainty: Array | None) -> Figure:
+        size, residual = _length(found.wrench[:3]), _length(found.residual)
+        error = None if uncertainty is None else float(largest_error(found.gain, uncertainty))
+        interval = None if error is None else (max(size - error, 0.0), size + error)
+        hidden = found.hidden * np.linalg.norm(found.axes[:3], axis=0)
+        if hidden.max() > NOTHING:
+            # What is seen of a force may exceed a limit; what is not seen cannot be within one.
+            interval = (size if interval is None else interval[0]), math.inf
+        if self.largest_residual is not None and residual > self.largest_residual:
+            # Where torques fit no force at this point, it may be any.
+            interval = 0.0, math.inf
+        return Figure(size, self.limit, interval, beside=_Found(found, residual, _length(tau), hidden, error))
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what is not known of the force, and draws it."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            told: _Found = figure.beside
+            force, size, moment = told.wrench.wrench[:3], figure.number, told.wrench.wrench[3:]
+            place = state.drawn_point(frame, offset)
+
+            def draw() -> tuple[Marker, ...]:
+                return self._markers(force, size, place(), verdict)
+
+            parts = [
+                Result(name=f"F{axis}", value=f, unit="N")
+                for axis, f in zip("xyz", force.tolist(), strict=True)
+            ]
+            if len(moment):
+                parts.append(Result(name="moment", value=_length(moment), unit="N·m"))
+            share = told.residual / told.torques if told.torques > 0 else 0.0
+            parts.append(Result(name="residual", value=told.residual, unit="N·m"))
+            parts.append(Result(name="residual share", value=share, unit=""))
+            return Shown(self._reason(told, size), draw, tuple(parts))
+
+        return present
+
+    def _reason(self, told: _Found, size: float) -> str:
+        reasons, hidden, error = [], told.hidden, told.error
+        if error is not None:
+            ends = max(size - error, 0.0), size + error
+            if judge_interval(ends, self.limit) is Verdict.UNDECIDED:
+                reasons.append(f"the torques' uncertainty is ± {error:.3g} N, across the limit")
+        if hidden.max() > NOTHING:
+            k = int(hidden.argmax())
+            share, unseen = told.wrench.hidden[k], told.wrench.axes[:3, k]
+            reasons.append(
+                f"singular: {share:.0%} of a force along ±{_vector(unseen)} does not show in the torques"
+            )
+        if self.largest_residual is not None and told.residual > self.largest_residual:
+            reasons.append(f"{told.residual:.3g} N·m fit no force at this point: the contact is elsewhere")
+        return "; ".join(reasons)
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         r"""Least margin in a span of a force without moment, from external torques that are measured.
@@ -225,55 +292,6 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             return limit - float((forces + more * errors).max())
 
         return lowest
-
-    def _result(self, found: Wrench, tau: Array, at: Array, uncertainty: Array | None) -> Result:
-        force = found.wrench[:3]
-        size, residual = float(np.linalg.norm(force)), float(np.linalg.norm(found.residual))
-        hidden = found.hidden * np.linalg.norm(found.axes[:3], axis=0)
-        interval = None
-        verdict = judge(size, self.limit)
-        reasons = []
-        if uncertainty is not None:
-            error = float(largest_error(found.gain, uncertainty))
-            interval = (max(size - error, 0.0), size + error)
-            verdict = judge_interval(interval, self.limit)
-            if verdict is Verdict.UNDECIDED:
-                reasons.append(f"the torques' uncertainty is ± {error:.3g} N, across the limit")
-        if hidden.max() > NOTHING:
-            unshaped = found.axes[:3, int(hidden.argmax())]
-            share = found.hidden[int(hidden.argmax())]
-            reasons.append(
-                f"singular: {share:.0%} of a force along ±{_vector(unshaped)} does not show in the torques"
-            )
-            # What is seen of a force may exceed a limit; what is not seen cannot be within one.
-            verdict, interval = (Verdict.UNDECIDED if verdict is Verdict.WITHIN else verdict), None
-        if self.largest_residual is not None and residual > self.largest_residual:
-            reasons.append(f"{residual:.3g} N·m fit no force at this point: the contact is elsewhere")
-            verdict = None if verdict is None else Verdict.UNDECIDED
-        total = float(np.linalg.norm(tau))
-        moment = found.wrench[3:]
-        return Result(
-            name=self.name,
-            value=size,
-            unit=self.unit,
-            limit=self.limit,
-            verdict=verdict,
-            reason="; ".join(reasons),
-            interval=interval,
-            parts=(
-                *(
-                    Result(name=f"F{axis}", value=float(f), unit="N")
-                    for axis, f in zip("xyz", force, strict=True)
-                ),
-                *(
-                    (Result(name="moment", value=float(np.linalg.norm(moment)), unit="N·m"),)
-                    * (len(moment) > 0)
-                ),
-                Result(name="residual", value=residual, unit="N·m"),
-                Result(name="residual share", value=residual / total if total > 0 else 0.0, unit=""),
-            ),
-            markers=self._markers(force, size, at, verdict),
-        )
 
     def _markers(self, force: Array, size: float, at: Array, verdict: Verdict | None) -> tuple[Marker, ...]:
         center = tuple(at.tolist())
@@ -339,6 +357,10 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
                 *(() if self.torque_uncertainty else ("uncertainty of the torques: nobody gave it",)),
             ),
         )
+
+
+def _length(u: Array) -> float:
+    return float(np.linalg.norm(u))
 
 
 def _vector(u: Array) -> str:

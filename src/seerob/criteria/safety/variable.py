@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, cast
 
 from msgspec import Meta
 
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
-from seerob.core.verdict import judge
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.snapshot import Basis, Input, Origin
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.spans import Fall, Falls, Points
 from seerob.twin.state import State
 from seerob.workstation.variables import Kind, Value
+
+_EXCEEDED = Verdict.EXCEEDED
 
 
 class MachineVariable(Criterion, frozen=True, kw_only=True):
@@ -43,8 +46,8 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
         """The variable."""
         return {**Criterion.variables(self), self.variable: ""}
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that compares the value."""
         variable = model.dictionary[self.variable]
         number = variable.type is Kind.NUMBER
         if variable.si_unit != self.unit:
@@ -57,45 +60,39 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
             what = f"{self.expected!r}, but {self.variable} is a {variable.type}"
             raise InputError.at(self.name, "expected", what, "give a value of that type")
 
-        def evaluate(state: State) -> Result:
-            now = judged(state.signal(self.variable))
+        def compute(twin: Twin) -> Figure:
+            state = cast("State", twin)
+            now = of(state.signal(self.variable))
             # What was told since the last tick counts too: the first of it that exceeds.
-            results = (judged(value) for value in state.signals_meanwhile(self.variable))
-            return next((result for result in results if result.verdict is Verdict.EXCEEDED), now)
-
-        def judged(value: Value) -> Result:
-            if self.expected is not None:
-                return self._compared(value)
-            return Result(
-                name=self.name,
-                value=float(value) if isinstance(value, int | float) else None,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=judge(value, self.limit) if isinstance(value, float) else None,
-                reason="" if number else self._said(value),
-                nothing=not number,
+            figures = map(of, state.signals_meanwhile(self.variable))
+            return next(
+                (each for each in figures if verdict_of(each, at_most=self.at_most) is _EXCEEDED), now
             )
 
-        return evaluate
+        def of(value: Value) -> Figure:
+            if self.expected is None:
+                figure = float(value) if isinstance(value, int | float) else None
+                return Figure(figure, self.limit, nothing=not number, beside=value)
+            # Of a bool itself, 0 or 1; of a text or a choice whether it is what is expected: exact counts.
+            if isinstance(self.expected, bool):
+                return Figure(int(bool(value)), float(self.expected), beside=value)
+            return Figure(int(value == self.expected), 1.0, beside=value)
+
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what the variable is, unless it is a number."""
+        number = model.dictionary[self.variable].type is Kind.NUMBER
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            return Shown("" if number else self._said(figure.beside))
+
+        return present
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Return no fall: a variable stands until it is told anew, and all that is told is judged."""
         fall = Fall(0.0 if self.every is None else math.inf)
         return lambda span, least: fall
-
-    def _compared(self, value: Value) -> Result:
-        """Of a bool itself, 0 or 1; of a text or a choice whether it is what is expected."""
-        figure, limit = int(value == self.expected), 1.0  # exact
-        if isinstance(self.expected, bool):
-            figure, limit = int(bool(value)), float(self.expected)
-        return Result(
-            name=self.name,
-            value=figure,
-            limit=limit,
-            at_most=self.at_most,
-            verdict=Verdict.WITHIN if value == self.expected else Verdict.EXCEEDED,
-            reason=self._said(value),
-        )
 
     def _said(self, value: Value) -> str:
         text = f"{self.variable} is {_word(value)}"

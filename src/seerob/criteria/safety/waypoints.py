@@ -9,9 +9,11 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Basis, Label, Marker, Polyline, Result, Sphere, Vec3
+from seerob.core.snapshot import Basis, Label, Marker, Polyline, Sphere, Vec3
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.files.waypoints.continuous import Programmed
 from seerob.files.waypoints.timing import JointLimits
 from seerob.model import provenance
@@ -48,25 +50,31 @@ class Waypoints(Criterion, frozen=True, kw_only=True):
         """The robot."""
         return (self.robot,)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the distance."""
         robot = model.robot(self.robot)
-        drawn = _drawn(model, robot)
+        at = _drawn(model, robot).at
 
-        def evaluate(state: State) -> Result:
-            state.require(robot.name)
-            _, position = state.pose(robot.tip)
-            away = np.linalg.norm(drawn.at - position, axis=1)
-            k = int(np.argmin(away))
-            return Result(
-                name=self.name,
-                value=float(away[k]),
-                unit=self.unit,
-                reason=f"nearest is {drawn.names[k]}",
-                markers=drawn.markers,
-            )
+        def compute(twin: Twin) -> Figure:
+            twin.require(robot.name)
+            _, position = twin.pose(robot.tip)
+            away = np.linalg.norm(at - position[..., None, :], axis=-1)
+            return Figure(away.min(axis=-1), beside=away)
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that names the nearest waypoint and draws all of them."""
+        drawn = _drawn(model, model.robot(self.robot))
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            return Shown(f"nearest is {drawn.names[int(figure.beside.argmin())]}", lambda: drawn.markers)
+
+        return present
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so of a robot that is carried by something that moves."""
+        return "" if model.robot(self.robot).alone else "something that moves carries the robot"
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

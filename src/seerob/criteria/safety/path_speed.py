@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple, cast
 
 import numpy as np
 from msgspec import Meta
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Undecided
 from seerob.core.files.bounded import TooLarge, content
-from seerob.core.markers import Marker
-from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.core.snapshot import Basis, Input, Origin
 from seerob.core.transforms import Array
-from seerob.core.verdict import keeps
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.files.trajectories.path_map import MAX_SIZE, PathMap, Place, path_markers, read_map
 from seerob.model import provenance
 from seerob.model.model import Model
@@ -90,16 +90,16 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
             what = f"cannot be read: {error.strerror}"
             raise InputError.at(self.map, "", what, "give a map.csv of `seerob permissible`") from error
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the share."""
         robot = model.robot(self.robot)
         found = read_map(self._data(model), name=self.map, units=robot.units)
         same, legs, permitted = _legs(found)
         if not len(same):
             raise InputError.at(self.map, "piece", "no two places follow each other", "give a whole map")
-        drawn = path_markers(_places(found))
 
-        def evaluate(state: State) -> Result:
+        def compute(twin: Twin) -> Figure:
+            state = cast("State", twin)
             qd = state.qd(robot)
             here = passed(state.q(robot), qd, legs)
             speed = float(np.linalg.norm(qd))
@@ -115,15 +115,23 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
             if np.isnan(limit):
                 raise Undecided(f"the map is undecided here: {why}")
             if speed <= STANDSTILL:
-                return self._result(0.0, Verdict.WITHIN, "stands still", drawn)
+                return Figure(0.0, 1.0, beside="stands still")
             if limit == 0:
-                return self._result(
-                    None, Verdict.EXCEEDED, f"moves where no speed is permitted: {why}", drawn
-                )
-            share = speed / limit
-            return self._result(share, Verdict.WITHIN if keeps(share, 1.0) else Verdict.EXCEEDED, why, drawn)
+                return Figure(None, 1.0, exceeded=True, beside=why)
+            return Figure(speed / limit, 1.0, beside=why)
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what decides there, and draws the path."""
+        units = model.robot(self.robot).units
+        drawn = path_markers(_places(read_map(self._data(model), name=self.map, units=units)))
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            why = "" if figure.value is not None else "moves where no speed is permitted: "
+            return Shown(f"{why}{figure.beside}", lambda: drawn)
+
+        return present
 
     def falls(self, model: Model, points: Points) -> Falls:
         r"""Bound the speed between instants: the fastest it may be, on the slowest stretch it may be on.
@@ -165,9 +173,6 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
             return down_to(least, 1.0 - share)
 
         return falls
-
-    def _result(self, share: float | None, verdict: Verdict, why: str, drawn: tuple[Marker, ...]) -> Result:
-        return Result(name=self.name, value=share, limit=1.0, verdict=verdict, reason=why, markers=drawn)
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 from msgspec import Meta
 
-from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Verdict
-from seerob.core.verdict import keeps
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result
+from seerob.core.verdict import Verdict, keeps
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.description.humans.skeleton import without_side
 from seerob.description.humans.skin import BODY_REGION
 from seerob.description.norms import body_limits
@@ -45,13 +46,20 @@ def pressed(name: str, force: float, area: float | None, regions: tuple[BodyRegi
         area: Contact area [m²]; None when nobody knows it.
         regions: Of the bone.
     """
-    allowed = all(region.permitted for region in regions)
-    least = min((region.force.value for region in regions), default=math.inf) if allowed else 0.0
-    found = [_against(name, force, "N", least)]
+    most, pressure = least_limits(regions)
+    found = [_against(name, force, "N", most)]
     if area is not None:
-        least = min((region.pressure.value for region in regions), default=math.inf) if allowed else 0.0
-        found.append(_against(f"{name}, pressure", force / area, "Pa", least))
+        found.append(_against(f"{name}, pressure", force / area, "Pa", pressure))
     return found
+
+
+def least_limits(regions: tuple[BodyRegion, ...]) -> tuple[float, float]:
+    """Least force [N] and pressure [Pa] that regions may take; infinity of none, 0 of forbidden ones."""
+    if not all(region.permitted for region in regions):
+        return 0.0, 0.0
+    forces = (region.force.value for region in regions)
+    pressures = (region.pressure.value for region in regions)
+    return min(forces, default=math.inf), min(pressures, default=math.inf)
 
 
 def _against(name: str, value: float, unit: str, limit: float) -> Result:
@@ -88,37 +96,51 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
         own = self.limits
         return body_limits.shipped() if own is None else body_limits.read(Path(model.folder, own))
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        person, table = model.human(self.human), self._table(model)
-        bodies = {i: model.bodies[i].name for i in person.bodies}
-        regions = {i: regions_of(name.removeprefix(f"{self.human}/"), table) for i, name in bodies.items()}
+    def _regions(self, model: Model) -> dict[int, tuple[BodyRegion, ...]]:
+        """Of each body of the person, by index."""
+        table, own = self._table(model), f"{self.human}/"
+        bodies = model.human(self.human).bodies
+        return {i: regions_of(model.bodies[i].name.removeprefix(own), table) for i in bodies}
 
-        def evaluate(state: State) -> Result:
-            found = state.contact_forces(self.human)
-            parts: list[Result] = []
-            lit = []
-            for i, (force, other) in found.items():
-                own = pressed(f"{other} on {bodies[i]}", force, self.area, regions[i])
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the forces."""
+        least = {i: least_limits(regions) for i, regions in self._regions(model).items()}
+
+        def compute(twin: Twin) -> Figure:
+            found = cast("State", twin).contact_forces(self.human)
+            largest: tuple[float, float | None] = 0.0, None
+            most, over = -1.0, False
+            for i, (force, _) in found.items():
+                limit, pressure = least[i]
+                share = _share(force, limit)
+                if not share <= most:  # also what is not a number
+                    most, largest = share, (force, limit if math.isfinite(limit) else None)
+                over = over or not keeps(force, limit)
+                over = over or (self.area is not None and not keeps(force / self.area, pressure))
+            return Figure(*largest, nothing=not over, exceeded=over, beside=found)
+
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what presses where, and lights what is pressed."""
+        regions, bodies = self._regions(model), model.bodies
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            parts, lit = [], []
+            for i, (force, other) in figure.beside.items():
+                own = pressed(f"{other} on {bodies[i].name}", force, self.area, regions[i])
                 parts += own
                 over = any(part.verdict is Verdict.EXCEEDED for part in own)
-                lit.append(Highlight(body=bodies[i], verdict=Verdict.EXCEEDED if over else None))
-            worst = max(parts, key=_share, default=None)
-            largest = max((part for part in parts if part.unit == "N"), key=_share, default=None)
-            over = any(part.verdict is Verdict.EXCEEDED for part in parts)
-            return Result(
-                name=self.name,
-                value=0.0 if largest is None else largest.value,
-                unit=self.unit,
-                limit=None if largest is None else largest.limit,
-                verdict=Verdict.EXCEEDED if over else None,
-                nothing=not over,
-                reason=f"{'nothing touches' if worst is None else worst.name}; {ESTIMATE}",
-                parts=tuple(parts),
-                markers=tuple(lit),
-            )
+                lit.append((bodies[i].name, Verdict.EXCEEDED if over else None))
+            worst = max(parts, key=lambda part: _share(part.value or 0.0, part.limit), default=None)
 
-        return evaluate
+            def draw() -> tuple[Highlight, ...]:
+                return tuple(Highlight(body=name, verdict=told) for name, told in lit)
+
+            who = "nothing touches" if worst is None else worst.name
+            return Shown(f"{who}; {ESTIMATE}", draw if lit else None, tuple(parts))
+
+        return present
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
@@ -144,6 +166,8 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
         )
 
 
-def _share(part: Result) -> float:
-    value = part.value or 0.0
-    return value / part.limit if part.limit else (math.inf if part.limit == 0.0 else 0.0)
+def _share(value: float, limit: float | None) -> float:
+    """Of its limit; none of one that nobody knows."""
+    if limit == 0.0:
+        return math.inf
+    return 0.0 if limit is None else value / limit

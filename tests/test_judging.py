@@ -109,7 +109,7 @@ def test_an_answer_that_is_kept_is_held_by_what_is_found_out_since(asked, monkey
     judge, state = asked(ENERGY + "every = 10\n")
     assert judge(state)[0].verdict == "within"
     found = Finding(level="warning", subject="arm", text="another tool", holds=("arm",))
-    monkeypatch.setattr(judge._as_heard, "at", lambda state: (found,))
+    monkeypatch.setattr(judge._plausible_places, "at", lambda state: (found,))
     state.refresh(0.01)
     (result,) = judge(state)
     assert (result.verdict, result.t) == ("undecided", 0.0)

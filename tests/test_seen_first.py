@@ -8,8 +8,8 @@ import pytest
 
 from made_cell import FLOATING, made, state_at
 from seerob.core.snapshot import Result, Verdict
+from seerob.criteria.body_parts import seen_first
 from seerob.criteria.judging import Judge
-from seerob.criteria.partly_seen import seen_first
 from seerob.description.humans.skeleton import BONES
 from seerob.twin.validity.hearing import BonesHeard
 

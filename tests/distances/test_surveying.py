@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from concave import made_crowd, said, walk
-from seerob.distance.least import DistanceKind, Per, Query, Survey
-from seerob.distance.surveying import Surveyor
+from seerob.distance.least import DistanceKind, Per, Query, Survey, Surveyor
 
 
 @pytest.fixture(scope="module")

@@ -18,11 +18,11 @@ from seerob.core.markers import Marker, changed
 from seerob.core.plugin import PluginError, kind_of
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
 from seerob.core.verdict import ROUNDING, admitted, keeps
-from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
 from seerob.criteria.figure import Twin
 from seerob.criteria.noisy_speeds import shaken
+from seerob.criteria.plausible_places import PlausiblePlaces
 from seerob.criteria.scoring.phases import entered_for, turns
 from seerob.model.model import Model
 from seerob.recording.series import INFORMS
@@ -468,7 +468,7 @@ class Judge:
         self._findings = tuple(findings)
         self._holds = False
         """Whether anything is held."""
-        self._as_heard: AsHeard | None = None
+        self._plausible_places: PlausiblePlaces | None = None
         self._worded: tuple[Finding, ...] = ()
         """What it says now."""
         self._claims: list[Claim] = []
@@ -478,16 +478,16 @@ class Judge:
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
-        if self._as_heard is None:
+        if self._plausible_places is None:
             model = state.model
             self._questions = [question_of(one, model) for one in self._bound]
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
             self._hold(model, findings)
-            self._as_heard = AsHeard(model)
+            self._plausible_places = PlausiblePlaces(model)
             known = {finding.holds for finding in findings}
             claims = (claim for one in self._bound for claim in one.criterion.claims(model))
             self._claims = [claim for claim in claims if claim.holds not in known]
-        worded = self._as_heard.at(state)
+        worded = self._plausible_places.at(state)
         refuted = [(claim, what) for claim in self._claims if (what := claim(state)) is not None]
         if worded is not None or refuted:
             self._worded = self._worded if worded is None else worded

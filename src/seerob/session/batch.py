@@ -22,9 +22,9 @@ from msgspec.structs import replace as changed
 from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.criterion import Criterion, EvaluateMany
 from seerob.criteria.judging import Judge, Question, held_names, question_of, worded
+from seerob.criteria.plausible_places import PlausiblePlaces
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
@@ -121,17 +121,21 @@ class _PositionsAlone(State):
 
 
 def _is_plausible(model: Model, motion: Motion) -> bool:
-    """Whether everybody is somewhere plausible once they are heard (`seerob.criteria.as_heard`)."""
-    as_heard, data, hearings = AsHeard(model), mujoco.MjData(model.mj), _hearings(model, motion)
+    """Whether everybody is somewhere plausible once they are heard (`seerob.criteria.plausible_places`)."""
+    places, data, hearings = (
+        PlausiblePlaces(model),
+        mujoco.MjData(model.mj),
+        _hearings(model, motion),
+    )
     state = _PositionsAlone(model, data, hearings)
     for k, t in enumerate(motion.t.tolist()):
-        if not as_heard.waits:
+        if not places.waits:
             return True
         data.qpos[:] = motion.q[k]
         _hear(hearings, motion, k)
         state.refresh(t)
         state.heard()
-        if as_heard.at(state):
+        if places.at(state):
             return False
     return True
 
@@ -153,7 +157,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     known = known_motion(engine, heard, end)
     if known is not None and _is_plausible(model, known):
         return replace(known, still=still, coarse=coarse(model))
-    as_heard, implausible = AsHeard(model), dict[Finding, None]()
+    plausible_places, implausible = PlausiblePlaces(model), dict[Finding, None]()
     engine = engine_of(model, _PositionsAlone)
     engine.end = end
     t, q, v = [], [], []
@@ -169,7 +173,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         v.append(state.data.qvel.copy())
         if state.path is not None:
             ways.append(state.path)
-        implausible |= dict.fromkeys(as_heard.at(state) or ())
+        implausible |= dict.fromkeys(plausible_places.at(state) or ())
         for name, found in reasons_of.items():
             hearing = state.hearings[name]
             # Of bones that are in doubt `Seen` tells, and the others may be relied on.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import NotAsked
 from seerob.model.model import Model
-from seerob.twin.joint_columns import moving_dofs
+from seerob.twin.attachments import moving_dofs
 
 Indices = NDArray[np.int64]
 

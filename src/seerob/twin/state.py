@@ -23,15 +23,14 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import Undecided, Unweighed
 from seerob.core.transforms import Array
-from seerob.distance.least import Closest, Closests, Per, Query
-from seerob.distance.surveying import Surveyor
+from seerob.distance.least import Closest, Closests, Per, Query, Surveyor
 from seerob.kernels.axes import felt, principal_axes, quaternion
 from seerob.kernels.chain import along, at_point
 from seerob.kernels.spans import greatest
 from seerob.kernels.speed import carried, fastest, in_body, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
+from seerob.twin.attachments import Columns, moving_dofs
 from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
-from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
 from seerob.twin.speed_noise import SpeedNoise

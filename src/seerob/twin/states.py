@@ -29,9 +29,8 @@ from seerob.kernels.chain import along, held_many, jacobians
 from seerob.kernels.speed import fastest_many, stacked, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
-from seerob.twin.attachments import unknown_place
+from seerob.twin.attachments import Columns, moving_dofs, unknown_place
 from seerob.twin.authors_view import OF_MANY, AuthorsView
-from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path, Ways
 from seerob.twin.trees import Followed, Tree
 from seerob.twin.validity.hearing import BoneErrors, BonesHeard, Hearing

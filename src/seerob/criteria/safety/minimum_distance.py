@@ -12,15 +12,14 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Basis, Segment
 from seerob.core.tolerances import Tolerance, deciding
 from seerob.core.verdict import Verdict
+from seerob.criteria.body_parts import BodyPlaces, partly_seen
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
-from seerob.criteria.partly_seen import partly_seen
 from seerob.distance.least import DistanceKind
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.accuracy.tracking_error import tracking
-from seerob.twin.body_place import BodyPlaces
 from seerob.twin.spans import Falls, Points, approaching
 from seerob.twin.state import State
 

@@ -18,19 +18,19 @@ from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.tolerances import Spread, deciding
 from seerob.core.transforms import Array
 from seerob.core.verdict import worst
+from seerob.criteria.body_parts import seen_first
 from seerob.criteria.contact import collision
 from seerob.criteria.contact import limits as contact_limits
 from seerob.criteria.contact import shape as contact_shape
 from seerob.criteria.contact.clamped_regions import Clamping, floor_input
 from seerob.criteria.contact.clamping import STILL
-from seerob.criteria.contact.impact_mass import Behind, moving_masses, train
+from seerob.criteria.contact.collision import Behind, moving_masses, train
 from seerob.criteria.contact.limits import NOT_GIVEN, ContactEnds, Judged, pushed, ranks, robot_masses
 from seerob.criteria.contact.measured import Measurements, with_measured
 from seerob.criteria.contact.regions import REGIONS, HeightReach, Person, reach_inputs, without_limit
 from seerob.criteria.contact.rows import NOT_MODELLED, ContactMarkers, ContactRows, area_results, margin
 from seerob.criteria.contact.shape import given_contacts
 from seerob.criteria.criterion import Criterion, Evaluate, Lowest
-from seerob.criteria.partly_seen import seen_first
 from seerob.description.humans.anthropometry import STATURE_RANGE
 from seerob.description.norms import body_limits
 from seerob.description.norms.crushing_gaps import NOT_VERIFIED, gap_inputs

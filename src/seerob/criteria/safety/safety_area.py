@@ -15,8 +15,8 @@ from seerob.core.markers import drawn
 from seerob.core.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, keeps
+from seerob.criteria.body_parts import seen_first
 from seerob.criteria.criterion import Criterion, Evaluate
-from seerob.criteria.partly_seen import seen_first
 from seerob.distance.depth import Depth, Depths
 from seerob.distance.least import Closests
 from seerob.model import provenance

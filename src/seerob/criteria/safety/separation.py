@@ -19,6 +19,7 @@ from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.core.tolerances import Shifts, Tolerance, deciding
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING
+from seerob.criteria.body_parts import BodyPlaces, partly_seen
 from seerob.criteria.criterion import (
     Claim,
     Criterion,
@@ -27,7 +28,6 @@ from seerob.criteria.criterion import (
     Follows,
     Moment,
 )
-from seerob.criteria.partly_seen import partly_seen
 from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping.inputs import approach_speed, intrusion
 from seerob.criteria.stopping.largest import LargestSeparation
@@ -55,7 +55,6 @@ from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.accuracy.tracking_error import tracking
-from seerob.twin.body_place import BodyPlaces
 from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, rows_of
 from seerob.twin.state import State
 

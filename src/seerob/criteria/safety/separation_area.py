@@ -20,8 +20,8 @@ from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, keeps
+from seerob.criteria.body_parts import seen_first
 from seerob.criteria.criterion import Criterion, Evaluate, Follows
-from seerob.criteria.partly_seen import seen_first
 from seerob.criteria.sensors.sensing import Names, bodies_of, names_of
 from seerob.distance.least import Per
 from seerob.distance.voxels import offset_shell

@@ -13,8 +13,8 @@ from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Highlight, Input, Label, Marker, Origin, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import keeps
+from seerob.criteria.body_parts import seen_first
 from seerob.criteria.criterion import Evaluate
-from seerob.criteria.partly_seen import seen_first
 from seerob.distance.least import Closests
 from seerob.model import provenance
 from seerob.model.model import Gap, Model

@@ -2,7 +2,7 @@
 
 The questions are asked once, of everybody at home; of whom a recorded source moves, when it was opened, of
 where its samples begin. Whom a live source moves is asked for what depends on that when heard, see
-`seerob.criteria.as_heard`.
+`seerob.criteria.plausible_places`.
 """
 
 from __future__ import annotations

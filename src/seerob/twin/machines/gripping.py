@@ -22,7 +22,7 @@ from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.distance.least import Query, Shapes
 from seerob.model.model import Body, Model
 from seerob.model.mounting.machines import AWAY, BODY, FINGERS, RESTING
-from seerob.twin.joint_columns import Columns
+from seerob.twin.attachments import Columns
 from seerob.twin.machines.following import ON_ITS_WAY
 from seerob.twin.state import Hearing, State
 from seerob.workstation.tables.machines import Fingers

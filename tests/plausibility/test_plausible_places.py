@@ -11,8 +11,8 @@ from msgspec import structs
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.samples import Quality
 from seerob.core.verdict import Verdict
-from seerob.criteria.as_heard import AGAIN, LASTS, AsHeard, _no_farther
 from seerob.criteria.judging import Judge
+from seerob.criteria.plausible_places import AGAIN, LASTS, PlausiblePlaces, _no_farther
 from seerob.devices.sources.csv import Csv
 from seerob.devices.sources.joint_angles import JointAngleFile
 from seerob.devices.sources.keyframes import Keyframes
@@ -215,5 +215,5 @@ def test_up_to_the_value_that_was_confirmed_and_at_it(value, confirmed, no_farth
 )
 def test_it_waits_for_whom_a_device_or_a_capture_places(tmp_path, source, waits):
     model = made(tmp_path, CELL, {"arm.urdf": two_r()}).model
-    asked = AsHeard(replace(model, workstation=structs.replace(model.workstation, sources=(source,))))
+    asked = PlausiblePlaces(replace(model, workstation=structs.replace(model.workstation, sources=(source,))))
     assert asked.waits is waits

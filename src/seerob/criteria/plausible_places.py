@@ -27,7 +27,7 @@ LASTS = 3.0
 jumps for longer, and what somebody stands on for longer is part of the workstation."""
 
 
-class AsHeard:
+class PlausiblePlaces:
     """Findings about where robots and people were heard to be, bound once.
 
     Args:

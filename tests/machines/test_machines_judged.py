@@ -10,6 +10,7 @@ from made_cell import heard, made, person, two_r
 from seerob.core.errors import InputError
 from seerob.core.verdict import Verdict
 from seerob.criteria.judging import Judge
+from seerob.recording.series import CODES
 from seerob.twin.engine import Engine
 
 VARIABLES = "".join(
@@ -218,6 +219,29 @@ def test_what_an_arm_carries_may_get_faster_by_itself_while_it_reacts(tmp_path):
     assert not (np.array(found.verdicts)[beyond] == 0).any()
     far = made(tmp_path / "far", text.replace("3.5, 0, 0", "4.6, 0, 0"), files).run().results["arm"]
     assert (np.array(far.verdicts)[:90] == 0).all()
+    near = made(tmp_path / "near", text.replace("3.5, 0, 0", "3.9, 0, 0"), files).run().results["arm"]
+    reasons = {near.reasons[k] for k in np.flatnonzero(near.verdicts == CODES[Verdict.UNDECIDED])}
+    assert any("if mover goes all of its stroke: give stop.acceleration" in text for text in reasons)
+    assert not any("as fast as it can be" in text for text in reasons)
+
+
+def test_what_masses_and_a_stroke_may_add_to_a_simulated_stop_counts_together(tmp_path):
+    """The stroke of what an arm carries took the place of what its masses may be off by."""
+    ram = 'on = "arm/tip"\nshape = { box = [0.3, 0.1, 0.1] }\nmass = 1\nslide = { along = [1, 0, 0], '
+    stop = f'stop = {{ reaction = {T_R}, model = "simulated", brakes = [4.0, 4.0] }}\n'
+    files = LOGS | {"arm.csv": _log(T, ("rad", T), ("rad", 0 * T)), "moves.csv": _log(T, ("m", 0 * T))}
+
+    def more(tolerance, stroke):
+        text = recorded(9, tolerance, f"{ram}lower = 0, upper = {stroke} }}\n")
+        text = text.replace(f"stop = {{ reaction = {T_R}, stopping = {T_S} }}\n", stop)
+        folder = tmp_path / f"{len(tolerance)} {stroke}"
+        series = made(folder, text, files).run(stop=lambda: True).results["arm"]
+        return series.parts["S_p may be larger by"].values[0]
+
+    off = "mass_tolerance = 0.5\n"
+    assert more("", 0.6) == pytest.approx(0.6)
+    assert more(off, 0.001) > 1
+    assert more(off, 0.6) - more(off, 0.001) == pytest.approx(0.599)
 
 
 SPEEDS = (

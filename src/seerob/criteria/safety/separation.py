@@ -32,7 +32,7 @@ from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping.inputs import approach_speed, intrusion
 from seerob.criteria.stopping.largest import LargestSeparation
 from seerob.criteria.stopping.many_instants import separations as at_instants
-from seerob.criteria.stopping.models import MOVING, Stop, StopModel, bind_stop
+from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.reaction import joint_limits
 from seerob.criteria.stopping.search import TOP, factor_by_search
@@ -356,7 +356,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
         human = self._sides(model)[1]
         ends_of_distance = DistanceEnds(model, gap)
         largest_ends = (1,) * len(ends.tolerances)
-        movers = (human, *self._everybody(model))
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap, allow_estimated=True, strayed=True)
@@ -412,10 +411,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 wide = float(far[k] - near[k])
                 open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
                 if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
-                    faster = "if the robot is as fast as it can be during the reaction time: give "
-                    why = stop.more or f"{faster}stop.acceleration, or acceleration_limits"
-                    if not state.speed_errors.keys().isdisjoint(movers):
-                        why = "by the noise of positions that speeds are derived from"
+                    noisy = human in state.speed_errors and NOISY not in now.more
+                    why = "; ".join(filter(None, (now.more, NOISY * noisy)))
                     open_ = f"S_p is up to {most[k]:.3f} m {why}"
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts[k].name} ↔ {nearest}"

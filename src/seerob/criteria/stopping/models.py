@@ -20,7 +20,7 @@ from seerob.criteria.stopping.by_energy import bind_braked_in_span
 from seerob.criteria.stopping.by_table import InSpan, Stopping, bind_in_span, bind_table, not_its_own
 from seerob.criteria.stopping.onset import At as OnsetAt
 from seerob.criteria.stopping.onset import Onset, by_speed
-from seerob.criteria.stopping.reaction import Reactions, bind_reaction, bind_riders, joint_limits
+from seerob.criteria.stopping.reaction import GIVE, Reactions, bind_reaction, bind_riders, joint_limits
 from seerob.criteria.stopping.simulated import Stopped, StopSimulation
 from seerob.criteria.stopping.table import StoppingTable
 from seerob.criteria.stopping.terms import (
@@ -51,6 +51,10 @@ STEADY = 1e-3
 """Speeds of joints that differ by less during the reaction time are the same [rad/s or m/s]."""
 MOVING = 1e-6
 """Speed above which a robot moves [m/s]."""
+FASTEST = f"if the robot is as fast as it can be during the reaction time: {GIVE}, or acceleration_limits"
+"""When ways are up to those of the reaction at its worst, in words."""
+NOISY = "by the noise of positions that speeds are derived from"
+"""Likewise, of speeds that may be off."""
 INSTANTS = 16
 """At most this many instants of a stop are asked for their distance to the person."""
 
@@ -168,8 +172,6 @@ class StopModel(Struct, frozen=True, eq=False):
     """Whether what is known ahead is in a course: then it is that of the whole tick that begins with it."""
     costly: bool = False
     """Takes milliseconds: searches ask it seldom."""
-    more: str = ""
-    """When ways are up to those of `Course.most`, in words; empty for the reaction time's."""
 
 
 class _Brakes(Struct, frozen=True, eq=False):
@@ -186,6 +188,7 @@ class _Brakes(Struct, frozen=True, eq=False):
     timed: bool = False
     costly: bool = False
     more: str = ""
+    """When ways are up to those of `Course.most`, in words; empty where they have none."""
 
 
 def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
@@ -220,6 +223,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
     )  # fmt: skip
     carries = stop.acceleration is None and bool(robot.riders)
     by_themselves = bind_riders(model, robot, gap, stop.reaction) if carries else None
+    everybody = (robot.name, *robot.riders, *model.carriers_of(robot.name))
 
     def reactions(state: State) -> tuple[OnsetAt, OnsetAt | None]:
         found: tuple[OnsetAt, OnsetAt | None] = state.once(("onset", asked), lambda: asked(state))
@@ -245,7 +249,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             least = np.zeros_like(onset.S_r)
             return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, unbounded)))
 
-        ways, restless = (np.zeros(0), "") if by_themselves is None else by_themselves(state)
+        ways, restless, who = (np.zeros(0), "", "") if by_themselves is None else by_themselves(state)
         # Who stops within a stroke takes no longer than with the given deceleration over all of it.
         longer = (
             0.0 if stop.deceleration is None else math.sqrt(2 * ways.max(initial=0.0) / stop.deceleration)
@@ -253,12 +257,15 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
 
         def at(scale: float) -> Course:
             course = after(least(scale), scale)
-            top = None if most is None else after(most(scale), scale)
+            top = course if most is None else after(most(scale), scale)
+            noisy = not state.speed_errors.keys().isdisjoint(everybody)
+            why = [NOISY if noisy else FASTEST] * (most is not None) + [found.more] * (top.most is not None)
+            top = top.most or top
             if restless or ways.any():
-                top = top or course
                 unbounded = "; ".join(filter(None, (top.unbounded_reason, restless)))
                 top = replace(top, S_r=top.S_r + ways, T_s=top.T_s + longer, unbounded_reason=unbounded)
-            return course if top is None else replace(course, most=top)
+                why += [f"if {who} goes all of its stroke: {GIVE}"] * bool(ways.any())
+            return course if top is course else replace(course, most=top, more="; ".join(why))
 
         return at
 
@@ -274,7 +281,6 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         found.in_span,
         stop.acceleration is None,
         found.costly,
-        found.more,
     )
 
 

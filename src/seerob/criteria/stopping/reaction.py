@@ -153,7 +153,9 @@ def stands_until(state: State, name: str, span: float) -> bool:
     return bool(max(moved) <= RESTS)
 
 
-def bind_riders(model: Model, robot: Mechanism, gap: Gap, T_r: float) -> Callable[[State], tuple[Array, str]]:
+def bind_riders(
+    model: Model, robot: Mechanism, gap: Gap, T_r: float
+) -> Callable[[State], tuple[Array, str, str]]:
     """Resolve how far machines on a robot may carry parts by themselves until all stand.
 
     No farther than their fingers and slides reach, whatever they do. Nothing bounds what turns.
@@ -165,7 +167,7 @@ def bind_riders(model: Model, robot: Mechanism, gap: Gap, T_r: float) -> Callabl
         T_r: Reaction time [s].
 
     Returns:
-        From a state to ways [m], shape (n,), and why they may be longer.
+        From a state to ways [m], shape (n,), why they may be longer, and whose they are.
     """
     none, lead = np.zeros(len(gap.b)), model.workstation.engine.tick
     strokes: list[tuple[str, Array, str]] = []
@@ -178,10 +180,11 @@ def bind_riders(model: Model, robot: Mechanism, gap: Gap, T_r: float) -> Callabl
         ways = none if endless else np.array([reach[row].sum() for row in rows])
         strokes.append((rider.name, ways, why if endless else ""))
 
-    def at(state: State) -> tuple[Array, str]:
+    def at(state: State) -> tuple[Array, str, str]:
         going = [each for each in strokes if not stands_until(state, each[0], T_r + lead)]
         why = "; ".join(filter(None, (each[2] for each in going)))
-        return np.sum([none, *(each[1] for each in going)], axis=0), why
+        who = ", ".join(each[0] for each in going)
+        return np.sum([none, *(each[1] for each in going)], axis=0), why, who
 
     return at
 

@@ -43,6 +43,8 @@ class Course(Struct, frozen=True, eq=False):
     """Why it may be more than this."""
     most: Course | None = None
     """A bound from above, where this is one from below."""
+    more: str = ""
+    """When it is up to ``most``, in words."""
 
 
 At = Callable[[float], Course]

@@ -7,12 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_permissible_speed import KEPT_OUT, KNOWN, PERSON, PFL, cell
+from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PERSON, PFL, SOURCE, cell, turn
 
+from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.errors import InputError
+from seerob.core.snapshot import Result
 from seerob.core.verdict import Verdict
+from seerob.recording.series import CODES, Series
 from seerob.session.permissible.ceilings import By, Ceiling, Method, governing
-from seerob.session.permissible.evaluation import Wish, given_motion, witness
+from seerob.session.permissible.evaluation import Wish, either_permits, given_motion, witness
 from seerob.session.permissible.joint_limits import joint_limits
 from seerob.session.permissible.path import path_of
 from seerob.session.permissible.survey import Survey
@@ -85,6 +88,42 @@ def test_either_is_quicker_and_judged_together(tmp_path):
     assert either.after.verdict == Verdict.EXCEEDED
     assert either.verified.kept
     assert either.verdict == both.verdict == Verdict.WITHIN
+
+
+def test_a_method_that_a_run_takes_back_permits_nothing_alone(tmp_path):
+    """The arm gets faster than the file says, which only the run finds: nothing rests on separation then."""
+    text = FLOATING + TWO_R + LIMITS + PERSON.format(x=3.2) + SOURCE + KNOWN + PFL + KEPT_OUT
+    station = made(tmp_path, text, {"arm.urdf": two_r(), "motion.csv": turn()})
+    found = station.permissible_speed(wish=replace(COARSE, by=By.EITHER))
+    assert CODES[Verdict.UNDECIDED] in found.after.results["S"].verdicts
+    assert found.verified.kept
+    assert found.verdict is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("S", "F", "between", "expected"),
+    [
+        ("wx", "xw", "accepted: looked at", Verdict.WITHIN),
+        ("wx", "xx", "accepted: looked at", Verdict.EXCEEDED),
+        ("wu", "xx", "accepted: looked at", Verdict.UNDECIDED),
+        # Where contact has nothing to judge, the plan's own looks say whether it permits.
+        ("wx", "xn", "accepted: looked at", Verdict.WITHIN),
+        ("wx", "xw", "nothing bounds it", Verdict.UNDECIDED),
+        ("ww", "xw", "nothing bounds it", Verdict.WITHIN),
+    ],
+)
+def test_one_of_two_methods_has_to_permit_every_tick(S, F, between, expected):
+    verdicts = {"w": Verdict.WITHIN, "x": Verdict.EXCEEDED, "u": Verdict.UNDECIDED, "n": None}
+    log = {
+        "S": Series(name="S", unit="m", at_most=False),
+        "F": Series(name="F", unit="", at_most=True, between=between),
+    }
+    for name, said in (("S", S), ("F", F)):
+        for k, letter in enumerate(said):
+            result = Result(name=name, verdict=verdicts[letter], nothing=letter == "n")
+            log[name].pass_time(result, 0.01 * k)
+            log[name].append(result, 0.01 * k)
+    assert either_permits(log, {"S": Method.SSM, "F": Method.PFL}) is expected
 
 
 def test_contact_counts_wherever_people_are_when_it_permits_alone(tmp_path):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
 from msgspec.structs import replace as changed
 
 from seerob.core.errors import InputError
@@ -14,8 +15,8 @@ from seerob.core.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.files.trajectories.trajectory import TrajectorySamples
 from seerob.model.model import Model
 from seerob.recording.result_log import ResultLog
-from seerob.recording.series import worst_verdict
-from seerob.session.permissible.ceilings import By
+from seerob.recording.series import CODES, Series, worst_verdict
+from seerob.session.permissible.ceilings import By, Method
 from seerob.session.permissible.joint_limits import JointLimits
 from seerob.session.permissible.path import GivenMotion, Path, path_of, solved
 from seerob.session.permissible.rescaled import Check, Rescaled, Spent, check, rescale, spent
@@ -80,7 +81,7 @@ class PermissibleSpeed:
         """Verdict of the rescaled motion, or why there is none.
 
         That of every criterion in the run of it; with `By.EITHER` the two methods count together, as they
-        were asked at `Verified.period`, instead of each by itself.
+        were asked at `Verified.period` and at each tick of the run, instead of each by itself.
         """
         if self.after is None or self.verified is None:
             return Verdict.UNDECIDED if self.map.undecided else Verdict.EXCEEDED
@@ -92,7 +93,35 @@ class PermissibleSpeed:
             for name, series in self.after.results.items()
             if self.map.by is not By.EITHER or name not in self.map.methods
         }
-        return worst_verdict([planned, *alone.values()])
+        either = [either_permits(self.after.results, self.map.methods)] if self.map.by is By.EITHER else []
+        return worst_verdict([planned, *alone.values(), *either])
+
+
+_SURE, _PLANNED, _OPEN, _BEYOND = range(4)
+"""What a method says at a tick: it permits it; it has nothing to judge, and only the plan's own looks say
+whether it does (nobody is near, it does not apply); nobody knows; it does not."""
+_RANKS = np.full(256, _OPEN)
+_RANKS[[CODES[Verdict.WITHIN], CODES[None], CODES[Verdict.EXCEEDED]]] = _SURE, _PLANNED, _BEYOND
+
+
+def either_permits(log: Mapping[str, Series], methods: Mapping[str, Method]) -> Verdict:
+    """Verdict of two methods of which one suffices at each tick of a run, with all that a run takes back.
+
+    Args:
+        log: What every criterion said over the run; what nothing bounds between ticks is open.
+        methods: Names of the criteria of each method.
+    """
+    t = np.unique(np.concatenate([log[name].t for name in methods]))
+    worst = {method: np.full(len(t), _SURE) for method in methods.values()}
+    for name, method in methods.items():
+        series = log[name]
+        k = np.searchsorted(series.t, t, side="right") - 1
+        said = np.where(k < 0, _OPEN, _RANKS[series.verdicts[np.maximum(k, 0)]])
+        if series.gap():
+            said = np.where(said == _SURE, _OPEN, said)
+        worst[method] = np.maximum(worst[method], said)
+    least = np.min(list(worst.values()), axis=0).max(initial=_SURE)
+    return {_BEYOND: Verdict.EXCEEDED, _OPEN: Verdict.UNDECIDED}.get(int(least), Verdict.WITHIN)
 
 
 def given_motion(model: Model, sources: Sources, robot: str) -> tuple[GivenMotion, tuple[Finding, ...]]:

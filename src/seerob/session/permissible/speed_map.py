@@ -13,7 +13,7 @@ speed it permits (`seerob.session.permissible.ceilings`). The permissible path s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
 from seerob.core.transforms import Array
-from seerob.session.permissible.ceilings import By, Ceiling, governing
+from seerob.session.permissible.ceilings import By, Ceiling, Method, governing
 from seerob.session.permissible.joint_limits import JointLimits
 from seerob.session.permissible.path import Path, Piece
 
@@ -90,8 +90,8 @@ class SpeedMap:
     by: By
     asked: tuple[str, ...]
     """Names of the criteria."""
-    methods: frozenset[str]
-    """Which of them are separation monitoring, or power and force limiting."""
+    methods: Mapping[str, Method]
+    """Which of them are separation monitoring, or power and force limiting, by name."""
 
     @property
     def undecided(self) -> tuple[tuple[float, Ceiling], ...]:

@@ -105,7 +105,7 @@ class Survey:
 
             found.append(self._stations(piece, s, others_at, told))
             before += length
-        methods = frozenset(name for name, ask in self._asks.items() if ask.method is not Method.OWN)
+        methods = {name: ask.method for name, ask in self._asks.items() if ask.method is not Method.OWN}
         asked = tuple(self._asks)
         return SpeedMap(self._robot.name, self._path, self._limits, tuple(found), self._by, asked, methods)
 

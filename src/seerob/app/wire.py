@@ -17,7 +17,7 @@ from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
 from types import GenericAlias, NoneType, UnionType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Struct
@@ -87,7 +87,7 @@ def _declarations(*, docs: bool) -> Iterator[str]:
     yield f"export type PageMessage = {' | '.join(c.__name__ for c in FROM_PAGE)};\n"
 
 
-def _aliases() -> dict[Any, str]:
+def _aliases() -> dict[object, str]:
     return {v: k for k, v in vars(snapshot).items() if isinstance(v, (GenericAlias, UnionType))}
 
 
@@ -102,7 +102,7 @@ def _enum(cls: type[StrEnum], *, docs: bool) -> str:
     return _comment("\n".join(lines).strip()) + text
 
 
-def _interface(cls: type[Struct], aliases: dict[Any, str], *, docs: bool) -> str:
+def _interface(cls: type[Struct], aliases: dict[object, str], *, docs: bool) -> str:
     texts = _field_docs(cls) if docs else {}
     hints = get_type_hints(cls)
     lines = [f"export interface {cls.__name__} {{\n"]
@@ -142,11 +142,11 @@ _SIMPLE = {
     bool: "boolean",
     bytes: "Uint8Array",
     NoneType: "null",
-    Any: "unknown",
+    object: "unknown",
 }
 
 
-def _type(hint: Any, aliases: dict[Any, str]) -> str:
+def _type(hint: object, aliases: dict[object, str]) -> str:
     if hint in aliases:
         return aliases[hint]
     if hint in _SIMPLE:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound="DataclassInstance")
 
 
-def by_name(kind: type[T], given: object, **instead: Any) -> T:
+def by_name(kind: type[T], given: object, **instead: object) -> T:
     """Fill a dataclass from whoever has attributes of the same names.
 
     Args:

@@ -40,7 +40,7 @@ HEAD, WRAP = "head", "wrap"
 """Looks beside the verdicts' words and number formats such as ``0.000``."""
 WORDS = {v.value: v for v in Verdict}
 """Of verdicts, which have a look each."""
-_WRAPPED: dict[str, Any] = {"text_wrap": True, "valign": "top"}
+_WRAPPED: dict[str, object] = {"text_wrap": True, "valign": "top"}
 
 
 class Formats:
@@ -67,7 +67,7 @@ class Formats:
         return self._made[key]
 
 
-def _properties(look: str) -> dict[str, Any]:
+def _properties(look: str) -> dict[str, object]:
     if look == HEAD:
         return {"bold": True, **_WRAPPED}
     if look == WRAP:

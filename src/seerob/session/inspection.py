@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from seerob.core import plugin
 from seerob.core.errors import InputError, SeerobError
@@ -90,7 +90,7 @@ def _shortened(facts: list[Fact]) -> list[Fact]:
     return kept if len(kept) == len(facts) else [*kept, Fact("note", f"and {len(facts) - _SHOWN} more")]
 
 
-def _outside(table: Mapping[str, Any], file: object, folder: Path) -> list[Named]:
+def _outside(table: Mapping[str, object], file: object, folder: Path) -> list[Named]:
     try:
         return list(named_outside(table, folder))
     except ValueError as error:
@@ -104,7 +104,7 @@ def _refused(outside: Named) -> Fact:
 # -- files ------------------------------------------------------------------------------------
 
 
-def _files(table: Mapping[str, Any], file: Path, folder: Path) -> Iterator[Fact]:
+def _files(table: Mapping[str, object], file: Path, folder: Path) -> Iterator[Fact]:
     """What is read, inside and outside the folder."""
     outside = _outside(table, file, folder)
     yield from map(_refused, outside)
@@ -158,7 +158,7 @@ def _named_in(path: Path, shown: str, folder: Path) -> Iterator[Fact]:
 # -- what runs, who is connected to, what is written --------------------------------------------
 
 
-def _rest(table: Mapping[str, Any], file: Path) -> Iterator[Fact]:
+def _rest(table: Mapping[str, object], file: Path) -> Iterator[Fact]:
     for group in PLUGINS:
         offered = plugin.offered(group)
         entries = table.get(group, [])
@@ -187,7 +187,7 @@ def _imported(kind: str, key: str, point: EntryPoint | None) -> Fact:
     return Fact("imports", f"{point.value} of {who}, which runs its code ({key} = {kind!r})")
 
 
-def _source(kind: str, entry: Mapping[str, Any], key: str, file: Path) -> Iterator[Fact]:
+def _source(kind: str, entry: Mapping[str, object], key: str, file: Path) -> Iterator[Fact]:
     rest = {name: value for name, value in entry.items() if name != "kind"}
     try:
         wanted = plugin.load("sources", kind, Source)
@@ -207,7 +207,7 @@ def _source(kind: str, entry: Mapping[str, Any], key: str, file: Path) -> Iterat
         yield Fact("sends", f"run, probe: the secret {contact.secret} to whom {key} {contact.where}, {to}")
 
 
-def _raw(rest: Mapping[str, Any]) -> Contact:
+def _raw(rest: Mapping[str, object]) -> Contact:
     """Whom an entry with mistakes would speak to, as far as it says."""
     where = ", ".join(
         f"{key} = {rest[key]}" for key in ("url", "host", "bind", "sender", "port") if key in rest
@@ -216,7 +216,7 @@ def _raw(rest: Mapping[str, Any]) -> Contact:
     return Contact(f"connects or listens: {where or 'as the kind has it'}", str(rest.get("user", "")), secret)
 
 
-def _writing(table: Mapping[str, Any]) -> Iterator[Fact]:
+def _writing(table: Mapping[str, object]) -> Iterator[Fact]:
     """Triggers and targets, which write to machines."""
     may = (
         "" if table.get("allow_writing") is True else "; allow_writing is not set, so that nothing is written"

@@ -106,7 +106,7 @@ def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
     return found._replace(head=head, problems=[*problems, *found.problems])
 
 
-def _outside(table: Mapping[str, Any], file: Path) -> list[Named]:
+def _outside(table: Mapping[str, object], file: Path) -> list[Named]:
     """The file itself where it is a link that leaves its folder, and what it names outside.
 
     Raises:
@@ -121,7 +121,7 @@ def _outside(table: Mapping[str, Any], file: Path) -> list[Named]:
 
 
 def convert_workstation(
-    table: Mapping[str, Any], file: str, allowed: Allowed = NOTHING
+    table: Mapping[str, object], file: str, allowed: Allowed = NOTHING
 ) -> tuple[Workstation | None, list[Problem]]:
     """The typed workstation of a parsed file, and every mistake that was found."""
     found = _convert(table, file, allowed)
@@ -130,7 +130,7 @@ def convert_workstation(
     return with_entries(found.head, found.entries), []
 
 
-def with_entries(head: Workstation, entries: Mapping[str, Mapping[int, Any]]) -> Workstation:
+def with_entries(head: Workstation, entries: Mapping[str, Mapping[int, object]]) -> Workstation:
     """A workstation of its head and its lists of tables."""
     return msgspec.structs.replace(head, **{g: tuple(found.values()) for g, found in entries.items()})
 
@@ -165,7 +165,7 @@ def _convert(table: Mapping[str, Any], file: str, allowed: Allowed = NOTHING) ->
 
 
 def _entry(
-    table: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem], allowed: Allowed
+    table: Mapping[str, object], group: str, key: str, file: str, problems: list[Problem], allowed: Allowed
 ) -> Struct | None:
     if group in PLUGINS:
         return _plugin(table, group, key, file, problems, allowed)
@@ -179,7 +179,7 @@ def _entry(
     return None if files else rest
 
 
-def _right(table: Mapping[str, Any], place: str, problems: Sequence[Problem]) -> dict[str, Any]:
+def _right(table: Mapping[str, object], place: str, problems: Sequence[Problem]) -> dict[str, object]:
     """A table without the keys that problems are in."""
     start = f"{place}." if place else ""
     wrong = [problem.key for problem in problems]
@@ -192,7 +192,7 @@ def _right(table: Mapping[str, Any], place: str, problems: Sequence[Problem]) ->
     }
 
 
-def _head(table: Mapping[str, Any], file: str, problems: list[Problem]) -> Workstation:
+def _head(table: Mapping[str, object], file: str, problems: list[Problem]) -> Workstation:
     """What is not in a list of tables; a key that is wrong is left out."""
     groups = (*TABLES, *PLUGINS)
     hidden = (*_NOT_IN_FILE, *groups)
@@ -205,7 +205,7 @@ def _head(table: Mapping[str, Any], file: str, problems: list[Problem]) -> Works
 
 
 def _plugin(
-    entry: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem], allowed: Allowed
+    entry: Mapping[str, object], group: str, key: str, file: str, problems: list[Problem], allowed: Allowed
 ) -> Struct | None:
     kind = entry.get("kind")
     if not isinstance(kind, str):

@@ -75,7 +75,7 @@ class Spoiling:
     """In which nothing that depends on it may be within."""
 
 
-def _number(k: int, sample: JointSample, **more: Any) -> JointSample:
+def _number(k: int, sample: JointSample, **more: object) -> JointSample:
     return sample if k < SPOILED else changed(sample, **more)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from seerob.core.errors import Problem
 from seerob.core.files.bounded import REMEDY, leads_outside
@@ -39,7 +39,7 @@ class Named(NamedTuple):
         return Problem(file, self.key, f"leads to {self.real}, outside the folder of the workstation", REMEDY)
 
 
-def named_outside(table: Mapping[str, Any], folder: Path) -> Iterator[Named]:
+def named_outside(table: Mapping[str, object], folder: Path) -> Iterator[Named]:
     """What a workstation file names outside its folder.
 
     Args:
@@ -66,13 +66,13 @@ def _linked(folder: Path, within: Path) -> Iterator[Path]:
             yield real
 
 
-def texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def texts(table: Mapping[str, object]) -> Iterator[tuple[str, str]]:
     """Every text of a file with its key, in order.
 
     Raises:
         ValueError: It is nested more deeply than any table is.
     """
-    waiting: list[tuple[str, Any, int]] = [("", table, 0)]
+    waiting: list[tuple[str, object, int]] = [("", table, 0)]
     while waiting:
         key, value, depth = waiting.pop()
         if depth > DEEPEST:

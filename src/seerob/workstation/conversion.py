@@ -38,12 +38,12 @@ def members(wanted: Any) -> tuple[Any, ...]:
     return (wanted,)
 
 
-def is_struct(wanted: Any) -> bool:
+def is_struct(wanted: object) -> bool:
     """Whether a type is a table."""
     return isinstance(wanted, type) and issubclass(wanted, Struct)
 
 
-def unit_of(wanted: Any) -> str | None:
+def unit_of(wanted: object) -> str | None:
     """Unit in the metadata of a type, also inside ``X | None`` and ``dict[str, X]``."""
     for meta in getattr(wanted, "__metadata__", ()):
         if isinstance(meta, msgspec.Meta) and meta.extra and "unit" in meta.extra:
@@ -54,7 +54,7 @@ def unit_of(wanted: Any) -> str | None:
     return None
 
 
-def choices(wanted: Any) -> tuple[str, ...]:
+def choices(wanted: object) -> tuple[str, ...]:
     """What a closed set allows; empty when the type is not one."""
     found: list[str] = []
     for member in members(wanted):
@@ -65,7 +65,7 @@ def choices(wanted: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
-def described(wanted: Any) -> str | None:
+def described(wanted: object) -> str | None:
     """What the metadata of a type say in words, also inside ``X | Y``."""
     for meta in getattr(wanted, "__metadata__", ()):
         if isinstance(meta, msgspec.Meta) and meta.description:
@@ -75,7 +75,7 @@ def described(wanted: Any) -> str | None:
     return None
 
 
-def expected(wanted: Any, complaint: str) -> str:
+def expected(wanted: object, complaint: str) -> str:
     """What would be right, from the type and the complaint of `msgspec`.
 
     Args:
@@ -103,7 +103,7 @@ LARGEST = 1e9
 
 
 def convert(
-    table: Mapping[str, Any],
+    table: Mapping[str, object],
     wanted: type[T],
     *,
     file: str,
@@ -125,7 +125,7 @@ def convert(
     """
     fields = {f.encode_name: f for f in msgspec.structs.fields(wanted) if f.encode_name not in hidden}
     before = len(problems)
-    values: dict[str, Any] = {}
+    values: dict[str, object] = {}
     for name, value in table.items():
         place = _join(key, name)
         field, factor = _field(name, fields)
@@ -161,7 +161,7 @@ def tables(value: Any, place: str, file: str, problems: list[Problem]) -> list[M
     return []
 
 
-def short(value: Any) -> str:
+def short(value: object) -> str:
     """A value for a message."""
     text = (
         "nothing"
@@ -179,7 +179,7 @@ def _join(key: str, name: str) -> str:
     return f"{key}.{name}" if key else name
 
 
-def _give(wanted: Any) -> str:
+def _give(wanted: object) -> str:
     unit = unit_of(wanted)
     if unit:
         return f"give it [{unit}]"
@@ -212,7 +212,7 @@ def _wrong_unit(name: str, fields: Mapping[str, Any]) -> str:
     return ""
 
 
-def _scaled(value: Any, factor: float) -> Any:
+def _scaled(value: object, factor: float) -> object:
     """Numbers times a factor, at any depth; what is not a number is left for `_value` to refuse."""
     if isinstance(value, bool) or not isinstance(value, int | float | list | dict):
         return value
@@ -259,7 +259,7 @@ def _value(value: Any, wanted: Any, place: str, file: str, problems: list[Proble
         return None
 
 
-def _inner(value: Any, path: str) -> Any:
+def _inner(value: object, path: str) -> object:
     """The value that ``[2][0]`` means inside another; the whole when the path cannot be followed."""
     for index in re.findall(r"\[(\d+)\]", path):
         if not isinstance(value, list) or int(index) >= len(value):
@@ -268,11 +268,11 @@ def _inner(value: Any, path: str) -> Any:
     return value
 
 
-def _unusable(value: Any, place: str) -> tuple[str, Any] | None:
+def _unusable(value: object, place: str) -> tuple[str, object] | None:
     """Place and value of the first number, at any depth, that is not finite or absurdly large."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return None if abs(value) <= LARGEST else (place, value)
-    items: list[tuple[str, Any]] = []
+    items: list[tuple[str, object]] = []
     if isinstance(value, list):
         items = [(f"{place}[{i}]", item) for i, item in enumerate(value)]
     elif isinstance(value, dict):

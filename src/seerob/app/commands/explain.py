@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from seerob.app.console.loading import compiled
 from seerob.app.console.terminal import OUT, Exit, add_workstation, allowed, line
@@ -114,7 +114,7 @@ def sentence(found: Explanation) -> str:
     return f"the model of the file and friction explain the log, the payload to {slack}"
 
 
-def figures(found: Explanation) -> dict[str, Any]:
+def figures(found: Explanation) -> dict[str, object]:
     """For JSON; null where the motion does not tell a figure."""
     return {
         "robot": found.robot,

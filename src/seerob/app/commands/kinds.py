@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any, get_args
+from typing import get_args
 
 import msgspec
 
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     return Exit.WITHIN
 
 
-def _unit(wanted: Any) -> str:
+def _unit(wanted: object) -> str:
     for item in (wanted, *get_args(wanted)):
         for meta in getattr(item, "__metadata__", ()):
             if isinstance(meta, msgspec.Meta) and meta.extra and "unit" in meta.extra:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from seerob.app.console.progress import lines
 from seerob.app.console.terminal import STATUS, WORDS, line, tell, tell_results
@@ -115,7 +115,7 @@ def tell_plan(found: PermissibleSpeed, cut: Sequence[PathSegment]) -> None:
 
 def permissible_json(
     found: PermissibleSpeed, cut: Sequence[PathSegment], bounds: Sequence[Bound], folder: Path
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """What was found, for machines; not a number and infinite become null."""
     from seerob.session.permissible.tables import SEGMENT_HEAD, segment_rows
 
@@ -146,7 +146,7 @@ def permissible_json(
 
 
 @contextmanager
-def work_progress(*, quiet: bool) -> Iterator[Any]:
+def work_progress(*, quiet: bool) -> Iterator[Callable[[str, float], None]]:
     """A bar on a terminal that says which part of the work is done; elsewhere `lines`."""
     if quiet or not STATUS.is_terminal:
         say = (lambda _: None) if quiet else lines()

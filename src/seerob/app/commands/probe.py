@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import aclosing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import OUT, Exit, add_allowed, allowed, line, port, seconds
@@ -75,7 +75,7 @@ async def _heard(
     return arrivals, reasons
 
 
-def _address(shown: str) -> Any:
+def _address(shown: str) -> object:
     """An address as a dictionary has it; some are tables."""
     return tomllib.loads(f"value = {shown}")["value"] if shown.startswith("{") else shown
 
@@ -200,7 +200,7 @@ def _workstation(path: Path, allow: Allowed) -> int:
     return Exit.ERROR if any("not reached at start" in f.text for f in said) else Exit.WITHIN
 
 
-def heard_rate(source: LiveSource, given: dict[str, Any], rate: float | None) -> int | None:
+def heard_rate(source: LiveSource, given: dict[str, object], rate: float | None) -> int | None:
     """What ``frequency`` should be [Hz]; None when it is right, was asked for, or is no option of the source.
 
     Args:
@@ -220,7 +220,7 @@ def heard_rate(source: LiveSource, given: dict[str, Any], rate: float | None) ->
     return round(rate)
 
 
-def _variables(source: VariablesSource, kind: str, given: dict[str, Any], wait: float) -> int:
+def _variables(source: VariablesSource, kind: str, given: dict[str, object], wait: float) -> int:
     """Print what a device has, and how regularly; a dictionary says what it means."""
     import asyncio
 
@@ -282,7 +282,7 @@ def _save_calibration(source: LiveSource, path: Path, where: str) -> None:
     line("wrote", f'{path}; in the robot\'s table: calibration = "{path.name}"', "bold")
 
 
-def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
+def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, object]]:
     """The source, and the options that make it."""
     from seerob.core.errors import Problem
     from seerob.core.extras import need
@@ -313,7 +313,7 @@ def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
     return source, given
 
 
-def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, Any]:
+def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, object]:
     """Options of a source from ``KEY=VALUE`` texts, values as in the workstation file.
 
     Args:
@@ -325,7 +325,7 @@ def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, Any
     """
     import tomllib
 
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for pair in pairs:
         key, equals, text = pair.partition("=")
         if not (equals and key.isidentifier()):
@@ -368,7 +368,7 @@ def _tell(sample: Sample) -> None:
             line("reason", reason, "yellow")
 
 
-def _snippet(kind: str, given: dict[str, Any]) -> str:
+def _snippet(kind: str, given: dict[str, object]) -> str:
     from seerob.files.tables.mapping import toml_value
 
     shown = (f"{key} = {toml_value(value)}" for key, value in given.items())

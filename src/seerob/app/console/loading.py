@@ -156,7 +156,7 @@ def _means(text: str, name: str) -> bool:
     return text == name or below or any(sign in text for sign in "*?[")
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _texts(value: object) -> Iterator[str]:
     """Every text in a table, but for its own name."""
     if isinstance(value, str):
         yield value

@@ -291,7 +291,7 @@ def _otherwise(series: Series) -> str:
     return f"; undecided {percent(share)} of the time, else {text}"
 
 
-def results_json(summary: Summary, **more: Any) -> str:
+def results_json(summary: Summary, **more: object) -> str:
     """The results for machines."""
     criteria = []
     for name, series in summary.results.items():

@@ -38,7 +38,7 @@ def option(text: str, unit: str = "", **limits: Any) -> Any:
     return Meta(description=text, extra={"unit": unit} if unit else None, **limits)
 
 
-def port(text: str = "port; 0 is any free one") -> Any:
+def port(text: str = "port; 0 is any free one") -> object:
     """Metadata of a port."""
     return option(text, ge=0, le=65535)
 

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
@@ -147,7 +147,7 @@ class _Answers(asyncio.DatagramProtocol):
     def __init__(self, server: FriServer) -> None:
         self._server = server
 
-    def datagram_received(self, data: bytes, _: tuple[str | Any, int]) -> None:
+    def datagram_received(self, data: bytes, _: tuple[str | object, int]) -> None:
         self._server.heard(data)
 
 

@@ -97,9 +97,9 @@ class RosbridgeServer(RosRobot):
         name = self.topics[topic][0].message_type
         return ros1_name(name) if self.edition is Edition.ROS1 else name
 
-    def _answer(self, asked: dict[str, Any]) -> str:
+    def _answer(self, asked: dict[str, object]) -> str:
         service = str(asked.get("service", ""))
-        values: dict[str, Any] = {}
+        values: dict[str, object] = {}
         if service == "/rosapi/topics":
             values = {"topics": list(self.topics), "types": [self._type(t) for t in self.topics]}
         known = bool(values)
@@ -113,7 +113,7 @@ class RosbridgeServer(RosRobot):
             }
         )
 
-    async def _publish(self, connection: ServerConnection, topic: str, asked: dict[str, Any]) -> None:
+    async def _publish(self, connection: ServerConnection, topic: str, asked: dict[str, object]) -> None:
         from websockets.exceptions import ConnectionClosed
 
         compression = str(asked.get("compression", "none"))
@@ -145,7 +145,7 @@ class RosbridgeServer(RosRobot):
         if compression == Compression.CBOR_RAW:
             raw = encode(content, said, self.edition)
             now, part = divmod(round((self.epoch + t) * 1e9), 10**9)
-            message: Any = {"secs": now, "nsecs": part, "bytes": raw}
+            message: object = {"secs": now, "nsecs": part, "bytes": raw}
         elif self.edition is Edition.ROS1:
             return None  # as the server of ROS 1 does with lists of texts
         else:
@@ -153,7 +153,7 @@ class RosbridgeServer(RosRobot):
         return cbor2.dumps({"op": "publish", "topic": topic, "msg": message})
 
 
-def document(said: Said, edition: Edition) -> dict[str, Any]:
+def document(said: Said, edition: Edition) -> dict[str, object]:
     """A message as rosbridge writes it in JSON: what is not finite is null."""
 
     def span(t: float | None) -> dict[str, int]:
@@ -163,7 +163,7 @@ def document(said: Said, edition: Edition) -> dict[str, Any]:
     def numbers(values: tuple[float, ...]) -> list[float | None]:
         return [x if math.isfinite(x) else None for x in values]
 
-    def header(stamp: float | None, frame: str = "") -> dict[str, Any]:
+    def header(stamp: float | None, frame: str = "") -> dict[str, object]:
         more = {"seq": 0} if edition is Edition.ROS1 else {}
         return {**more, "stamp": span(stamp), "frame_id": frame}
 
@@ -191,7 +191,7 @@ def document(said: Said, edition: Edition) -> dict[str, Any]:
     return {"transforms": [edge(t) for t in said]}
 
 
-def _typed(value: Any) -> Any:
+def _typed(value: object) -> object:
     """With lists of numbers as typed arrays of doubles."""
     import struct
 

@@ -15,7 +15,7 @@ from seerob.protocols.plc import s7_web
 MOST_SESSIONS = 4
 IDLE = 120.0
 """A session that nobody uses for so long is freed [s]."""
-Program = Mapping[str, Callable[[float], Any]]
+Program = Mapping[str, Callable[[float], object]]
 """Variable → its value at a time since the start [s]."""
 
 
@@ -50,7 +50,7 @@ class SiemensWebServer(HttpEmulator):
         self.written: dict[str, list[bool]] = {name: [] for name in outputs}
         self._who = user, password
 
-    def routes(self) -> Sequence[Any]:
+    def routes(self) -> Sequence[object]:
         """Its one address."""
         from starlette.routing import Route
 
@@ -112,7 +112,7 @@ class SiemensWebServer(HttpEmulator):
             return {"result": self._below(params.get("var", ""))}
         return _error(-32601, "Method not found")
 
-    def _below(self, address: str) -> list[dict[str, Any]]:
+    def _below(self, address: str) -> list[dict[str, object]]:
         names: dict[str, bool] = {}
         for name in self.program:
             block, _, rest = name.removeprefix('"').partition('"')
@@ -130,7 +130,7 @@ class SiemensWebServer(HttpEmulator):
         return {"datatype": "bool" if isinstance(value, bool) else "lreal"}
 
 
-def _error(code: int, text: str) -> dict[str, Any]:
+def _error(code: int, text: str) -> dict[str, object]:
     return {"error": {"code": code, "message": text}}
 
 

@@ -12,7 +12,7 @@ from seerob.app.emulation import motions
 from seerob.app.emulation.background import HttpEmulator
 from seerob.app.emulation.options import EmulatorOptions, Ready, port
 
-Document = Callable[[float], Mapping[str, Any]]
+Document = Callable[[float], Mapping[str, object]]
 """What it tells at a time since the start [s]."""
 STATE, LIVE = "/state", "/live"
 
@@ -47,7 +47,7 @@ class WebServer(HttpEmulator):
         """Where its WebSocket is."""
         return f"ws{self.url.removeprefix('http')}{LIVE}"
 
-    def routes(self) -> Sequence[Any]:
+    def routes(self) -> Sequence[object]:
         """The document, and the WebSocket."""
         from starlette.routing import Route, WebSocketRoute
 
@@ -94,7 +94,7 @@ class Web(EmulatorOptions, frozen=True, kw_only=True):
         return Ready(server, what, f"{self.host}:{self.port}", hear)
 
 
-def _cell(t: float) -> Mapping[str, Any]:
+def _cell(t: float) -> Mapping[str, object]:
     return {
         "belt": {
             "running": motions.running(t),

@@ -53,7 +53,7 @@ class Doorstep(socket.socket):
         # With its protocol: asyncio sends at once (TCP_NODELAY) only where it is named.
         super().__init__(listening.family, listening.type, socket.IPPROTO_TCP, listening.detach())
 
-    def accept(self) -> tuple[socket.socket, Any]:
+    def accept(self) -> tuple[socket.socket, object]:
         """Accept somebody.
 
         Raises:

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -411,7 +411,7 @@ def read_zones(path: Path, name: str, *, sheet: str | None = None) -> ZoneTable:
     raise InputError(nearest[:1] or Problem(name, "", "holds no table"))
 
 
-def zones_of(table: Mapping[str, Any], name: str) -> ZoneTable:
+def zones_of(table: Mapping[str, object], name: str) -> ZoneTable:
     """The zones of a parsed TOML file.
 
     Raises:
@@ -518,7 +518,7 @@ def _row(
         problems.append(Problem(grid.file, place(grid, count, column), what, remedy))
 
     before = len(problems)
-    values: dict[str, Any] = {}
+    values: dict[str, object] = {}
     column_of = {}
     for i, name in names.items():
         cell = cells[i] if i < len(cells) else None

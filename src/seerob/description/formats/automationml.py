@@ -250,7 +250,7 @@ def _unpack(path: Path, name: str) -> bytes:
 # -- the tree -----------------------------------------------------------------------------------
 
 
-def _local(tag: Any) -> str:
+def _local(tag: object) -> str:
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
 
 

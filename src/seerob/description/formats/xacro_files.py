@@ -177,7 +177,7 @@ _watching: list[_Watch] = []
 """Of the file that is expanded, if any is."""
 
 
-def _hook(event: str, args: tuple[Any, ...]) -> None:
+def _hook(event: str, args: tuple[object, ...]) -> None:
     for watch in _watching:
         watch.ask(event, args)
 
@@ -233,7 +233,7 @@ def _guarded(xacro: ModuleType, resolver: Resolver, watch: _Watch) -> Iterator[N
     substitution = importlib.import_module("xacro.substitution_args")
     evaluate, extension = xacro.safe_eval, xacro.eval_extension
 
-    def checked(expression: str, *scopes: Any) -> Any:
+    def checked(expression: str, *scopes: object) -> object:
         refuse_hostile(expression)
         return evaluate(expression, *scopes)
 
@@ -244,7 +244,7 @@ def _guarded(xacro: ModuleType, resolver: Resolver, watch: _Watch) -> Iterator[N
                 return str(root)
         raise _Refused(f"no package {package!r} was found")
 
-    def refused(*_: Any, **__: Any) -> Any:
+    def refused(*_: object, **__: object) -> object:
         raise _Refused("$(eval …), $(env …), $(optenv …) and $(cwd) are not evaluated")
 
     patches = [

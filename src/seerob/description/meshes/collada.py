@@ -37,7 +37,7 @@ def read(source: MeshSource) -> RawFile:
         meshes: list[RawMesh] = []
         count = visited = 0
         # A stack instead of recursion: depth is the file's choice.
-        stack: list[tuple[Any, Array, tuple[str, ...]]] = (
+        stack: list[tuple[object, Array, tuple[str, ...]]] = (
             [] if document.scene is None else [(n, np.eye(4), ()) for n in reversed(document.scene.nodes)]
         )
         while stack:
@@ -109,7 +109,7 @@ def _meshes(source: MeshSource, node: Any, matrix: Array, names: tuple[str, ...]
     return meshes
 
 
-def _color(material: Any) -> Color | None:
+def _color(material: object) -> Color | None:
     diffuse = getattr(getattr(material, "effect", None), "diffuse", None)
     if not isinstance(diffuse, tuple) or len(diffuse) < 3:
         return None

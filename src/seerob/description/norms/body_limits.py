@@ -235,7 +235,7 @@ class _Builder:
     def problem(self, key: str, what: str, remedy: str) -> None:
         self.problems.append(Problem(self.file, key, what, remedy))
 
-    def region(self, i: int, row: dict[str, Any]) -> BodyRegion | None:
+    def region(self, i: int, row: dict[str, object]) -> BodyRegion | None:
         key = f"regions[{i}]"
         try:
             read = msgspec.convert(row, _Region)

@@ -314,12 +314,12 @@ def glb_bytes(meshes: Sequence[Mesh], *, crease: float = CREASE) -> bytes:
     return _container(tree, b"".join(chunks))
 
 
-def _material(color: tuple[float, float, float, float]) -> dict[str, Any]:
+def _material(color: tuple[float, float, float, float]) -> dict[str, object]:
     # glTF wants linear light; the colours of meshes, files and screens are sRGB.
     rgba = np.clip(color, 0, 1)
     linear = np.where(rgba <= 0.04045, rgba / 12.92, ((rgba + 0.055) / 1.055) ** 2.4)
     factor = [round(float(c), 6) for c in (*linear[:3], rgba[3])]
-    material: dict[str, Any] = {
+    material: dict[str, object] = {
         "pbrMetallicRoughness": {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": 0.7},
         "doubleSided": True,
     }
@@ -328,7 +328,7 @@ def _material(color: tuple[float, float, float, float]) -> dict[str, Any]:
     return material
 
 
-def _container(tree: dict[str, Any], binary: bytes) -> bytes:
+def _container(tree: dict[str, object], binary: bytes) -> bytes:
     if binary:
         tree["buffers"] = [{"byteLength": len(binary)}]
     text = json.dumps(tree, separators=(",", ":"), sort_keys=True).encode()

@@ -11,7 +11,7 @@ is wider than a voxel the true volume lies between the inside voxels and inside 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -324,8 +324,8 @@ def _boxes_meet(parts: Sequence[Mesh]) -> bool:
 def _union(parts: Sequence[Mesh], volumes: Sequence[float]) -> Mesh | None:
     import manifold3d
 
-    solids: list[Any] = []
-    cavities: list[Any] = []
+    solids: list[object] = []
+    cavities: list[object] = []
     for part, volume in zip(parts, volumes, strict=True):
         body = manifold(part if volume > 0 else flipped(part))
         if body is None:

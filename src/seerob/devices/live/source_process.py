@@ -26,7 +26,7 @@ import tempfile
 import time
 import zlib
 from threading import Event, Lock, Thread
-from typing import IO, Any, NamedTuple
+from typing import IO, NamedTuple
 
 import msgspec
 import numpy as np
@@ -151,7 +151,7 @@ class SharedMailbox:
         return None
 
 
-def _plain(value: Any) -> float | bool | int:
+def _plain(value: object) -> float | bool | int:
     """Numbers of numpy, which some libraries give."""
     if isinstance(value, np.generic):
         return value.item()  # type: ignore[no-any-return]

@@ -7,7 +7,7 @@ import time
 from collections.abc import AsyncGenerator, Iterator
 from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
@@ -262,7 +262,7 @@ def _topics(node: str) -> tuple[str, ...]:
     return f"{sparkplug.NAMESPACE}/{group}/+/{edge}", f"{sparkplug.NAMESPACE}/{group}/+/{edge}/+"
 
 
-def _bytes(payload: Any) -> bytes:
+def _bytes(payload: object) -> bytes:
     return payload if isinstance(payload, bytes) else str("" if payload is None else payload).encode()
 
 

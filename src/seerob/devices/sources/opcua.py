@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncGenerator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
@@ -143,7 +143,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
         async with connect(self.way(), Path()) as client:
             uris = await client.get_namespace_array()
             waiting = [(client.nodes.objects, 0)]
-            seen: set[Any] = set()
+            seen: set[object] = set()
             while waiting and len(seen) < MOST_BROWSED:
                 node, depth = waiting.pop()
                 for child in await node.get_children():

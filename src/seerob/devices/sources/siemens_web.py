@@ -9,7 +9,7 @@ from collections import defaultdict, deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 from urllib.parse import urlsplit
 
 from msgspec import Meta
@@ -109,7 +109,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             due = clock.time()
             while True:
                 asked = time.monotonic()
-                said: list[tuple[Any, str]] = []
+                said: list[tuple[object, str]] = []
                 for k in range(0, len(addresses), s7_web.MOST):
                     some = addresses[k : k + s7_web.MOST]
                     said += s7_web.results(await session.post(s7_web.reading(some)), len(some))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any
 
 from seerob.protocols.links.json_pointer import at, parts
 
@@ -16,8 +15,8 @@ AHEAD = 1.0
 
 
 def value_and_time(
-    document: Any, pointer: str, time: str | None, *, now: float
-) -> tuple[Any, float, float | None]:
+    document: object, pointer: str, time: str | None, *, now: float
+) -> tuple[object, float, float | None]:
     """A value, how old it is [s], and when it was so [s since 1970]; 0 and None when nothing says it.
 
     Args:
@@ -41,7 +40,7 @@ def value_and_time(
     return value, max(0.0, age), stamp
 
 
-def instant(value: Any) -> float:
+def instant(value: object) -> float:
     """Seconds since 1970 of a number of seconds or milliseconds, or of an ISO 8601 text.
 
     Raises:

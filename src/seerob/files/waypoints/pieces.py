@@ -104,7 +104,7 @@ def joint_line(a: Array, b: Array) -> Piece | None:
     return Piece(curve, 0.0, length, False, float(np.abs(b - a).max()) / length)
 
 
-def _curve(s: Array, q: Array) -> Any:
+def _curve(s: Array, q: Array) -> object:
     need("scipy")
     from scipy.interpolate import CubicSpline
 

@@ -11,7 +11,6 @@ import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -148,7 +147,7 @@ def command() -> str:
     return "a Python program that uses seerob"
 
 
-def _engine(table: Any) -> tuple[tuple[str, str], ...]:
+def _engine(table: object) -> tuple[tuple[str, str], ...]:
     try:
         e = msgspec.convert(table, Engine, strict=False)
     except msgspec.ValidationError:
@@ -167,7 +166,7 @@ def _engine(table: Any) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _source(entry: dict[str, Any]) -> tuple[str, ...]:
+def _source(entry: dict[str, object]) -> tuple[str, ...]:
     kind = str(entry.get("kind", ""))
     rest = {key: value for key, value in entry.items() if key != "kind"}
     source: Source | None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 from seerob.protocols import ProtocolError
 
@@ -13,7 +12,7 @@ DEEPEST = 32
 """Parts of a pointer."""
 
 
-def document(data: bytes | str) -> Any:
+def document(data: bytes | str) -> object:
     """A JSON document; NaN and Infinity, which JSON does not have, are refused.
 
     Raises:
@@ -27,7 +26,7 @@ def document(data: bytes | str) -> Any:
         raise ProtocolError(f"no JSON: {str(error)[:100]}") from None
 
 
-def _refuse(word: str) -> Any:
+def _refuse(word: str) -> object:
     raise ValueError(f"{word} is no JSON value")
 
 
@@ -44,7 +43,7 @@ def parts(pointer: str) -> tuple[str, ...]:
     return tuple(p.replace("~1", "/").replace("~0", "~") for p in pointer[1:].split("/"))
 
 
-def at(value: Any, pointer: tuple[str, ...]) -> Any:
+def at(value: object, pointer: tuple[str, ...]) -> object:
     """What a pointer leads to.
 
     Raises:

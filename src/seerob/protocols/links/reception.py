@@ -112,7 +112,7 @@ class _Wait(asyncio.Future[None]):
         """Called by the task that awaits it, and by no one else."""
         self._then, self._context = fn, context
 
-    def cancel(self, msg: Any | None = None) -> bool:
+    def cancel(self, msg: object | None = None) -> bool:
         """Called by whoever cancels the task, from within a task of their own."""
         if not super().cancel(msg):
             return False

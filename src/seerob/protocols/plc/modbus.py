@@ -543,7 +543,7 @@ async def connect(host: str, port: int, number: int) -> AsyncGenerator[Device, N
         loop.set_exception_handler(usual)
 
 
-def _quiet(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+def _quiet(loop: asyncio.AbstractEventLoop, context: dict[str, object]) -> None:
     """Bytes on which pymodbus fails end the connection, which is said as a loss; no traceback beside it."""
     if not type(context.get("protocol")).__module__.startswith("pymodbus"):
         loop.default_exception_handler(context)

@@ -208,7 +208,7 @@ async def _child(node: Node, namespace: int, name: str) -> Node | None:
         return None
 
 
-async def _value(node: Node) -> Any:
+async def _value(node: Node) -> object:
     from asyncua.ua.uaerrors import UaError
 
     try:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.json_pointer import document
@@ -51,11 +50,11 @@ def _request(method: str, number: int, **params: str) -> bytes:
     return json.dumps(_call(method, number, params)).encode()
 
 
-def _call(method: str, number: int, params: Mapping[str, str | bool]) -> dict[str, Any]:
+def _call(method: str, number: int, params: Mapping[str, str | bool]) -> dict[str, object]:
     return {"jsonrpc": "2.0", "method": method, "id": number, "params": dict(params)}
 
 
-def result(data: bytes) -> Any:
+def result(data: bytes) -> object:
     """The result of one call.
 
     Raises:
@@ -70,7 +69,7 @@ def result(data: bytes) -> Any:
     return found
 
 
-def results(data: bytes, count: int) -> list[tuple[Any, str]]:
+def results(data: bytes, count: int) -> list[tuple[object, str]]:
     """Per call of a batch its result, and why there is none.
 
     Args:
@@ -85,7 +84,7 @@ def results(data: bytes, count: int) -> list[tuple[Any, str]]:
         raise ProtocolError(_outcome(answers)[1] or "one answer to many questions")
     if not isinstance(answers, list):
         raise ProtocolError("the answer is no JSON-RPC")
-    found: list[tuple[Any, str]] = [(None, "the PLC gave no answer")] * count
+    found: list[tuple[object, str]] = [(None, "the PLC gave no answer")] * count
     for answer in answers:
         number = answer.get("id") if isinstance(answer, dict) else None
         if isinstance(number, int) and not isinstance(number, bool) and 0 <= number < count:
@@ -93,7 +92,7 @@ def results(data: bytes, count: int) -> list[tuple[Any, str]]:
     return found
 
 
-def _outcome(answer: dict[str, Any]) -> tuple[Any, str]:
+def _outcome(answer: dict[str, object]) -> tuple[object, str]:
     if "error" in answer:
         error = answer["error"]
         text = error.get("message", "") if isinstance(error, dict) else ""

@@ -200,7 +200,7 @@ def decode(content: Content, channel: ServerChannel, payload: bytes) -> Said:
 # -- Foxglove's own schemas ---------------------------------------------------------------------
 
 
-def _own_json(content: Content, said: Any) -> Said:
+def _own_json(content: Content, said: object) -> Said:
     """By putting it as ROS would."""
     if not isinstance(said, dict):
         raise ProtocolError("a message that is no table")
@@ -208,7 +208,7 @@ def _own_json(content: Content, said: Any) -> Said:
         joints = said.get("joints")
         if not isinstance(joints, list) or not all(isinstance(j, dict) for j in joints):
             raise ProtocolError("joint states without joints")
-        put: dict[str, Any] = {"header": {"stamp": said.get("timestamp")}}
+        put: dict[str, object] = {"header": {"stamp": said.get("timestamp")}}
         put["name"] = [j.get("name") for j in joints]
         for key in ("position", "velocity", "effort"):
             known = any(j.get(key) is not None for j in joints)

@@ -35,7 +35,7 @@ class Frame(NamedTuple):
         """Whether it is for the other program itself."""
         return self.destination.startswith(COMMAND)
 
-    def fields(self) -> dict[str, Any]:
+    def fields(self) -> dict[str, object]:
         """Of a command.
 
         Raises:

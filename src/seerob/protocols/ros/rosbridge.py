@@ -87,7 +87,7 @@ def subscribe(topic: str, message_type: str, *, interval: float, compression: Co
         interval: Least time between two messages [s].
         compression: How they are to come.
     """
-    asked: dict[str, Any] = {"op": "subscribe", "id": topic, "topic": topic}
+    asked: dict[str, object] = {"op": "subscribe", "id": topic, "topic": topic}
     if message_type:
         asked["type"] = message_type
     milliseconds = int(1000 * interval)
@@ -105,7 +105,7 @@ def advertise(topic: str, message_type: str) -> str:
     return json.dumps({"op": "advertise", "id": topic, "topic": topic, "type": message_type})
 
 
-def publish(topic: str, message: dict[str, Any]) -> str:
+def publish(topic: str, message: dict[str, object]) -> str:
     """Publish a message; numbers must be finite."""
     return json.dumps({"op": "publish", "topic": topic, "msg": message}, allow_nan=False)
 
@@ -149,7 +149,7 @@ class Reader:
                 raise ProtocolError("fragments of no operation")
         return _operation(frame)
 
-    def _put(self, frame: dict[Any, Any]) -> str | None:
+    def _put(self, frame: dict[object, object]) -> str | None:
         name, number, total, data = (frame.get(key) for key in ("id", "num", "total", "data"))
         if not isinstance(number, int) or not isinstance(total, int) or not isinstance(data, str):
             raise ProtocolError("a fragment without its place or its data")
@@ -171,7 +171,7 @@ class Reader:
             raise ProtocolError("fragments that do not fit together") from None
 
 
-def _operation(frame: dict[Any, Any]) -> Operation | None:
+def _operation(frame: dict[object, object]) -> Operation | None:
     op = frame.get("op")
     if op == "publish":
         topic = frame.get("topic")
@@ -205,7 +205,7 @@ def message(content: Content, published: Published, edition: Edition) -> Said:
     return read(content, said)
 
 
-def _json(text: str) -> Any:
+def _json(text: str) -> object:
     # Some servers write NaN as such, which is no JSON, and others as null: both come out as not finite.
     try:
         return json.loads(text)
@@ -213,7 +213,7 @@ def _json(text: str) -> Any:
         raise ProtocolError(f"no JSON: {str(error)[:100]}") from None
 
 
-def _cbor(data: bytes) -> Any:
+def _cbor(data: bytes) -> object:
     need("cbor2")
     import cbor2
 

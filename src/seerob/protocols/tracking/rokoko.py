@@ -197,7 +197,7 @@ def encode(scene: Scene, *, compressed: bool = False) -> bytes:
     actors = [_actor_object(actor, nested=scene.version == "3") for actor in scene.actors]
     when = None if np.isnan(scene.t) else scene.t
     if scene.version == "3":
-        said: dict[str, Any] = {
+        said: dict[str, object] = {
             "version": "3,0",
             "fps": scene.fps,
             "scene": {"timestamp": when, "actors": actors, "props": []},
@@ -213,7 +213,7 @@ def encode(scene: Scene, *, compressed: bool = False) -> bytes:
     return packed
 
 
-def _actor_object(actor: Actor, *, nested: bool) -> dict[str, Any]:
+def _actor_object(actor: Actor, *, nested: bool) -> dict[str, object]:
     positions = (actor.positions @ WORLD_FROM_UNITY).tolist()
     turns = actor.orientations.copy()
     turns[:, 1:] = -(turns[:, 1:] @ WORLD_FROM_UNITY)

@@ -33,7 +33,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -305,7 +305,7 @@ def fastest(piece: Piece, s: Array, top: Array, limits: JointLimits) -> Array:
         dof = property(lambda _: len(limits.velocity))
         path_interval = property(lambda _: np.array([s[0], s[-1]]))
 
-        def __call__(self, at: Any, order: int = 0) -> Array:
+        def __call__(self, at: object, order: int = 0) -> Array:
             return np.asarray(piece.spline(at, order))
 
     class Map(LinearConstraint):  # type: ignore[misc, unused-ignore]
@@ -315,7 +315,7 @@ def fastest(piece: Piece, s: Array, top: Array, limits: JointLimits) -> Array:
             super().__init__()
             self.dof = len(limits.velocity)
 
-        def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Any, ...]:
+        def compute_constraint_params(self, path: object, gridpoints: object) -> tuple[object, ...]:
             bound = np.column_stack([np.zeros(len(s)), top**2])
             return None, None, None, None, None, None, bound
 

@@ -60,7 +60,7 @@ class Zone(Table, frozen=True, kw_only=True):
             if a >= b:
                 raise ValueError(f"{axis} from {a:g} to {b:g} m is no interval: the lower end comes first")
 
-    def shape(self) -> dict[str, Any]:
+    def shape(self) -> dict[str, object]:
         """As the table of a simple shape."""
         if self.low is not None and self.high is not None:
             (x0, y0, z0), (x1, y1, z1) = self.low, self.high
@@ -128,19 +128,19 @@ def zones_of(name: object, folder: Path, file: str, problems: list[Problem]) -> 
     for i, entry in enumerate(entries):
         zone = convert(entry, Zone, file=where, key=f"zones[{i}]", problems=problems)
         if zone is not None and frame is not None:
-            area: dict[str, Any] = {"name": zone.name, "shape": zone.shape()}
+            area: dict[str, object] = {"name": zone.name, "shape": zone.shape()}
             if frame.on is not None:
                 area["on"] = frame.on
             areas.append({**area, "at": _plain(frame.at)})
     return Zones(tuple(areas), {path.as_posix(): raw})
 
 
-def _plain(pose: Pose) -> dict[str, Any]:
-    given: dict[str, Any] = msgspec.to_builtins(pose)
+def _plain(pose: Pose) -> dict[str, object]:
+    given: dict[str, object] = msgspec.to_builtins(pose)
     return {key: value for key, value in given.items() if value is not None}
 
 
-def _read(path: Path) -> tuple[Mapping[str, Any], bytes]:
+def _read(path: Path) -> tuple[Mapping[str, object], bytes]:
     """Content of a file of zones, parsed and raw.
 
     Raises:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar
 
 from msgspec import Meta, Struct
 
@@ -64,7 +64,7 @@ class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return cls(**{**same, **cls.read(task)})
 
     @classmethod
-    def read(cls, task: TaskPhase) -> Mapping[str, Any]:
+    def read(cls, task: TaskPhase) -> Mapping[str, object]:
         """Fields that a rule takes in words of its own, by name."""
         return {}
 

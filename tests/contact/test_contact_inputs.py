@@ -9,7 +9,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.core.tolerances import Tolerance
-from seerob.criteria.contact.collision import simplified_mass
+from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.contact.limits import (
     ContactEnds,
     RegionArrays,

@@ -12,7 +12,7 @@ from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Origin
-from seerob.criteria.contact.collision import moving_masses
+from seerob.criteria.contact.impact_mass import moving_masses
 from seerob.description.description import Description, Joint, JointKind, Mimic, Quantity
 from seerob.model.mounting.chains import couple
 from seerob.model.mounting.mechanisms import MechanismDraft, Riders

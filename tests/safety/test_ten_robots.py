@@ -160,7 +160,7 @@ def test_mass_jacobian_energy_and_effective_mass_are_pinocchios(tmp_path, name):
 )
 def test_moving_masses_of_the_maker(tmp_path, name, mass):
     """Sums of the maker's files without the base; half of it is what Annex A counts of a bare arm."""
-    from seerob.criteria.contact.collision import moving_masses, simplified_mass
+    from seerob.criteria.contact.impact_mass import moving_masses, simplified_mass
 
     model = made(tmp_path, f'[[robots]]\nname = "arm"\nmodel = "library:{name}"\n').model
     assert moving_masses(model, model.robot("arm")) == pytest.approx((mass, 0), abs=5e-5)

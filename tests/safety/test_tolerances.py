@@ -10,7 +10,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, basis_in, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.tolerances import Tolerance, deciding, spread
-from seerob.criteria.contact.collision import simplified_mass
+from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.judging import Judge
 from seerob.description.humans.skeleton import BONES
 from seerob.distance.least import Query

@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.criteria.contact.clamping import STILL
-from seerob.criteria.contact.collision import Behind
+from seerob.criteria.contact.impact_mass import Behind
 from seerob.criteria.stopping.models import Stop, bind_stop
 from seerob.criteria.stopping.simulated import StopSimulation
 from seerob.twin.moving_base import RESTS

@@ -41,7 +41,7 @@ from seerob.core.snapshot import Input, Origin, Verdict
 from seerob.core.tolerances import Shifts, Spread, Tolerance, spread
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING
-from seerob.criteria.contact.collision import masses_along_motion
+from seerob.criteria.contact.impact_mass import masses_along_motion
 from seerob.criteria.contact.shape import ContactShape, force_at_pressure
 from seerob.description.norms.body_limits import BodyLimits, BodyRegion
 from seerob.kernels import contact_speeds as kernel

@@ -18,7 +18,7 @@ from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result
 from seerob.core.tolerances import Shifts, Spread, deciding, spread
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
-from seerob.criteria.contact.collision import simplified_mass
+from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.criterion import Criterion, Lowest
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.kernels.axes import masses_along, mobility, principal_axes, reciprocals

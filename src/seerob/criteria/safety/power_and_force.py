@@ -24,7 +24,7 @@ from seerob.criteria.contact import limits as contact_limits
 from seerob.criteria.contact import shape as contact_shape
 from seerob.criteria.contact.clamped_regions import Clamping, floor_input
 from seerob.criteria.contact.clamping import STILL
-from seerob.criteria.contact.collision import Behind, moving_masses, train
+from seerob.criteria.contact.impact_mass import Behind, moving_masses, train
 from seerob.criteria.contact.limits import NOT_GIVEN, ContactEnds, Judged, pushed, ranks, robot_masses
 from seerob.criteria.contact.measured import Measurements, with_measured
 from seerob.criteria.contact.regions import REGIONS, HeightReach, Person, reach_inputs, without_limit

@@ -1,6 +1,7 @@
 """Where an arm is from its description alone, how fast points of its flange move, and where these were said.
 
 None has types in its decorator: most runs ask none of them, and what is typed is loaded with the module.
+Arrays are copied number by number: Numba compiles a slice that is written from an array for seconds.
 """
 
 from __future__ import annotations
@@ -63,7 +64,10 @@ def postures(
                     B[i, j] = 0.0
                     for m in range(3):
                         B[i, j] += R[i, m] * links[link, m, j]
-            p[:], R[:] = moved, B
+            for i in range(3):
+                p[i] = moved[i]
+                for j in range(3):
+                    R[i, j] = B[i, j]
             for k in range(start[link], start[link + 1]):
                 joint = order[k]
                 x, y, z = own_axes[joint]
@@ -104,8 +108,11 @@ def postures(
                     p[i] = anchors[s, joint, i]
                     for j in range(3):
                         p[i] -= B[i, j] * own_anchors[joint, j]
-                R[:] = B
-        positions[s], rotations[s] = p, R
+                        R[i, j] = B[i, j]
+        for i in range(3):
+            positions[s, i] = p[i]
+            for j in range(3):
+                rotations[s, i, j] = R[i, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

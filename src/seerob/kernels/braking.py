@@ -36,7 +36,8 @@ def braked(M: Array, b: Array, v: Array, B: Array, h: float, out: Array) -> bool
         for k in range(n):
             impulse += M[j, k] * v[k]
         wanted[j] = impulse - h * b[j]
-    out[:] = v
+    for j in range(n):
+        out[j] = v[j]
     for _ in range(2000):
         change, largest = 0.0, 0.0
         for j in range(n):

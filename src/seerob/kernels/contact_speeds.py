@@ -163,7 +163,8 @@ def governing(
     """
     b, k = v.shape
     column = np.full(k, -1)
-    column[columns] = np.arange(len(columns))
+    for i in range(len(columns)):
+        column[columns[i]] = i
     rows, ranks = np.zeros(k, np.int64), np.zeros(k, np.int64)
     for j in range(k):
         worst = -np.inf

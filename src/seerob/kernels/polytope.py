@@ -246,9 +246,12 @@ def vertices(A: Array, low: Array, high: Array, tolerance: float) -> tuple[Array
             if new:
                 if at == len(found):
                     more = np.empty((2 * len(found) + 1, 3))
-                    more[:at] = found
+                    for i in range(at):
+                        for c in range(3):
+                            more[i, c] = found[i, c]
                     found = more
-                found[at] = V[k]
+                for c in range(3):
+                    found[at, c] = V[k, c]
                 at += 1
         begin[s + 1] = at
     return found[:at].copy(), begin

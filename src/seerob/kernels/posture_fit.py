@@ -317,7 +317,8 @@ def fit(
             damping = max(10.0 * damping, 1e-4)
         if not better:
             break
-        q[:] = new
+        for d in range(n):
+            q[d] = new[d]
         cost = reached
         damping = max(0.1 * damping, 1e-9)
         if largest < enough:

@@ -21,7 +21,6 @@ from seerob.app.console.terminal import cache_folder
 from seerob.core.errors import InputError, Problem
 from seerob.core.files.parser_process import begin
 from seerob.description.formats.resolve import as_written_or_in_other_case
-from seerob.session.reading import with_entries
 from seerob.workstation.allowed import NOTHING, Allowed
 from seerob.workstation.naming import Entries, Named
 from seerob.workstation.workstation import Workstation
@@ -46,6 +45,8 @@ class Draft:
     @property
     def station(self) -> Workstation:
         """As a workstation, whose entries are numbered without what is left out."""
+        from seerob.session.reading import with_entries
+
         return with_entries(self.head, self.entries)
 
     @property

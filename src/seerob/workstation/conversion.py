@@ -10,6 +10,7 @@ import re
 import types
 from collections.abc import Collection, Mapping
 from enum import Enum
+from functools import cache
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
@@ -36,6 +37,12 @@ def members(wanted: Any) -> tuple[Any, ...]:
     if get_origin(wanted) in (Union, types.UnionType):
         return tuple(m for item in get_args(wanted) if item is not type(None) for m in members(item))
     return (wanted,)
+
+
+@cache
+def fields_of(table: type[Struct]) -> tuple[msgspec.structs.FieldInfo, ...]:
+    """Fields of a table: to ask msgspec for them evaluates every annotation anew."""
+    return msgspec.structs.fields(table)
 
 
 def is_struct(wanted: object) -> bool:
@@ -123,7 +130,7 @@ def convert(
         hidden: Fields that the table may not set.
         beside: Keys that somebody else reads, to be named as right ones.
     """
-    fields = {f.encode_name: f for f in msgspec.structs.fields(wanted) if f.encode_name not in hidden}
+    fields = {f.encode_name: f for f in fields_of(wanted) if f.encode_name not in hidden}
     before = len(problems)
     values: dict[str, object] = {}
     for name, value in table.items():

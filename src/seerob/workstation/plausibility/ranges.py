@@ -24,7 +24,7 @@ from msgspec import Struct
 from seerob.core.errors import Problem, suggestion
 from seerob.core.quantities import splits
 from seerob.core.snapshot import Finding
-from seerob.workstation.conversion import unit_of
+from seerob.workstation.conversion import fields_of, unit_of
 from seerob.workstation.workstation import Confirmed, Engine, Workstation
 
 Entries = Mapping[str, Mapping[int, Any]]
@@ -394,7 +394,7 @@ def quantities(
 
 
 def _quantities(table: Struct, key: str, kind: str, about: tuple[str, ...]) -> Iterator[Quantity]:
-    for field in msgspec.structs.fields(type(table)):
+    for field in fields_of(type(table)):
         value = getattr(table, field.name)
         default = field.default
         if field.default_factory is not msgspec.NODEFAULT:

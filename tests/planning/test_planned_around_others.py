@@ -143,3 +143,30 @@ def test_every_seed_finds_a_path_near_the_shortest(model):
         q = plan(model, "arm", [GOAL], margin=MARGIN, keep_out=["zone"], seed=seed).q
         lengths.append(sum(np.linalg.norm(b - a) for a, b in pairwise(q)))
     assert max(lengths) < 1.15 * min(lengths)
+
+
+def test_who_moves_is_not_taken_to_stand_still_unless_somebody_says_so(cell, capsys):
+    call = ["plan", str(cell), "--robot", "arm", "--to=1.2,0", f"--margin={MARGIN}", "-o"]
+    assert cli.main([*call, str(cell / "unsaid.toml")]) == Exit.UNDECIDED
+    assert "other: moved by sources, and taken to stand still" in capsys.readouterr().out
+    assert cli.main([*call, str(cell / "still.toml"), "--others", "still"]) == Exit.WITHIN
+
+
+DEGREES = "t [s],j1 [deg],j2 [deg]\n" + "".join(f"{0.1 * k:.1f},{0.2 * k:.1f},0.1\n" for k in range(11))
+BY_FILE = '[[sources]]\nkind = "csv"\nrobot = "other"\nfile = "other.csv"\n'
+
+
+def test_what_a_run_would_hold_is_not_planned_around_as_known(tmp_path, capsys):
+    """A file in degrees that may be in radians; a base that nobody has so far away."""
+    (tmp_path / "arm.urdf").write_text(ARM, encoding="utf-8")
+    (tmp_path / "other.csv").write_text(DEGREES, encoding="utf-8")
+    alone = CELL[: CELL.index("[[sources]]")]
+    (tmp_path / "workstation.toml").write_text(alone + BY_FILE, encoding="utf-8")
+    call = ["plan", str(tmp_path), "--robot", "arm", "--to=1.2,0", f"--margin={MARGIN}", "-o"]
+    for how in ("swept", "0.5"):
+        assert cli.main([*call, str(tmp_path / "a.toml"), "--others", how]) == Exit.ERROR
+        assert "degrees" in " ".join(capsys.readouterr().err.split())
+    far = alone.replace("q = [-1.2, 0.0]", "q = [-1.2, 0.0]\nbase = { position = [75, 0, 0] }", 1)
+    (tmp_path / "workstation.toml").write_text(far, encoding="utf-8")
+    assert cli.main([*call, str(tmp_path / "b.toml")]) == Exit.UNDECIDED
+    assert "# Not known to be clear: arm" in (tmp_path / "b.toml").read_text(encoding="utf-8")

@@ -30,7 +30,7 @@ STILL, SWEPT = "still", "swept"
 OTHERS = (
     "where robots, people and machines that sources move are taken to be: still (where the file puts them), "
     "swept (everywhere that their recorded motion takes them) or an instant of that motion [s] "
-    "(default: still)"
+    "(default: still, and the answer is undecided where somebody moves)"
 )
 
 
@@ -165,7 +165,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--keep-out", action="append", default=[], metavar="AREA", help="area to keep away from, repeatable"
     )
-    sub.add_argument("--others", type=others, default=STILL, metavar="HOW", help=OTHERS)
+    sub.add_argument("--others", type=others, metavar="HOW", help=OTHERS)
     sub.add_argument(
         "--voxel", type=edge, default=0.05, help="of what others sweep [m] (default: 0.05; at most 1)"
     )
@@ -188,6 +188,7 @@ def run(options: argparse.Namespace) -> int:
     station = compiled(options.workstation, allowed(options), sources=False)
     from seerob.app.console.interruption import Stopped as Asked
     from seerob.outputs.sinks.dossier import write_whole
+    from seerob.session.planning.others import movers
     from seerob.session.planning.plan import NoPath, Stopped, plan
 
     names = [robot.name for robot in station.workstation.robots]
@@ -207,7 +208,7 @@ def run(options: argparse.Namespace) -> int:
             place = around(
                 station,
                 robot,
-                options.others,
+                STILL if options.others is None else options.others,
                 options.keep_out,
                 voxel=options.voxel,
                 stopped=asked,
@@ -249,13 +250,21 @@ def run(options: argparse.Namespace) -> int:
         line("assumed", f"{pair} touch at the start and are not watched", "yellow")
     for text in found.around:
         line("others", text)
+    open_ = [*found.open]
+    if options.others is None and (moving := movers(station.workstation, robot)):
+        who = ", ".join(moving)
+        open_.append(
+            f"{who}: moved by sources, and taken to stand still; say with --others how that is meant"
+        )
+    for text in open_:
+        line("undecided", text, "yellow")
     line("note", "preliminary: planned, and executed by nobody")
     line("wrote", str(options.output))
     line(
         "next",
         f'kind = "waypoints", robot = "{found.robot}", file = "{options.output.name}" with joint_speed …',
     )
-    return Exit.WITHIN
+    return Exit.UNDECIDED if open_ else Exit.WITHIN
 
 
 def _refuse_existing(path: Path) -> None:

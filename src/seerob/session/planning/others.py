@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Basis, Result, Snapshot
+from seerob.core.snapshot import Basis, Result, Snapshot, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.model.model import Model
@@ -98,7 +98,9 @@ class Witness(Closing):
         self.last = snapshot.t
         if self._instant is not None:
             self.places = {name: np.array(q) for name, q in snapshot.joints.items()}
-        reason = next((r.reason for r in snapshot.results if r.name == KNOWN and r.value is None), "")
+        reason = next(
+            (r.reason for r in snapshot.results if r.name == KNOWN and r.verdict is not Verdict.WITHIN), ""
+        )
         if reason:
             self._unknown = f"{reason} (at {snapshot.t:.2f} s)"
 
@@ -116,9 +118,10 @@ class Witness(Closing):
 
 
 class _Known(Criterion, frozen=True, kw_only=True):
-    """Whether it is known where everybody of interest is."""
+    """Whether it is known where everybody of interest is: within where nothing of theirs is in doubt."""
 
     unit: ClassVar[str] = ""
+    limit: ClassVar[float] = 1.0
 
     who: tuple[str, ...]
 
@@ -129,7 +132,7 @@ class _Known(Criterion, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             for name in self.who:
                 state.require(name)
-            return Result(name=self.name, value=0.0, unit=self.unit)
+            return Result(name=self.name, value=0.0, unit=self.unit, limit=self.limit, verdict=Verdict.WITHIN)
 
         return evaluate
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
-from seerob.session.planning.clearance import Clearance
+from seerob.session.planning.clearance import WATCHED, Clearance
 from seerob.session.planning.others import made_for, movers
 
 LIMIT = 1e-9
@@ -55,6 +55,8 @@ class Plan:
     """Rows of ``q`` at which the start and each goal are."""
     around: tuple[str, ...] = ()
     """How everybody else was taken, one sentence each."""
+    open: tuple[str, ...] = ()
+    """Why it is not known that the way is clear, although it is by the twin's shapes where they stand."""
 
     @property
     def others(self) -> str:
@@ -67,6 +69,7 @@ class Plan:
             f"# Planned for {self.robot} with seed {self.seed}: straight joint moves between these postures",
             f"# keep at least {self.margin:g} m from everything, by the twin's shapes{self.others}",
             *(f"# - {text}" for text in self.around),
+            *(f"# Not known to be clear: {text}" for text in self.open),
             "# A blend would leave the proven way. Preliminary: not executed by any controller.",
             f"# joints: {', '.join(self.joints)}",
         ]
@@ -165,6 +168,16 @@ def plan(
         left_out=clearance.left_out,
         at=tuple(at),
         around=_around(model, robot, keep_out, places or {}, swept),
+        open=tuple(_open(model, robot, keep_out)),
+    )
+
+
+def _open(model: Model, robot: str, keep_out: Sequence[str]) -> Iterator[str]:
+    """What findings hold of whatever is kept apart: a run calls no distance of theirs within."""
+    bodies = [b for b in model.bodies if b.role in WATCHED or b.name in keep_out]
+    names = {robot, *model.mechanisms, *(b.name for b in bodies), *(b.owner for b in bodies)}
+    yield from dict.fromkeys(
+        f"{f.subject}: {f.text}" for f in model.findings if not names.isdisjoint(f.holds) or "*" in f.holds
     )
 
 

@@ -16,6 +16,7 @@ from typing import ClassVar
 from msgspec import Struct
 from msgspec.structs import replace
 
+from seerob.core.errors import InputError
 from seerob.core.quantities import NotBefore, Seconds
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
@@ -123,6 +124,36 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             InputError: The file is missing or wrong; names file, place, value and remedy.
         """
         raise NotImplementedError
+
+
+def driven_robot(
+    target: Target | None,
+    robot: str,
+    where: str,
+    *,
+    joints: int,
+    whose: str,
+    give: str = "name another robot",
+) -> Target:
+    """The robot that a source drives, whose joints are as many as it says.
+
+    Args:
+        target: As the source was given it.
+        robot: Name in the source's table.
+        where: Kind and address of the source, for messages.
+        joints: That it says.
+        whose: Who says so many, with the verb: ``an LBR has``.
+        give: What would be right.
+
+    Raises:
+        InputError: There is no such robot, or it has another number of joints.
+    """
+    if target is None:
+        raise InputError.at("sources", "robot", f"no robot {robot!r}", "name a robot")
+    if len(target.joints) != joints:
+        what = f"{target.name} has {len(target.joints)} joints, {whose} {joints}"
+        raise InputError.at(where, "robot", what, give)
+    return target
 
 
 @dataclass(frozen=True, eq=False)

@@ -223,7 +223,6 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
     )  # fmt: skip
     carries = stop.acceleration is None and bool(robot.riders)
     by_themselves = bind_riders(model, robot, gap, stop.reaction) if carries else None
-    everybody = (robot.name, *robot.riders, *model.carriers_of(robot.name))
 
     def reactions(state: State) -> tuple[OnsetAt, OnsetAt | None]:
         found: tuple[OnsetAt, OnsetAt | None] = state.once(("onset", asked), lambda: asked(state))
@@ -258,7 +257,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         def at(scale: float) -> Course:
             course = after(least(scale), scale)
             top = course if most is None else after(most(scale), scale)
-            noisy = not state.speed_errors.keys().isdisjoint(everybody)
+            noisy = _noisy(state, model, robot)
             why = [NOISY if noisy else FASTEST] * (most is not None) + [found.more] * (top.most is not None)
             top = top.most or top
             if restless or ways.any():
@@ -282,6 +281,14 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         stop.acceleration is None,
         found.costly,
     )
+
+
+def _noisy(state: State, model: Model, robot: Mechanism) -> bool:
+    """Whether speeds of a robot, of what rides on it or of what carries it may be off by noise."""
+    if not state.speed_errors:
+        return False
+    everybody = (robot.name, *robot.riders, *model.carriers_of(robot.name))
+    return not state.speed_errors.keys().isdisjoint(everybody)
 
 
 def _while_riders_rest(braking: Braking, model: Model, robot: Mechanism) -> Braking:
@@ -409,7 +416,6 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     brakes, origin, source = _brakes(stop, robot)
     unknown = [joint.name for joint, torque in zip(robot.joints, brakes, strict=True) if np.isnan(torque)]
     simulation = StopSimulation(model, robot, brakes, gap.b)
-    everybody = (robot.name, *robot.riders, *model.carriers_of(robot.name))
     masses = simulation.masses
     followed = not masses.moved and len(masses) <= MOST_OFF
     corners = [*product((-1, 1), repeat=len(masses))] if followed and len(masses) else []
@@ -421,7 +427,7 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         def once(onset: Onset, scale: float, known: tuple[Array, Array] | None, shifts: Shifts) -> Course:
             stopped = simulation.stop(state, stop.reaction, scale, known, shifts)
             found = stopped.course()
-            if not state.speed_errors.keys().isdisjoint(everybody):
+            if _noisy(state, model, robot):
                 why = f"the noise of positions that speeds of {robot.name} are derived from is not followed"
                 onset = replace(
                     onset, unbounded_reason=onset.unbounded_reason or f"{why} in a simulated stop"

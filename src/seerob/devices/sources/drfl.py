@@ -15,7 +15,6 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.listening import LiveSource
@@ -31,7 +30,7 @@ from seerob.protocols.robots.doosan_drfl import (
     RobotState,
     decode,
 )
-from seerob.workstation.source import Opened, Target
+from seerob.workstation.source import Opened, Target, driven_robot
 
 SILENCE = 1.0
 """Longest pause before the bridge is taken for gone [s]."""
@@ -70,12 +69,8 @@ class Drfl(LiveSource, frozen=True, kw_only=True):
         Raises:
             InputError: The robot does not have six joints.
         """
-        if target is None:
-            raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
-        if len(target.joints) != JOINTS:
-            what = f"{target.name} has {len(target.joints)} joints, the bridge sends {JOINTS}"
-            raise InputError.at(f"drfl {self.host}", "robot", what, "name another robot")
-        return super().open(folder, target)
+        where, whose = f"drfl {self.host}", "the bridge sends"
+        return super().open(folder, driven_robot(target, self.robot, where, joints=JOINTS, whose=whose))
 
     async def ask(self) -> tuple[Finding, ...]:
         """Whether it sends, and what it does not have."""

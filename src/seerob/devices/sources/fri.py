@@ -16,7 +16,6 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import REORDERED
@@ -27,7 +26,7 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import fri
 from seerob.protocols.robots.fri import Monitoring, SessionState
-from seerob.workstation.source import Opened, Target
+from seerob.workstation.source import Opened, Target, driven_robot
 
 JOINTS = 7
 """Of every LBR."""
@@ -185,12 +184,8 @@ class Fri(LiveSource, frozen=True, kw_only=True):
         Raises:
             InputError: The robot does not have seven joints.
         """
-        if target is None:
-            raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
-        if len(target.joints) != JOINTS:
-            what = f"{target.name} has {len(target.joints)} joints, an LBR has {JOINTS}"
-            raise InputError.at(f"fri {self.host}", "robot", what, "name another robot")
-        return super().open(folder, target)
+        where, whose = f"fri {self.host}", "an LBR has"
+        return super().open(folder, driven_robot(target, self.robot, where, joints=JOINTS, whose=whose))
 
     async def ask(self) -> tuple[Finding, ...]:
         """Which FRI it speaks, how often it sends, and what state it is in."""

@@ -35,7 +35,7 @@ from seerob.protocols.robots.rtde import (
     name,
     quality,
 )
-from seerob.workstation.source import Opened, Target
+from seerob.workstation.source import Opened, Target, driven_robot
 
 _log = logging.getLogger(__name__)
 
@@ -183,12 +183,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
         Raises:
             InputError: The robot does not have six joints.
         """
-        if target is None:
-            raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
-        if len(target.joints) != 6:
-            what = f"{target.name} has {len(target.joints)} joints, a Universal Robots arm has 6"
-            raise InputError.at(f"rtde {self.host}", "robot", what, "name another robot")
-        return super().open(folder, target)
+        where, whose = f"rtde {self.host}", "a Universal Robots arm has"
+        return super().open(folder, driven_robot(target, self.robot, where, joints=6, whose=whose))
 
     def reach(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
         """Ask the controller what it has, and for the kinematics of this very robot, if it can be reached.

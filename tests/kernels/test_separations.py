@@ -1,14 +1,13 @@
-"""Compiled separation distances and their verdicts are those of the norm's and the verdict's own formulas."""
+"""Compiled separation distances are those of the norm's own formulas."""
 
 import math
 
 import numpy as np
 import pytest
 
-from seerob.core.verdict import ROUNDING, Verdict, judge_interval, worst
 from seerob.criteria.stopping.terms import Course, separation_distance
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING, least_distance
-from seerob.kernels.separation import EXCEEDED, UNDECIDED, WITHIN, judged, separations
+from seerob.kernels.separation import separations
 
 T_R, T_S, K = 0.1, 0.3, 0.055
 
@@ -41,31 +40,3 @@ def test_what_is_not_a_number_gives_no_separation(bad):
     S_r, S_s, seen = values
     separations(S_r, S_s, T_R + T_S, K, math.nan, seen, REACHING, WALKING, ARM_REACH, found)
     assert np.isnan(found).all()
-
-
-def test_verdicts_and_who_governs_are_those_of_the_rule_for_one_part_after_the_other():
-    rng = np.random.default_rng(4)
-    edges = np.array([0.0, 1e-10, 5e-10, 9.9e-10, 1e-9, 1.1e-9, 1e-8, 0.1, -1e-10, np.nan, np.inf])
-    names = {WITHIN: Verdict.WITHIN, UNDECIDED: Verdict.UNDECIDED, EXCEEDED: Verdict.EXCEEDED}
-    seen = set()
-    for _ in range(2000):
-        S_p = np.where(rng.random(4) < 0.1, np.inf, rng.uniform(0, 3, 4))
-        distance = np.where(rng.random(4) < 0.1, np.inf, S_p + rng.choice(edges, 4))
-        off, more, less = rng.choice([0.0, 1e-9, 0.05], (3, 4)) * (rng.random() < 0.7)
-        incomplete = bool(rng.random() < 0.3)
-        ends, verdicts = np.empty((2, 4)), np.empty(4, np.int64)
-        with np.errstate(invalid="ignore"):
-            near, far, low, high = distance - off, distance + off, S_p - less, S_p + less
-            wanted = np.array([(near - more) - (high - S_p), far + (S_p - low)])
-        k = judged(distance, near, far, S_p, more, low, high, ROUNDING, incomplete, ends, verdicts)
-        np.testing.assert_array_equal(ends, wanted)
-        each = [judge_interval((a, b), s, at_most=False) for a, b, s in zip(*ends, S_p, strict=True)]
-        each = [Verdict.UNDECIDED if incomplete and v is Verdict.WITHIN else v for v in each]
-        assert [names[code] for code in verdicts.tolist()] == each
-        assert each[k] is worst(each)
-        with np.errstate(invalid="ignore"):
-            margins = (distance - S_p).tolist()
-        if not np.isnan(margins).any():
-            assert k == min((i for i in range(4) if each[i] is each[k]), key=margins.__getitem__)
-        seen |= set(each)
-    assert len(seen) == 3

@@ -76,7 +76,7 @@ def test_what_a_file_does_ahead_is_that_of_each_instant_by_itself(tmp_path, monk
     assert not found.note
     monkeypatch.setattr(many_instants._Ahead, "of", lambda *_: None)
     alone = cell.batch()["apart"]
-    assert "not made for batches" in alone.note
+    assert "worked out at each instant" in alone.note
     np.testing.assert_array_equal(found.answers.verdict, alone.answers.verdict)
     np.testing.assert_allclose(found.value, alone.value, rtol=1e-12)
     np.testing.assert_allclose(found.answers.limit, alone.answers.limit, rtol=1e-12)

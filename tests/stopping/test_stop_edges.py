@@ -7,7 +7,7 @@ import pytest
 
 from seerob.core.errors import Undecided
 from seerob.core.tolerances import Tolerance
-from seerob.core.verdict import ROUNDING
+from seerob.criteria.safety.separation import room_ends
 from seerob.criteria.stopping import search, table
 from seerob.criteria.stopping.largest import LargestSeparation
 from seerob.criteria.stopping.search import factor_by_search
@@ -21,7 +21,6 @@ from seerob.criteria.stopping.terms import (
     way_of_person,
 )
 from seerob.criteria.stopping.tolerances import SeparationEnds
-from seerob.kernels.separation import judged
 
 
 def test_full_speed_until_standstill_is_the_bound_and_half_of_it_a_constant_deceleration():
@@ -98,9 +97,8 @@ def test_what_S_p_may_be_off_is_put_on_the_side_of_the_distance():
     distance, S_p, none = np.array([3.0, 2.0]), np.array([1.0, 1.5]), np.zeros(2)
 
     def between(near, far, low, high):
-        ends, verdicts = np.empty((2, 2)), np.empty(2, np.int64)
-        judged(distance, near, far, S_p, none, low, high, ROUNDING, False, ends, verdicts)
-        return list(zip(*ends.tolist(), strict=True))
+        ends = room_ends(near, far, S_p, none, low, high)
+        return list(zip(*(each.tolist() for each in ends), strict=True))
 
     assert between(distance, distance, S_p, S_p) == [(3.0, 3.0), (2.0, 2.0)]
     assert between(distance - 0.25, distance + 0.25, S_p, S_p) == [(2.75, 3.25), (1.75, 2.25)]

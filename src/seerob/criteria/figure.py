@@ -117,7 +117,7 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     parts.governs = k = judged(
         parts.value, low, high, parts.limit, ROUNDING, at_most, bool(parts.open), codes
     )
-    parts.verdicts = verdicts = [_VERDICTS[code] for code in codes.tolist()]
+    parts.verdicts = verdicts = list(map(_VERDICTS.__getitem__, codes.tolist()))
     return verdicts[k] if parts.whole else worst([verdicts[k], _own_verdict(figure, at_most=at_most)])
 
 
@@ -179,6 +179,9 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
 def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> list[Result]:
     unit, at_most = result.unit, result.at_most
     ends: Iterable[tuple[float, float] | None] = repeat(None)
+    limits = parts.limit.tolist()
+    if math.isnan(sum(limits)):
+        limits = [None if math.isnan(limit) else limit for limit in limits]
     if parts.interval is not None:
         low, high = parts.interval
         ends = zip(low.tolist(), high.tolist(), strict=True)
@@ -186,7 +189,7 @@ def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> 
         parts.names,
         parts.value.tolist(),
         parts.units or repeat(unit),
-        parts.limit.tolist(),
+        limits,
         parts.verdicts,
         ends,
         where or repeat(""),
@@ -197,7 +200,7 @@ def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> 
             name=name,
             value=value,
             unit=own,
-            limit=None if math.isnan(limit) else limit,
+            limit=limit,
             at_most=at_most,
             verdict=verdict,
             interval=interval,

@@ -1,4 +1,4 @@
-"""Protective separation distances of the parts of a robot, and what they say of distances, compiled."""
+"""Protective separation distances of the parts of a robot, and speeds at which they are kept, compiled."""
 
 from __future__ import annotations
 
@@ -6,14 +6,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-
-Codes = NDArray[np.int64]
-
-WITHIN, UNDECIDED, EXCEEDED = 0, 1, 2
-"""Verdicts, the worse the larger."""
 
 _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
 
@@ -107,64 +101,6 @@ def separations(
     """
     for k in range(S_r.shape[0]):
         separation(S_r[k], S_s[k], time, K, v_h, seen[k], reaching, walking, arm, found[k])
-
-
-@njit(
-    f"i8({_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, f8, b1, {_ROWS}, i8[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def judged(
-    distance: Array,
-    near: Array,
-    far: Array,
-    S_p: Array,
-    more: Array,
-    low: Array,
-    high: Array,
-    rounding: float,
-    incomplete: bool,
-    ends: Array,
-    verdicts: Codes,
-) -> int:
-    """Judge distances of parts against S_p as `seerob.core.verdict.keeps`; writes the last two arguments.
-
-    Args:
-        distance: As the twin has them [m], shape (n,).
-        near: Least that they may be [m], shape (n,).
-        far: Largest, likewise.
-        S_p: As given [m], shape (n,).
-        more: What acceleration and noise may add to it [m], shape (n,).
-        low: Least end of S_p by its tolerances [m], shape (n,).
-        high: Largest end, likewise.
-        rounding: Share of S_p, and of 1 m where it is less, by which a distance must keep it.
-        incomplete: Whether S_p may be larger than all that: then nothing is within.
-        ends: Between which each distance lies, with what S_p may be off put on its side [m], shape (2, n).
-        verdicts: Of each, shape (n,).
-
-    Returns:
-        Which part governs: of those with the worst verdict the one that is nearest to its S_p, or deepest in.
-    """
-    worst, governs = -1, 0
-    for i in range(len(S_p)):
-        ends[0, i] = (near[i] - more[i]) - (high[i] - S_p[i])
-        ends[1, i] = far[i] + (S_p[i] - low[i])
-        limit = S_p[i]
-        if not math.isinf(limit):
-            limit = limit + rounding * max(1.0, abs(limit))
-        kept = ends[0, i] >= limit
-        if math.isnan(ends[0, i]) or math.isnan(ends[1, i]) or kept != (ends[1, i] >= limit):
-            verdicts[i] = UNDECIDED
-        elif kept:
-            verdicts[i] = UNDECIDED if incomplete else WITHIN
-        else:
-            verdicts[i] = EXCEEDED
-        if verdicts[i] > worst:
-            worst, governs = verdicts[i], i
-        elif verdicts[i] == worst and distance[i] - S_p[i] < distance[governs] - S_p[governs]:
-            governs = i
-    return governs
 
 
 @njit(f"f8({_ROW}, {_ROW}, {_ROW})", cache=True, nogil=True, error_model="numpy")

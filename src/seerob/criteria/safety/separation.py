@@ -5,33 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from seerob.core import figures
 from seerob.core.domains import at_least, number
 from seerob.core.errors import InputError, Undecided
-from seerob.core.markers import drawn
-from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
-from seerob.core.tolerances import Shifts, Tolerance, deciding
+from seerob.core.snapshot import Basis, Input, Origin, Result, Segment
+from seerob.core.tolerances import Shifts, Spread, Tolerance, deciding
 from seerob.core.transforms import Array
-from seerob.core.verdict import ROUNDING
+from seerob.core.verdict import Verdict
 from seerob.criteria.body_parts import BodyPlaces, partly_seen
-from seerob.criteria.criterion import (
-    Claim,
-    Criterion,
-    Evaluate,
-    EvaluateMany,
-    Follows,
-    Moment,
-)
+from seerob.criteria.criterion import Claim, Criterion, Evaluate, Follows, Moment
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
+from seerob.criteria.noisy_speeds import others_noisy
 from seerob.criteria.sensors.detection import Detection, device_of
+from seerob.criteria.stopping import many_instants
 from seerob.criteria.stopping.inputs import approach_speed, intrusion
 from seerob.criteria.stopping.largest import LargestSeparation
-from seerob.criteria.stopping.many_instants import separations as at_instants
 from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.reaction import joint_limits
@@ -41,15 +35,8 @@ from seerob.criteria.stopping.terms import At, Course, separation_distance, way_
 from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shifted, tolerances
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import REACHING, WALKING
-from seerob.kernels.separation import (
-    EXCEEDED,
-    UNDECIDED,
-    WITHIN,
-    approach_speeds,
-    judged,
-    separation,
-    separations,
-)
+from seerob.distance.least import Closests
+from seerob.kernels.separation import approach_speeds, separation, separations
 from seerob.kernels.spans import greatest
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
@@ -57,6 +44,7 @@ from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.accuracy.tracking_error import tracking
 from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, rows_of
 from seerob.twin.state import State
+from seerob.twin.states import States
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 
@@ -64,7 +52,6 @@ __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 CLOSE = 1e-4
 """A rise of S_p between ticks that is not looked into [m]; our choice, a tenth of the tolerance to which
 `seerob.session.permissible.between_samples` bounds distances."""
-_VERDICTS = {WITHIN: Verdict.WITHIN, UNDECIDED: Verdict.UNDECIDED, EXCEEDED: Verdict.EXCEEDED}
 MORE = "S_p may be larger by"
 """Name of the part of a result that says so; there is none where S_p is known."""
 
@@ -78,6 +65,56 @@ class Required(NamedTuple):
     """A bound from above [m], shape (n,)."""
     unbounded_reason: str
     """Why it may be still more; empty when it may not."""
+
+
+class _Shared(NamedTuple):
+    """What questions about parts of a gap share."""
+
+    unknown_ever: str
+    """Why S_p may always be larger than what is computed; empty when it may not."""
+    largest: tuple[LargestSeparation, LargestSeparation]
+    ends: SeparationEnds
+    tops: Mapping[Shifts, Array]
+    """By which ends of the inputs, the bound on S_p from above that was asked last [m], shape (n,)."""
+
+
+class _Found(Struct, frozen=True, eq=False):
+    """What distances and S_p at one instant follow from."""
+
+    stop: StopModel
+    found: Closests
+    course: At
+    now: Course
+    seen: tuple[float, float]
+    """Speed of the person as it is known, and as it may be [m/s]."""
+    stray: str
+    S_p: Array
+    """As shown [m], shape (n,)."""
+    most: Array
+    """A bound on it from above, likewise."""
+    unbounded_reason: str
+    span: Spread | None
+    """Ends of S_p by its tolerances."""
+    near: Array
+    """Least distances of the parts [m], shape (n,)."""
+    far: Array
+    """Largest, likewise."""
+
+
+def room_ends(
+    near: Array, far: Array, S_p: Array, more: Array, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Ends of distances, with what S_p may be off put on their side [m], shape (n,) each.
+
+    Args:
+        near: Least distances [m], shape (n,), as all others.
+        far: Largest distances [m].
+        S_p: As given [m].
+        more: What acceleration and noise may add to it [m].
+        low: Least end of S_p by its tolerances [m].
+        high: Largest end [m].
+    """
+    return (near - more) - (high - S_p), far + (S_p - low)
 
 
 def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) -> Array:
@@ -316,12 +353,34 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return (StatedAcceleration(model, self.moving(model), a, T_r, key, holds),)
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        own, _, _ = self._by_device(model)
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
+        own, shared = self._by_device(model)[0], self._shared(model)
+
+        def bind(gap: Gap) -> Evaluate:
+            return self.judging(own._separations(model, gap, shared), own._line(model, gap, shared))
+
+        return partly_seen(model, own._gap(model), bind)
+
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes distances and S_p."""
+        own = self._by_device(model)[0]
+        return own._separations(model, own._gap(model), self._shared(model))
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so of what depends on earlier instants, has ends, or where the way to stop is not given."""
+        own = self._by_device(model)[0]
+        if self.mode == "fixed":
+            return "the largest S_p so far counts"
+        if own._tolerances():
+            return "what S_p is made from has tolerances"
+        if many_instants.courses(model, own.stop, own._gap(model)) is None:
+            return "how the robot stops is worked out at each instant"
+        return ""
+
+    def _shared(self, model: Model) -> _Shared:
+        own, tops = self._by_device(model)[0], dict[Shifts, Array]()
         if self.stop.model == "simulated":
             model.mover(self._sides(model)[0]).require_masses(self.name)
-
-        tops: dict[Shifts, Array] = {}
 
         def figure(shifts: Shifts) -> Callable[[State], Array]:
             required = own._shifted(shifts).required(model)
@@ -334,90 +393,76 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return at
 
         ends = SeparationEnds(own._tolerances(), figure, remembers=own.mode == "fixed")
-        rest = self.unknown(model), (LargestSeparation(), LargestSeparation()), ends, tops
-        return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, *rest))
+        return _Shared(self.unknown(model), (LargestSeparation(), LargestSeparation()), ends, tops)
 
-    def _bound(
-        self,
-        model: Model,
-        gap: Gap,
-        unknown_ever: str,
-        largest: tuple[LargestSeparation, LargestSeparation],
-        ends: SeparationEnds,
-        tops: Mapping[Shifts, Array],
-    ) -> Evaluate:
-        stop = self._stop(model)
+    def _terms_given(self, gap: Gap) -> dict[str, float]:
+        """C, Z_d and Z_r [m], by name."""
         C, Z_d, Z_r = self._terms()[0]
-        K = C + Z_d + Z_r + gap.deviation
-        terms = {"C": C + gap.deviation, "Z_d": Z_d, "Z_r": Z_r}
-        rest = sum(terms.values())
-        given = tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
-        places, names = BodyPlaces(model), [body.name for body in model.bodies]
-        human = self._sides(model)[1]
-        ends_of_distance = DistanceEnds(model, gap)
-        largest_ends = (1,) * len(ends.tolerances)
+        return {"C": C + gap.deviation, "Z_d": Z_d, "Z_r": Z_r}
 
-        def evaluate(state: State) -> Result:
-            found = state.closest_per_body(gap, allow_estimated=True, strayed=True)
-            stray = state.strays(gap.a)
-            course = stop.courses(state)
-            now = course(1.0)
-            seen = self._seen(state, gap, stray)
+    def _separations(self, model: Model, gap: Gap, shared: _Shared) -> Compute:
+        stop, K = self._stop(model), sum(self._terms()[0]) + gap.deviation
+        names = tuple(model.bodies[i].name for i in gap.b)
+        unknown_ever, largest, ends, tops = shared
+        ends_of_distance, largest_ends = DistanceEnds(model, gap), (1,) * len(ends.tolerances)
+        everybody = (*self._everybody(model), *gap.carriers, *model.carriers_of(self._sides(model)[1]))
+        courses: Callable[[States], Course] | None = None
+
+        def of_many(states: States, distance: Array) -> Figure:
+            nonlocal courses
+            courses = courses or many_instants.courses(model, self.stop, gap)
+            assert courses is not None
+            seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)
+            S_p = self._distances(courses(states), K, seen)
+            # How much faster noise may make everybody is asked of each instant.
+            states.alone = states.alone | others_noisy(states, everybody)
+            return Figure(None, parts=Parts(names, distance, S_p, open=bool(unknown_ever)))
+
+        def compute(twin: Twin) -> Figure:
+            found = twin.closest_per_body(gap, allow_estimated=True, strayed=True)
+            if twin.many:
+                return of_many(cast("States", twin), found.distance)
+            state: State = twin  # type: ignore[assignment]
+            stray, course = state.strays(gap.a), stop.courses(state)
+            now, seen = course(1.0), self._seen(state, gap, stray)
             S_p, most, unbounded_reason = self._required(now, K, *seen)
             if self.mode == "fixed":
                 S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
-            unknown = ""
-            if unknown_ever or unbounded_reason or stray:
-                slower = f"{stray}: how fast the person is nobody knows" if stray else ""
-                unknown = "; ".join(filter(None, (unknown_ever, unbounded_reason, slower)))
-                unknown = f"{unknown}; S_p is at least the figure shown"
             near, far = ends_of_distance.of_bodies(state, found.distance)
-            span = ends.at(state) if ends.tolerances else None
-            # What acceleration and noise may add to S_p, with all inputs at their worst, is less distance.
-            more = most - S_p if span is None else np.maximum(tops[largest_ends] - span.high, 0.0)
-            low, high = (S_p, S_p) if span is None else (span.low, span.high)
-            verdicts, between = np.empty(len(S_p), np.int64), np.empty((2, len(S_p)))
-            k = judged(
-                found.distance, near, far, S_p, more, low, high, ROUNDING, bool(unknown), between, verdicts
-            )
-            open_at_all = span is not None or (far is not near and bool((far > near).any()))
-            open_at_all = open_at_all or (most is not S_p and bool((most > S_p).any()))
-            bodies = found.body_a.tolist()
-            parts = tuple(
-                Result(
-                    name=names[body],
-                    value=distance,
-                    unit="m",
-                    limit=least,
-                    at_most=False,
-                    verdict=_VERDICTS[code],
-                    interval=(first, last) if open_at_all else None,
-                    reason=names[bone],
-                )
-                for body, distance, least, code, first, last, bone in zip(
-                    gap.b,
-                    found.distance.tolist(),
-                    S_p.tolist(),
-                    verdicts.tolist(),
-                    *between.tolist(),
-                    bodies,
-                    strict=True,
-                )
-            )
-            verdict = parts[k].verdict
-            open_ = unknown
-            if verdict is Verdict.UNDECIDED and not unknown:
-                widths = np.zeros(0) if span is None else span.widths[:, k]
-                wide = float(far[k] - near[k])
-                open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
-                if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
-                    noisy = human in state.speed_errors and NOISY not in now.more
-                    why = "; ".join(filter(None, (now.more, NOISY * noisy)))
-                    open_ = f"S_p is up to {most[k]:.3f} m {why}"
+            span, interval = ends.at(state) if ends.tolerances else None, None
+            if span is not None:
+                # What acceleration and noise may add to S_p, all inputs at their worst, is less distance.
+                more = np.maximum(tops[largest_ends] - span.high, 0.0)
+                interval = room_ends(near, far, S_p, more, span.low, span.high)
+            elif (far is not near and (far > near).any()) or (most is not S_p and (most > S_p).any()):
+                interval = near - (most - S_p), far
+            open_ = bool(unknown_ever or unbounded_reason or stray)
+            parts = Parts(names, found.distance, S_p, interval, open_)
+            return Figure(None, parts=parts, beside=_Found(
+                stop, found, course, now, seen, stray, S_p, most, unbounded_reason, span, near, far
+            ))  # fmt: skip
+
+        return compute
+
+    def _line(self, model: Model, gap: Gap, shared: _Shared) -> Present:
+        """What is said of the part that governs, and the line to it."""
+        names = [body.name for body in model.bodies]
+        terms = self._terms_given(gap)
+        K, rest = sum(self._terms()[0]) + gap.deviation, sum(terms.values())
+        given = tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+        places, human = BodyPlaces(model), self._sides(model)[1]
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            at: _Found = figure.beside
+            parts, found = figure.parts, at.found
+            assert parts is not None
+            k, S_p = parts.governs, at.S_p
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
-            where = f"{parts[k].name} ↔ {nearest}"
-            if seen[0] > (self.human_speed or WALKING):
-                where += f", and {human} is seen at {seen[0]:.2f} m/s, faster than v_h"
+            where = f"{parts.names[k]} ↔ {nearest}"
+            if at.seen[0] > (self.human_speed or WALKING):
+                where += f", and {human} is seen at {at.seen[0]:.2f} m/s, faster than v_h"
+            if verdict is Verdict.UNDECIDED:
+                where = f"{where}: {self._undecided_reason(model, state, at, k, shared)}"
             value, limit = float(found.distance[k]), float(S_p[k])
 
             def draw() -> tuple[Segment, ...]:
@@ -426,26 +471,28 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 start, end = tuple(found.point_b[k].tolist()), tuple(found.point_a[k].tolist())
                 return (Segment(start=start, end=end, label=label, verdict=verdict),)
 
-            return Result(
-                name=self.name,
-                value=value,
-                unit=self.unit,
-                limit=limit,
-                at_most=False,
-                verdict=verdict,
-                reason=f"{where}: {open_}" if verdict is Verdict.UNDECIDED else where,
-                interval=parts[k].interval,
-                parts=(
-                    *parts,
-                    *self._shown(now, k, limit, rest, seen[0]),
-                    *given,
-                    *self._more(S_p, most, unbounded_reason),
-                    *self._permissible(stop, state, course, now, found.distance, K, seen, stray),
-                ),
-                markers=drawn(draw),
+            beside = (
+                *self._shown(at.now, k, limit, rest, at.seen[0]),
+                *given,
+                *self._more(S_p, at.most, at.unbounded_reason),
+                *self._permissible(at.stop, state, at.course, at.now, found.distance, K, at.seen, at.stray),
             )
+            return Shown(where, draw, beside, list(map(names.__getitem__, found.body_a.tolist())))
 
-        return evaluate
+        return present
+
+    def _undecided_reason(self, model: Model, state: State, at: _Found, k: int, shared: _Shared) -> str:
+        human, S_p, most = self._sides(model)[1], at.S_p, at.most
+        slower = f"{at.stray}: how fast the person is nobody knows" if at.stray else ""
+        if unknown := "; ".join(filter(None, (shared.unknown_ever, at.unbounded_reason, slower))):
+            return f"{unknown}; S_p is at least the figure shown"
+        widths = np.zeros(0) if at.span is None else at.span.widths[:, k]
+        wide = float(at.far[k] - at.near[k])
+        if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
+            noisy = human in state.speed_errors and NOISY not in at.now.more
+            why = "; ".join(filter(None, (at.now.more, NOISY * noisy)))
+            return f"S_p is up to {most[k]:.3f} m {why}"
+        return deciding((*shared.ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
 
     @staticmethod
     def _more(S_p: Array, highest: Array, unbounded_reason: str) -> tuple[Result, ...]:
@@ -466,16 +513,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
             Result(name="S_r", value=S_r, unit="m"),
             Result(name="S_s", value=S_s, unit="m"),
         )
-
-    def batch(self, model: Model) -> EvaluateMany | None:
-        """Judge many instants at once, where the stopping time is given and S_p is that of present speeds."""
-        own, _, _ = self._by_device(model)
-        gap = own._gap(model)
-        K = sum(own._terms()[0]) + gap.deviation
-        if self.mode == "fixed" or own._tolerances():
-            return None
-        incomplete = bool(self.unknown(model))
-        return at_instants(model, own.stop, gap, own._distances, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""

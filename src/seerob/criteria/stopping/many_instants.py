@@ -1,4 +1,4 @@
-"""Distances of the moving parts of a robot against S_p, of many instants."""
+"""How far the moving parts of a robot come while it stops, at many instants."""
 
 from __future__ import annotations
 
@@ -7,61 +7,38 @@ from collections.abc import Callable
 import numpy as np
 
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import EvaluateMany
 from seerob.criteria.stopping.models import SHARES, Stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW, Onset, accelerated
 from seerob.criteria.stopping.terms import Course, braking
 from seerob.kernels.ahead import part_speeds, reactions
 from seerob.model.model import Gap, Mechanism, Model
-from seerob.recording.answers import Answers
 from seerob.twin.spans import ROUNDING, Chains, Points, Ways, rows_of
 from seerob.twin.states import Motion, States
 from seerob.twin.validity.hearing import SLACK
 
 
-def separations(
-    model: Model,
-    stop: Stop,
-    gap: Gap,
-    S_p: Callable[[Course, float, Array], Array],
-    K: float,
-    *,
-    incomplete: bool,
-) -> EvaluateMany | None:
-    """What the part that governs comes to; None where the stopping time is not given, or has a tolerance.
+def courses(model: Model, stop: Stop, gap: Gap) -> Callable[[States], Course] | None:
+    """Courses of the moving parts at N instants, shape (N, b).
+
+    None where the stopping time is not given or has a tolerance, or what the motion does ahead is to be asked
+    instant by instant.
 
     Args:
         model: The workstation.
         stop: How the robot stops.
         gap: From whom to its moving parts.
-        S_p: Of a course, K and the speed that a person is seen to have [m/s] (N,), shape (N, b) [m].
-        K: C + Z_d + Z_r [m].
-        incomplete: Whether S_p may be larger than what is computed.
     """
+
+    def speeds(states: States) -> Array:
+        return states.fastest_points(gap.b)[0]
+
     if stop.model not in SHARES or stop.stopping is None or stop.tolerance is not None:
         return None
     a, T_r, T_s, share = stop.acceleration, stop.reaction, stop.stopping, SHARES[stop.model]
-    ahead = None if a is not None else _Ahead.of(model, gap, T_r)
-    if a is None and ahead is None:
-        # What the motion does ahead is asked instant by instant.
-        return None
-
-    def evaluate(states: States) -> Answers:
-        distance = states.closest_per_body(gap).distance
-        v_r, _, _ = states.fastest_points(gap.b)
-        seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)
-        if a is not None:
-            onset = accelerated(v_r, T_r, a, np.zeros(0))
-        else:
-            assert ahead is not None
-            onset = ahead.at(states, v_r)
-        least = S_p(braking(onset, T_s, share), K, seen)
-        k = (distance - least).argmin(axis=1)[:, None]
-        value, limit = (np.take_along_axis(found, k, axis=1)[:, 0] for found in (distance, least))
-        found = Answers.against(value, limit, at_most=False)
-        return found.open() if incomplete else found
-
-    return evaluate
+    if a is not None:
+        return lambda states: braking(accelerated(speeds(states), T_r, a, np.zeros(0)), T_s, share)
+    ahead = _Ahead.of(model, gap, T_r)
+    return None if ahead is None else lambda states: braking(ahead.at(states, speeds(states)), T_s, share)
 
 
 class _Ahead:

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import math
 import sys
 import threading
 import time
@@ -15,11 +16,12 @@ import pytest
 
 from live_story import wait_for as until
 from seerob.core.errors import SeerobError
-from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.core.samples import BodyPoint, BodySample, JointSample, Quality, SignalSample
 from seerob.devices.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
     MARGIN,
+    STILL,
     Listener,
     LiveSource,
     delay_of,
@@ -347,3 +349,24 @@ def test_a_mistake_in_a_source_is_told_with_its_place_once(monkeypatch, caplog):
         ("made: a mistake in the source itself", True),
         ("made: not heard: KeyError: 'gone'", False),
     ]
+
+
+def test_what_is_no_number_and_is_said_again_is_the_same():
+    """A person of whom one point is none hangs; a robot's buffer is no other clock."""
+    told = []
+    ears = Listener(Made(name="made", timeout=0.2), None, told.append)
+    for k in range(100):
+        nowhere = BodyPoint(name="hand", bone="right_hand", position=(math.nan * k, 0.0, 0.0))
+        there = BodyPoint(name="head", bone="head", position=(0.0, 0.0, 1.7))
+        body = BodySample(
+            source="", seq=0, t=5 + 0.01 * k, t_device=0.01 * k, target="op", points=(nowhere, there)
+        )
+        ears._take(body)
+    assert told[-1].reason.endswith(STILL)
+    ears = Listener(Made(name="made", timeout=0.2), None, told.append)
+    for late, first in ((0.0, 0), (3.0, 100)):
+        ears._clock.reconnect()
+        for k in range(first, 200):
+            q = (math.nan * k,)
+            ears._take(msgspec.structs.replace(joint(5 + late + 0.01 * k, 0.01 * k), q=q))
+    assert ears.statistics().offset == pytest.approx(5, abs=2e-3)

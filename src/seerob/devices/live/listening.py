@@ -571,11 +571,17 @@ class _Person:
 
 def _content(sample: Sample) -> int:
     """What tells a sample's content from that of others."""
+    if isinstance(sample, SignalSample):
+        return 0
+    said: tuple[tuple[float, ...] | None, ...]
     if isinstance(sample, JointSample):
-        return hash((sample.q, sample.qd))
-    if isinstance(sample, BodySample):
-        return hash(tuple([(p.position, p.wxyz) for p in sample.points]))
-    return 0 if isinstance(sample, SignalSample) else hash((sample.position, sample.wxyz))
+        said = sample.q, sample.qd
+    elif isinstance(sample, BodySample):
+        said = tuple([each for p in sample.points for each in (p.position, p.wxyz)])
+    else:
+        said = sample.position, sample.wxyz
+    # What is no number differs from itself; its words do not.
+    return hash(repr(said) if math.isnan(sum(map(sum, filter(None, said)))) else said)
 
 
 def name_of(source: LiveSource) -> str:

@@ -127,6 +127,12 @@ def listening(source, target=None):
         assert listener.join(30)
 
 
+def elsewhere(server, motion):
+    """Switch a device on whose robot was moved meanwhile: at the same times of its clock it is elsewhere."""
+    server.motion = lambda t: motion(t + 1.0)
+    server.start()
+
+
 def open_files():
     return len(os.listdir("/proc/self/fd"))
 

@@ -207,7 +207,7 @@ SPOILED = {
     ),
     "played again": Case(looped(live=False), gap=0.02, least=0.4, until=3.05, why="says again what it said"),
     "played again, connected anew": Case(
-        looped(live=False), least=0.4, until=3.05, again=(3.0, 5.0), why="not for the first time"
+        looped(live=False), least=0.4, until=3.05, again=(3.0, 5.0), why="a buffer on the way"
     ),
     "played again among what is live": Case(looped(live=True), least=0.4, until=3.05),
     "a stamp ahead": Case(ahead(0.15), gap=0.02, least=0.85, why="ahead of what its clock was"),

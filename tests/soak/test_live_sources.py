@@ -78,7 +78,8 @@ def listen(monkeypatch):
     monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.002)
     monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.02)
     # A clock that starts again ten times a second is not relied on; here only whether it is heard is asked.
-    for name, value in (("RESTART_HOLD", 0.0), ("AGAIN", 0.0), ("HOLD", 0.0), ("DRIFT", 1e9)):
+    nothing = dict.fromkeys(("RESTART_HOLD", "AGAIN", "HOLD", "BUFFERED"), 0.0)
+    for name, value in {**nothing, "DRIFT": 1e9}.items():
         monkeypatch.setattr(f"seerob.devices.live.device_clock.{name}", value)
     log, made = logging.getLogger("seerob.devices.live.listening"), []
 

@@ -14,6 +14,7 @@ from listening import heard
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import made
+from seerob.app.emulation.ros_robot import JOINT_STATES, states_of
 from seerob.app.emulators.rosbridge import RosbridgeServer
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, PoseSample, Quality
@@ -99,11 +100,17 @@ def test_the_twin_follows_whatever_order_the_joints_are_in(tmp_path):
 
 def test_a_topic_that_dies_is_undecided_and_followed_again(tmp_path):
     server = RosbridgeServer(motion, NAMES).start()
+
+    def on():
+        # Another clock, and none that is a little late.
+        server.topics[JOINT_STATES] = Content.JOINT_STATE, states_of(motion, NAMES, server.epoch - 100.0)
+        server.start()
+
     story = Story(
         300,
         lambda s: "within" in s.verdicts()[110:],
         at_50=server.stop,
-        at_110=server.start,
+        at_110=on,
     )
     try:
         lived(cell(tmp_path, server), story)

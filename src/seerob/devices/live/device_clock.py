@@ -7,8 +7,14 @@ of the way, and never later than it arrived. What is over that least one is how 
 
 The minimum may fall at once, by whatever came faster than anything before. It rises no faster than clocks
 drift (`DRIFT`), through silences and connections alike: a delay that lasts stays a delay. What is made of it
-moves smoothly (`SLEW`), so that intervals between samples never collapse. Time that goes back is a restart
-once, and a loop after that; datagrams that say again what was said at that time are a recording.
+moves smoothly (`SLEW`), so that intervals between samples never collapse.
+
+Time that goes back, by which a sample would be late by less than `BUFFERED`, is that of the same clock: it
+comes out of a buffer on the way, and is no news until it is newer than what was heard. Whoever started again
+so soon looks the same, but for one thing: at an instant that was heard the old clock said one thing and the
+new one says another (`OTHERWISE`). Without that proof it stays as late as it seems. Time that goes back
+farther is a restart once, and a loop after that; datagrams that say again what was said at that time are a
+recording.
 """
 
 from __future__ import annotations
@@ -43,10 +49,13 @@ AGAIN = 60.0
 """A clock that starts again twice within this time is followed, and not relied on for as long [s]: no
 controller is switched on so often."""
 BUFFERED = 10.0
-"""What says again what it said, over a new connection, and is late by less, is a buffer on the way and no
-device that started again [s]: its clock is the one from before, so that it looks as late as it is."""
-BOOTED = 10.0
-"""A clock that begins again below it tells since when its device is on, and is another one [s]."""
+"""What is late by less, by the clock from before, comes out of a buffer on the way [s]: controllers take
+longer to be switched on. No time that passes tells both apart: whoever takes from a queue as fast as it is
+filled stays behind for good."""
+MAY_BE_LATE = ": a buffer on the way, or has it started again?"
+OTHERWISE = 5
+"""So many samples one after another that say something else than was said at their instants are of another
+clock [-]: one that is garbled, or has the stamp of its neighbour, does now and then."""
 KEPT = 16384
 """Stamps of which it is known what was said with them: half a minute of the fastest source."""
 MARKED, MARK_EVERY = 1 << 15, 1.0
@@ -107,12 +116,10 @@ class DeviceClock:
         """When it last started again."""
         self._before: Known | None = None
         """Its clock before that, while it may be the same one."""
-        self._first = math.nan
-        """Stamp that was heard first."""
+        self._otherwise, self._last_otherwise = 0, -math.inf
+        """How often it said something else at an instant that was heard, since there was news; when last."""
         self._content = 0
         """What was said last."""
-        self._repeats = False
-        """Whether it said again what it said before it started again."""
         self._said: dict[float, int] = {}
         self._marks: dict[float, int] = {}
         """As `_said`, of a few."""
@@ -152,21 +159,20 @@ class DeviceClock:
         raw = host - device
         if not math.isfinite(self._offset):
             self._offset = self._applied = raw
-            self._first = device if math.isnan(self._first) else self._first
         elif not self._follow(raw, host, device - self._newest):
             return Instant(None, self._standing(host))
         elif self._ahead is not None and device - self._newest > REORDERED:
-            # One packet that came late over a new connection looked like a restart: time leaps on from it.
+            # What came very late over a new connection looked like a restart: time leaps on from it.
+            self._resume(raw, host)
+        elif host - self._restarted < AGAIN:
             self._resume(raw, host)
         self._connected = False
+        self._otherwise, self._last_otherwise = 0, -math.inf
         self._newest, self._host = device, max(host, self._host)
         again = said in (self._said.get(device), self._marks.get(device))
-        if again and (forgeable or (self._before is not None and said != self._content)):
+        if again and (forgeable or said != self._content):
             # Of a connection that nobody forges, what stands may say the same; what moves does not.
             self._hold(host, AGAIN, "says again what it said before: is a recording played to it?")
-        self._repeats = self._repeats or again
-        if self._repeats:
-            self._resume(raw, host)
         self.latency = raw - self._offset
         self._remember(device, said)
         t = device + self._applied
@@ -182,7 +188,7 @@ class DeviceClock:
         if self._before is None:
             return
         risen = self._before.offset + DRIFT * (host - self._before.host)
-        if raw - risen < BUFFERED:
+        if raw - risen < BUFFERED - STEP:
             self._before = None
             self._offset = self._applied = min(self._offset, risen)
 
@@ -234,10 +240,21 @@ class DeviceClock:
         back = self._newest - device
         if back <= REORDERED:
             return False
-        if not self._connected and self._said.get(device) == said:
-            self._hold(
-                host, HOLD, f"says again what it said {back:.3g} s before: is a recording played to it?"
-            )
+        before = self._said.get(device)
+        if before == said:
+            self._otherwise = 0
+            if not self._connected:
+                what = f"says again what it said {back:.3g} s before: is a recording played to it?"
+                self._hold(host, HOLD, what)
+                return False
+        elif before is not None and device > self._last_otherwise:
+            self._otherwise, self._last_otherwise = self._otherwise + 1, device
+        late = host - device - self._offset - DRIFT * max(0.0, host - self._host)
+        if late < BUFFERED and self._otherwise < OTHERWISE:
+            # Who is told of it is told once.
+            what = f"its time went back by {back:.3g} s{MAY_BE_LATE}"
+            standing = self._standing(host)
+            self._hold(host, HOLD, standing if standing.endswith(MAY_BE_LATE) else what)
             return False
         if host - self._restarted < AGAIN:
             what = f"its time went back by {back:.3g} s, not for the first time within {AGAIN:g} s: a loop?"
@@ -245,10 +262,10 @@ class DeviceClock:
         else:
             what = f"its time went back by {back:.3g} s: it seems to have started again"
             self._hold(host, RESTART_HOLD, what)
-        if 0 <= device < BOOTED or self._newest - self._first < BUFFERED:
+        if late < BUFFERED:
             self._before = None
         elif self._before is None or host - self._restarted > RESTART_HOLD:
-            self._before, self._repeats = Known(self._offset, self._newest, self._host), False
+            self._before = Known(self._offset, self._newest, self._host)
         self._restarted = host
         self._offset = self._applied = math.inf
         self._ahead = None

@@ -8,9 +8,8 @@ import pytest
 from seerob.core.errors import Undecided
 from seerob.core.tolerances import Tolerance
 from seerob.criteria.safety.separation import room_ends
-from seerob.criteria.stopping import search, table
-from seerob.criteria.stopping.largest import LargestSeparation
-from seerob.criteria.stopping.search import factor_by_search
+from seerob.criteria.stopping import required, table
+from seerob.criteria.stopping.required import LargestSeparation, SeparationEnds, factor_by_search
 from seerob.criteria.stopping.table import interpolate, joint_stop
 from seerob.criteria.stopping.terms import (
     BOUND,
@@ -20,7 +19,6 @@ from seerob.criteria.stopping.terms import (
     largest_scale,
     way_of_person,
 )
-from seerob.criteria.stopping.tolerances import SeparationEnds
 
 
 def test_full_speed_until_standstill_is_the_bound_and_half_of_it_a_constant_deceleration():
@@ -70,7 +68,7 @@ def test_a_search_halves_so_often_and_stays_below():
     assert [largest_scale(lambda s: s <= 0.7, 2.0, n) for n in range(5)] == [0, 0, 0.5, 0.5, 0.625]
 
 
-@pytest.mark.parametrize(("costly", "top", "halvings"), [(False, search.TOP, 14), (True, 1.0, 6)])
+@pytest.mark.parametrize(("costly", "top", "halvings"), [(False, required.TOP, 14), (True, 1.0, 6)])
 def test_the_largest_factor_is_searched_up_to_ten_times_the_present_speeds(costly, top, halvings):
     """A costly course is asked seldom, and never beyond the present speeds."""
     asked = []
@@ -81,7 +79,7 @@ def test_the_largest_factor_is_searched_up_to_ten_times_the_present_speeds(costl
             raise Undecided("beyond a table")
         return np.array([factor, 2 * factor])
 
-    assert search.TOP == 10.0
+    assert required.TOP == 10.0
     found = factor_by_search(S_p, np.array([5.0, 0.6]), costly)
     assert len(asked) == 2 + halvings
     assert max(asked) == top

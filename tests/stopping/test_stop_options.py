@@ -7,9 +7,9 @@ import pytest
 
 from seerob.core.snapshot import Origin
 from seerob.core.tolerances import Tolerance
-from seerob.criteria.stopping.inputs import approach_speed, intrusion
 from seerob.criteria.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
 from seerob.criteria.stopping.onset import accelerated
+from seerob.criteria.stopping.required import approach_speed, intrusion, shifted, tolerances
 from seerob.criteria.stopping.terms import (
     BOUND,
     CONSTANT,
@@ -18,7 +18,6 @@ from seerob.criteria.stopping.terms import (
     largest_speed_in_time,
     separation_distance,
 )
-from seerob.criteria.stopping.tolerances import shifted, tolerances
 
 KNOWN = {"acceleration": 0.0, "reaction": 0.1, "stopping": 0.3}
 HALF = {**KNOWN, "model": "constant_deceleration"}

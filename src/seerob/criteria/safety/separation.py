@@ -24,15 +24,22 @@ from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import others_noisy
 from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping import many_instants
-from seerob.criteria.stopping.inputs import approach_speed, intrusion
-from seerob.criteria.stopping.largest import LargestSeparation
 from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.reaction import joint_limits
-from seerob.criteria.stopping.search import TOP, factor_by_search
+from seerob.criteria.stopping.required import (
+    SIMULATED,
+    TOP,
+    LargestSeparation,
+    SeparationEnds,
+    approach_speed,
+    factor_by_search,
+    intrusion,
+    shifted,
+    tolerances,
+)
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
-from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shifted, tolerances
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import REACHING, WALKING
 from seerob.distance.least import Closests

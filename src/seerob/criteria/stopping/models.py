@@ -54,7 +54,7 @@ MOVING = 1e-6
 FASTEST = f"if the robot is as fast as it can be during the reaction time: {GIVE}, or acceleration_limits"
 """When ways are up to those of the reaction at its worst, in words."""
 NOISY = "by the noise of positions that speeds are derived from"
-"""Likewise, of speeds that may be off."""
+"""When ways may be longer because speeds may be off, in words."""
 INSTANTS = 16
 """At most this many instants of a stop are asked for their distance to the person."""
 

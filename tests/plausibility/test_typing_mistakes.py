@@ -137,6 +137,19 @@ def test_a_sensible_cell_is_within_and_nothing_of_it_is_implausible(tmp_path: Pa
 
 INCH = 'units = "mm"\nmesh = "tool.stl"\n'
 STOPS = "{{ joint = {j}, full_speed = 180, way = [[[0.3]]], time = [[[0.3]]] }}"
+TABLED = (
+    'reaction = 0.1, model = "table", table_for = "ur5", table = { robot = "ur5", '
+    'category = 0, source = "s", confidence = "1S", rated_payload = 5, joints = ['
+)
+
+
+def tabled(figures: str) -> dict[str, str]:
+    """Stopping tables of six joints, the first as it is typed."""
+    right = "full_speed = 3, way = [[[0.4]]], time = [[[0.3]]]"
+    joints = ", ".join(f"{{ joint = {j}, {right if j else figures} }}" for j in range(6))
+    return {"stop": f"{TABLED}{joints}] }}"}
+
+
 MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
     # what is typed, the key that is named, the criteria that may still be within
     "degrees in rpy": ({"base": "position = [0, 0, 0.75], rpy = [0, 0, 90]"}, "robots[0].base.rpy", set()),
@@ -439,6 +452,16 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "safety[2].stop.table.joints[0].full_speed",
         {"speed", "distance"},
     ),
+    "ways in turns in a table of stops": (
+        tabled("full_speed = 3, way = [[[0.064]]], time = [[[0.3]]]"),
+        "safety[2].stop.table.joints[0].share",
+        {"speed", "distance"},
+    ),
+    "cells of a table of stops that were left empty": (
+        tabled("full_speed = 3, speed = [0.5, 1], way = [[[0.2]], [[0]]], time = [[[0.3]], [[0.3]]]"),
+        "safety[2].stop.table.joints[0].way",
+        {"speed", "distance"},
+    ),
     "asked once in an hour": (
         {"limit": "limit = 1.0\nevery = 3600"},
         "safety[0].every",
@@ -739,6 +762,7 @@ def test_every_row_of_the_data_is_of_something() -> None:
                       for unit in ("m", "kg", "kg/m²", "kg/m³", "")}  # fmt: skip
     walk(Engine, "engine")
     kinds.add(("engine.gravity.turned", "rad"))
+    kinds.add(("safety.separation.stop.table.joints.share", ""))
     kinds |= {("measurements.spring_N_mm", "N/mm"), ("measurements.contact_area", "m²")}
     for group in PLUGINS:
         kinds |= {(f"{group}.{what}", unit) for what in FOLLOWS.get(group, ()) for unit in ("s", "°", "")}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import UR10, basis_in, made, results_at
-from made_separation import JOINT, KNOWN, PERSON, TABLE, V, separation, terms
+from made_separation import HEAD, JOINT, KNOWN, PERSON, TABLE, V, separation, terms
 from seerob.core.errors import InputError
 
 
@@ -131,3 +131,24 @@ def test_table_by_tool_speed(tmp_path):
     S = separation(tmp_path, UR10_TABLE, x=9.0)
     T_s = 0.55 + 0.1 * (V - 2)
     assert terms(S)[:3] == pytest.approx([1.6 * (0.1 + T_s), 0.1 * V, T_s * V])
+
+
+@pytest.mark.parametrize(
+    ("way", "time", "full", "verdict"),
+    [
+        (0.9, 0.3, "full_speed = 3.0, ", "within"),
+        (0.95, 0.3, "full_speed = 3.0, ", "undecided"),
+        # By the robot's own limit of 10 rad/s where the table says none.
+        (3.0, 0.3, "", "within"),
+        (4.0, 0.3, "", "undecided"),
+    ],
+)
+def test_a_way_longer_than_at_full_speed_for_all_of_its_time_is_no_table(tmp_path, way, time, full, verdict):
+    """Of way and speed times time the lesser counted: a time in another unit made every stop short."""
+    joint = "{{ joint = {j}, {full}way = [[[{way}]]], time = [[[{time}]]] }}"
+    joints = ", ".join(joint.format(j=j, full=full, way=way, time=time) for j in range(2))
+    head = f"{HEAD}, rated_payload = 5.0, joints = [{joints}]"
+    stop = f'acceleration = 0, reaction = 0.1, model = "table", table_for = "arm", table = {{ {head} }}'
+    found = separation(tmp_path, stop, x=8.0)
+    assert found.verdict == verdict
+    assert ("contradicts itself" in found.reason) is (verdict != "within")

@@ -14,7 +14,7 @@ with :math:`\rho_k` the lever in the middle of the span, and D = 0 at the tip.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -57,6 +57,22 @@ def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
         f"the stopping table is that of {table.robot}, and whether {robot.name} ({entry.model}) is one is "
         "not known: say so with stop.table_for"
     )
+
+
+ROUNDED = 1.02
+"""Share of speed times time up to which a way may be so far by the rounding of what is published."""
+
+
+def impossible(table: StoppingTable, robot: Mechanism) -> Iterator[str]:
+    """Why figures of a table cannot be those of one robot: ways of what does not only brake."""
+    for entry in table.joints:
+        full = _full_speed(entry, robot, entry.joint) if entry.joint < len(robot.joints) else None
+        most = max(entry.shares(full)) if full else 0.0
+        if most > ROUNDED:
+            yield (
+                f"the stopping table contradicts itself: joint {entry.joint} goes {most:.3g} times as far as "
+                "at its speed for all of its time (way in rad or m, time in s, full_speed in rad/s or m/s?)"
+            )
 
 
 def bind_table(

@@ -17,7 +17,14 @@ from seerob.core.tolerances import Shifts
 from seerob.core.transforms import Array
 from seerob.criteria.stopping import table as stopping_table
 from seerob.criteria.stopping.by_energy import bind_braked_in_span
-from seerob.criteria.stopping.by_table import InSpan, Stopping, bind_in_span, bind_table, not_its_own
+from seerob.criteria.stopping.by_table import (
+    InSpan,
+    Stopping,
+    bind_in_span,
+    bind_table,
+    impossible,
+    not_its_own,
+)
 from seerob.criteria.stopping.onset import At as OnsetAt
 from seerob.criteria.stopping.onset import Onset, by_speed
 from seerob.criteria.stopping.reaction import GIVE, Reactions, bind_reaction, bind_riders, joint_limits
@@ -374,6 +381,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
         raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
     unbounded_reason = not_its_own(table, model, robot) if stop.table_for is None else ""
+    undecided_reasons = (unbounded_reason, *impossible(table, robot))
 
     def bind(after: Stopping) -> InSpan | None:
         if stop.acceleration:
@@ -401,7 +409,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         by_table,
         formula,
         (named, *inputs, *rest),
-        undecided_reasons=(unbounded_reason,) if unbounded_reason else (),
+        undecided_reasons=tuple(filter(None, undecided_reasons)),
         not_modelled=(
             f"stop category {table.category} only, as tabulated",
             "below the table's first speed, payload and extension its first stopping time holds"

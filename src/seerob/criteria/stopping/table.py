@@ -5,8 +5,9 @@ Tables are shipped as cited data in ``norms/stopping``; a user's own has the sam
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Annotated
 
@@ -46,6 +47,26 @@ class JointStop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Stopping distance [rad or m] per speed, payload and extension."""
     time: Grid
     """Stopping time [s] per speed, payload and extension."""
+
+    def shares(self, full_speed: float) -> tuple[float, ...]:
+        """Each way as a share of that at its speed for all of its time; at most 1 of what only brakes.
+
+        Args:
+            full_speed: [rad/s or m/s].
+        """
+        nodes = zip(self.speed, self.way, self.time, strict=False)
+        return tuple(
+            way / (full_speed * speed * time) if time > 0 else (math.inf if way > 0 else 0.0)
+            for speed, ways, times in nodes
+            for rows in zip(ways, times, strict=False)
+            for way, time in zip(*rows, strict=False)
+        )
+
+    def derived(self) -> Iterator[tuple[str, str, tuple[float, ...]]]:
+        """What follows from several of its figures: name, unit and values."""
+        shares = () if self.full_speed is None else self.shares(self.full_speed)
+        if some := tuple(share for share in shares if share > 0):
+            yield "share", "", some
 
 
 class SpeedStop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

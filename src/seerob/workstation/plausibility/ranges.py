@@ -403,6 +403,8 @@ def _quantities(table: Struct, key: str, kind: str, about: tuple[str, ...]) -> I
             continue
         place = f"{key}.{field.encode_name}", f"{kind}.{field.encode_name}"
         yield from _of_value(value, field.type, *place, about)
+    for name, unit, values in getattr(table, "derived", tuple)():
+        yield Quantity(f"{key}.{name}", f"{kind}.{name}", unit, values, about, "way over speed times time")
 
 
 def _of_value(value: Any, wanted: Any, key: str, kind: str, about: tuple[str, ...]) -> Iterator[Quantity]:

@@ -88,6 +88,7 @@ class TrajectoryFile(Source, frozen=True, kw_only=True):
     beyond_limits: Beyond = Beyond.REFUSE
     """``report`` goes on with positions beyond a limit of the robot, with a warning."""
     velocities: Velocities = Velocities.GIVEN
+    """The file's own where it has them, after a check against the positions; or derived from these."""
 
     def target(self) -> str:
         """The robot."""

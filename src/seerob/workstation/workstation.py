@@ -95,6 +95,7 @@ class Robot(_Table, frozen=True, kw_only=True):
     """A robot arm or any other chain of joints."""
 
     name: Name
+    """Its name, by which criteria and sources ask for it."""
     model: str
     """``library:ur10``, ``package:…/ur10_robot.urdf``, or a path to URDF, xacro or MJCF."""
     on: str | None = None
@@ -151,20 +152,24 @@ class Body(_Table, frozen=True, kw_only=True):
     """Physical properties given by hand."""
 
     mass: Mass
+    """Mass [kg]."""
     com: Metres3 | None = None
     """Centre of mass in the link's frame [m]; from the shape at uniform density when not given."""
     inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
     """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; from the shape when not given."""
     source: str = "workstation file"
+    """Where the figures are from, for the report."""
 
 
 class Thing(_Table, frozen=True, kw_only=True):
     """What a tool, a workpiece and a part have in common: a shape and where it is."""
 
     name: PathName
+    """Its name, by which criteria and sources ask for it."""
     mesh: str | None = None
     """STL, OBJ, PLY, OFF, glTF, COLLADA or 3MF file."""
     shape: Shape | None = None
+    """A simple shape, when there is no mesh file."""
     units: str | None = None
     """Unit of the mesh file (``mm``, ``m``, ``inch`` …) when the format does not say."""
     up: Literal["x", "y", "z"] | None = None
@@ -172,6 +177,7 @@ class Thing(_Table, frozen=True, kw_only=True):
     at: Pose = Pose()
     """Pose in the world, or in the frame it is mounted on."""
     mass: Mass | None = None
+    """Mass [kg]; by `density` when not given, and with neither nobody knows it."""
     com: Metres3 | None = None
     """Centre of mass in its own frame [m]."""
     inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
@@ -235,11 +241,17 @@ class Machine(Thing, frozen=True, kw_only=True):
     on: str | None = None
     """Machine, link or tool that carries it, such as ``ur10/tool0``; stands in the world when not given."""
     slide: Slide | None = None
+    """It moves along a straight line."""
     turn: Turn | None = None
+    """It turns about an axis."""
     belt: Belt | None = None
+    """It is carried by a belt."""
     vehicle: Vehicle | None = None
+    """It drives on the floor and tells its pose."""
     route: Route | None = None
+    """It goes along a way that is drawn on the floor."""
     grip: Fingers | None = None
+    """It is a gripper with these fingers."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -308,11 +320,13 @@ class Human(_Table, frozen=True, kw_only=True):
     """A person."""
 
     name: Name
+    """Its name, by which criteria and sources ask for it."""
     stature: Annotated[float, unit("m", ge=1.2, le=2.3)] | Percentile
     """[m], or a percentile of a published population: ``"germany P50"``."""
     mass: Annotated[float, unit("kg", ge=30, le=250)]
     """[kg]"""
     sex: Literal["male", "female"]
+    """Which anthropometric tables are used."""
     hand: Literal["right", "left"] = "right"
     """Dominant hand."""
     lengths: Literal["drillis", "deleva"] | dict[str, Length] = "drillis"
@@ -337,6 +351,7 @@ class Contact(_Table, frozen=True, kw_only=True):
     """Two sets that may touch in the physics. Nothing else does."""
 
     between: tuple[str, str]
+    """Two names, of groups, things or bodies."""
 
 
 class Confirmed(_Table, frozen=True, kw_only=True):

@@ -56,6 +56,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
     unit: ClassVar[str] = ""
 
     robot: str
+    """The robot that is judged."""
     torques: Literal["measured", "model"] = "measured"
     """What the source measures; or what the model needs for the motion, when the source measures nothing."""
     limit: Annotated[float, Meta(gt=0, le=1)] = 1.0

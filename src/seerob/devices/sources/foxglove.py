@@ -30,6 +30,7 @@ class Foxglove(RosSource, frozen=True, kw_only=True):
     host: str
     """Name or address of the computer with the bridge."""
     port: Annotated[int, Meta(ge=1, le=65535)] = foxglove.PORT
+    """TCP port of the bridge."""
     tls: bool = False
     """Encrypted, and the server's certificate is checked."""
 

@@ -64,6 +64,7 @@ class Kinect(CaptureStream, frozen=True, kw_only=True):
     first when not given. It is no proof: addresses of datagrams can be forged. When anybody else sends, the
     person is undecided."""
     port: Annotated[int, Meta(ge=1, le=65535)] = PORT
+    """UDP or TCP port that the sender sends to, or listens on."""
     bind: str = "0.0.0.0"  # noqa: S104  # whoever sends is on another machine
     """Own address on which datagrams are listened for."""
     frequency: Annotated[float, Meta(ge=1, le=60, extra={"unit": "Hz"})] = 30.0

@@ -30,6 +30,7 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
     host: str
     """Name or address of the device."""
     port: Annotated[int, Meta(ge=1, le=65535)] = modbus.PORT
+    """TCP port of the device."""
     device: Annotated[int, Meta(ge=0, le=255)] = 1
     """Number of the device behind that address (unit identifier); often 1 or 255."""
     every: Seconds = 0.1

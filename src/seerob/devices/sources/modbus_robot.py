@@ -56,6 +56,7 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
     map: str = "doosan"
     """Register map: one that ships, or a file (``.toml``) beside the workstation."""
     port: Annotated[int, Meta(ge=1, le=65535)] = modbus.PORT
+    """TCP port of the controller."""
     device: Annotated[int, Meta(ge=0, le=255)] = 1
     """Number of the device behind that address (unit identifier); often 1 or 255."""
     every: Seconds = 0.1

@@ -136,6 +136,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
     ca: str | None = None
     """Certificates that are trusted instead of the system's, a PEM file beside the workstation."""
     user: str | None = None
+    """Name to log in with at the broker; none when not given."""
     password_env: str | None = None
     """Environment variable that holds the password: a workstation file is no place for one."""
 

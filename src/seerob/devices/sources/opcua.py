@@ -52,6 +52,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
     interval: Seconds = 0.02
     """Publishing interval that is asked for [s]; a server may grant a longer one, and says so."""
     security: Security = Security.NONE
+    """How the session is protected: not at all, signed, or signed and encrypted (Basic256Sha256)."""
     certificate: str | None = None
     """Own certificate beside the workstation, which the server must trust; for ``sign`` and ``encrypt``."""
     key: str | None = None
@@ -59,6 +60,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
     server_certificate: str | None = None
     """The server's certificate; another one is refused."""
     user: str | None = None
+    """Name to log in with; anonymous when not given."""
     password_env: str | None = None
     """Environment variable that holds the password: a workstation file is no place for one."""
 

@@ -56,6 +56,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
     timeout: Seconds = 0.5
     """Age at which what it said no longer counts [s]."""
     security: Security = Security.NONE
+    """How the session is protected: not at all, signed, or signed and encrypted (Basic256Sha256)."""
     certificate: str | None = None
     """Own certificate beside the workstation, which the server must trust; for ``sign`` and ``encrypt``."""
     key: str | None = None
@@ -63,6 +64,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
     server_certificate: str | None = None
     """The server's certificate; another one is refused."""
     user: str | None = None
+    """Name to log in with; anonymous when not given."""
     password_env: str | None = None
     """Environment variable that holds the password: a workstation file is no place for one."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER

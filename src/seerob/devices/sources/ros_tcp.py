@@ -57,6 +57,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
     host: str = ""
     """With ``client``: name or address of the computer with the endpoint."""
     port: Annotated[int, Meta(ge=1, le=65535)] = ros_tcp.PORT
+    """TCP port of the endpoint, or the one to listen on."""
     bind: str = "127.0.0.1"
     """With ``endpoint``: own address; when not given, only this machine can connect."""
     edition: Edition = Edition.ROS1

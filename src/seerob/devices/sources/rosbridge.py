@@ -26,6 +26,7 @@ class Rosbridge(RosSource, frozen=True, kw_only=True):
     host: str
     """Name or address of the computer with the rosbridge server."""
     port: Annotated[int, Meta(ge=1, le=65535)] = rosbridge.PORT
+    """TCP port of the server."""
     tls: bool = False
     """Encrypted, and the server's certificate is checked."""
     edition: Edition = Edition.ROS2

@@ -161,6 +161,7 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
     host: str
     """Name or address of the controller."""
     port: Annotated[int, Meta(ge=1, le=65535)] = rtde.PORT
+    """TCP port of the controller's real-time data exchange."""
     frequency: Annotated[float, Meta(ge=1, le=500, extra={"unit": "Hz"})] = 125.0
     """Samples per second [Hz]; e-Series and later can do 500."""
     primary_port: Annotated[int, Meta(ge=0, le=65535)] = ur_primary.PORT

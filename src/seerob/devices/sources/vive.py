@@ -64,6 +64,7 @@ class Vive(CaptureStream, frozen=True, kw_only=True):
     whoever sends first when not given. It is no proof: addresses of datagrams can be forged. When anybody
     else sends, the person is undecided."""
     port: Annotated[int, Meta(ge=1, le=65535)] = PORT
+    """UDP or TCP port that the sender sends to, or listens on."""
     bind: str = "127.0.0.1"
     """Own address on which datagrams are listened for; when not given, only this machine is heard."""
     trackers: dict[str, str] = field(default_factory=dict)

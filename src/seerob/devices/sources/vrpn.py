@@ -47,6 +47,7 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
     host: str
     """Address of the computer with the server."""
     port: Annotated[int, Meta(ge=1, le=65535)] = vrpn.PORT
+    """Port of the server."""
     trackers: dict[str, str] = field(default_factory=dict)
     """Name at the server → where it is worn (``waist``, ``left_foot`` …); ``name/3`` is sensor 3 of a tracker
     that has several."""

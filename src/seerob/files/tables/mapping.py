@@ -100,7 +100,9 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     robot: str | None = None
     """The name to take from it."""
     time: Column | None = None
+    """Column of the instants, by header or number."""
     time_unit: TimeUnit | None = None
+    """Unit of that column, when its header does not say."""
     joints: str | tuple[Column, ...] | None = None
     """Columns of the joint positions in joint order; or a regular expression for whole headers
     whose first group is the joint's number."""
@@ -109,17 +111,20 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     velocities: str | tuple[Column, ...] | None = None
     """As ``joints``; ``[]`` leaves them out, and velocities are derived from the positions."""
     velocity_unit: RateUnit | tuple[RateUnit, ...] | None = None
+    """One unit for all joints, or one per joint."""
     torques: str | tuple[Column, ...] | None = None
     """As ``joints`` [N·m or N]; ``[]`` leaves them out."""
     tcp_position: tuple[Column, ...] | None = None
     """Columns x, y, z of the tool; ``[]`` leaves them out."""
     tcp_position_unit: LengthUnit | None = None
+    """Unit of those columns, when their headers do not say."""
     tcp_orientation: tuple[Column, ...] | None = None
     """Columns of the tool's orientation, in the order of the convention; ``[]`` leaves them out."""
     tcp_convention: str | None = None
     """``"ZYX"``: turned axes in the order of the columns; ``"xyz"``: fixed axes; ``"rpy"``;
     ``"rotation_vector"``; ``"wxyz"`` or ``"xyzw"``."""
     tcp_orientation_unit: AngleUnit | None = None
+    """Unit of the angles, when the headers do not say."""
 
     def toml(self, remarks: dict[str, str] | None = None) -> str:
         """The table as it stands in a workstation file.

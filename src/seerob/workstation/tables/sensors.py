@@ -102,8 +102,11 @@ class Sensor(Table, frozen=True, kw_only=True):
     on: str | None = None
     """Full name of the link or tool that carries it; stands still when not given."""
     laser_scanner: LaserScanner | None = None
+    """It is a laser scanner, with these figures."""
     light_curtain: Curtain | None = None
+    """It is a light curtain, with these figures."""
     pressure_mat: Mat | None = None
+    """It is a pressure mat, with these figures."""
     capability: Capability | None = None
     """Detection capability d: the smallest object that it always sees [m], from its data sheet."""
     response: Seconds | None = None

@@ -53,6 +53,7 @@ class CartesianTarget(Table, frozen=True, kw_only=True):
     topic: Topic
     """Such as ``/target_pose``; there is no usual one."""
     message: TargetMessage = TargetMessage.POSE_STAMPED
+    """Type of the messages that are published."""
     ros: Annotated[int, Meta(ge=1, le=2)] = 2
     """1 for a rosbridge server of ROS 1; an endpoint says it by itself."""
     frame_id: str = "base_link"
@@ -93,5 +94,6 @@ class Trigger(Table, frozen=True, kw_only=True):
     criterion: str
     """Name of the criterion whose verdict it follows."""
     when: When = When.EXCEEDED
+    """Which verdicts set the variable."""
     every: Annotated[float, unit("s", ge=0.1, le=3600)] = 0.5
     """Least time between two writings [s]; what changes faster is written as it is then."""

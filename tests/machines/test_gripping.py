@@ -188,6 +188,58 @@ def test_let_go_in_silence_means_nobody_knows_where(cell):
         cell.between("nut", "post")
 
 
+SECOND = """
+[[machines]]
+name = "lift"
+shape = { box = [0.1, 0.1, 0.1] }
+mass = 5
+at = { position = [1.0, 0.5, 0] }
+slide = { along = [0, 0, 1], lower = -1, upper = 1 }
+[[machines]]
+name = "second"
+on = "lift"
+at = { position = [0, -0.5, 0] }
+shape = { box = [0.02, 0.02, 0.06] }
+mass = 0.2
+grip = { upper = 0.1, along = [0, 1, 0] }
+"""
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_what_another_gripper_takes_is_where_nobody_knows(tmp_path, held):
+    """Handed over, or taken from where it lies: it stayed in mid-air, and weighed on nobody."""
+    cell = Cell(tmp_path, STATION + SECOND)
+    cell.engine = Engine(cell.model, driven=dict.fromkeys(("axis", "hand", "lift", "second"), 0.05))
+    cell.k, lift = 0, cell.model.mechanisms["lift"]
+
+    def go(opening, other, height=0.0):
+        said = {"axis": 0.0, "hand": opening / 2, "lift": height, "second": other / 2}
+        cell.engine.take(
+            JointSample(source=name, seq=cell.k, t=cell.k * TICK, target=name, q=(q,), qd=(0.0,))
+            for name, q in said.items()
+        )
+        cell.state = cell.engine.tick() if cell.k else cell.engine.start()
+        cell.k += 1
+
+    go(WIDE, WIDE)
+    if held:
+        go(SHUT, WIDE)
+        go(SHUT, 0.04)
+        assert cell.between("nut", "post") > 0
+        assert cell.state.mass_matrix(lift) is not None
+    go(WIDE, WIDE if held else 0.04)
+    if held:
+        # Who opens too is not there to take it.
+        assert cell.between("nut", "post") > 0
+        go(SHUT, 0.04)
+        go(WIDE, 0.04)
+    go(WIDE, 0.04, 0.01)
+    with pytest.raises(Undecided, match="nut: the fingers of second are at it"):
+        cell.between("nut", "post")
+    with pytest.raises(Undecided, match="nut: the fingers of second are at it"):
+        cell.state.mass_matrix(lift)
+
+
 def test_the_picture_shows_it_where_it_is(cell):
     names = [b.name for b in cell.model.bodies]
     for steps in [(0.0, WIDE)], [(0.0, SHUT), (LIFTED, SHUT)]:

@@ -2,9 +2,10 @@
 
 A workpiece is held from the tick on at which both fingers are as near to it as ``touch`` and it reaches
 between them; it then keeps its place in the hand. It is let go when a finger is farther from it than twice
-that, and lies where it was then: nothing falls, and no belt takes it along. Where a run begins with fingers
-that are not shut and no farther apart than if they held it, as the file has it in the hand, and it does not
-lie between them, nobody knows where it is.
+that, and lies where it was then: nothing falls, and no belt takes it along. Where another gripper has both
+fingers at it then, or while it lies, nobody knows where it is, nor what that gripper weighs. Where a run
+begins with fingers that are not shut and no farther apart than if they held it, as the file has it in the
+hand, and it does not lie between them, nobody knows where it is.
 
 What grippers hold along a motion that was recorded: picked up and let go as in the run that it is of.
 """
@@ -142,6 +143,12 @@ class _Grip:
             places: [Query(model.shapes, (finger.index,), places, cap=cap) for finger in self._fingers]
             for places in (tuple(self._held), tuple(self._resting))
         }
+        self._others = [
+            _Other(model, other.name, other.motion.touch, places)
+            for other in model.workstation.machines
+            if other.name != self._hand and isinstance(other.motion, Fingers)
+            for places in (tuple(self._held), tuple(self._resting))
+        ]
         for index in (*self._held, *self._resting):
             state.attachments.unknown.pop(index, None)
         self._holds = True
@@ -165,6 +172,14 @@ class _Grip:
                 "knows where it is: begin with fingers that are open or shut, or let it rest between them"
             )
             state.attachments.unknown |= dict.fromkeys((*self._held, *self._resting), reason)
+            return False
+        if not grips and (other := self._with_another(state)):
+            # Of two that hold it the first one's word counts, as long as it does hold it.
+            reason = (
+                f"{self._piece}: the fingers of {other.name} are at it, and only those of {self._hand} are "
+                "said to pick it up: nobody knows where it is"
+            )
+            state.attachments.unknown |= dict.fromkeys((*self._held, *self._resting, *other.bodies), reason)
             return False
         if self._holds == grips:
             return False
@@ -200,6 +215,12 @@ class _Grip:
         palm = state.data.xmat[self._palm].reshape(3, 3), state.data.xpos[self._palm]
         both = np.stack([palm[0], R[places[0]]]), np.stack([palm[1], x[places[0]]])
         return self._holds or self._gap.minimum(*both).distance <= 0
+
+    def _with_another(self, state: State) -> _Other | None:
+        """Another gripper whose fingers are both at it where it is."""
+        places = tuple(self._held if self._holds else self._resting)
+        here = (other for other in self._others if other.places == places)
+        return next((other for other in here if other.grips(state)), None)
 
     def _as_if_held(self, state: State) -> bool:
         """Whether fingers that are not shut would be at it in the hand, where the file has it there."""
@@ -256,6 +277,21 @@ class _Grip:
             if body == 0:
                 break
             body = int(mj.body_parentid[body])
+
+
+class _Other:
+    """A gripper that the file does not let pick up a piece, and that may take it all the same."""
+
+    def __init__(self, model: Model, name: str, touch: float, places: tuple[int, ...]) -> None:
+        self.name, self.places, self._touch = name, places, touch
+        self.bodies = tuple(b.index for b in model.bodies if b.owner == name)
+        fingers = [_body(model, f"{name}/{side}") for side in FINGERS]
+        self._queries = [Query(model.shapes, (f.index,), places, cap=2 * touch) for f in fingers]
+
+    def grips(self, state: State) -> bool:
+        """Whether both of its fingers are as near to the piece as they are when they hold it."""
+        R, x = state.rotations, state.positions
+        return all(query.minimum(R, x).distance <= self._touch for query in self._queries)
 
 
 def _body(model: Model, name: str) -> Body:

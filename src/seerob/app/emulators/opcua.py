@@ -26,6 +26,8 @@ from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS,
 
 if TYPE_CHECKING:
     from asyncua.common.node import Node
+    from asyncua.server.server import Server
+    from cryptography import x509
 
 URI = "urn:seerob:emulator"
 
@@ -33,7 +35,7 @@ URI = "urn:seerob:emulator"
 class Emulated(NamedTuple):
     """A variable of the PLC."""
 
-    value: Callable[[float], Any]
+    value: Callable[[float], object]
     """At a time since the start [s]."""
     unit: str = ""
     """That the server states; nothing for none."""
@@ -84,7 +86,7 @@ class OpcuaServer(LoopEmulator):
         self.clock: Callable[[], float] = time.time
         """What its variables are stamped with [s since 1970]; may be changed while it runs."""
         self._made = time.monotonic()
-        self._built: tuple[Any, _Cell] | None = None
+        self._built: tuple[Server, _Cell] | None = None
 
     @property
     def url(self) -> str:
@@ -106,7 +108,7 @@ class OpcuaServer(LoopEmulator):
         self._built = asyncio.run(self._build())
         return self
 
-    async def _build(self) -> tuple[Any, _Cell]:
+    async def _build(self) -> tuple[Server, _Cell]:
         from asyncua.server.server import Server
 
         for name in (*SILENT, "asyncua.server"):
@@ -130,7 +132,7 @@ class OpcuaServer(LoopEmulator):
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(over.wait(), self.period)
 
-    async def _protect(self, server: Any) -> None:
+    async def _protect(self, server: Server) -> None:
         from asyncua import ua
 
         if self._certificate is None:
@@ -170,13 +172,13 @@ class OpcuaServer(LoopEmulator):
 class _Known:
     """Lets in whoever shows one of the certificates that were given."""
 
-    def __init__(self, known: list[bytes], *_: Any) -> None:
+    def __init__(self, known: list[bytes], *_: object) -> None:
         from cryptography import x509
         from cryptography.hazmat.primitives.serialization import Encoding
 
         self._known = {x509.load_pem_x509_certificate(k).public_bytes(Encoding.DER) for k in known}
 
-    async def __call__(self, certificate: Any, _: Any) -> None:
+    async def __call__(self, certificate: x509.Certificate, _: object) -> None:
         from asyncua.ua.uaerrors import BadCertificateUntrusted
         from cryptography.hazmat.primitives.serialization import Encoding
 
@@ -185,7 +187,7 @@ class _Known:
 
 
 class _Cell:
-    def __init__(self, server: Any, emulator: OpcuaServer) -> None:
+    def __init__(self, server: Server, emulator: OpcuaServer) -> None:
         self._server, self._emulator = server, emulator
         self._variables: dict[str, Node] = {}
         self._outputs: dict[str, Node] = {}
@@ -205,7 +207,7 @@ class _Cell:
         if self._emulator.robots:
             await self._build_robots(own)
 
-    async def _add(self, own: int, path: str, value: Any) -> Node:
+    async def _add(self, own: int, path: str, value: object) -> Node:
         *folders, name = path.split("/")
         node = self._server.nodes.objects
         for folder in folders:
@@ -228,7 +230,7 @@ class _Cell:
         di = await self._server.register_namespace(DEVICES)
 
         async def typed(number: int, name: str) -> ua.NodeId:
-            kind = ua.NodeId(ua.Int32(number), robotics)
+            kind = ua.NodeId(ua.Int32(number), ua.Int16(robotics))
             await self._server.nodes.base_object_type.add_object_type(kind, ua.QualifiedName(name, robotics))
             return kind
 
@@ -301,7 +303,7 @@ class _Cell:
         for key, node in self._safety.items():
             await self._write(node, self._emulator.safety[key])
 
-    async def _write(self, node: Node, value: Any) -> None:
+    async def _write(self, node: Node, value: object) -> None:
         from asyncua import ua
 
         now: Any = datetime.now(UTC).replace(tzinfo=None)

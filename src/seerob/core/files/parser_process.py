@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from threading import Lock, Timer
-from typing import Any, BinaryIO, NamedTuple, TypeVar
+from typing import IO, Any, BinaryIO, NamedTuple, TypeVar
 
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.extras import MissingPackage
@@ -53,7 +53,7 @@ _HEAD = 8
 
 def parsed(
     function: Callable[..., T],
-    *arguments: Any,
+    *arguments: object,
     file: str,
     remedy: str = "export it again",
     memory: int = MEMORY,
@@ -78,7 +78,7 @@ def parsed(
 
 def parsed_one_by_one(
     function: Callable[..., Iterator[T]],
-    *arguments: Any,
+    *arguments: object,
     file: str,
     remedy: str = "export it again",
     memory: int = MEMORY,
@@ -178,7 +178,7 @@ class _Child:
 class _Plain(pickle.Unpickler):
     """Takes no class from a process that read what strangers wrote, dates apart."""
 
-    def find_class(self, module: str, name: str) -> Any:
+    def find_class(self, module: str, name: str) -> object:
         if module == "datetime" and name in _DATES:
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name} is no plain data")
@@ -230,7 +230,7 @@ class _Conversation:
     def __init__(
         self,
         function: Callable[..., Any],
-        arguments: tuple[Any, ...],
+        arguments: tuple[object, ...],
         file: str,
         remedy: str,
         memory: int,
@@ -299,13 +299,13 @@ class _Conversation:
         return InputError.at(self.file, "", what, self.remedy)
 
 
-def _send(pipe: Any, content: bytes) -> None:
+def _send(pipe: IO[bytes], content: bytes) -> None:
     pipe.write(len(content).to_bytes(_HEAD, "little"))
     pipe.write(content)
     pipe.flush()
 
 
-def _received(pipe: Any) -> bytes | None:
+def _received(pipe: IO[bytes]) -> bytes | None:
     head = pipe.read(_HEAD)
     size = int.from_bytes(head, "little")
     if len(head) < _HEAD or size > LONGEST:
@@ -333,7 +333,7 @@ def _main() -> None:
 
 
 def _answer(request: bytes, questions: BinaryIO, out: BinaryIO) -> None:
-    def say(kind: str, value: Any, *, last: bool = True) -> None:
+    def say(kind: str, value: object, *, last: bool = True) -> None:
         _send(out, pickle.dumps((kind, value, last, _peak() > TIRED)))
 
     # Of the process that started this one.

@@ -14,8 +14,8 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
+from xml.etree.ElementTree import Element as Node
 
 import numpy as np
 
@@ -266,7 +266,7 @@ class _Reader:
         """Add a finding."""
         self.findings.append(Finding(level=level, subject=Path(self.file).name, text=text))
 
-    def element(self, node: Any, depth: int, *, group: bool = False) -> Element:
+    def element(self, node: Node, depth: int, *, group: bool = False) -> Element:
         """An internal element, or a hierarchy as one."""
         self._count += 1
         if self._count > MAX_ELEMENTS:
@@ -298,7 +298,7 @@ class _Reader:
             name, _plain(where), tuple(roles), attributes, tuple(interfaces), tuple(children), frame
         )
 
-    def _interfaces(self, node: Any, depth: int) -> Iterator[Interface]:
+    def _interfaces(self, node: Node, depth: int) -> Iterator[Interface]:
         """The interface and, in CAEX 3.0, those nested in it."""
         if depth == 0:
             raise InputError.at(self.file, node.get("Name", ""), f"nested {MAX_DEPTH} deep", "flatten it")
@@ -312,7 +312,7 @@ class _Reader:
             if _local(child.tag) == "ExternalInterface":
                 yield from self._interfaces(child, depth - 1)
 
-    def _attributes(self, node: Any, depth: int) -> dict[str, Attribute]:
+    def _attributes(self, node: Node, depth: int) -> dict[str, Attribute]:
         if depth == 0:
             raise InputError.at(self.file, node.get("Name", ""), f"nested {MAX_DEPTH} deep", "flatten it")
         found: dict[str, Attribute] = {}

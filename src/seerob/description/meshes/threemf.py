@@ -9,9 +9,10 @@ from __future__ import annotations
 import io
 import zipfile
 from dataclasses import dataclass, field
-from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.transforms import Array
@@ -33,9 +34,9 @@ _ROOT = "3D/3dmodel.model"
 class _Object:
     name: str
     vertices: Array
-    faces: Any
+    faces: NDArray[np.int64]
     color: Color | None
-    components: list[tuple[str, str, Array]] = field(default_factory=list)
+    components: list[tuple[str, str | None, Array]] = field(default_factory=list)
 
 
 def read(source: MeshSource) -> RawFile:
@@ -55,8 +56,8 @@ class _Package:
     def __init__(self, source: MeshSource, package: zipfile.ZipFile) -> None:
         self.source, self.package = source, package
         self.entries = {name.lower(): name for name in package.namelist()}
-        self.objects: dict[tuple[str, str], _Object] = {}
-        self.models: dict[str, Any] = {}
+        self.objects: dict[tuple[str, str | None], _Object] = {}
+        self.models: dict[str, Element] = {}
         self.left = source.max_bytes
         """How much more of the package is unpacked [byte]."""
 
@@ -68,7 +69,7 @@ class _Package:
                     return str(relation.get("Target", _ROOT)).strip("/")
         return _ROOT
 
-    def _xml(self, part: str) -> Any:
+    def _xml(self, part: str) -> Element:
         from defusedxml.ElementTree import fromstring
 
         name = self.entries.get(part.lower())
@@ -79,14 +80,15 @@ class _Package:
         except TooLarge as error:
             self.source.fail(f"{name[:200]}: {error}", "raise max_bytes")
         self.left -= len(text)
-        return fromstring(text, forbid_dtd=True)
+        root: Element = fromstring(text, forbid_dtd=True)
+        return root
 
-    def model(self, part: str) -> Any:
+    def model(self, part: str) -> Element:
         """Root element of a model part; its objects are remembered."""
         if part in self.models:
             return self.models[part]
         root = self.models[part] = self._xml(part)
-        colors: dict[tuple[str, int], Color] = {}
+        colors: dict[tuple[str | None, int], Color] = {}
         for group in root.iterfind(".//{*}basematerials"):
             for number, base in enumerate(group.findall("{*}base")):
                 colors[group.get("id"), number] = _color(base.get("displaycolor", ""))
@@ -96,7 +98,7 @@ class _Package:
             self.objects[part, element.get("id")] = self._object(part, element, colors)
         return root
 
-    def _object(self, part: str, element: Any, colors: dict[tuple[str, int], Color]) -> _Object:
+    def _object(self, part: str, element: Element, colors: dict[tuple[str | None, int], Color]) -> _Object:
         vertices = [[v.get(k) for k in "xyz"] for v in element.iterfind("{*}mesh/{*}vertices/{*}vertex")]
         faces = [
             [t.get(k) for k in ("v1", "v2", "v3")]
@@ -115,7 +117,7 @@ class _Package:
             found.components.append((path.strip("/"), component.get("objectid"), self._matrix(component)))
         return found
 
-    def _matrix(self, element: Any) -> Array:
+    def _matrix(self, element: Element) -> Array:
         text = element.get("transform")
         if text is None:
             return np.eye(4)
@@ -127,13 +129,13 @@ class _Package:
         matrix[:3, :] = values.reshape(4, 3).T
         return matrix
 
-    def instances(self, root: Any) -> list[RawMesh]:
+    def instances(self, root: Element) -> list[RawMesh]:
         """Every mesh that the build holds, moved to where it is built."""
         items = list(root.iterfind("{*}build/{*}item"))
         if not items:
             self.source.fail("builds nothing: its <build> is empty", "export it again")
         start = next(part for part, model in self.models.items() if model is root)
-        stack: list[tuple[str, Any, Array, tuple[str, ...], tuple[tuple[str, Any], ...]]] = []
+        stack: list[tuple[str, str | None, Array, tuple[str, ...], tuple[tuple[str, str | None], ...]]] = []
         for item in reversed(items):
             path = next((v for k, v in item.items() if k.endswith("}path")), start)
             stack.append((path.strip("/"), item.get("objectid"), self._matrix(item), (), ()))

@@ -30,6 +30,8 @@ class Datagram(NamedTuple):
     data: bytes
 
 
+Address = tuple[str | Any, int] | tuple[str, int, int, int]
+"""Of a socket, as asyncio says it: host, port and, of IPv6, flow and scope."""
 Answer = Callable[[bytes], bytes | None]
 """What is sent back to whoever sent a datagram; None for nothing."""
 
@@ -74,7 +76,7 @@ class Datagrams(asyncio.DatagramProtocol):
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
         self._wakeup = Wakeup()
         self._error: OSError | None = None
-        self._send: Callable[[bytes, Any], object] = lambda data, to: None
+        self._send: Callable[[bytes, Address], object] = lambda data, to: None
         self.port = 0
         self.dropped = self.strangers = 0
 
@@ -89,7 +91,7 @@ class Datagrams(asyncio.DatagramProtocol):
         reception, loop = Reception(link), self._loop
         self.port = link.getsockname()[1]
 
-        def send(data: bytes, to: Any) -> None:
+        def send(data: bytes, to: Address) -> None:
             # An answer that cannot be delivered, or not now, is no reason to stop listening.
             with contextlib.suppress(OSError):
                 link.sendto(data, to)
@@ -107,11 +109,11 @@ class Datagrams(asyncio.DatagramProtocol):
         self._send = send
         return read
 
-    def datagram_received(self, data: bytes, addr: tuple[str | Any, int]) -> None:
+    def datagram_received(self, data: bytes, addr: Address) -> None:
         """Called by the loop."""
         self._take(time.monotonic(), data, addr)
 
-    def _take(self, arrived: float, data: bytes, sender: tuple[str | Any, int]) -> None:
+    def _take(self, arrived: float, data: bytes, sender: Address) -> None:
         who = plain(sender[0]), int(sender[1]) if self._one_port else 0
         if self._first is None and self._may(who[0]):
             self._first, self._before[self.port] = who, who[0]
@@ -132,7 +134,7 @@ class Datagrams(asyncio.DatagramProtocol):
             return address == self._before.get(self.port, address)
         return address in self._senders
 
-    def _reply(self, data: bytes, sender: Any) -> None:
+    def _reply(self, data: bytes, sender: Address) -> None:
         if self._answer is not None and (reply := self._answer(data)) is not None:
             self._send(reply, sender)
 
@@ -177,7 +179,7 @@ def _shown(who: tuple[str, int]) -> str:
     return f"{who[0]} port {who[1]}" if who[1] else who[0]
 
 
-def plain(address: Any) -> str:
+def plain(address: object) -> str:
     """An address as its sender calls it: IPv4 looks otherwise through a socket of IPv6."""
     return str(address).lower().removeprefix("::ffff:")
 
@@ -230,7 +232,7 @@ async def listening(
         leave()
 
 
-def _bound(family: int, address: Any) -> socket.socket:
+def _bound(family: int, address: Address | tuple[int, bytes]) -> socket.socket:
     """A socket with an address of this machine."""
     link = socket.socket(family, socket.SOCK_DGRAM)
     try:

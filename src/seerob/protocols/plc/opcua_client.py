@@ -34,7 +34,9 @@ from seerob.protocols.links.credentials import Server, secret, server_of
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
+    from asyncua.client.ua_client import UASocketProtocol
     from asyncua.common.node import Node
+    from asyncua.common.subscription import DataChangeNotif
     from asyncua.ua import NodeId, QualifiedName
 
 
@@ -212,7 +214,7 @@ def plainly_cancelled() -> Iterator[None]:
         raise asyncio.CancelledError(*error.args) from error
 
 
-def hang_up(link: Any) -> None:
+def hang_up(link: UASocketProtocol | None) -> None:
     """Close the socket of a link, if there is one; the loop does it next.
 
     Args:
@@ -276,7 +278,7 @@ class Way(msgspec.Struct, frozen=True, kw_only=True):
     """Environment variable that holds the password."""
 
 
-def server(way: Any) -> Server:
+def server(way: Way) -> Server:
     """Who is given the password of a `Way`, or of what has its fields."""
     return server_of(way.url, encrypted=way.security is not Security.NONE)
 
@@ -510,7 +512,7 @@ class Changes:
                 refused |= dict.fromkeys(names, _text(error))
         return refused
 
-    def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
+    def datachange_notification(self, node: Node, value: object, data: DataChangeNotif) -> None:
         """Called by asyncua, in the loop."""
         for name in self._names.get(node.nodeid, ()):
             self._waiting[name] = said(data.monitored_item.Value)

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from threading import Lock
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -329,7 +330,7 @@ class _Patience:
         return NoPath(f"no path was found {spent}; that there is none is not known")
 
 
-def _ompl() -> tuple[Any, Any, Any]:
+def _ompl() -> tuple[ModuleType, ModuleType, ModuleType]:
     try:
         from ompl import base, geometric, util
     except ImportError as error:
@@ -339,7 +340,7 @@ def _ompl() -> tuple[Any, Any, Any]:
 
 
 @contextmanager
-def _quiet(util: Any) -> Iterator[None]:
+def _quiet(util: ModuleType) -> Iterator[None]:
     """Without what OMPL writes to the terminal: that it is seeded anew, too."""
     before = util.getLogLevel()
     util.setLogLevel(util.LOG_NONE)
@@ -349,7 +350,7 @@ def _quiet(util: Any) -> Iterator[None]:
         util.setLogLevel(before)
 
 
-def _space(base: Any, clearance: Clearance, start: Array, goal: Array) -> Any:
+def _space(base: ModuleType, clearance: Clearance, start: Array, goal: Array) -> Any:
     """Where postures are tried: within the limits, and where there are none half a turn around both ends."""
     robot = clearance.robot
     least, most = np.minimum(start, goal), np.maximum(start, goal)

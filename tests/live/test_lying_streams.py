@@ -98,14 +98,20 @@ def of_another(sample):
     return replace(sample, target="nobody")
 
 
+def old_in_between(sample, since, last):
+    """An old sample that comes now, with the stamp that it had; a variable without one may stand."""
+    return sample.t_device and (replace(last, t=sample.t) if sample.seq % 2 else sample)
+
+
 LIVE_LIES = (
-    *LIES,
-    Lie("comes a second late", lambda s, t: replace(s, t=s.t + 1.0)),
-    Lie("has a clock of twice the speed", lambda s, t: at_speed(s, t, 2.0)),
-    Lie("has a clock of a fifth of the speed", lambda s, t: at_speed(s, t, 0.2)),
-    Lie("stamps no time", lambda s, t: s.t_device and replace(s, t_device=math.nan)),
-    Lie("stands at its last stamp", lambda s, t: s.t_device and replace(s, t_device=t + OFFSET)),
-    Lie("speaks of somebody else", lambda s, t: of_another(s)),
+    *(lie for lie in LIES if lie.what != "says an old sample in between"),
+    Lie("says an old sample in between", old_in_between),
+    Lie("comes a second late", lambda s, t, last: replace(s, t=s.t + 1.0)),
+    Lie("has a clock of twice the speed", lambda s, t, last: at_speed(s, t, 2.0)),
+    Lie("has a clock of a fifth of the speed", lambda s, t, last: at_speed(s, t, 0.2)),
+    Lie("stamps no time", lambda s, t, last: s.t_device and replace(s, t_device=math.nan)),
+    Lie("stands at its last stamp", lambda s, t, last: s.t_device and replace(s, t_device=t + OFFSET)),
+    Lie("speaks of somebody else", lambda s, t, last: of_another(s)),
 )
 
 
@@ -120,7 +126,8 @@ class Stream:
         self.listener = Listener(self.source, source_target(station.model, self.source), self.box.post)
         self.delay = delay_of([self.source])
         self._lie = lie
-        self._waiting = list(said)
+        self._last = None
+        self._waiting = [replace(sample, seq=k) for k, sample in enumerate(said)]
 
     def _sleep(self, seconds):
         self.now += seconds
@@ -132,12 +139,17 @@ class Stream:
     def take(self):
         while self._waiting and self._waiting[0].t <= self.now:
             sample = self._waiting.pop(0)
+            lies = self._lie is not None and sample.t >= BEGIN + LIES_AT
+            self._last = self._last if lies else sample
             try:
-                if self._lie is not None and sample.t >= BEGIN + LIES_AT:
-                    sample = self._lie.said(sample, BEGIN + LIES_AT)
+                if lies:
+                    sample = self._lie.said(sample, BEGIN + LIES_AT, self._last)
+            except OSError:
+                sample = None
+            try:
                 if sample is not None:
                     self.listener._take(sample)
-            except Exception:  # as `Listener._session` ends, and is begun anew
+            except (SeerobError, TypeError):  # as `Listener._session` ends, and is begun anew
                 self.listener._clock.reconnect()
         return self.box.take()
 

@@ -59,7 +59,7 @@ class Stream:
             while self.again and self.again[0] <= arrived:
                 self.again.pop(0)
                 self.listener._clock.reconnect()
-            self.listener._take(
+            self.listener.take(
                 JointSample(
                     source="", seq=0, target=self.target, t=BEGIN + arrived, t_device=device,
                     q=tuple(q), qd=None if qd is None else tuple(qd),

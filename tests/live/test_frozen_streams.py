@@ -154,7 +154,7 @@ def listened(samples):
     posted = []
     listener = Listener(Kinect(human="op", timeout=TIMEOUT), None, posted.append)
     for sample in samples:
-        listener._take(sample)
+        listener.take(sample)
     return posted
 
 

@@ -361,12 +361,12 @@ def test_what_is_no_number_and_is_said_again_is_the_same():
         body = BodySample(
             source="", seq=0, t=5 + 0.01 * k, t_device=0.01 * k, target="op", points=(nowhere, there)
         )
-        ears._take(body)
+        ears.take(body)
     assert told[-1].reason.endswith(STILL)
     ears = Listener(Made(name="made", timeout=0.2), None, told.append)
     for late, first in ((0.0, 0), (3.0, 100)):
         ears._clock.reconnect()
         for k in range(first, 200):
             q = (math.nan * k,)
-            ears._take(msgspec.structs.replace(joint(5 + late + 0.01 * k, 0.01 * k), q=q))
+            ears.take(msgspec.structs.replace(joint(5 + late + 0.01 * k, 0.01 * k), q=q))
     assert ears.statistics().offset == pytest.approx(5, abs=2e-3)

@@ -26,7 +26,7 @@ from seerob.devices.live.receivers import Clock, hear
 from seerob.devices.sources.kinect import LAYOUT, frame
 from seerob.session.opening import source_target
 from seerob.session.run import Judge, bind, engine_of, ticks
-from seerob.testing import LIES, Lie
+from seerob.testing import LIVE_LIES
 
 BEGIN, LIES_AT, END = 1000.0, 0.6, 1.4
 """Host's monotonic time of the first sample; from when it lies and until when it speaks [s]."""
@@ -86,35 +86,6 @@ KINDS = {
 }  # fmt: skip
 
 
-def at_speed(sample, since, speed):
-    """With the device's stamp of a clock that goes so fast from an instant of the host on."""
-    return sample.t_device and replace(sample, t_device=since + OFFSET + speed * (sample.t - since))
-
-
-def of_another(sample):
-    """The same of a robot, person or variable that is not there."""
-    if isinstance(sample, SignalSample):
-        return replace(sample, values={"another": 5.0})
-    return replace(sample, target="nobody")
-
-
-def old_in_between(sample, since, last):
-    """An old sample that comes now, with the stamp that it had; a variable without one may stand."""
-    return sample.t_device and (replace(last, t=sample.t) if sample.seq % 2 else sample)
-
-
-LIVE_LIES = (
-    *(lie for lie in LIES if lie.what != "says an old sample in between"),
-    Lie("says an old sample in between", old_in_between),
-    Lie("comes a second late", lambda s, t, last: replace(s, t=s.t + 1.0)),
-    Lie("has a clock of twice the speed", lambda s, t, last: at_speed(s, t, 2.0)),
-    Lie("has a clock of a fifth of the speed", lambda s, t, last: at_speed(s, t, 0.2)),
-    Lie("stamps no time", lambda s, t, last: s.t_device and replace(s, t_device=math.nan)),
-    Lie("stands at its last stamp", lambda s, t, last: s.t_device and replace(s, t_device=t + OFFSET)),
-    Lie("speaks of somebody else", lambda s, t, last: of_another(s)),
-)
-
-
 class Stream:
     """One live source of a run, what it yields, and from an instant on something else."""
 
@@ -148,7 +119,7 @@ class Stream:
                 sample = None
             try:
                 if sample is not None:
-                    self.listener._take(sample)
+                    self.listener.take(sample)
             except (SeerobError, TypeError):  # as `Listener._session` ends, and is begun anew
                 self.listener._clock.reconnect()
         return self.box.take()

@@ -10,7 +10,8 @@ basis, a result that contradicts itself).
 
 ``sources_never_within("my_cell")`` takes one in which every criterion is within while its files are played,
 and lets each source lie: it stops, fails, repeats itself, goes back in time, speaks of the future, jumps,
-says what is no number or of the wrong shape.
+says what is no number or of the wrong shape. A live source is listened to for some seconds, and what it said
+goes the way that it goes in a run, from the listener on, without a lie and with each.
 
 As a plug-in of pytest, without a test file: ``pytest -p seerob.testing my_cell/workstation.toml`` asks both.
 """
@@ -18,7 +19,9 @@ As a plug-in of pytest, without a test file: ``pytest -p seerob.testing my_cell/
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import aclosing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +30,7 @@ import numpy as np
 from msgspec.structs import replace as changed
 
 from seerob.core.errors import SeerobError
-from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.core.samples import BodySample, JointSample, Mailbox, PoseSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING
@@ -36,7 +39,8 @@ from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import Judge, bound_to, declared
 from seerob.description.humans.skeleton import BONES, PARENTS, ROOT
 from seerob.devices.live.contradictions import LookedAt
-from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.listening import Listener, LiveSource, at_start, because
+from seerob.devices.live.receivers import PATIENCE
 from seerob.model.model import Mechanism, Model
 from seerob.session.opening import source_target
 from seerob.session.run import engine_of, pump, ticks
@@ -45,7 +49,7 @@ from seerob.twin.engine import Engine
 from seerob.twin.spans import Points
 from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import BonesHeard
-from seerob.workstation.source import Opened, Source
+from seerob.workstation.source import Source
 from seerob.workstation.variables import Kind, Value, Variable
 
 TICKS = 18
@@ -143,9 +147,18 @@ def never_within(
         for criterion in getattr(station.workstation, group)
         if not names or criterion.name in names
     ]
+    if unknown := _unknown(names, [criterion.name for criterion, _ in asked], "criterion"):
+        raise AssertionError(unknown)
     failures = _Harness(station.model, values or {}, asked).failures()
     if failures:
         raise AssertionError("\n".join(dict.fromkeys(failures)))
+
+
+def _unknown(names: Sequence[str], known: Sequence[str], what: str) -> str:
+    """Why nothing would be asked of some names; empty when something is."""
+    if lacking := sorted({*names} - {*known}):
+        return f"no {what} is called {' or '.join(map(repr, lacking))}"
+    return "" if known else f"there is no {what} to be asked"
 
 
 @dataclass(frozen=True)
@@ -208,6 +221,45 @@ LIES = (
     Lie("says what has the wrong shape", _misshapen),
     Lie("calls it invalid", lambda s, t, last: changed(s, quality=Quality.INVALID)),
 )
+
+
+def _at_speed(sample: Sample, last: Sample, speed: float) -> Sample | None:
+    """With the device's stamp of a clock that goes so fast from an instant of the host on."""
+    if sample.t_device is None or last.t_device is None:
+        return None
+    return changed(sample, t_device=last.t_device + speed * (sample.t - last.t))
+
+
+def _old_in_between(sample: Sample, since: float, last: Sample) -> Sample | None:
+    """An old sample that comes now, with the stamp that it had; what has none may stand."""
+    if sample.t_device is None:
+        return None
+    return changed(last, t=sample.t) if sample.seq % 2 else sample
+
+
+def _of_another(sample: Sample, since: float, last: Sample) -> Sample:
+    """Of a robot, person or variable that is not there."""
+    if isinstance(sample, SignalSample):
+        return changed(sample, values={"seerob.testing/another": 5.0})
+    return changed(sample, target="seerob.testing/nobody")
+
+
+LIVE_LIES = (
+    *(lie for lie in LIES if lie.what != "says an old sample in between"),
+    Lie("says an old sample in between", _old_in_between),
+    Lie("comes a second late", lambda s, t, last: None if s.t_device is None else changed(s, t=s.t + 1.0)),
+    Lie("has a clock of twice the speed", lambda s, t, last: _at_speed(s, last, 2.0)),
+    Lie("has a clock of a fifth of the speed", lambda s, t, last: _at_speed(s, last, 0.2)),
+    Lie("stamps no time", lambda s, t, last: None if s.t_device is None else changed(s, t_device=_NAN)),
+    Lie("stands at its last stamp", lambda s, t, last: _at_speed(s, last, 0.0)),
+    Lie("speaks of somebody else", _of_another),
+)
+"""Of live sources, whose samples have the host's time when they arrive, and may have the device's. How late
+those are that have not, the file says (`LiveSource.delay`), and nobody can see that it is not so."""
+SHOWS = 0.3
+"""By when a live stream that contradicts itself shows it, beside its time-out [s]."""
+LISTENS = 2.0
+"""For so long a live source is listened to, and as long as it takes to be silent [s]."""
 MOVES = 0.1
 """Speed of a joint that does not stand [rad/s or m/s]."""
 LIES_FROM = 0.3
@@ -218,8 +270,8 @@ def sources_never_within(cell: Station | Path | str, *, names: Sequence[str] = (
     """Fail unless every criterion is within while files are played, and not once a source lies.
 
     Args:
-        cell: A workstation, or its file or folder. Its live sources are left out: what they say is looked
-            at where it is heard.
+        cell: A workstation, or its file or folder. Its live sources have to be there, or their emulators; of
+            several live ones only that is heard which lies.
         names: Sources that lie, one after the other, by name; all of them when not given.
 
     Raises:
@@ -228,10 +280,12 @@ def sources_never_within(cell: Station | Path | str, *, names: Sequence[str] = (
     """
     station = cell if isinstance(cell, Station) else load(cell, allow_plugins=True)
     told: list[str] = []
+    asked = [source.name for source, _ in station.sources if not names or source.name in names]
+    if unknown := _unknown(names, asked, "source"):
+        raise AssertionError(unknown)
     for i, (source, _) in enumerate(station.sources):
-        if isinstance(source, LiveSource) or (names and source.name not in names):
-            continue
-        told += _Played(station, i).failures()
+        if not names or source.name in names:
+            told += (_Heard if isinstance(source, LiveSource) else _Played)(station, i).failures()
     if told:
         raise AssertionError("\n".join(dict.fromkeys(told)))
 
@@ -244,16 +298,23 @@ class _Played:
         which: Number of that source.
     """
 
+    lies: tuple[Lie, ...] = LIES
+
     def __init__(self, station: Station, which: int) -> None:
         self._model, self._sources, self._which = station.model, station.sources, which
         self._findings = station.scene().findings
-        source, opened = station.sources[which]
+        source, _ = station.sources[which]
         self._name = source.name or type(source).__module__
-        self._since = LIES_FROM * opened.duration
+        self._end = self._duration()
+        self._since = LIES_FROM * self._end
         """Instant from which it lies [s]."""
         self._from = self._since + source.timeout + 2 * station.workstation.engine.tick
         """From which nothing may be within [s]."""
         self._bound = [one for one in station.bound if self._concerns(source, one.criterion)]
+
+    def _duration(self) -> float:
+        """How long it speaks [s]."""
+        return self._sources[self._which][1].duration
 
     def _concerns(self, source: Source, criterion: Criterion) -> bool:
         variables = (self._model.dictionary.get(name) for name in criterion.variables())
@@ -265,32 +326,35 @@ class _Played:
         """What is wrong, one sentence each."""
         if not self._bound:
             return [f"{self._name}: no criterion depends on what it says: add one"]
-        end = self._sources[self._which][1].duration
-        if self._from >= end:
-            return [f"{self._name}: give more than {self._from / LIES_FROM:.3g} s, it says {end:.3g} s"]
+        if self._from >= self._end:
+            more = f"give more than {self._from / LIES_FROM:.3g} s, it says {self._end:.3g} s"
+            return [f"{self._name}: {more}"]
         honest = self._within(None, 0.0)
         told = [
             f"{one.criterion.name}: give a motion in which it is within, as {self._name} says it"
             for one in self._bound
             if one.criterion.name not in honest and getattr(one.criterion, "limit", None) is not None
         ]
-        for lie in LIES:
+        for lie in self.lies:
             for name, (where, t) in self._within(lie, self._from).items():
                 told.append(f"{name}: {where} is within at {t:.3f} s although {self._name} {lie.what}")
         return told
 
-    def _within(self, lie: Lie | None, start: float) -> dict[str, tuple[str, float]]:
-        """By criterion that is within from an instant on, what of it, and when first."""
+    def _feed(self, lie: Lie | None) -> Iterator[tuple[Sample, ...]]:
+        """What is said for each tick."""
         source, opened = self._sources[self._which]
         target = source_target(self._model, source)
         sources = list(self._sources)
         if lie is not None:
-            lying = LookedAt(_Lying(opened, lie, self._since), self._name, target)
+            lying = LookedAt(_Lying(opened.samples, lie, self._since), self._name, target)
             sources[self._which] = source, changed(opened, samples=lying)
-        feed = pump(sources, self._model.workstation.engine.tick)
+        return pump(sources, self._model.workstation.engine.tick)
+
+    def _within(self, lie: Lie | None, start: float) -> dict[str, tuple[str, float]]:
+        """By criterion that is within from an instant on, what of it, and when first."""
         found: dict[str, tuple[str, float]] = {}
         try:
-            for out, _ in ticks(engine_of(self._model), Judge(self._bound, self._findings), feed):
+            for out, _ in ticks(engine_of(self._model), Judge(self._bound, self._findings), self._feed(lie)):
                 for result in out.results if out.t >= start else ():
                     if result.name not in found and (where := _within(result)):
                         found[result.name] = where, out.t
@@ -300,15 +364,69 @@ class _Played:
         return found
 
 
+class _Heard(_Played):
+    """A workstation one live source of which was listened to, and lies."""
+
+    lies = LIVE_LIES
+
+    def _duration(self) -> float:
+        source, _ = self._sources[self._which]
+        assert isinstance(source, LiveSource)
+        self._live, seconds = source, LISTENS + 2 * source.timeout
+        try:
+            self._said = at_start(self._listened(seconds), within=seconds + PATIENCE)
+        except (OSError, EOFError, SeerobError) as error:
+            raise AssertionError(f"{self._name}: {because(error)}; is it there?") from None
+        self._begun = self._said[0].t
+        return self._said[-1].t - self._begun
+
+    async def _listened(self, seconds: float) -> list[Sample]:
+        """What it says in so long [s], as it is yielded."""
+        said: list[Sample] = []
+        async with aclosing(self._live.listen(source_target(self._model, self._live))) as samples:
+            async for sample in samples:
+                said.append(changed(sample, seq=len(said)))
+                if sample.t - said[0].t >= seconds:
+                    break
+        if not said:
+            raise SeerobError("it says nothing")
+        return said
+
+    def failures(self) -> list[str]:
+        """What is wrong, one sentence each."""
+        self._from += self._live.behind() + SHOWS
+        return super().failures()
+
+    def _feed(self, lie: Lie | None) -> Iterator[tuple[Sample, ...]]:
+        """What is taken at each tick: of a live source as a run hears it, by the instants of its arrivals."""
+        box, tick = Mailbox(), self._model.workstation.engine.tick
+        listener = Listener(self._live, source_target(self._model, self._live), box.post)
+        waiting, last, since = deque(self._said), self._said[0], self._begun + self._since
+        files = [pair for pair in self._sources if not isinstance(pair[0], LiveSource)]
+        for k, recorded in enumerate(pump(files, tick, endless=True)):
+            while waiting and waiting[0].t <= self._begun + self._live.behind() + k * tick:
+                sample = waiting.popleft()
+                # What fails ends a session, and a run goes on.
+                with suppress(Exception):
+                    if lie is None or sample.t < since:
+                        last = sample
+                        listener.take(sample)
+                    elif (said := lie.said(sample, since, last)) is not None:
+                        listener.take(said)
+            yield (*recorded, *(changed(sample, t=sample.t - self._begun) for sample in box.take()))
+            if not waiting:
+                return
+
+
 class _Lying:
     """What a source yields, and from an instant on [s] something else."""
 
-    def __init__(self, opened: Opened, lie: Lie, since: float) -> None:
-        self._opened, self._lie, self._since = opened, lie, since
+    def __init__(self, said: Iterable[Sample], lie: Lie, since: float) -> None:
+        self._said, self._lie, self._since = said, lie, since
 
     def __iter__(self) -> Iterator[Sample]:
         last: Sample | None = None
-        for sample in self._opened.samples:
+        for sample in self._said:
             if sample.t < self._since or last is None:
                 last = sample
                 yield sample

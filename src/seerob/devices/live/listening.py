@@ -438,7 +438,7 @@ class Listener:
                     # together with what it waits for (Python 3.11).
                     if self._stopping:
                         break
-                    self._take(sample)
+                    self.take(sample)
         except (OSError, EOFError, SeerobError) as error:
             return because(error)
         except Exception as error:
@@ -447,7 +447,12 @@ class Listener:
             return f"{type(error).__name__}: {error}"
         return "the other end closed the connection"
 
-    def _take(self, sample: Sample) -> None:
+    def take(self, sample: Sample) -> None:
+        """Hear what the source has yielded, and post what is news.
+
+        Raises:
+            SeerobError: It has no time of its arrival.
+        """
         if not math.isfinite(sample.t):
             raise SeerobError(f"it yields a sample without the time of its arrival (t is {sample.t})")
         if isinstance(sample, SignalSample):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
 from seerob.criteria.judging import UNBOUNDED
+from seerob.outputs.notebook import results_html
 from seerob.outputs.sentences import summary
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
@@ -95,6 +98,17 @@ def test_shares_of_time_are_of_time():
     for k, verdict in enumerate((W, E, U, None)):
         plain.add(Snapshot(seq=k, t=0.0, poses=b"", results=(Result(name="v", verdict=verdict),)))
     assert plain["v"].times() == (0.25, 0.25, 0.25, 0.0, 0.25, 0.0)
+
+
+def test_no_headline_says_that_more_was_decided_than_the_rows_below_it():
+    """A criterion that is muted for nearly all of a run, and within in the rest."""
+    log = told([(0, W), (0.1, W), (5, "muted")])
+    assert log.verdict is W
+    assert log.decided == pytest.approx(log["v"].times().decided) == pytest.approx(0.02)
+    assert log.so_far(whole=True).decided == log.decided
+    assert "decided 2 % of the time" in results_html(log)
+    # That nobody was near is no time in which nobody looked.
+    assert told([(0, W), (0.1, W), (5, "idle")]).decided == pytest.approx(1.0)
 
 
 ROWS = "t [s],J1 [rad],J2 [rad]\n" + "".join(f"{k / 10:.1f},{0.01 * k:.2f},0\n" for k in range(41))
@@ -233,3 +247,12 @@ def test_the_share_is_told_to_people_and_to_machines_and_the_exit_code_follows(t
     page = next((tmp_path / "out").rglob("*.html")).read_text()
     assert "nothing bounds it between" in page
     assert "Decided 0 % of the run, not asked in 100 %" in page
+
+
+def test_a_figure_that_is_no_number_any_more_is_a_difference():
+    """`scripts/compare-results` took what became NaN, or infinite, for equal."""
+    differences = runpy.run_path(str(EXAMPLES.parent / "scripts/compare-results"))["differences"]
+    found = [
+        size for _, size, _ in differences([1.0, math.inf, 1.0, math.nan], [math.nan, 1.0, 1.5, math.nan])
+    ]
+    assert found == [math.inf, math.inf, pytest.approx(1 / 3)]

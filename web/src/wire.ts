@@ -482,7 +482,10 @@ export interface CriterionSoFar {
 export interface SoFar {
   type: "so_far";
   verdict: Verdict | null;
-  /** Least share that a criterion with a verdict decided of the time in which it applied, 0…1. */
+  /**
+   * Least share that a criterion with a verdict decided of the time in which it was muted or had something
+   * to judge, 0…1.
+   */
   decided: number | null;
   criteria: Record<string, CriterionSoFar>;
   /** Whether that is all of the run. */

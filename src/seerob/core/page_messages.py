@@ -64,7 +64,8 @@ class SoFar(Struct, frozen=True, kw_only=True, tag="so_far"):
 
     verdict: Verdict | None
     decided: float | None
-    """Least share that a criterion with a verdict decided of the time in which it applied, 0…1."""
+    """Least share that a criterion with a verdict decided of the time in which it was muted or had something
+    to judge, 0…1."""
     criteria: dict[str, CriterionSoFar]
     whole: bool = False
     """Whether that is all of the run."""

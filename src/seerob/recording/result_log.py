@@ -143,13 +143,14 @@ class ResultLog(Mapping[str, Series]):
     def decided(self) -> float | None:
         """Least share of the run that a criterion with a verdict decided, 0…1; None when none has one.
 
-        What a criterion did not apply in, or had nothing to judge in, takes nothing from it.
+        What a criterion had nothing to judge in takes nothing from it; what it did not apply in does: nobody
+        judged that, and no headline claims more than the rows below it.
         """
         shares = []
         for series in tuple(self._series.values()):
             times = series.times()
             if series.verdict is not None:
-                asked = 1.0 - times.muted - times.nothing
+                asked = 1.0 - times.nothing
                 shares.append(times.decided / asked if asked > 0 else 0.0)
         return min(shares, default=None)
 

@@ -494,6 +494,22 @@ def test_values_that_are_played_again_are_a_restart_once_and_a_loop_then(monkeyp
         server.stop()
 
 
+@pytest.mark.parametrize(("back", "doubted"), [(0.25, False), (0.26, True), (9.9, True), (10.1, False)])
+def test_a_value_that_is_older_than_one_that_was_heard_is_not_relied_on_until_there_is_a_newer_one(
+    back, doubted
+):
+    """What came late stands for as long as nothing new is said: a door that is shut, and was opened."""
+    picture = Picture((RUNS,), by_exception=True)
+    picture.take((Change("belt/runs", True, stamp=50.0),), 100.0)
+    picture.take((Change("belt/runs", False, stamp=50.0 - back),), 101.0)
+    for now in (110.0, 1000.0):
+        assert bool(picture.sample(now).doubts) is doubted
+    picture.take((Change("belt/runs", False, stamp=49.999),), 1001.0)
+    assert bool(picture.sample(1100.0).doubts) is doubted
+    picture.take((Change("belt/runs", True, stamp=50.0 if back < 10 else 60.0),), 1101.0)
+    assert not picture.sample(1200.0).doubts
+
+
 def test_a_value_that_was_overtaken_is_no_news():
     picture = Picture((SPEED,), by_exception=True)
     for stamp, raw in ((10.0, 250.0), (9.8, 300.0)):

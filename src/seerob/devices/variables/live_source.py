@@ -22,7 +22,7 @@ from seerob.core.errors import SeerobError
 from seerob.core.quantities import Seconds
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.devices.live.device_clock import AGAIN, REORDERED, RESTART_HOLD
+from seerob.devices.live.device_clock import AGAIN, BUFFERED, REORDERED, RESTART_HOLD
 from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
 from seerob.workstation.variables import BadValue, Value, Variable
@@ -214,11 +214,15 @@ class Stamps:
         self._back: dict[str, tuple[float, str]] = {}
         """Variables whose time went back: until when nothing rests on them [s], and why."""
         self._restarted: dict[str, float] = {}
+        self._passed: dict[str, float] = {}
+        """Variables whose value is older than one that was heard: stamp of that [s]."""
 
     def is_old(self, change: Change, stamp: float, now: float) -> bool:
         """Whether a value was overtaken on the way; time that goes back by more is a restart, then a loop.
 
-        What is said again with the stamp that it had is a recording, also over a new connection. As
+        What is said again with the stamp that it had is a recording, also over a new connection. On what is
+        older than a value that was heard, by less than a buffer explains, nothing rests until something newer
+        comes: it came late, or the clock was set back, and nobody knows which. As
         `seerob.devices.live.device_clock.DeviceClock` has it of samples.
 
         Args:
@@ -227,9 +231,14 @@ class Stamps:
             now: Host's monotonic time [s].
         """
         name, said = change.name, hash(repr(change.raw))
-        back = self._last.get(name, -math.inf) - stamp
+        last = self._last.get(name, -math.inf)
+        back = last - stamp
         if 0 < back <= REORDERED:
             return True
+        if 0 < back < BUFFERED:
+            self._passed.setdefault(name, last)
+        elif back > 0 or stamp >= self._passed.get(name, -math.inf):
+            self._passed.pop(name, None)
         ago = self._newest.get(name, -math.inf) - stamp
         self._last[name] = stamp
         self._newest[name] = max(stamp, self._newest.get(name, -math.inf))
@@ -252,7 +261,9 @@ class Stamps:
 
     def invalid_reasons(self, now: float) -> list[tuple[str, str]]:
         """Variables on which nothing rests at ``now`` [s], each with the reason."""
-        return [(name, why) for name, (until, why) in self._back.items() if now <= until]
+        late = "older, by its own clock, than what it said before: came it late, or was that set back?"
+        holds = {name: why for name, (until, why) in self._back.items() if now <= until}
+        return [*(dict.fromkeys(self._passed, late) | holds).items()]
 
 
 _STAMPS: ContextVar[Stamps] = ContextVar("stamps")

@@ -111,7 +111,7 @@ def moved_by_others(model: Model, names: tuple[str, ...]) -> Others:
     return Others(q, v, np.array(moved, np.int64))
 
 
-def without(mj: mujoco.MjModel, data: Any, others: Others) -> Any:
+def without(mj: mujoco.MjModel, data: mujoco.MjData, others: Others) -> mujoco.MjData:
     """A copy of MuJoCo's data in which what others have an influence on is not a number."""
     data, (q, v, bodies) = copy(data), others
     if not len(v):

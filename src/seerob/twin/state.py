@@ -11,11 +11,11 @@ engine, the picture and the recorder. While a criterion is asked (`asking`) it i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import deepcopy
 from functools import partial
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import ClassVar, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -109,10 +109,10 @@ class State(Validity):
         self.captured_between: tuple[Array, Array] | None = None
         """Of an instant between two ticks: ``qpos`` and ``qvel`` with people as they were captured; None at a
         tick, and where nobody is held (`seerob.twin.spans.Path.captured`)."""
-        self._wanted: Any = None
+        self._wanted: mujoco.MjData | None = None
         """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
-        self._points: dict[tuple[Any, ...], tuple[Frame, int, Indices, NDArray[np.bool_], Array]] = {}
+        self._points: dict[tuple[Hashable, ...], tuple[Frame, int, Indices, NDArray[np.bool_], Array]] = {}
         """Points of which Jacobians are asked: what of them is the same at all ticks."""
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
@@ -148,7 +148,7 @@ class State(Validity):
     # -- what says nothing of whether it may be relied on: closed while a criterion is asked ---------
 
     @property
-    def data(self) -> Any:
+    def data(self) -> mujoco.MjData:
         """The `mujoco.MjData`."""
         self._open("data", "data_of(names), q, qd, pose or another accessor")
         return self._data
@@ -240,7 +240,7 @@ class State(Validity):
         ids = self.attachments.ids[rows]
         return R[ids], x[ids]
 
-    def _as_captured(self, name: str, q: Array) -> Any:
+    def _as_captured(self, name: str, q: Array) -> mujoco.MjData:
         """Data with all others where they are, and a person with given joints [rad or m]; no kinematics."""
         if self._wanted is None:
             self._wanted = mujoco.MjData(self._model.mj)
@@ -374,7 +374,7 @@ class State(Validity):
     def _rows_of(self, bodies: tuple[int, ...]) -> Indices:
         return self._owners(bodies).rows
 
-    def data_of(self, *names: str) -> Any:
+    def data_of(self, *names: str) -> mujoco.MjData:
         """MuJoCo's data, of which only what these robots, people and machines decide may be used.
 
         For what has no accessor of its own. Of one's own criteria it is a copy, in which everybody else and
@@ -746,7 +746,7 @@ class State(Validity):
         return found
 
     def _moving_point(
-        self, key: tuple[Any, ...], frame: Frame, mechanism: Mechanism, offset: Array | None
+        self, key: tuple[Hashable, ...], frame: Frame, mechanism: Mechanism, offset: Array | None
     ) -> _Point:
         mj, columns = self._model.mj, self.columns[mechanism.name]
         bound = self._points.get(key)

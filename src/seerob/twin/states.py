@@ -10,7 +10,7 @@ Their motion may be said by arrays instead of sources (`motion_of`).
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -203,7 +203,7 @@ class States:
         self.alone = np.zeros(len(motion.t), bool)
         """Instants that whoever was asked last leaves to be asked one by one, shape (N,)."""
         self._bench = bench
-        self._cache: dict[Any, Any] = {}
+        self._cache: dict[str | tuple[Hashable, ...], Any] = {}
         self._answers: dict[tuple[Query, Per], Closests] = {}
 
     def __len__(self) -> int:

@@ -7,7 +7,7 @@ author of a criterion can forget it. Each reason is worked out once per tick.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from seerob.workstation.variables import VARIABLE, Value
 
 MOST = 4096
 """Sets of bodies of which it is kept whom they belong to."""
+
+T = TypeVar("T")
 
 
 class _Owners(NamedTuple):
@@ -78,7 +80,7 @@ class Validity:
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False
         self._asking = _Asking(self)
-        self._cache: dict[Any, Any] = {}
+        self._cache: dict[str | tuple[Hashable, ...], Any] = {}
         engine = model.workstation.engine
         self._period = engine.tick
         limits = {"human": engine.human_tracking_limit}
@@ -427,7 +429,7 @@ class Validity:
 
     # -- what follows from it -------------------------------------------------------------------
 
-    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+    def once(self, key: tuple[Hashable, ...], make: Callable[[], T]) -> T:
         """What several criteria work out from this state: made by whoever asks first at this tick.
 
         Args:
@@ -444,7 +446,8 @@ class Validity:
                 self.asked |= asked[0]
                 self.speeds_asked |= asked[1]
             self._cache[key] = made, *asked
-        made, names, speeds = self._cache[key]
+        found: T
+        found, names, speeds = self._cache[key]
         self.asked |= names
         self.speeds_asked |= speeds
-        return made
+        return found

@@ -254,6 +254,35 @@ def test_a_phase_that_nobody_asked_in_is_not_within(tmp_path, begin, end, more, 
     assert stage.batch()["owas"].verdict is verdict
 
 
+PULSED = """
+variables = "variables.toml"
+[[sources]]
+kind = "signals_csv"
+name = "plc"
+file = "signals.csv"
+time = "t"
+time_unit = "s"
+"""
+
+
+@pytest.mark.parametrize("every", ["", 'every = 0.3\nbetween_samples = "accepted: stands"\n'])
+@pytest.mark.parametrize(
+    ("begin", "end", "verdict"),
+    [(0.403, 0.407, Verdict.UNDECIDED), (0.405, 0.415, Verdict.EXCEEDED), (2.0, 2.1, Verdict.WITHIN)],
+)
+def test_what_applies_between_two_ticks_only_is_not_within(tmp_path, every, begin, end, verdict):
+    instants = sorted({0.0, 0.1, begin, end, *np.arange(0.0, 1.0, 0.05).round(2).tolist()})
+    applies = [t < 0.1 or begin <= t < end for t in instants]
+    rows = "".join(f"{t},{str(on).lower()}\n" for t, on in zip(instants, applies, strict=True) if t <= 1)
+    text = PULSED + HUMANS + LIFTS.format(0.2, 0.9, 'active = "on"\n' + every)
+    files = {
+        "person.toml": STANDS.encode(),
+        "variables.toml": '[[variables]]\nname = "on"\nsource = "plc"\naddress = "on"\ntype = "bool"\n',
+        "signals.csv": "t,on\n" + rows,
+    }
+    assert made(tmp_path, text, files).run().results["owas"].verdict is verdict
+
+
 @pytest.mark.parametrize(
     ("phases", "before", "now", "expected"),
     [

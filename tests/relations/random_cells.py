@@ -140,6 +140,8 @@ class Cell:
     machine: Machine | None = None
     more: str = ""
     """More tables."""
+    every: float | None = None
+    """Period of all criteria [s]."""
     left_out: frozenset[str] = field(default=frozenset())
     """Criteria that are not asked."""
 
@@ -206,13 +208,18 @@ def random_cell(seed: int, *, published: bool = True, around: bool = True) -> Ce
 
 
 def more_of(rng: np.random.Generator, cell: Cell) -> dict[str, object]:
-    """What there is around a cell: a post, and contacts with anyone, slow enough that some are permitted."""
+    """What there is around a cell: a post, and contacts with anyone, slow enough that some are permitted.
+
+    One arm in ten hardly moves.
+    """
     heading, far = rng.uniform(-np.pi, np.pi), rng.uniform(0.3, 0.9)
     found: dict[str, object] = {"anyone": bool(rng.random() < 0.5)}
     if rng.random() < 0.5:
         found["post"] = far * np.array([np.cos(heading), np.sin(heading)])
     if found["anyone"]:
         found["frequency"] = cell.frequency * 10 ** rng.uniform(-2, 0)
+    if rng.random() < 0.1:
+        found["frequency"] = cell.frequency * 10 ** rng.uniform(-5, -3)  # below 1 mm/s
     return found
 
 
@@ -483,7 +490,8 @@ def files(cell: Cell) -> dict[str, str]:
         tables, asked = tables[::-1], asked[::-1]
     for name, text in asked:
         group = "ergonomics" if name == "posture" else "safety"
-        tables.append(f'[[{group}]]\nname = "{name}"\n{text}')
+        period = "" if cell.every is None else f"every = {cell.every!r}\n"
+        tables.append(f'[[{group}]]\nname = "{name}"\n{period}{text}')
     phase = '[[phases]]\ntitle = "all"\nstart = 0.0\nload = 1.0\nlegs = "posture"\n' * cell.walks
     spoken = machine is not None and not machine.by_file
     head = (

@@ -222,6 +222,46 @@ def nearer_never_relieves(seed, folder):
         no_relief(one, said(moved, folder / "other"), name)
 
 
+LIMITED = {
+    "speed": "speed", "fastest": "speed", "energy": "energy", "distance": "distance", "felt": "mass",
+    "cart speed": "speed", "cart energy": "energy", "cart distance": "distance",
+}  # fmt: skip
+"""Criteria whose limits are given, and the name of each limit."""
+
+
+def on_its_limit_nothing_is_within(seed, folder):
+    """A limit that is the worst figure of the run, or off from it by its last bit."""
+    cell = made(seed)
+    name = list(LIMITED)[seed // 2 % (8 if cell.machine else 5)]
+    cell = replace(cell, left_out=frozenset(ALL) - {name})
+    log = said(cell, folder / "one")
+    if name not in log or log[name].worst() is None or not np.isfinite(log[name].values).any():
+        return
+    worst = np.nanmax if log[name].at_most else np.nanmin
+    value = float(worst(log[name].values))
+    if value <= 0:
+        return
+    for k, limit in enumerate((value, np.nextafter(value, 0), np.nextafter(value, np.inf))):
+        other = replace(cell, limits=cell.limits | {LIMITED[name]: float(limit)})
+        on = station(other, folder / f"on {k}")
+        assert on.run().results[name].verdict is not Verdict.WITHIN, (name, limit)
+        assert on.batch()[name].verdict is not Verdict.WITHIN, (name, limit)
+
+
+def asked_seldom_nothing_is_within_that_was_not(seed, folder):
+    cell = made(seed)
+    one, other = pair(
+        folder, cell, replace(cell, every=float(np.random.default_rng(seed).uniform(0.011, 0.3)))
+    )
+    for name in one:
+        verdicts = one[name].verdict, other[name].verdict
+        assert verdicts[1] is not Verdict.WITHIN or verdicts[0] is Verdict.WITHIN, (
+            name,
+            one[name].worst(),
+            other[name].worst(),
+        )
+
+
 def wider_tolerances_never_relieve(seed, folder):
     cell = made(seed)
     one, other = pair(folder, cell, replace(cell, uncertainty=0.05, mass_tolerance=0.2))
@@ -323,6 +363,8 @@ RELATIONS = {
             thicker_never_relieves,
             faster_never_relieves,
             nearer_never_relieves,
+            on_its_limit_nothing_is_within,
+            asked_seldom_nothing_is_within_that_was_not,
             wider_tolerances_never_relieve,
             a_finer_tick_never_finds_a_larger_separation,
             a_gap_in_the_log_is_never_greener,

@@ -384,6 +384,8 @@ class Question:
     """Another one of it, for what errors of speeds would change; none of one that remembers."""
     turns: Callable[[float, float], Sequence[float]] | None = None
     """When what its phases enter changes between two instants (`seerob.criteria.scoring.phases.turns`)."""
+    since: float | None = None
+    """The last instant at which it was looked whether it applies [s]."""
     seen: tuple[float, str] | None = None
     """The last instant [s], and why nothing is within there: a phase that began and ended since the one
     before."""
@@ -420,6 +422,23 @@ class Question:
             yield unmoved(still)
         for name in self.relied_on:
             yield twin.invalid_source_reason(name)
+
+    def pulse(self, state: State) -> str:
+        """Why one that does not apply is not muted: it did, between two ticks only; empty where it did not.
+
+        One that is bounded between ticks is judged there by itself (`BetweenTicks`).
+        """
+        active = self.criterion.active
+        if active is None or self.bound.watch is not None:
+            return ""
+        before, self.since = self.since, state.t
+        if before is None or not before < state.t:
+            return ""
+        switches = state.signals.switches(active, before, state.t)
+        ends = (state.signals.at(active, t).value for t in (before, state.t))
+        if len(switches) < 2 or any(value is not False for value in ends):
+            return ""
+        return f"{active} was true from {switches[0]:.6g} s, between two ticks only, and nobody asked it then"
 
     def passed_over(self, t: float) -> str:
         """Why nothing is within at an instant [s]: a phase began and ended since the last one."""
@@ -528,6 +547,9 @@ class Judge:
     def _one(self, question: Question, state: State) -> Result:
         kept = question.kept
         passed_over = question.passed_over(state.t)
+        if pulse := question.pulse(state):
+            question.kept = None
+            return _unknown(question.criterion, pulse)
         if kept is not None and self._lasts(kept, question, state):
             if self._holds:  # also what was found out since it was asked
                 question.why = question.held_for(kept.asked)

@@ -17,6 +17,7 @@ from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.core.verdict import judge
 from seerob.criteria.criterion import Criterion
+from seerob.criteria.safety.safety_area import SafetyArea
 from seerob.recording.answers import Answers
 from seerob.recording.series import CODES, NO_VERDICT
 from seerob.session import batch as batches
@@ -181,6 +182,32 @@ def test_the_motion_crosses_limits(batch):
 
 def test_only_what_remembers_is_asked_instant_by_instant(batch):
     assert {name for name, column in batch.items() if column.note} == {"fixed", "contact"}
+
+
+AREA = """
+[[areas]]
+name = "zone"
+shape = { box = [0.4, 0.4, 0.4] }
+at = { position = [0.8, 0.2, 0.4] }
+[[safety]]
+kind = "safety_area"
+name = "zone"
+area = "zone"
+of = "arm"
+"""
+
+
+def test_an_area_says_of_many_instants_what_it_says_of_each(tmp_path, motion, monkeypatch):
+    """How deep somebody is inside is asked of each; who stays outside is judged in arrays."""
+    own = made(tmp_path, f"engine = {{ physics = false }}\n{UR10}{AREA}")
+    found = own.batch(*motion, t=T)["zone"]
+    monkeypatch.setattr(SafetyArea, "one_by_one", lambda *_: "asked so")
+    alone = own.batch(*motion, t=T)["zone"]
+    assert (found.note, alone.note) == ("", "asked instant by instant: asked so")
+    assert set(found.answers.verdict.tolist()) == {CODES[Verdict.WITHIN], CODES[Verdict.EXCEEDED]}
+    np.testing.assert_array_equal(found.answers.verdict, alone.answers.verdict)
+    np.testing.assert_allclose(found.value, alone.value, rtol=1e-12)
+    np.testing.assert_array_equal(found.reasons, alone.reasons)
 
 
 def test_number_of_threads_changes_no_bit(cell, motion, batch, monkeypatch):

@@ -26,7 +26,7 @@ from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sa
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Result, Row, Scene, Snapshot
 from seerob.core.verdict import Verdict, judge, judge_interval, worst
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
 from seerob.criteria.scoring.phases import Phase, phase_at, shared_phases
 from seerob.criteria.scoring.rule import PostureRule as Rule
 from seerob.criteria.scoring.rule import bind_posture
@@ -71,6 +71,7 @@ __all__ = [
     "Model",
     "Opened",
     "Origin",
+    "Parts",
     "Phase",
     "Points",
     "Polyline",

@@ -15,10 +15,10 @@ Codes = NDArray[np.uint8]
 WITHIN, EXCEEDED, UNDECIDED = 0, 1, 2
 """Verdicts, as in `seerob.recording.series.CODES`."""
 
-_ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+_ROWS = "f8[:,::1]"
 
 
-@njit(f"i8({_ROW}, {_ROW}, {_ROW}, {_ROW}, f8, b1, b1, u1[::1])", cache=True, nogil=True, error_model="numpy")
+@njit("i8(f8[:], f8[:], f8[:], f8[:], f8, b1, b1, u1[::1])", cache=True, nogil=True, error_model="numpy")
 def judged(
     value: Array,
     low: Array,

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from operator import attrgetter
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.markers import drawn
-from seerob.core.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
+from seerob.core.snapshot import Basis, Highlight, Marker, Segment
 from seerob.core.transforms import Array
-from seerob.core.verdict import ROUNDING, keeps
+from seerob.core.verdict import ROUNDING, Verdict
 from seerob.criteria.body_parts import seen_first
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
 from seerob.distance.depth import Depth, Depths
 from seerob.distance.least import Closests
 from seerob.model import provenance
@@ -24,9 +25,12 @@ from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.spans import Falls, Points, approaching
 from seerob.twin.state import State
+from seerob.twin.states import States
 
 CELLS, FEWEST = 130, 5
 """Of the search for depths at one tick, shared by all that is inside; the interval says what it left open."""
+
+_DEEP = attrgetter("at_least", "at_most")
 
 
 class SafetyArea(Criterion, frozen=True, kw_only=True):
@@ -53,9 +57,11 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         return *_names(self.area), *_names(self.of)
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
-        watched = self._watched(model)
-        depths = Depths(model.shapes, tolerance=self.tolerance, cells=CELLS, fewest=FEWEST)
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
+        watched, present, depths = self._watched(model), self.present(model), self._depths(model)
+
+        def bind(watched: Sequence[_Watched]) -> Evaluate:
+            return self.judging(self._distances(model, watched, depths), present)
 
         def without(lost: tuple[int, ...]) -> Evaluate | None:
             rest = [
@@ -63,100 +69,97 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 for each in watched
                 if (kept := tuple(i for i in each.gap.b if i not in lost))
             ]
-            return self._bound(model, tuple(rest), depths) if rest else None
+            return bind(rest) if rest else None
 
         bodies = tuple(dict.fromkeys(i for each in watched for i in each.gap.b))
-        return seen_first(bodies, self._bound(model, watched, depths), without)
+        return seen_first(bodies, bind(watched), without)
 
-    def _bound(self, model: Model, watched: tuple[_Watched, ...], depths: Depths) -> Evaluate:
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes distances and depths."""
+        return self._distances(model, self._watched(model), self._depths(model))
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together, but for those at which something is inside."""
+        return ""
+
+    def _depths(self, model: Model) -> Depths:
+        return Depths(model.shapes, tolerance=self.tolerance, cells=CELLS, fewest=FEWEST)
+
+    def _distances(self, model: Model, watched: Sequence[_Watched], depths: Depths) -> Compute:
         several = len(_names(self.area)) > 1
         offs = [TrackingError(model, each.gap.bodies) for each in watched]
         surfaces = [np.full(len(each.gap.b), each.gap.deviation) for each in watched]
+        places = [[_where(model, each, i, several) for i in range(len(each.gap.b))] for each in watched]
         concerned = tuple(dict.fromkeys(i for each in watched for i in each.gap.bodies))
 
-        def evaluate(state: State) -> Result:
+        def of_many(states: States, asked: list[Closests]) -> Figure:
+            value = np.min([found.distance.min(axis=-1) for found in asked], axis=0)
+            room = [(found.distance - may).min(axis=-1) for found, may in zip(asked, surfaces, strict=True)]
+            least = np.min(room, axis=0)
+            # How deep somebody is inside is asked of each instant.
+            states.alone = states.alone | ~(value > ROUNDING)
+            return Figure(value, 0.0, (np.minimum(least, value), value))
+
+        def compute(twin: Twin) -> Figure:
+            asked = [twin.closest_per_body(each.gap, strayed=True) for each in watched]
+            if twin.many:
+                return of_many(cast("States", twin), asked)
+            state: State = twin  # type: ignore[assignment]
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
-            parts: list[Result] = []
-            lit: list[tuple[str, Depth, Array]] = []
-            asked = [state.closest_per_body(each.gap, strayed=True) for each in watched]
-            entered: list[tuple[_Watched, Closests, int]] = []
-            for each, found, off, still in zip(watched, asked, offs, surfaces, strict=True):
+            entered: list[tuple[int, int]] = []
+            for k, (each, names, found, off, still) in enumerate(
+                zip(watched, places, asked, offs, surfaces, strict=True)
+            ):
                 may = still
                 if not off.none(state):
                     errors, on = off.at(state), len(each.gap.a)
                     # An area that a person carries may be elsewhere, too.
                     may = errors[:on].max() + errors[on:] + each.gap.deviation
                 i = int(found.distance.argmin())
-                nearest = min(nearest, (float(found.distance[i]), _where(model, each, i, several)))
+                nearest = min(nearest, (float(found.distance[i]), names[i]))
                 # Another may be nearer than it, shapes and devices being what they are.
                 room = found.distance - may
                 i = int(room.argmin())
-                perhaps = min(perhaps, (float(room[i]), _where(model, each, i, several), float(may[i])))
-                entered += [(each, found, i) for i in np.flatnonzero(found.distance <= ROUNDING).tolist()]
-            pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
-            deeps = depths.ask(*state.placed(concerned, strayed=True), pairs) if pairs else []
-            for (each, found, i), deep in zip(entered, deeps, strict=True):
-                parts.append(
-                    Result(
-                        name=_where(model, each, i, several),
-                        value=-deep.at_least,
-                        unit="m",
-                        limit=0.0,
-                        at_most=False,
-                        verdict=Verdict.EXCEEDED,
-                        interval=(-deep.at_most, -deep.at_least),
-                    )
-                )
-                lit.append((model.bodies[each.gap.b[i]].name, deep, found.point_a[i]))
-            return self._result(nearest, perhaps, parts, deeps, lit)
+                perhaps = min(perhaps, (float(room[i]), names[i], float(may[i])))
+                entered += [(k, i) for i in np.flatnonzero(found.distance <= ROUNDING).tolist()]
+            if not entered:
+                # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not out.
+                (value, who), (least, _, _) = nearest, perhaps
+                ends = None if least >= value else (least, value)
+                return Figure(value, 0.0, ends, beside=_Near(who, *perhaps[1:]))
+            pairs = [(int(asked[k].body_a[i]), watched[k].gap.b[i]) for k, i in entered]
+            deeps = depths.ask(*state.placed(concerned, strayed=True), pairs)
+            names = [places[k][i] for k, i in entered]
+            least_deep, most_deep = -np.array([*map(_DEEP, deeps)]).T
+            parts = Parts(names, least_deep, np.zeros(len(deeps)), (most_deep, least_deep))
+            return Figure(None, parts=parts, beside=_Near(inside=(pairs, deeps, entered, asked)))
 
-        return evaluate
+        return compute
 
-    def _result(
-        self,
-        nearest: tuple[float, str],
-        perhaps: tuple[float, str, float],
-        parts: list[Result],
-        deeps: Sequence[Depth],
-        lit: Sequence[tuple[str, Depth, Array]],
-    ) -> Result:
-        room, who = nearest
-        interval: tuple[float, float] | None
-        if parts:
-            deepest = max(deeps, key=lambda deep: deep.at_least)
-            verdict, reason = Verdict.EXCEEDED, ", ".join(part.name for part in parts)
-            room, interval = -deepest.at_least, (-deepest.at_most, -deepest.at_least)
-        else:
-            # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not outside.
-            least, close, deviation = perhaps
-            open_ = not keeps(least, 0.0, at_most=False)
-            verdict = Verdict.UNDECIDED if open_ else Verdict.WITHIN
-            reason = (
-                f"{close} is within {deviation * 1e3:.1f} mm, what its shape and its place may be off by"
-                if open_
-                else who
-            )
-            interval = (least, room) if least < room else None
+    def present(self, model: Model) -> Present:
+        """Return the function that says who is inside or nearest, and lights areas and bodies."""
 
-        def draw() -> tuple[Marker, ...]:
-            areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]
-            inside: list[Marker] = []
-            for body, deep, border in lit:
-                inside += (Highlight(body=body, verdict=Verdict.EXCEEDED), *_line(deep, border))
-            return *areas, *dict.fromkeys(inside)
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            near: _Near = figure.beside
+            pairs, deeps, entered, found = near.inside
+            reason = near.who
+            if figure.parts is not None:
+                reason = ", ".join(figure.parts.names)
+            elif verdict is Verdict.UNDECIDED:
+                mm = f"{near.off * 1e3:.1f} mm"
+                reason = f"{near.perhaps} is within {mm}, what its shape and its place may be off by"
 
-        return Result(
-            name=self.name,
-            value=room,
-            unit=self.unit,
-            limit=0.0,
-            at_most=False,
-            verdict=verdict,
-            reason=reason,
-            interval=interval,
-            parts=tuple(parts),
-            markers=drawn(draw),
-        )
+            def draw() -> tuple[Marker, ...]:
+                areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]
+                inside: list[Marker] = []
+                for (_, body), deep, (k, i) in zip(pairs, deeps, entered, strict=True):
+                    name, border = model.bodies[body].name, found[k].point_a[i]
+                    inside += (Highlight(body=name, verdict=Verdict.EXCEEDED), *_line(deep, border))
+                return *areas, *dict.fromkeys(inside)
+
+            return Shown(reason, draw)
+
+        return present
 
     def _watched(self, model: Model) -> tuple[_Watched, ...]:
         known = {body.owner: body for body in model.bodies if body.role == "area"}
@@ -197,6 +200,20 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
 class _Watched:
     area: str
     gap: Gap
+
+
+class _Near(Struct, frozen=True, eq=False):
+    """Who is nearest to an area, or inside it."""
+
+    who: str = ""
+    perhaps: str = ""
+    """Who may be nearest, shapes and devices being what they are."""
+    off: float = 0.0
+    """By how much that one may be elsewhere [m]."""
+    inside: tuple[
+        Sequence[tuple[int, int]], Sequence[Depth], Sequence[tuple[int, int]], Sequence[Closests]
+    ] = (), (), (), ()
+    """Bodies of the area and of who is in it, how deep, and which of whose distances those are."""
 
 
 def _names(given: str | tuple[str, ...]) -> tuple[str, ...]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 from msgspec import Meta
 
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.snapshot import Basis, Input, Origin, Result
-from seerob.core.verdict import judge
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.snapshot import Basis, Input, Origin
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.sensors.sensing import Names, bodies_of, names_of
 from seerob.model import provenance
 from seerob.model.model import Model
@@ -47,8 +48,8 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
             raise UnknownName("area or field of a sensor", self.field, known)
         return known[self.field]
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that measures a disagreement."""
         bodies = bodies_of(model, self.of)
         if not bodies:
             raise InputError.at(self.name, "of", "nothing in it has a shape", "name who may enter the field")
@@ -56,8 +57,9 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
         since: float | None = None
         last: float | None = None
 
-        def evaluate(state: State) -> Result:
+        def compute(twin: Twin) -> Figure:
             nonlocal since, last
+            state = cast("State", twin)
             if last is not None and state.t < last:
                 since = None
             last = state.t
@@ -68,20 +70,21 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
             elif since is None:
                 since = state.t
             lasted = 0.0 if since is None else state.t - since
-            words = {True: "free", False: "interrupted"}
-            reason = (
-                "" if device_sees == seen else f"the device says {words[device_sees]}, the twin {words[seen]}"
-            )
-            return Result(
-                name=self.name,
-                value=lasted,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=judge(lasted, self.limit),
-                reason=reason,
-            )
+            return Figure(lasted, self.limit, beside=(device_sees, seen))
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what the device and the twin say."""
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            device_sees, seen = figure.beside
+            words = {True: "free", False: "interrupted"}
+            if device_sees == seen:
+                return Shown()
+            return Shown(f"the device says {words[device_sees]}, the twin {words[bool(seen)]}")
+
+        return present
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""

@@ -286,7 +286,10 @@ def swinging(folder, what, share, figure):
         text += '[[safety]]\nkind = "path_speed"\nname = "c"\nrobot = "arm"\nmap = "map.csv"\n'
     else:
         own = by_table("c", 2, ", acceleration = 0" if what == "held" else "")
-        text += person("op", figure, 0, 0) + own.replace("full_speed = 50.0", "full_speed = 4.0")
+        text += person("op", figure, 0, 0) + own.replace("full_speed = 50.0", "full_speed = 4.0").replace(
+            "way = [[[0.05, 0.06]]",
+            "way = [[[0.015, 0.02]]",  # no farther than speed times time
+        )
     # A place of a thousandth of a radian, which is passed within a millisecond, is to be passed slowly.
     slow = [(q, 0.0, v) for q, v in ((-0.1, 2), (0.1046, 2), (0.105, 0.9), (0.1054, 2), (0.5, 2))]
     kept = {"arm.urdf": two_r(), "map.csv": map_csv(("rad", "rad"), slow), "motion.csv": bumped(share)}

@@ -656,9 +656,10 @@ def _foresee(
     beyond, rows = bool(len(rows)) and rows[-1] >= len(motion.t), np.minimum(rows, len(motion.t) - 1)
     columns = state.columns[name]
     q, qd = motion.q[rows][:, columns.own_q], motion.v[rows][:, columns.own_v]
-    for i, row in enumerate(rows.tolist() if motion.ways is not None else ()):
-        if motion.ways is not None and row > 0 and motion.t[row - 1] + SLACK < t[i] < motion.t[row] - SLACK:
-            every = motion.ways[row - 1].at(float(t[i]))
+    if motion.ways is not None:
+        between = (rows > 0) & (motion.t[rows - 1] + SLACK < t) & (t < motion.t[rows] - SLACK)
+        for i in np.flatnonzero(between).tolist():
+            every = motion.ways[rows[i] - 1].at(float(t[i]))
             q[i], qd[i] = every[0][columns.own_q], every[1][columns.own_v]
     why = next(filter(None, motion.invalid_reasons[name][rows].tolist()), "")
     if beyond and np.abs(motion.v[-1][columns.own_v]).max(initial=0.0) > STANDS:
@@ -666,11 +667,17 @@ def _foresee(
     return q, qd, why
 
 
-def _knots(motion: Motion, name: str, begin: float, end: float) -> list[float]:
+def _knots(motion: Motion, name: str, begin: float, end: float) -> Sequence[float] | Array:
     """Tell between which instants of a motion a robot moves along one cubic (`seerob.twin.spans.Knots`)."""
-    first, last = (int(np.searchsorted(motion.t, t)) for t in (begin, end))
-    ways = (motion.ways or ())[max(first - 1, 0) : last]
-    return [t for way in ways for t in way.t[1:-1].tolist() if begin + SLACK < t < end - SLACK]
+    if motion.ways is None:
+        return []
+    first, last = np.searchsorted(motion.t, (begin, end)).tolist()
+    ways = motion.ways[max(first - 1, 0) : last]
+    if isinstance(ways, Ways):
+        inside = ways.knots_inside()
+    else:
+        inside = np.array([t for way in ways for t in way.t[1:-1].tolist()])
+    return np.asarray(inside[(begin + SLACK < inside) & (inside < end - SLACK)])
 
 
 def _of_results(results: Sequence[Result]) -> tuple[Answers, Reasons]:

@@ -150,6 +150,15 @@ class Ways(Sequence[Path]):
         k = range(len(self))[k]
         return self.joined(k, k + 1)
 
+    def knots_inside(self) -> Array:
+        """Knots of all paths that are none of the instants [s], shape (m,)."""
+        begin, end = int(self.first[0]), int(self.first[-1])
+        if end - begin == len(self):
+            return self.t[:0]
+        inside = np.ones(end - begin + 1, bool)
+        inside[self.first - begin] = False
+        return self.t[begin : end + 1][inside]
+
     def joined(self, begin: int, end: int) -> Path:
         """Paths that follow one another as one."""
         knots = slice(int(self.first[begin]), int(self.first[end]) + 1)

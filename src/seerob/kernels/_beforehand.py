@@ -72,7 +72,7 @@ def compile_loop(name: str) -> None:
 
 def main() -> None:
     """Compile what is asked for, until nothing is asked for any more."""
-    gc.disable()  # what is made lives on, and looking through it takes a tenth of the time
+    gc.disable()  # what is made lives on, and looking through it took 4 to 7 % of the time
     for line in sys.stdin:
         compile_loop(line.strip())
         print(line.strip(), flush=True)  # noqa: T201 - to whoever asked

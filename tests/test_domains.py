@@ -177,6 +177,19 @@ REBA = dict(zip(inspect.signature(reba.reba).parameters, reba.LEAST.values(), st
 BOXED = {"J_v": np.eye(3) + 0.1, "low": -np.ones(3), "high": np.ones(3)}
 CALLS = {
     "criteria.safety.effective_mass.inverse_effective_mass": {"J_v": J, "M": M},
+    "criteria.safety.separation.room_ends": {
+        "near": np.array([1.0]),
+        "far": np.array([1.1]),
+        "S_p": np.array([0.5]),
+        "more": np.array([0.1]),
+        "low": np.array([0.4]),
+        "high": np.array([0.6]),
+    },
+    "criteria.safety.effective_mass.felt_toward": {
+        "inverse": np.eye(3),
+        "along": np.array([1.0, 0, 0]),
+        "least": 0.1,
+    },
     "criteria.safety.effective_mass.projected_mass": {"inverse": np.eye(3), "u": np.array([1.0, 0, 0])},
     "criteria.safety.effective_mass.principal_masses": {"inverse": np.eye(3)},
     "criteria.safety.joint_torque.shares": {"torques": TWO, "limits": 10 * TWO, "uncertainty": TWO},
@@ -258,6 +271,7 @@ CALLS = {
     "core.transforms.apply": {"a_from_b": POSE, "points_in_b": np.ones(3)},
     "core.transforms.cross": {"a": np.ones(3), "b": np.array([1.0, 2, 4])},
     "core.transforms.inverse": {"a_from_b": POSE},
+    "core.transforms.length": {"v": np.array([1.0, 2, 4])},
     "core.transforms.product": {"p": POSE[:1], "q": POSE[:1]},
     "core.transforms.rotation_from_axis_angle": {"axis": POSE[2, :3], "angle": 0.5},
     "core.transforms.rotation_from_rpy": {"rpy": np.ones(3)},

@@ -317,3 +317,49 @@ def test_speeds_that_come_from_noisy_positions_are_as_far_off_as_is_said(station
         assert rates or min(wide) > 0.1
         # The controllers of the twin smooth what they are pulled to.
         assert all(tick.speed_off < tick.noise + 0.02 for tick in sure)
+
+
+SEEN = STATION.replace("limit = 5.0", "limit = 0.5")
+HELD = 3.0, 0.15
+"""When packets are held back, and for how long [s]."""
+
+
+def held_back(t):
+    begin, seconds = HELD
+    return WAY + max(begin + seconds - t, 0.0) * (begin <= t)
+
+
+def to_and_fro(size, began):
+    """A joint that goes so far and comes back in 0.14 s [rad]: 1.3 m/s of the tip for 0.03 rad."""
+
+    def said(stamp):
+        s = (stamp - (BEGIN + OFFSET) - began) / 0.14
+        moves = 0.0 < s < 1.0
+        q = size * (1 - math.cos(2 * math.pi * s)) / 2 * moves
+        qd = size * math.pi / 0.14 * math.sin(2 * math.pi * s) * moves
+        return np.array([q, 0.0]), np.array([qd, 0.0])
+
+    return said
+
+
+@pytest.mark.parametrize("speeds", [True, False])
+def test_what_was_done_and_undone_while_packets_were_held_back_is_not_within(tmp_path, monkeypatch, speeds):
+    """Of what comes together the newest is taken, and that lies where everything lay before."""
+    station, said = made(tmp_path, SEEN, {"arm.urdf": two_r()}), to_and_fro(0.03, HELD[0] + 0.002)
+    for way, verdict in ((lambda t: WAY, "exceeded"), (held_back, "undecided")):
+        packets = stream(way=way, said=said)
+        live = Stream(station, monkeypatch, "arm", packets if speeds else silent(packets))
+        results = [result for _, (result,), _ in live.ticks(600)]
+        assert any(result.verdict == verdict for result in results)
+    assert any("held back" in result.reason for result in results)
+
+
+@pytest.mark.parametrize("said", [motion, to_and_fro(0.002, HELD[0]), to_and_fro(0.03, 4.0)])
+def test_a_motion_that_goes_on_while_packets_are_held_back_is_followed(station, monkeypatch, said):
+    live = Stream(station, monkeypatch, "arm", stream(way=held_back, said=said))
+    assert not [r.reason for _, (r,), _ in live.ticks(600) if "held back" in r.reason]
+
+
+def test_packets_of_a_jittering_network_are_not_held_back(station, monkeypatch):
+    live = Stream(station, monkeypatch, "arm", stream(way=jitter(0.03)))
+    assert not [r.reason for _, (r,), _ in live.ticks(600) if "held back" in r.reason]

@@ -39,6 +39,7 @@ from seerob.core.snapshot import Finding
 from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
+from seerob.devices.live.held_back import HeldBack
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
 
@@ -374,6 +375,7 @@ class Listener:
         """Who was heard at which port, by datagrams."""
         self._posted: dict[tuple[str, ...], Sample] = {}
         self._people: dict[tuple[str, ...], _Person] = {}
+        self._held: dict[tuple[str, ...], HeldBack] = {}
         self._lock = Lock()
         self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -483,7 +485,7 @@ class Listener:
             late = self._clock.latency
         distrusted, until = self._distrusted
         # Also beside another doubt: what stands at once is seen by the one sample in which it stopped.
-        reason = self._contradiction(sample, what, host) or heard.invalid_reason
+        reason = self._contradiction(sample, what, heard.t, host) or heard.invalid_reason
         if host <= until:
             reason = distrusted
         if sample.t_device is None and not self._source.asked and self._source.delay is None:
@@ -534,11 +536,20 @@ class Listener:
             if not isinstance(self._posted[what], SignalSample):
                 self._invalidate(what, reason)
 
-    def _contradiction(self, sample: Sample, what: tuple[str, ...], host: float) -> str:
-        """What in it contradicts what was said before, now or a moment ago."""
+    def _contradiction(self, sample: Sample, what: tuple[str, ...], t: float, host: float) -> str:
+        """What in it contradicts what was said before, now or a moment ago, or shows that nobody judged that.
+
+        Args:
+            sample: As it was heard.
+            what: It is about.
+            t: When what it says was so, on the host's clock [s].
+            host: When it arrived [s].
+        """
         if what not in self._contradictions:
             self._contradictions[what] = Contradictions(self._target)
-        if found := self._contradictions[what].find(sample):
+            self._held[what] = HeldBack(self._source.behind())
+        unseen = self._held[what].reason(sample, t, host)
+        if found := self._contradictions[what].find(sample) or unseen:
             self._found[what] = found, host + HOLD
         found, until = self._found.get(what, ("", 0.0))
         return found if host <= until else ""

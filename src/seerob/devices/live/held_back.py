@@ -1,0 +1,86 @@
+"""What a source did and undid while its packets were held back: no tick of the run was there to see it.
+
+A run shows the world a fixed delay ago. Packets that come later than that find the twin gone on without them,
+and of those that come together only the newest is taken. Where the others lie between the last one that came
+in time and the newest, the twin went that way, too. Where they do not, nobody judged what was done meanwhile.
+"""
+
+from __future__ import annotations
+
+from seerob.core.samples import BodySample, JointSample, Sample, SignalSample
+
+TOGETHER = 0.02
+"""Samples that arrive within this time may be of one tick, of which the newest is taken [s]."""
+PLACE, SPEED = 5e-3, 0.05
+"""How far beyond both others a sample may be, for noise and for the curve of a motion that goes on [rad or m,
+rad/s or m/s]. Own choice."""
+FASTER = 0.9
+"""Share of the time between two samples within which they arrive that were held back; others come late one by
+one."""
+MOST = 1024
+"""Samples that are kept; of more nobody knows that they lie between."""
+
+Said = dict[str, float]
+"""What a sample says, by what it is about: places [rad or m], and speeds after `RATE`."""
+RATE = "rate of "
+
+
+class HeldBack:
+    """Looks at all samples of one robot, person or thing of a live source, as they arrive.
+
+    Args:
+        behind: How far a run is behind the world at least [s].
+    """
+
+    def __init__(self, behind: float) -> None:
+        self._behind = behind
+        self._taken: Said = {}
+        """By the last sample that a run has taken."""
+        self._missed: list[Said] = []
+        """By those since then that none may have taken."""
+        self._last: Said = {}
+        self._late, self._arrived, self._t = False, 0.0, 0.0
+
+    def reason(self, sample: Sample, t: float, host: float) -> str:
+        """Why what a source did until now was not judged; empty when it was.
+
+        Args:
+            sample: That arrives now.
+            t: When what it says was so, on the host's clock [s].
+            host: When it arrives [s].
+        """
+        since = host - self._arrived
+        if self._late and since <= TOGETHER and since < FASTER * (t - self._t):
+            self._missed.append(self._last)
+        else:
+            self._taken, self._missed = self._last, []
+        self._last, self._late = said_by(sample), host - t > self._behind
+        self._arrived, self._t = host, t
+        if not self._missed:
+            return ""
+        beyond = len(self._missed) > MOST or any(map(self._beyond, self._missed))
+        if not beyond:
+            return ""
+        self._taken, self._missed = self._last, []  # is said once
+        return "its packets were held back, and what it did meanwhile and undid was judged at no instant"
+
+    def _beyond(self, missed: Said) -> bool:
+        """Whether a sample lies beyond what the last that was taken and the newest say."""
+        for what, value in missed.items():
+            ends = [each[what] for each in (self._taken, self._last) if what in each]
+            room = SPEED if what.startswith(RATE) else PLACE
+            if not ends or not min(ends) - room <= value <= max(ends) + room:
+                return True
+        return False
+
+
+def said_by(sample: Sample) -> Said:
+    """What a sample says of places and speeds; nothing of signals, which are told one by one."""
+    if isinstance(sample, SignalSample):
+        return {}
+    if isinstance(sample, JointSample):
+        found = {f"{j}": value for j, value in enumerate(sample.q)}
+        return found | {f"{RATE}{j}": value for j, value in enumerate(sample.qd or ())}
+    points = sample.points if isinstance(sample, BodySample) else (sample,)
+    named = ((getattr(point, "name", ""), point.position) for point in points)
+    return {f"{name} {k}": x for name, at in named if at is not None for k, x in enumerate(at)}

@@ -32,7 +32,7 @@ from seerob.criteria.stopping.onset import (
     largest_between,
     with_knots,
 )
-from seerob.criteria.stopping.table import JointStop, SpeedStop, StoppingTable, interpolate, joint_stop
+from seerob.criteria.stopping.table import JointStop, SpeedStop, StoppingTable, along_axis, joint_stop
 from seerob.criteria.stopping.terms import Braking, Course, braking, travel
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
@@ -143,6 +143,8 @@ def _by_tool_speed(
     table: StoppingTable, tool: SpeedStop, robot: Mechanism, load: float
 ) -> Callable[[Onset], Course]:
     share, unknown = _payload_share(table, robot, load)
+    # The worse corner, as of `interpolate`.
+    times = np.maximum.accumulate(np.array(tool.time)).tolist()
     if share > 1 + 1e-9:
         unknown = f"payload is {share:.3g} of the rated payload, at which the stopping table ends"
 
@@ -150,7 +152,7 @@ def _by_tool_speed(
         # Any point counts as the tool's: the fastest decides for all.
         top, end = float(onset.v_s.max()), tool.speed[-1]
         beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
-        T_s = interpolate([tool.speed], np.array(tool.time), [min(top, end)])
+        T_s = along_axis(tool.speed, times, min(top, end))
         unbounded_reasons = (onset.unbounded_reason, unknown, beyond if top > end * (1 + 1e-9) else "")
         return braking(replace(onset, unbounded_reason="; ".join(filter(None, unbounded_reasons))), T_s)
 

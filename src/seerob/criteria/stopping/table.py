@@ -9,7 +9,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import msgspec
 import numpy as np
@@ -149,6 +149,9 @@ def table(name: str) -> StoppingTable:
         raise InputError.at(f"{name}.toml", "", str(error), "see the tables that come with seerob") from error
 
 
+Value = TypeVar("Value", float, Array)
+
+
 def interpolate(axes: Sequence[Sequence[float]], values: Array, at: Sequence[float]) -> float:
     """Value of a table between its nodes, linear along each axis; below the first node the first.
 
@@ -166,15 +169,23 @@ def interpolate(axes: Sequence[Sequence[float]], values: Array, at: Sequence[flo
     for k in range(found.ndim):
         found = np.maximum.accumulate(found, axis=k)
     for axis, x in zip(axes, at, strict=True):
-        if not x <= axis[-1] * (1 + 1e-9):
-            raise Undecided(f"{x:.3g} is beyond the table, which ends at {axis[-1]:g}")
-        if len(axis) == 1:
-            found = found[0]
-            continue
-        k = min(max(bisect_right(axis, x) - 1, 0), len(axis) - 2)
-        share = max((x - axis[k]) / (axis[k + 1] - axis[k]), 0.0)
-        found = (1 - share) * found[k] + share * found[k + 1]
+        found = np.asarray(along_axis(axis, list(found), x))
     return float(found)
+
+
+def along_axis(axis: Sequence[float], values: Sequence[Value], x: float) -> Value:
+    """Value between the nodes of an axis, linear; below the first node the first.
+
+    Raises:
+        Undecided: Beyond the last node.
+    """
+    if not x <= axis[-1] * (1 + 1e-9):
+        raise Undecided(f"{x:.3g} is beyond the table, which ends at {axis[-1]:g}")
+    if len(axis) == 1:
+        return values[0]
+    k = min(max(bisect_right(axis, x) - 1, 0), len(axis) - 2)
+    share = max((x - axis[k]) / (axis[k + 1] - axis[k]), 0.0)
+    return (1 - share) * values[k] + share * values[k + 1]
 
 
 def joint_stop(entry: JointStop, speed: float, payload: float, extension: float) -> tuple[float, float]:

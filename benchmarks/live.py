@@ -193,7 +193,7 @@ def emulate(notes: str, command: list[str], *, nice: int) -> int:
 
 def listen(notes: str) -> int:
     """The process that listens, with a note of when each sample was in the mailbox."""
-    hear, noted = Listener._take, []
+    hear, noted = Listener.take, []
 
     def heard(listener, sample):
         seq = listener._seq
@@ -202,7 +202,7 @@ def listen(notes: str) -> int:
             signals = isinstance(sample, SignalSample)
             noted.append((listener.name, signals, seq, sample.t, sample.t_device, time.monotonic()))
 
-    Listener._take = heard
+    Listener.take = heard
     code = listening_process.main()
     Path(notes, str(os.getpid())).write_text(json.dumps(noted))
     return code

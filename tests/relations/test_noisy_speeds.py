@@ -68,6 +68,8 @@ def asked(cell, figures):
         if name == "table":
             text = by_table(name, len(cell.links), ", acceleration = 0", "human_speed = 1.6\n")
             text = text.replace("full_speed = 50.0", "full_speed = 15.0").replace("sion = 0", "sion = FIGURE")
+            # About half of speed times time, as of a robot that brakes evenly.
+            text = text.replace("[[0.2, 0.25]], [[0.5, 0.7]]", "[[0.6, 0.75]], [[2.5, 3.0]]")
         texts.append(text.replace("FIGURE", repr(figures[name])))
     return "".join(texts)
 

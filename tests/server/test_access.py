@@ -179,7 +179,9 @@ def test_nobody_is_locked_out_for_what_others_did(addresses, other):
     for address in addresses:
         for _ in range(2 * FREE):
             guesses.fail(str(address))
-    near = {a.exploded[:19] if a.version == 6 else a.exploded for a in addresses}
+    # Who is known by an address of IPv4 within one of IPv6 is the same.
+    known = [getattr(a, "ipv4_mapped", None) or a for a in addresses]
+    near = {a.exploded[:19] if a.version == 6 else a.exploded for a in known}
     if (other.exploded[:19] if other.version == 6 else other.exploded) not in near and other.version == 4:
         assert guesses.locked(str(other)) == 0
     assert all(guesses.locked(str(address)) > 0 for address in addresses)

@@ -7,6 +7,8 @@ in time and the newest, the twin went that way, too. Where they do not, nobody j
 
 from __future__ import annotations
 
+import math
+
 from seerob.core.samples import BodySample, JointSample, Sample, SignalSample
 
 TOGETHER = 0.02
@@ -39,7 +41,8 @@ class HeldBack:
         self._missed: list[Said] = []
         """By those since then that none may have taken."""
         self._last: Said = {}
-        self._late, self._arrived, self._t = False, 0.0, 0.0
+        self._t = self._arrived = -math.inf
+        """When the last one was so, and when it arrived too late [s]; the latter -inf where it came in time."""
 
     def reason(self, sample: Sample, t: float, host: float) -> str:
         """Why what a source did until now was not judged; empty when it was.
@@ -50,12 +53,12 @@ class HeldBack:
             host: When it arrives [s].
         """
         since = host - self._arrived
-        if self._late and since <= TOGETHER and since < FASTER * (t - self._t):
+        if since <= TOGETHER and since < FASTER * (t - self._t):
             self._missed.append(self._last)
         else:
             self._taken, self._missed = self._last, []
-        self._last, self._late = said_by(sample), host - t > self._behind
-        self._arrived, self._t = host, t
+        self._last, self._t = said_by(sample), t
+        self._arrived = host if host - t > self._behind else -math.inf
         if not self._missed:
             return ""
         beyond = len(self._missed) > MOST or any(map(self._beyond, self._missed))

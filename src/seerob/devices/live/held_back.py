@@ -42,7 +42,7 @@ class HeldBack:
         """By those since then that none may have taken."""
         self._last: Said = {}
         self._t = self._arrived = -math.inf
-        """When the last one was so, and when it arrived too late [s]; the latter -inf where it came in time."""
+        """When the last one was so, and when it arrived [s]; -inf where that was in time."""
 
     def reason(self, sample: Sample, t: float, host: float) -> str:
         """Why what a source did until now was not judged; empty when it was.

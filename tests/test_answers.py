@@ -71,6 +71,21 @@ def test_a_figure_says_of_many_instants_what_it_says_of_one(at_most, limit, valu
 
 
 @pytest.mark.parametrize("at_most", [True, False])
+def test_nothing_is_within_a_limit_without_end(at_most):
+    endless = INF if at_most else -INF
+    assert verdict_of(Figure(1.0, endless), at_most=at_most) is Verdict.UNDECIDED
+    assert (
+        answers_of(Figure(np.ones(2), endless), 2, at_most=at_most).verdict.tolist()
+        == [CODES[Verdict.UNDECIDED]] * 2
+    )
+
+
+def test_a_part_without_a_figure_is_undecided_whatever_its_ends():
+    nan, limit, ends = np.array([NAN]), np.array([1.0]), (np.array([0.0]), np.array([0.5]))
+    assert verdict_of(Figure(None, parts=Parts("a", nan, limit, ends)), at_most=True) is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize("at_most", [True, False])
 @pytest.mark.parametrize("open_", [False, True])
 def test_the_worst_of_parts_is_the_whole_of_one_instant_and_of_many(at_most, open_):
     """Parts on both sides of their limits, but for rounding, with ends that are no number and infinite."""

@@ -16,8 +16,13 @@ def joints(q, qd=None):
     return JointSample(source="s", seq=0, t=0.0, target="arm", q=q, qd=qd)
 
 
-def pose(*position):
-    return PoseSample(source="s", seq=0, t=0.0, target="cart", position=position, wxyz=(1.0, 0.0, 0.0, 0.0))
+def pose(*position, wxyz=(1.0, 0.0, 0.0, 0.0)):
+    return PoseSample(source="s", seq=0, t=0.0, target="cart", position=position, wxyz=wxyz)
+
+
+def turned(w, x):
+    point = BodyPoint(name="imu", bone="right_hand", wxyz=(w, x, 0.0, 0.0))
+    return BodySample(source="s", seq=0, t=0.0, target="op", points=(point,))
 
 
 def body(**points):
@@ -102,12 +107,22 @@ def test_of_too_many_nobody_knows_that_they_lie_between():
     ("rest", "away"),
     [
         (pose(0.0, 0.0, 1.0), pose(0.0, 0.0, 1.2)),
+        (pose(0.0, 0.0, 1.0), pose(0.0, 0.0, 1.0, wxyz=(0.96, 0.28, 0.0, 0.0))),
+        (turned(1.0, 0.0), turned(0.96, 0.28)),
         (body(hand=(0.0, 0.0, 1.0)), body(hand=(0.3, 0.0, 1.0))),
         (body(hand=(0.0, 0.0, 1.0)), body(foot=(0.0, 0.0, 1.0))),
         (joints((0.0, 1.0)), joints((0.0, 1.0, 2.0))),
         (joints((0.0, 1.0)), joints((float("nan"), 1.0))),
     ],
-    ids=["a pose", "a hand", "a point that nobody else says", "a joint more", "no number"],
+    ids=[
+        "a pose",
+        "a pose that turns",
+        "a hand of which only that is seen that turns",
+        "a hand",
+        "a point that nobody else says",
+        "a joint more",
+        "no number",
+    ],
 )
 def test_whatever_moves_is_looked_at(rest, away):
     assert "held back" in burst(rest, away, rest)
@@ -117,3 +132,7 @@ def test_whatever_moves_is_looked_at(rest, away):
 def test_nothing_is_said_of_signals():
     on, off = (SignalSample(source="s", seq=0, t=0.0, values={"door": value}) for value in (True, False))
     assert burst(on, off, on) == ""
+
+
+def test_both_signs_of_a_quaternion_are_one_orientation():
+    assert burst(turned(0.8, 0.6), turned(-0.8, -0.6), turned(0.8, 0.6)) == ""

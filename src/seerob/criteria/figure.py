@@ -135,7 +135,9 @@ def _own_verdict(figure: Figure, *, at_most: bool) -> Verdict | None:
         verdict = judge_interval((float(low), float(high)), limit, at_most=at_most)
     else:
         verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
-    return _UNDECIDED if verdict is _WITHIN and figure.open else verdict
+    # Nothing could exceed a limit without end.
+    endless = limit is not None and math.isinf(limit)
+    return _UNDECIDED if verdict is _WITHIN and (figure.open or endless) else verdict
 
 
 def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Result) -> Result:
@@ -228,7 +230,8 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
     found = replace(found, verdict=np.where(unknown, CODES[_UNDECIDED], found.verdict).astype(np.uint8))
     if limit is not None and np.any(figure.exceeded):
         found = found.exceeded(np.broadcast_to(figure.exceeded, (n,)))
-    found = found.finite().open(figure.open) if np.any(figure.open) else found.finite()
+    open_ = figure.open if limit is None else figure.open | np.isinf(limit)
+    found = found.finite().open(open_) if np.any(open_) else found.finite()
     return found.without_verdict(np.broadcast_to(figure.nothing, (n,))) if np.any(figure.nothing) else found
 
 

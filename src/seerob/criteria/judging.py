@@ -50,11 +50,6 @@ class Bound:
     """How it is judged between two ticks; None where nothing bounds it."""
 
     @cached_property
-    def computed(self) -> bool:
-        """Whether it ships, and its verdict is made of its figure where all are (`criteria.figure`)."""
-        return not self.own and type(self.criterion).compute is not Criterion.compute
-
-    @cached_property
     def own(self) -> bool:
         """Whether it is one of the user's, which does not ship."""
         return not type(self.criterion).__module__.startswith("seerob.")
@@ -617,17 +612,16 @@ class Judge:
         if result.muted or result.t is not None:
             # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
             result = replace(result, t=None, muted=False)
-        if not bound.computed and (reason := contradiction(result, criterion)):
+        if reason := contradiction(result, criterion):
             reason = f"{_where(bound)} contradicts itself: {reason}"
             self._warn(bound, reason)
             if type(result.verdict) is not Verdict:
                 raise Undecided(reason)
             return undecided(result, reason)
-        silent = result.verdict is None and not (bound.computed and result.value is not None)
-        if silent and (why := unsaid(result, criterion)):
-            self._warn(bound, f"{_where(bound)}: {why}")
-            why = f"{why}; {result.reason}".removesuffix("; ")
-            return replace(undecided(result, why), verdict=_UNDECIDED, nothing=False, reason=why)
+        if result.verdict is None and (silent := unsaid(result, criterion)):
+            self._warn(bound, f"{_where(bound)}: {silent}")
+            silent = f"{silent}; {result.reason}".removesuffix("; ")
+            return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
         if result.verdict is _WITHIN or question.relied_on:

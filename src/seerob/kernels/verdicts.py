@@ -52,7 +52,8 @@ def judged(
         if not math.isinf(last):
             last -= rounding * max(1.0, abs(last))
         kept, also = side * low[i] <= last, side * high[i] <= last
-        if math.isnan(low[i]) or math.isnan(high[i]) or math.isnan(last) or kept != also:
+        unknown = math.isnan(value[i]) or math.isnan(low[i]) or math.isnan(high[i]) or math.isnan(last)
+        if unknown or kept != also:
             verdicts[i], rank = UNDECIDED, 1
         elif not kept:
             verdicts[i], rank = EXCEEDED, 2

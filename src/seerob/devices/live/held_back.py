@@ -15,7 +15,7 @@ TOGETHER = 0.02
 """Samples that arrive within this time may be of one tick, of which the newest is taken [s]."""
 PLACE, SPEED = 5e-3, 0.05
 """How far beyond both others a sample may be, for noise and for the curve of a motion that goes on [rad or m,
-rad/s or m/s]. Own choice."""
+and of orientations a share of a quaternion; rad/s or m/s]. Own choice."""
 FASTER = 0.9
 """Share of the time between two samples within which they arrive that were held back; others come late one by
 one."""
@@ -84,6 +84,11 @@ def said_by(sample: Sample) -> Said:
     if isinstance(sample, JointSample):
         found = {f"{j}": value for j, value in enumerate(sample.q)}
         return found | {f"{RATE}{j}": value for j, value in enumerate(sample.qd or ())}
-    points = sample.points if isinstance(sample, BodySample) else (sample,)
-    named = ((getattr(point, "name", ""), point.position) for point in points)
-    return {f"{name} {k}": x for name, at in named if at is not None for k, x in enumerate(at)}
+    found = {}
+    for point in sample.points if isinstance(sample, BodySample) else (sample,):
+        name, turn = getattr(point, "name", ""), point.wxyz
+        found |= {f"{name} {k}": x for k, x in enumerate(point.position or ())}
+        if turn is not None:
+            side = math.copysign(1.0, turn[0])  # both signs of a quaternion are one orientation
+            found |= {f"{name} turned {k}": side * x for k, x in enumerate(turn)}
+    return found

@@ -138,7 +138,7 @@ class _Grip:
         solids = tuple(solid for index in self._resting for solid in model.bodies[index].solids)
         self._gap = Query(Shapes.build([("gap", (plate,)), ("piece", solids)]), (0,), (1,), cap=self._touch)
         cap = 2 * LET_GO * self._touch
-        self._gap_query = Query(model.shapes, *((finger.index,) for finger in self._fingers), cap=cap)
+        self._between_fingers = Query(model.shapes, *((finger.index,) for finger in self._fingers), cap=cap)
         self._queries = {
             places: [Query(model.shapes, (finger.index,), places, cap=cap) for finger in self._fingers]
             for places in (tuple(self._held), tuple(self._resting))
@@ -224,7 +224,7 @@ class _Grip:
 
     def _as_if_held(self, state: State) -> bool:
         """Whether fingers that are not shut would be at it in the hand, where the file has it there."""
-        if self._gap_query.minimum(state.rotations, state.positions).distance <= self._touch:
+        if self._between_fingers.minimum(state.rotations, state.positions).distance <= self._touch:
             return False
         R, x, held = state.rotations.copy(), state.positions.copy(), self._held
         turn, mj = state.data.xmat[self._palm].reshape(3, 3), state.model.mj

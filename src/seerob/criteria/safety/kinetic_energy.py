@@ -35,7 +35,7 @@ LEAST = 1e-9
 """What rounding may make of no energy [J]."""
 
 
-def kinetic_energy(M: Array, qd: Array) -> Array | float:
+def kinetic_energy(M: Array, qd: Array) -> Array:
     r"""Kinetic energy :math:`E = \frac{1}{2} \dot{q}^T M(q) \dot{q}`.
 
     Args:
@@ -45,9 +45,7 @@ def kinetic_energy(M: Array, qd: Array) -> Array | float:
     Returns:
         Energy [J], shape (...).
     """
-    if qd.ndim == 1 and (single := 0.5 * float(qd @ M @ qd)) >= 0.0:
-        return single
-    energy = np.asarray(0.5 * (qd[..., None, :] @ M @ qd[..., :, None])[..., 0, 0])
+    energy = np.asarray(0.5 * np.vecdot(qd, np.matvec(M, qd)))
     at_least("energy of M, a mass matrix,", energy, -LEAST, "J")
     return energy
 
@@ -108,7 +106,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
     @staticmethod
     def _ends(masses: MassTolerances, state: State) -> Spread:
         matrices, qd = masses.matrices(state), state.qd(masses.robot)
-        return spread(lambda shifts: np.asarray(kinetic_energy(matrices.at(shifts), qd)), len(masses))
+        return spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
 
     def present(self, model: Model) -> Present:
         """Return the function that draws a sphere at the tool's working point."""

@@ -76,10 +76,10 @@ def shared_phases(
 
 def entered_for(model: Model, criterion: object) -> tuple[Phase, ...]:
     """Phases by which a criterion judges: its own, or the shared ones of its person; none of one without."""
-    own, human = getattr(criterion, "phases", None), getattr(criterion, "human", "")
+    own = getattr(criterion, "phases", None)
     if own is None:
         return ()
-    return tuple(own) or tuple(p for p in model.workstation.phases if p.human in ("", human))
+    return shared_phases(model, getattr(criterion, "human", ""), own, lambda phase: phase)
 
 
 def turns(phases: Sequence[Phase]) -> Callable[[float, float], Sequence[float]]:

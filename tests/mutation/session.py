@@ -94,6 +94,7 @@ class Mutation:
         """Instead of running the tests once."""
         if session.testsfailed:
             raise session.Interrupted(f"{session.testsfailed} errors while tests were collected")
+        _interpret({mutant.file for mutant in self.mutants})
         callers, lines, seconds = self._unchanged(session)
         statements = {file: _statements(source) for file, source in self.sources.items()}
         queue = []
@@ -270,6 +271,23 @@ def put_in(mutant: Mutant, source: str) -> None:
         function = _plain(vars(holder)[method or owner])
         function.__code__ = code
         _defaults(function, ast.parse(source), tree, mutant)
+
+
+def _interpret(files: Iterable[str]) -> None:
+    """Have loops of these files run by Python, wherever they are imported, instead of what was compiled.
+
+    Loops of other files that call them keep what was compiled of them.
+    """
+    for module in map(importlib.import_module, map(_module, files)):
+        own = {
+            id(loop): loop.py_func
+            for loop in vars(module).values()
+            if getattr(getattr(loop, "py_func", None), "__module__", None) == module.__name__
+        }
+        for other in list(sys.modules.values()):
+            for name, held in list(vars(other).items()):
+                if id(held) in own:
+                    setattr(other, name, own[id(held)])
 
 
 def _module(file: str) -> str:

@@ -102,14 +102,19 @@ def test_equivalent_mutants_have_a_reason_and_are_named_once():
 
 def test_a_sample_is_killed():
     """In a process of its own: it changes living code."""
-    command = [sys.executable, ROOT / "scripts/mutate", "--sample", "16", "--jobs", "1"]
-    for only in ("criteria/contact/collision.py", "criteria/stopping/terms.py"):
+    command = [sys.executable, ROOT / "scripts/mutate", "--sample", "22", "--jobs", "1"]
+    files = ["criteria/contact/collision.py", "criteria/stopping/terms.py", "kernels/verdicts.py"]
+    for only in files:
         command += ["--only", only]
     stopping = ("stopping", "stop_options", "stop_edges")
-    for tests in ("contact/test_collision.py", *(f"stopping/test_{name}.py" for name in stopping)):
+    for tests in (
+        "contact/test_collision.py",
+        "test_answers.py",
+        *(f"stopping/test_{n}.py" for n in stopping),
+    ):
         command += ["--tests", ROOT / "tests" / tests]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     told = re.findall(r"^(\S+): (\d+) of (\d+) mutants killed", done.stdout, re.MULTILINE)
-    assert [file for file, *_ in told] == ["criteria/contact/collision.py", "criteria/stopping/terms.py"]
+    assert [file for file, *_ in told] == files
     assert all(int(killed) == int(tried) > 3 for _, killed, tried in told)

@@ -46,7 +46,7 @@ def judged(
         the farthest beyond.
     """
     side = 1.0 if at_most else -1.0
-    worst, least, governs = -1, math.inf, 0
+    worst, least, governs = 0, math.inf, 0
     for i in range(len(value)):
         last = side * limit[i]
         if not math.isinf(last):

@@ -17,7 +17,6 @@ from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.core.verdict import judge
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.safety.safety_area import SafetyArea
 from seerob.recording.answers import Answers
 from seerob.recording.series import CODES, NO_VERDICT
 from seerob.session import batch as batches
@@ -184,30 +183,63 @@ def test_only_what_remembers_is_asked_instant_by_instant(batch):
     assert {name for name, column in batch.items() if column.note} == {"fixed", "contact"}
 
 
-AREA = """
+WATCHED = """
 [[areas]]
 name = "zone"
 shape = { box = [0.4, 0.4, 0.4] }
 at = { position = [0.8, 0.2, 0.4] }
+[[sensors]]
+name = "mat"
+response = 0.1
+at = { position = [0.6, 0, 0.2] }
+pressure_mat = { corners = [[0, 0], [0.4, 0], [0.4, 0.4], [0, 0.4]], height = 0.4 }
+[[sensors]]
+name = "curtain"
+capability = 0.03
+response = 0.02
+light_curtain = { ends = [[0.8, -1, -0.2], [0.8, 1, -0.2]], height = 1.5 }
+[[sensors]]
+name = "scanner"
+at = { position = [2, 0, 0.3], rpy_deg = [0, 0, 180] }
+capability = 0.07
+response = 0.08
+[sensors.laser_scanner]
+range = 5.5
+angle_deg = 270
+resolution_deg = 0.5
+fields = [{ name = "field", corners = [[0, -1], [1.25, -1], [1.25, 1], [0, 1]] }]
+[[parts]]
+name = "far"
+shape = { box = [0.1, 0.1, 0.1] }
+at = { position = [9, 9, 9] }
 [[safety]]
-kind = "safety_area"
-name = "zone"
-area = "zone"
-of = "arm"
+name = "it"
 """
 
 
-def test_an_area_says_of_many_instants_what_it_says_of_each(tmp_path, motion, monkeypatch):
+@pytest.mark.parametrize(
+    ("asked", "whom", "verdicts"),
+    [
+        ('kind = "safety_area"\narea = "zone"', "arm", {Verdict.WITHIN, Verdict.EXCEEDED}),
+        ('kind = "pressure_mat"\nsensor = "mat"', "arm", {Verdict.WITHIN, Verdict.EXCEEDED}),
+        ('kind = "light_curtain"\nsensor = "curtain"', "arm", {Verdict.WITHIN, Verdict.EXCEEDED}),
+        # Where the arm interrupts beams, nobody knows who is behind it.
+        ('kind = "light_curtain"\nsensor = "curtain"', "far", {Verdict.WITHIN, Verdict.UNDECIDED}),
+        ('kind = "scanner_field"\nsensor = "scanner"', "arm", {Verdict.WITHIN, Verdict.EXCEEDED}),
+    ],
+)
+def test_who_enters_is_said_of_many_instants_as_of_each(tmp_path, motion, monkeypatch, asked, whom, verdicts):
     """How deep somebody is inside is asked of each; who stays outside is judged in arrays."""
-    own = made(tmp_path, f"engine = {{ physics = false }}\n{UR10}{AREA}")
-    found = own.batch(*motion, t=T)["zone"]
-    monkeypatch.setattr(SafetyArea, "one_by_one", lambda *_: "asked so")
-    alone = own.batch(*motion, t=T)["zone"]
+    own = made(tmp_path, f'engine = {{ physics = false }}\n{UR10}{WATCHED}{asked}\nof = "{whom}"\n')
+    found = own.batch(*motion, t=T, threads=2)["it"]
+    monkeypatch.setattr(type(own.bound[0].criterion), "one_by_one", lambda *_: "asked so")
+    alone = own.batch(*motion, t=T)["it"]
     assert (found.note, alone.note) == ("", "asked instant by instant: asked so")
-    assert set(found.answers.verdict.tolist()) == {CODES[Verdict.WITHIN], CODES[Verdict.EXCEEDED]}
+    assert set(found.answers.verdict.tolist()) == {CODES[verdict] for verdict in verdicts}
     np.testing.assert_array_equal(found.answers.verdict, alone.answers.verdict)
     np.testing.assert_allclose(found.value, alone.value, rtol=1e-12)
-    np.testing.assert_array_equal(found.reasons, alone.reasons)
+    said = found.answers.verdict != CODES[Verdict.UNDECIDED]
+    np.testing.assert_array_equal(found.reasons[said], alone.reasons[said])
 
 
 def test_number_of_threads_changes_no_bit(cell, motion, batch, monkeypatch):

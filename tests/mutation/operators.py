@@ -65,8 +65,8 @@ DRAWN = ("Arrow", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "marker
          "Basis", "Input", "provenance.given", "InputError", "InputError.at", "Undecided", "ValueError",
          "UnknownName", "Meta", "np.errstate")  # fmt: skip
 """Calls whose arguments no verdict depends on."""
-SPOKEN = ("basis", "subjects", "inputs", "_markers", "_picture", "_shells", "_line", "_vector", "_rounded",
-          "_Way.hull", "_Curtain._beams", "_Scan._hidden", "Presence._worst_sight", "_limits_given",
+SPOKEN = ("basis", "subjects", "inputs", "_markers", "_fan", "_shells", "_line", "_vector", "_rounded",
+          "_Way.hull", "_Curtain.shown", "_Scan._hidden", "Presence._worst_sight", "_limits_given",
           "_places")  # fmt: skip
 """Functions whose result no verdict depends on, by their name or, where others are called so too, in full."""
 

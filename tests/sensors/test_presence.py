@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.criteria.figure import verdict_of
 from seerob.criteria.sensors.sensing import Presence, Seen, Sight
+from seerob.recording.series import CODES
 
 MAT = '[[sensors]]\nname = "mat"\n{more}pressure_mat = {{ corners = [[0, 0], [1, 0], [1, 1], [0, 1]] }}\n'
 BOX = '[[parts]]\nname = "{name}"\nshape = {{ box = [0.1, 0.1, 0.1] }}\n'
@@ -73,7 +75,15 @@ def test_a_device_that_has_seen_somebody_who_is_not_inside_goes_on(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("x", "verdict"), [(2.05, "within"), (2.021, "undecided"), (2.005, "undecided"), (1.99, "exceeded")]
+    ("x", "verdict"),
+    [
+        (2.05, "within"),
+        (2.021, "undecided"),
+        (2.005, "undecided"),
+        # On its border but for rounding is on it.
+        (2.0 + 5e-10, "exceeded"),
+        (1.99, "exceeded"),
+    ],
 )
 @pytest.mark.parametrize("more", ["", "response = 0.25\n"])
 def test_nearly_on_the_mat_is_open_and_the_response_time_is_asked_for(tmp_path, x, verdict, more):
@@ -85,13 +95,16 @@ def test_nearly_on_the_mat_is_open_and_the_response_time_is_asked_for(tmp_path, 
     station = made(tmp_path, text, {"arm.urdf": urdf})
     found = results_at(station, arm=((0.0, 0.0), (0.0, 0.0)))["m"]
     assert (found.verdict, found.limit, found.at_most) == (verdict, 0.0, False)
+    many = station.batch({"arm": np.zeros((2, 2))}, {"arm": np.zeros((2, 2))})["m"]
+    assert many.answers.verdict.tolist() == [CODES[found.verdict]] * 2
+    np.testing.assert_allclose(np.array(many.answers.interval).T, [found.interval] * 2, rtol=1e-12)
     named = {part.name: part for part in found.parts}
     if verdict != "exceeded":
         assert not named
         return
     link, until = named["arm/l2"], named["walked until the output switched"]
     assert (link.verdict, link.limit, link.at_most) == ("exceeded", 0.0, False)
-    assert link.value == found.value <= 0
+    assert link.value == found.value <= 1e-9
     assert named["walked before detection"].value == 0
     assert (until.value, until.verdict) == ((0.0, None) if more else (None, "undecided"))
     assert bool(until.reason) is not bool(more)
@@ -108,6 +121,8 @@ def test_one_body_that_the_device_sees_switches_it_and_one_alone_that_it_misses_
         ({bodies[0]: missed, bodies[1]: missed}, "NOT detected: one, why", False),
     ):
         presence = Presence(station.model, station.model.workstation.sensors[0], index["mat"], bodies)
-        found = presence.result("m", state, sights)
-        assert (found.verdict, found.reason) == ("exceeded", reason)
+        figure = presence.of_one(state, state.closest_per_body(presence.gap), sights)
+        verdict = verdict_of(figure, at_most=False)
+        found = presence.shown(state, figure, verdict)
+        assert (verdict, found.reason) == ("exceeded", reason)
         assert ("walked until the output switched" in {part.name for part in found.parts}) is output

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from seerob.core.shapes import signed_area
 from seerob.core.transforms import Array
-from seerob.kernels.rays import cast
+from seerob.kernels.rays import CLOSE, STEPS, cast
 from seerob.kernels.shapes import Shapes
 from seerob.kernels.signed_distance import place
 from seerob.workstation.tables.sensors import LaserScanner, MonitoredField
@@ -27,7 +27,6 @@ class Rays:
         """Of a model, and indices of the bodies that can stop a ray; none is allowed."""
         self.shapes, self.bodies = shapes, tuple(dict.fromkeys(bodies))
         self._solids = np.array([s for b in self.bodies for s in shapes.solids[b]], np.int64)
-        self._world = np.zeros((len(shapes.which), 12))
 
     def cast(
         self,
@@ -51,16 +50,27 @@ class Rays:
         s = self.shapes
         if not len(self._solids):
             return
+        # Of its own: threads of a batch ask one of these at the same time.
+        world = np.empty((len(s.which), 12))
         place(
             np.ascontiguousarray(rotations, float), np.ascontiguousarray(positions, float), s.which, s.local,
-            self._solids, self._world,
+            self._solids, world,
         )  # fmt: skip
         starts = np.ascontiguousarray(origins, float)
         along = np.ascontiguousarray(directions, float)
         cast(
             starts, along, self._solids, s.which, s.ball, s.corners, s.radius, s.nodes, s.links, s.triangles,
-            self._world, distance, met,
+            world, distance, met,
         )  # fmt: skip
+
+
+def met_beside(length: float) -> float:
+    """How far a ray of a length may run from a body that it counts as meeting [m].
+
+    A dilated core is met within `kernels.rays.CLOSE`, or where as many steps as are made, each of the
+    distance to it, end before the ray does.
+    """
+    return length / STEPS + CLOSE
 
 
 DRAWN = 0.09

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterator
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.snapshot import Basis, Marker, Result, Segment, Verdict
+from seerob.core.snapshot import Basis, Marker, Segment, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.sensors.sensing import (
     Names,
     Presence,
@@ -22,10 +24,11 @@ from seerob.criteria.sensors.sensing import (
     seen_in_field,
     sensor_of,
 )
-from seerob.distance.scan import Rays
+from seerob.distance.scan import Rays, met_beside
 from seerob.model.model import Model
 from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State
+from seerob.twin.states import States
 from seerob.workstation.tables.sensors import Sensor
 
 FINER = 16
@@ -57,9 +60,21 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
         return (*self.subjects(), *model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
         curtain = self._curtain(model)
-        return seen_in_field(self.name, curtain.presence, lambda state: curtain.judge(self.name, state))
+        return seen_in_field(self, curtain.presence, curtain.compute, curtain.shown)
+
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes distances and beams."""
+        return self._curtain(model).compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says who interrupts the curtain, and draws the interrupted beams."""
+        return self._curtain(model).shown
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together."""
+        return ""
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how far a body can move into the field between two instants at which this is asked."""
@@ -94,14 +109,16 @@ class _Curtain:
         self.start, self.length = a, float(np.linalg.norm(b - a))
         self.along = (b - a) / self.length
         still, moving = others(model, sensor, bodies)
+        self.finer = np.linspace(0.0, curtain.height, FINER * (len(self.heights) - 1) + 1)
+        self.none = np.full(len(self.heights), -1, np.int64)
+        self.beside = met_beside(self.length)
         self.people = Rays(model.shapes, bodies)
         self.rest = Rays(model.shapes, (*still, *moving))
         self.concerned = (self.plane, *bodies, *still, *moving)
         self.carriers = carriers_of(model, (*bodies, *moving, self.plane))
 
-    def cast(self, rays: Rays, state: State, heights: Array) -> NDArray[np.int64]:
-        """The body that interrupts each beam at a height above the lowest (-1: none)."""
-        rotations, positions = state.placed(self.concerned)
+    def cast(self, rays: Rays, rotations: Array, positions: Array, heights: Array) -> NDArray[np.int64]:
+        """The body that interrupts each beam at a height above the lowest (-1: none), at one instant."""
         R, x = rotations[self.plane], positions[self.plane]
         starts = (self.start + np.outer(heights, [0.0, 0.0, 1.0])) @ R.T + x
         along = np.broadcast_to(R @ self.along, starts.shape)
@@ -109,27 +126,37 @@ class _Curtain:
         rays.cast(rotations, positions, starts, along, np.full(len(heights), self.length), met)
         return met
 
-    def judge(self, name: str, state: State) -> Result:
-        state.require(*self.carriers)
-        _, inside = self.presence.inside(state)
-        met = self.cast(self.people, state, self.heights)
-        finer = np.linspace(0.0, self.heights[-1], FINER * (len(self.heights) - 1) + 1)
+    def compute(self, twin: Twin) -> Figure:
+        twin.require(*self.carriers)
+        found = twin.closest_per_body(self.presence.gap)
+        rotations, positions = twin.placed(self.concerned)
+        if twin.many:
+            each = zip(rotations, positions, strict=True)
+            blocked = np.array([(self.cast(self.rest, R, x, self.heights) >= 0).any() for R, x in each])
+            return self.presence.of_many(cast("States", twin), found, open=blocked, beside=self.beside)
+        # Nobody who is farther from the curtain interrupts a beam.
+        near = bool((found.distance <= self.beside).any())
+        met = self.cast(self.people, rotations, positions, self.heights) if near else self.none
         sights: dict[int, Sight] = {}
+        inside = self.presence.inside(found) if near else []
         # A body behind another one in the same beam interrupts it too: whoever is inside counts.
-        for k, i in enumerate(self.presence.bodies):
-            if inside[k] or (met == i).any():
+        for i in self.presence.bodies if near else ():
+            if i in inside or (met == i).any():
                 alone = Rays(self.model.shapes, (i,))
-                beams = self.cast(alone, state, self.heights) == i
-                on = finer[self.cast(alone, state, finer) == i]
+                beams = self.cast(alone, rotations, positions, self.heights) == i
+                on = self.finer[self.cast(alone, rotations, positions, self.finer) == i]
                 sights[i] = self._seen(int(beams.sum()), float(np.ptp(on)) if len(on) else 0.0)
-        blocked = self.cast(self.rest, state, self.heights)
-        found, counts = np.unique(blocked[blocked >= 0], return_counts=True)
+        met_first = self.cast(self.rest, rotations, positions, self.heights)
+        who, counts = np.unique(met_first[met_first >= 0], return_counts=True)
         undecided_reasons = tuple(
-            f"{count} of {len(blocked)} beams are interrupted by {self.model.bodies[i].name}"
-            for i, count in zip(found.tolist(), counts.tolist(), strict=True)
+            f"{count} of {len(met_first)} beams are interrupted by {self.model.bodies[i].name}"
+            for i, count in zip(who.tolist(), counts.tolist(), strict=True)
         )
-        markers = self._beams(state, met)
-        return self.presence.result(name, state, sights, undecided_reasons=undecided_reasons, markers=markers)
+        plane = rotations[self.plane].copy(), positions[self.plane].copy()
+        more = self.heights[met >= 0][:MOST_DRAWN], *plane
+        return self.presence.of_one(
+            cast("State", twin), found, sights, undecided_reasons=undecided_reasons, more=more
+        )
 
     def _seen(self, beams: int, height: float) -> Sight:
         capability = self.sensor.capability
@@ -144,13 +171,14 @@ class _Curtain:
             return Sight(Seen.MAYBE, text)
         return Sight(Seen.DETECTED, where)
 
-    def _beams(self, state: State, met: NDArray[np.int64]) -> tuple[Marker, ...]:
-        """The interrupted beams."""
-        rotations, positions = state.placed(self.concerned)
-        R, x = rotations[self.plane], positions[self.plane]
-        drawn: list[Marker] = []
-        for height in self.heights[met >= 0][:MOST_DRAWN]:
-            a = R @ (self.start + np.array([0.0, 0.0, height])) + x
-            b = a + R @ self.along * self.length
-            drawn.append(Segment(start=tuple(a.tolist()), end=tuple(b.tolist()), verdict=Verdict.EXCEEDED))
-        return tuple(drawn)
+    def shown(self, state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+        heights, R, x = figure.beside.more
+
+        def beams() -> Iterator[Marker]:
+            """The interrupted ones."""
+            for height in heights:
+                a = R @ (self.start + np.array([0.0, 0.0, height])) + x
+                b = a + R @ self.along * self.length
+                yield Segment(start=tuple(a.tolist()), end=tuple(b.tolist()), verdict=verdict)
+
+        return self.presence.shown(state, figure, verdict, also=beams)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, cast
 
-from seerob.core.snapshot import Basis, Result
+from seerob.core.snapshot import Basis
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Twin
 from seerob.criteria.sensors.sensing import (
     Names,
     Presence,
@@ -19,6 +20,7 @@ from seerob.criteria.sensors.sensing import (
 from seerob.model.model import Model
 from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State
+from seerob.twin.states import States
 
 
 class PressureMat(Criterion, frozen=True, kw_only=True):
@@ -43,15 +45,21 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
         return Presence(model, sensor, mat, bodies_of(model, self.of))
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
         presence = self._presence(model)
+        return seen_in_field(self, presence, _on(presence), presence.shown)
 
-        def evaluate(state: State) -> Result:
-            _, inside = presence.inside(state)
-            sights = {i: Sight(Seen.DETECTED) for k, i in enumerate(presence.bodies) if inside[k]}
-            return presence.result(self.name, state, sights)
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes distances to the mat."""
+        return _on(self._presence(model))
 
-        return seen_in_field(self.name, presence, evaluate)
+    def present(self, model: Model) -> Present:
+        """Return the function that says who is on the mat, and how far they walked on it."""
+        return self._presence(model).shown
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together."""
+        return ""
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how far a body can move onto the mat between two instants at which this is asked."""
@@ -69,3 +77,14 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
                 "stepping or jumping over it",
             ),
         )
+
+
+def _on(presence: Presence) -> Compute:
+    def compute(twin: Twin) -> Figure:
+        found = twin.closest_per_body(presence.gap)
+        if twin.many:
+            return presence.of_many(cast("States", twin), found)
+        sights = dict.fromkeys(presence.inside(found), Sight(Seen.DETECTED))
+        return presence.of_one(cast("State", twin), found, sights)
+
+    return compute

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
-from msgspec import Meta
-from msgspec.structs import replace
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from seerob.core import markers
@@ -14,7 +15,9 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.shapes import contains
 from seerob.core.snapshot import Basis, Result
 from seerob.core.transforms import Array
+from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.sensors.sensing import (
     Names,
     Presence,
@@ -27,15 +30,20 @@ from seerob.criteria.sensors.sensing import (
     seen_in_field,
     sensor_of,
 )
-from seerob.distance.scan import Coverage, Rays, beam_angles, directions, outline, spans
+from seerob.distance.scan import Coverage, Rays, beam_angles, directions, met_beside, outline, spans
 from seerob.model.model import Model
 from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State
+from seerob.twin.states import States
 from seerob.workstation.tables.sensors import MonitoredField as Field
 from seerob.workstation.tables.sensors import Sensor
 
 FINER = 64
 """Beams that a body's seen width is measured with."""
+_Placed = tuple[Array, Array]
+"""Rotations and positions [m] of all bodies."""
+_Beams = tuple[Array, NDArray[np.int64]]
+"""How far each beam gets [m], and the body that it meets (-1: none)."""
 
 
 class ScannerField(Criterion, frozen=True, kw_only=True):
@@ -71,9 +79,21 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
         return (*self.subjects(), *model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
         scan = self._scan(model)
-        return seen_in_field(self.name, scan.presence, lambda state: scan.judge(self.name, state))
+        return seen_in_field(self, scan.presence, scan.compute, scan.shown)
+
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes distances and beams."""
+        return self._scan(model).compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says whom the scanner sees, and draws what it sees."""
+        return self._scan(model).shown
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together, but for those at which a beam may end beside the field."""
+        return ""
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how far a body can move into the field between two instants at which this is asked."""
@@ -116,8 +136,8 @@ class _Scan:
         self.watched = np.zeros(len(model.bodies) + 1, bool)
         self.watched[list(bodies)] = True
         self.fixed = not model.bodies[self.plane].carrier
-        self.background: tuple[Array, NDArray[np.int64]] | None = None
-        self.drawn: tuple[float, markers.Rays] | None = None
+        self.background: _Beams | None = None
+        self.drawn: tuple[float, Verdict | None, Callable[[], markers.Rays]] | None = None
         self.blind: float
         farthest = max(float(np.hypot(x, y)) for x, y in chosen.corners)
         self.spacing = farthest * self.scanner.resolution
@@ -131,27 +151,19 @@ class _Scan:
                 f"{what}, more than the detection capability of {capability * 1e3:.0f} mm",
             )
 
-    def cast(
-        self, state: State, beams: Array, before: tuple[Array, NDArray[np.int64]] | None = None
-    ) -> tuple[Array, NDArray[np.int64]]:
+    def cast(self, placed: _Placed, beams: Array, before: _Beams | None = None) -> _Beams:
         """How far beams get [m], and the body each meets (-1: none).
 
         Args:
-            state: The twin.
+            placed: Where everybody is, at one instant.
             beams: Their directions in the scanner's plane, shape (n, 3).
             before: The same against what stands still, where that is known.
         """
-        distance, met = self._against(self.still, state, beams) if before is None else before
-        return self._against(self.moving, state, beams, (distance.copy(), met.copy()))
+        distance, met = self._against(self.still, placed, beams) if before is None else before
+        return self._against(self.moving, placed, beams, (distance.copy(), met.copy()))
 
-    def _against(
-        self,
-        rays: Rays,
-        state: State,
-        beams: Array,
-        before: tuple[Array, NDArray[np.int64]] | None = None,
-    ) -> tuple[Array, NDArray[np.int64]]:
-        rotations, positions = state.placed(self.concerned)
+    def _against(self, rays: Rays, placed: _Placed, beams: Array, before: _Beams | None = None) -> _Beams:
+        rotations, positions = placed
         u = beams @ rotations[self.plane].T
         origins = np.empty_like(u)
         origins[:] = positions[self.plane]
@@ -159,53 +171,73 @@ class _Scan:
         rays.cast(rotations, positions, origins, u, distance, met)
         return distance, met
 
-    def judge(self, name: str, state: State) -> Result:
-        state.require(*self.carriers)
-        self._look_at_what_stands(state)
-        distance, met = self.cast(state, self.beams, self.background)
+    def compute(self, twin: Twin) -> Figure:
+        twin.require(*self.carriers)
+        placed = twin.placed(self.concerned)
+        if twin.many:
+            return self._of_many(cast("States", twin), placed)
+        background = self._background(placed)
+        distance, met = self.cast(placed, self.beams, background)
         # The last one is for beams that meet nothing, -1.
         hit = self.watched[met]
         hit[hit] = contains(self.chosen.corners, self.beams[hit, :2] * distance[hit, None])
         seen = set(met[hit].tolist())
-        _, inside = self.presence.inside(state)
+        found = twin.closest_per_body(self.presence.gap)
+        inside = self.presence.inside(found)
         sights = {
-            i: self._seen(state, i, np.flatnonzero(hit & (met == i)), distance)
+            i: self._seen(placed, i, found.point_b[k], np.flatnonzero(hit & (met == i)), distance)
             for k, i in enumerate(self.presence.bodies)
-            if inside[k] or i in seen
+            if i in inside or i in seen
         }
-        assert self.background is not None
-        alone = np.array_equal(distance, self.background[0])
+        alone = np.array_equal(distance, background[0])
         now = self.blind if alone else self.coverage.blind(distance)
-        parts = (
-            Result(
-                name="blind area",
-                value=self.blind,
-                unit="m²",
-                reason=f"of {self.coverage.whole:.3g} m², behind what stands still",
-            ),
-            Result(name="blind area now", value=now, unit="m²"),
+        R, x = placed[0][self.plane], placed[1][self.plane]
+        view = _View(distance, hit, R.copy(), x.copy(), self.blind, now)
+        return self.presence.of_one(
+            cast("State", twin), found, sights, undecided_reasons=self.undecided_reasons, more=view
         )
-        result = self.presence.result(
-            name, state, sights, undecided_reasons=self.undecided_reasons, parts=parts
-        )
-        return replace(result, markers=(*result.markers, self._picture(state, distance, hit, result)))
 
-    def _look_at_what_stands(self, state: State) -> None:
+    def _of_many(self, states: States, placed: _Placed) -> Figure:
+        """Who is in the field is seen or should be: rays say nothing of it."""
+        if self.fixed:
+            self._background((placed[0][0], placed[1][0]))
+        else:
+            # What stands about a scanner that is carried may be about it at some instants only.
+            each = (self._against(self.still, one, self.beams) for one in zip(*placed, strict=True))
+            states.alone = states.alone | np.array([not distance.any() for distance, _ in each])
+        found = states.closest_per_body(self.presence.gap)
+        return self.presence.of_many(
+            states, found, open=bool(self.undecided_reasons), beside=met_beside(self.scanner.range)
+        )
+
+    def _background(self, placed: _Placed) -> _Beams:
+        """Against what stands still."""
         if self.background is not None and self.fixed:
-            return
-        distance, met = self._against(self.still, state, self.beams)
+            return self.background
+        distance, met = self._against(self.still, placed, self.beams)
         if not distance.any():
             what = self.model.bodies[int(met[0])].name
             raise Undecided(f"{self.sensor.name} is inside {what}: name it in its ignores, or move it")
-        self.background = distance, met
         self.blind = self.coverage.blind(distance)
+        self.background = distance, met
+        return distance, met
 
-    def _seen(self, state: State, body: int, beams: NDArray[np.int64], distance: Array) -> Sight:
-        """What the scanner makes of a body of which some beams, or none, end on it inside the field."""
+    def _seen(
+        self, placed: _Placed, body: int, nearest: Array, beams: NDArray[np.int64], distance: Array
+    ) -> Sight:
+        """What the scanner makes of a body of which some beams, or none, end on it inside the field.
+
+        Args:
+            placed: Where everybody is.
+            body: By index.
+            nearest: Its point nearest to the field, in the world [m], shape (3,).
+            beams: Those that end on it.
+            distance: How far all beams get [m].
+        """
         if not len(beams):
-            return Sight(Seen.MISSED, self._hidden(state, body))
+            return Sight(Seen.MISSED, self._hidden(placed, body, nearest))
         capability = self.sensor.capability
-        width = self._width(state, body, beams)
+        width = self._width(placed, body, beams)
         where = f"{width * 1e3:.0f} mm wide at {distance[beams].min():.2f} m"
         if capability is None:
             return Sight(Seen.MAYBE, f"{where}, detection capability not given")
@@ -213,52 +245,73 @@ class _Scan:
             return Sight(Seen.MAYBE, f"{where}, detection capability {capability * 1e3:.0f} mm")
         return Sight(Seen.DETECTED, where)
 
-    def _width(self, state: State, body: int, beams: NDArray[np.int64]) -> float:
+    def _width(self, placed: _Placed, body: int, beams: NDArray[np.int64]) -> float:
         """Extent of what is seen of a body, between finer beams that still end on it [m]."""
         step = self.scanner.resolution
         low, high = self.angles[beams[0]] - step, self.angles[beams[-1]] + step
         finer = directions(np.linspace(low, high, FINER))
-        distance, met = self.cast(state, finer)
+        distance, met = self.cast(placed, finer)
         on = np.flatnonzero(met == body)
         if not len(on):
             return 0.0
         ends = finer[on] * distance[on, None]
         return float(np.linalg.norm(ends - ends[0], axis=1).max())
 
-    def _hidden(self, state: State, body: int) -> str:
+    def _hidden(self, placed: _Placed, body: int, nearest: Array) -> str:
         """Why no beam ends on a body that is in the field."""
-        R, x = self._plane(state)
-        found, _ = self.presence.inside(state)
-        at = R.T @ (found.point_b[self.presence.bodies.index(body)] - x)
+        at = placed[0][self.plane].T @ (nearest - placed[1][self.plane])
         angle = float(np.arctan2(at[1], at[0]))
         if not self.angles[0] - 1e-9 <= angle <= self.angles[-1] + 1e-9:
             return "outside the angle that is scanned"
         far = float(np.hypot(at[0], at[1]))
-        distance, met = self.cast(state, directions(np.array([angle])))
+        distance, met = self.cast(placed, directions(np.array([angle])))
         blocker = int(met[0])
         if blocker >= 0 and blocker != body and distance[0] <= far:
             return f"in the shadow of {self.model.bodies[blocker].name}"
         return "between two beams" if far <= self.scanner.range else "beyond the range"
 
-    def _plane(self, state: State) -> tuple[Array, Array]:
-        rotations, positions = state.placed(self.concerned)
-        return rotations[self.plane], positions[self.plane]
+    def shown(self, state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+        view: _View = figure.beside.more
+        whole = f"of {self.coverage.whole:.3g} m², behind what stands still"
+        parts = (
+            Result(name="blind area", value=view.blind, unit="m²", reason=whole),
+            Result(name="blind area now", value=view.blind_now, unit="m²"),
+        )
+        drawn = self.drawn
+        stale = drawn is None or not 0 <= state.t - drawn[0] < self.redraw
+        if drawn is None or stale or not self.fixed or drawn[1] is not verdict:
+            # Made once, by whoever looks first.
+            drawn = self.drawn = state.t, verdict, cache(partial(self._fan, view, verdict))
+        fan = drawn[2]
+        return self.presence.shown(state, figure, verdict, parts=parts, also=lambda: (fan(),))
 
-    def _picture(self, state: State, distance: Array, hit: NDArray[np.bool_], result: Result) -> markers.Rays:
-        stale = self.drawn is None or not 0 <= state.t - self.drawn[0] < self.redraw
-        if self.drawn is None or stale or not self.fixed or self.drawn[1].verdict is not result.verdict:
-            R, x = self._plane(state)
-            ends, beams = outline(self.spans, distance, self.angles)
-            fan = markers.Rays(
-                starts=(_rounded(x),),
-                ends=tuple(map(_rounded, ends @ R.T + x)),
-                hits=tuple(np.flatnonzero(hit[beams]).tolist()),
-                filled=True,
-                label=self.chosen.name,
-                verdict=result.verdict,
-            )
-            self.drawn = state.t, fan
-        return self.drawn[1]
+    def _fan(self, view: _View, verdict: Verdict | None) -> markers.Rays:
+        ends, beams = outline(self.spans, view.distance, self.angles)
+        return markers.Rays(
+            starts=(_rounded(view.position),),
+            ends=tuple(map(_rounded, ends @ view.rotation.T + view.position)),
+            hits=tuple(np.flatnonzero(view.hit[beams]).tolist()),
+            filled=True,
+            label=self.chosen.name,
+            verdict=verdict,
+        )
+
+
+class _View(Struct, frozen=True, eq=False):
+    """What the scanner sees at an instant."""
+
+    distance: Array
+    """How far each beam gets [m]."""
+    hit: NDArray[np.bool_]
+    """Which end in the field on who may not be there."""
+    rotation: Array
+    """World from the scanner's plane."""
+    position: Array
+    """Of the scanner, in the world [m]."""
+    blind: float
+    """Area of the field behind what stands still [m²]."""
+    blind_now: float
+    """Area of the field that no beam reaches [m²]."""
 
 
 def _rounded(point: Array) -> tuple[float, float, float]:

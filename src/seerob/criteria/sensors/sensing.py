@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any, cast
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Highlight, Input, Label, Marker, Origin, Result, Verdict
 from seerob.core.transforms import Array
-from seerob.core.verdict import keeps
+from seerob.core.verdict import ROUNDING, keeps
 from seerob.criteria.body_parts import seen_first
-from seerob.criteria.criterion import Evaluate
+from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.distance.least import Closests
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
+from seerob.recording.answers import Flags
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.spans import Falls, approaching
 from seerob.twin.state import State
+from seerob.twin.states import States
 from seerob.workstation.tables.sensors import Sensor
 
 Names = str | tuple[str, ...]
@@ -97,6 +102,7 @@ class Presence:
         self.model, self.sensor, self.bodies = model, sensor, bodies
         self.gap: Gap = model.gap((field,), bodies)
         self._off = TrackingError(model, bodies)
+        self._rows, self._row = list(bodies), {i: k for k, i in enumerate(bodies)}
         self._last: tuple[float, Array] | None = None
         self._since: float | None = None
         self.undetected = 0.0
@@ -104,14 +110,13 @@ class Presence:
         self.until_output = 0.0
         """Further path until the output had switched [m]."""
 
-    def inside(self, state: State) -> tuple[Closests, NDArray[np.bool_]]:
-        """How near each body is to the field, and which are in it."""
-        found = state.closest_per_body(self.gap)
-        return found, found.distance <= 0
+    def inside(self, found: Closests) -> list[int]:
+        """Which bodies are in the field."""
+        return [self.bodies[k] for k in np.flatnonzero(found.distance <= ROUNDING).tolist()]
 
     def follow(self, state: State, inside: NDArray[np.bool_], triggered: bool) -> None:
         """Take the way of what is inside since the last evaluation into account."""
-        now = state.placed(self.bodies)[1][list(self.bodies)]
+        now = state.placed(self.bodies)[1][self._rows]
         if self._last is None or state.t <= self._last[0]:
             self._last, self._since, self.undetected, self.until_output = None, None, 0.0, 0.0
         way = 0.0
@@ -130,105 +135,141 @@ class Presence:
             self.until_output += way * min(max(left / (state.t - self._last[0]), 0.0), 1.0)
         self._last = state.t, now
 
-    def result(
+    def of_many(
+        self, states: States, found: Closests, *, open: bool | Flags = False, beside: float = 0.0
+    ) -> Figure:
+        """Compute how far everybody is from the field, of N instants.
+
+        Args:
+            states: The twin.
+            found: How near each body is to the field.
+            open: Whether somebody may be in the field all the same, shape (N,).
+            beside: How far from the field the device may see somebody [m]: that is asked of each instant.
+        """
+        value = found.distance.min(axis=-1)
+        states.alone = states.alone | ((value > ROUNDING) & (value <= beside))
+        return Figure(value, 0.0, (value - self.gap.deviation, value), open=open)
+
+    def of_one(
         self,
-        name: str,
         state: State,
+        found: Closests,
         sights: Mapping[int, Sight],
         *,
         undecided_reasons: tuple[str, ...] = (),
-        parts: tuple[Result, ...] = (),
-        markers: tuple[Marker, ...] = (),
-    ) -> Result:
-        """What a device says at this tick.
+        more: Any = None,
+    ) -> Figure:
+        """Compute how far everybody is from the field now, and how far they walked in it.
 
         Args:
-            name: Of the criterion.
             state: The twin.
-            sights: What it makes of each body that it saw or should have seen.
+            found: How near each body is to the field.
+            sights: What the device makes of each body that it saw or should have seen.
             undecided_reasons: Why nobody in the field may be wrong all the same.
-            parts: More figures.
-            markers: More to draw.
+            more: What the device shows besides.
         """
-        found, inside = self.inside(state)
+        inside = found.distance <= ROUNDING
         triggered = any(sight.seen is not Seen.MISSED for sight in sights.values())
         self.follow(state, inside, triggered)
         may = self._off.at(state) + self.gap.deviation
-        nearest, perhaps = int(found.distance.argmin()), int((found.distance - may).argmin())
-        entered = dict(zip(self.bodies, found.distance.tolist(), strict=True))
-        each = tuple(
+        room = found.distance - may
+        nearest, perhaps = int(found.distance.argmin()), int(room.argmin())
+        value = float(found.distance[nearest])
+        entered = {i: (sight, float(found.distance[self._row[i]])) for i, sight in sights.items()}
+        missed = [i for i, sight in sights.items() if sight.seen is Seen.MISSED]
+        near = _Near(
+            who=self.bodies[nearest],
+            perhaps=self.bodies[perhaps],
+            off=float(may[perhaps]),
+            entered=entered,
+            walked=(self.undetected, self.until_output if triggered else None),
+            missed={i: tuple(state.placed((i,))[1][i].tolist()) for i in missed},
+            undecided_reasons=undecided_reasons,
+            more=more,
+        )
+        ends = float(room[perhaps]), value
+        return Figure(value, 0.0, ends, exceeded=bool(sights), open=bool(undecided_reasons), beside=near)
+
+    def shown(
+        self,
+        state: State,
+        figure: Figure,
+        verdict: Verdict | None,
+        *,
+        parts: tuple[Result, ...] = (),
+        also: Callable[[], Iterable[Marker]] = tuple,
+    ) -> Shown:
+        """Say and draw who is in the field, and what the device makes of them.
+
+        Args:
+            state: The twin.
+            figure: From `of_one`.
+            verdict: Of it.
+            parts: More figures.
+            also: Draws more, from copies.
+        """
+        near: _Near = figure.beside
+        names = self.model.bodies
+        least, _ = cast("tuple[float, float]", figure.interval)
+        if near.entered:
+            reason = self._worst_sight(near.entered)
+        elif not keeps(least, 0.0, at_most=False):
+            off = f"{near.off * 1e3:.1f} mm"
+            reason = f"{names[near.perhaps].name} is within {off}, what its shape and its place may be off by"
+        else:
+            reason = "; ".join(near.undecided_reasons) or names[near.who].name
+        each = [
             Result(
-                name=self.model.bodies[i].name,
-                value=entered.get(i),
+                name=names[i].name,
+                value=distance,
                 unit="m",
                 limit=0.0,
                 at_most=False,
-                verdict=Verdict.EXCEEDED,
+                verdict=verdict,
                 reason=f"{sight.seen}: {sight.why}" if sight.why else str(sight.seen),
             )
-            for i, sight in sights.items()
-        )
-        if sights:
-            verdict, reason = Verdict.EXCEEDED, self._worst_sight(sights)
-        elif not keeps(found.distance[perhaps] - may[perhaps], 0.0, at_most=False):
-            verdict = Verdict.UNDECIDED
-            mm = f"{may[perhaps] * 1e3:.1f} mm"
-            reason = f"{self._name(perhaps)} is within {mm}, what its shape and its place may be off by"
-        elif undecided_reasons:
-            verdict, reason = Verdict.UNDECIDED, "; ".join(undecided_reasons)
-        else:
-            verdict, reason = Verdict.WITHIN, self._name(nearest)
-        lit = [Highlight(body=self.model.bodies[i].name, verdict=Verdict.EXCEEDED) for i in sights]
-        near, least = float(found.distance[nearest]), float(found.distance[perhaps] - may[perhaps])
-        marks: list[Marker] = [Highlight(body=self.model.bodies[self.gap.a[0]].name, verdict=verdict), *lit]
-        for i, sight in sights.items():
-            if sight.seen is Seen.MISSED:
-                at = tuple(state.placed((i,))[1][i].tolist())
-                marks.append(Label(position=at, text=f"not detected: {sight.why}", verdict=Verdict.EXCEEDED))
-        return Result(
-            name=name,
-            value=near,
-            unit="m",
-            limit=0.0,
-            at_most=False,
-            verdict=verdict,
-            reason=reason,
-            interval=(least, near) if least < near else None,
-            parts=(*each, *self._ways(bool(sights), triggered), *parts),
-            markers=(*marks, *markers),
-        )
+            for i, (sight, distance) in near.entered.items()
+        ]
 
-    def _name(self, nearest: int) -> str:
-        return self.model.bodies[self.bodies[nearest]].name
-
-    def _worst_sight(self, sights: Mapping[int, Sight]) -> str:
-        """The worst first: who is not detected although in the field."""
-        if all(sight.seen is Seen.MISSED for sight in sights.values()):
-            i, sight = next(iter(sights.items()))
-            return f"NOT detected: {self.model.bodies[i].name}, {sight.why}"
-        surely = [i for i, sight in sights.items() if sight.seen is Seen.DETECTED]
-        if surely:
-            return "detected: " + ", ".join(self.model.bodies[i].name for i in surely)
-        i, sight = next((i, s) for i, s in sights.items() if s.seen is Seen.MAYBE)
-        return f"may be missed: {self.model.bodies[i].name}, {sight.why}"
-
-    def _ways(self, present: bool, triggered: bool) -> tuple[Result, ...]:
-        if not present:
-            return ()
-        why = "" if triggered else "not detected yet"
-        ways = [Result(name="walked before detection", value=self.undetected, unit="m", reason=why)]
-        response = self.sensor.response
-        if triggered:
-            ways.append(
-                Result(
-                    name="walked until the output switched",
-                    value=self.until_output if response is not None else None,
-                    unit="m",
-                    verdict=Verdict.UNDECIDED if response is None else None,
-                    reason="response time not given" if response is None else "",
-                )
+        def draw() -> tuple[Marker, ...]:
+            lit = (Highlight(body=names[i].name, verdict=verdict) for i in (self.gap.a[0], *near.entered))
+            missed = (
+                Label(position=at, text=f"not detected: {near.entered[i][0].why}", verdict=verdict)
+                for i, at in near.missed.items()
             )
-        return tuple(ways)
+            return *lit, *missed, *also()
+
+        return Shown(reason, draw, (*each, *self._ways(near), *parts))
+
+    def _worst_sight(self, entered: Mapping[int, tuple[Sight, float]]) -> str:
+        """The worst first: who is not detected although in the field."""
+        sights, names = [(i, sight) for i, (sight, _) in entered.items()], self.model.bodies
+        if all(sight.seen is Seen.MISSED for _, sight in sights):
+            i, sight = sights[0]
+            return f"NOT detected: {names[i].name}, {sight.why}"
+        surely = [i for i, sight in sights if sight.seen is Seen.DETECTED]
+        if surely:
+            return "detected: " + ", ".join(names[i].name for i in surely)
+        i, sight = next((i, sight) for i, sight in sights if sight.seen is Seen.MAYBE)
+        return f"may be missed: {names[i].name}, {sight.why}"
+
+    def _ways(self, near: _Near) -> tuple[Result, ...]:
+        if not near.entered:
+            return ()
+        undetected, until_output = near.walked
+        why = "" if until_output is not None else "not detected yet"
+        way = Result(name="walked before detection", value=undetected, unit="m", reason=why)
+        if until_output is None:
+            return (way,)
+        known = self.sensor.response is not None
+        until = Result(
+            name="walked until the output switched",
+            value=until_output if known else None,
+            unit="m",
+            verdict=None if known else Verdict.UNDECIDED,
+            reason="" if known else "response time not given",
+        )
+        return way, until
 
     def falls(self) -> Falls:
         """How far its distance can fall between two instants, see `Criterion.falls`."""
@@ -255,15 +296,37 @@ class Presence:
         return (*provenance.motion(self.model, *self.gap.carriers), *provenance.shapes(self.gap), *given)
 
 
-def seen_in_field(name: str, presence: Presence, judge: Evaluate) -> Evaluate:
+class _Near(Struct, frozen=True, eq=False):
+    """Who is nearest to a field or in it at an instant; bodies by index."""
+
+    who: int
+    perhaps: int
+    """Who may be nearest, shapes and devices being what they are."""
+    off: float
+    """By how much that one may be elsewhere [m]."""
+    entered: Mapping[int, tuple[Sight, float]]
+    """What the device makes of each that it saw or should have seen, and its distance from the field [m]."""
+    walked: tuple[float, float | None]
+    """Way in the field before somebody was seen, and from then until the output had switched [m]; None where
+    nobody is seen yet."""
+    missed: Mapping[int, tuple[float, float, float]]
+    """Where those are whom it does not see [m]."""
+    undecided_reasons: tuple[str, ...]
+    """Why nobody in the field may be wrong all the same."""
+    more: Any
+    """What the device shows besides."""
+
+
+def seen_in_field(criterion: Criterion, presence: Presence, compute: Compute, present: Present) -> Evaluate:
     """Judge people of whom a part is seen: who is in the field with that part is in it.
 
     What the device makes of it stays open, since a bone that nobody sees may shade another.
 
     Args:
-        name: Of the criterion.
+        criterion: Which is asked.
         presence: Of the whole question.
-        judge: It.
+        compute: Its figures.
+        present: What is shown of them.
     """
     model, (field,) = presence.model, presence.gap.a
 
@@ -272,13 +335,13 @@ def seen_in_field(name: str, presence: Presence, judge: Evaluate) -> Evaluate:
         if not bodies:
             return None
         rest = Presence(model, presence.sensor, field, bodies)
+        sight = Sight(Seen.MAYBE, "whether the device sees it is open")
 
-        def evaluate(state: State) -> Result:
-            _, inside = rest.inside(state)
-            why = "whether the device sees it is open"
-            sights = {i: Sight(Seen.MAYBE, why) for i, there in zip(bodies, inside, strict=True) if there}
-            return rest.result(name, state, sights)
+        def compute(twin: Twin) -> Figure:
+            state = cast("State", twin)
+            found = state.closest_per_body(rest.gap)
+            return rest.of_one(state, found, dict.fromkeys(rest.inside(found), sight))
 
-        return evaluate
+        return criterion.judging(compute, rest.shown)
 
-    return seen_first(presence.bodies, judge, without)
+    return seen_first(presence.bodies, criterion.judging(compute, present), without)

@@ -7,9 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from seerob.core.snapshot import Verdict
+from seerob.core.markers import Label
+from seerob.core.snapshot import Result, Verdict
 from seerob.core.verdict import ROUNDING, judge, judge_interval, worst
-from seerob.criteria.figure import Figure, Parts, answers_of, verdict_of
+from seerob.criteria.figure import Figure, Parts, Shown, answers_of, result_of, verdict_of
 from seerob.kernels import verdicts
 from seerob.recording.answers import Answers, judge_many
 from seerob.recording.series import CODES, NO_VERDICT
@@ -60,7 +61,10 @@ NAN, INF = float("nan"), float("inf")
 @pytest.mark.parametrize("at_most", [True, False])
 @pytest.mark.parametrize("limit", [None, 1.0])
 @pytest.mark.parametrize("value", [0.5, 1.0, 1.5, NAN, INF])
-@pytest.mark.parametrize("ends", [None, (0.0, 0.0), (0.4, 0.6), (0.5, 1.5), (NAN, NAN), (0.4, NAN)])
+@pytest.mark.parametrize(
+    "ends",
+    [None, (0.0, 0.0), (0.4, 0.6), (0.5, 1.5), (NAN, NAN), (0.4, NAN), (-INF, 0.5), (0.5, INF)],
+)
 @pytest.mark.parametrize("flags", [{}, {"nothing": True}, {"exceeded": True}, {"open": True}])
 def test_a_figure_says_of_many_instants_what_it_says_of_one(at_most, limit, value, ends, flags):
     one = verdict_of(Figure(value, limit, ends, **flags), at_most=at_most)
@@ -68,6 +72,49 @@ def test_a_figure_says_of_many_instants_what_it_says_of_one(at_most, limit, valu
     each = {name: np.full(3, flag) for name, flag in flags.items()}
     many = answers_of(Figure(np.full(3, value), limit, arrays, **each), 3, at_most=at_most)
     assert many.verdict.tolist() == [CODES[one]] * 3
+    # A result shows it: what is no number, or has no end, as none.
+    figure = Figure(None if np.isnan(value) else value, limit, ends, **flags)
+    told = result_of(figure, one, Shown("why"), Result(name="x", unit="m", at_most=at_most))
+    shown = [None if np.isnan(x) else x for x in (many.value[0], many.limit[0])]
+    assert [told.value, told.limit] == shown
+    assert told.interval == (ends if ends in ((0.4, 0.6), (0.5, 1.5)) else None)
+    assert told.nothing is (many.nothing is not None and bool(many.nothing[0]))
+    assert (told.name, told.unit, told.at_most, told.reason) == ("x", "m", at_most, "why")
+    assert told.verdict is one
+
+
+@pytest.mark.parametrize("at_most", [True, False])
+def test_each_instant_is_judged_alone_whatever_is_beside_it(at_most):
+    """Values with and without ends, what is open or exceeded or nothing, in any order."""
+    rng = np.random.default_rng(7)
+    for n in (1, 2, 60):
+        value, limit = rng.choice([0.5, 1.0, 1.5, NAN, INF], n), rng.choice([1.0, 1.2, INF, -INF], n)
+        low, high = (np.where(rng.random(n) < 0.5, value, value + off) for off in (-0.4, 0.4))
+        flags = {name: rng.random(n) < 0.3 for name in ("nothing", "exceeded", "open")}
+        many = answers_of(Figure(value, limit, (low, high), **flags), n, at_most=at_most)
+        for k in range(n):
+            each = {name: bool(flag[k]) for name, flag in flags.items()}
+            alone = Figure(float(value[k]), float(limit[k]), (float(low[k]), float(high[k])), **each)
+            assert many.verdict[k] == code(verdict_of(alone, at_most=at_most))
+
+
+def test_a_count_is_exact_and_what_is_no_count_is_shown_as_a_float():
+    assert [verdict_of(Figure(3, 3.0), at_most=side) for side in (True, False)] == [Verdict.WITHIN] * 2
+    for value, kind in ((3, int), (np.float64(3.0), float), (np.float32(3.0), float)):
+        told = result_of(Figure(value, 4.0), Verdict.WITHIN, Shown(), Result(name="x"))
+        assert (told.value, type(told.value)) == (3, kind)
+        assert Figure(value).number == 3.0
+    assert verdict_of(Figure(np.float64(3.0), 3.0), at_most=True) is Verdict.EXCEEDED
+    assert np.isnan(Figure(None).number)
+
+
+def test_what_is_drawn_is_made_when_somebody_looks_and_nothing_is_where_nobody_draws():
+    label, made = Label(position=(0, 0, 0), text="here"), []
+    shown = Shown(draw=lambda: made.append(1) or (label,))
+    told = result_of(Figure(0.5, 1.0), Verdict.WITHIN, shown, Result(name="x"))
+    assert not made
+    assert tuple(told.markers) == (label,)
+    assert result_of(Figure(0.5, 1.0), Verdict.WITHIN, Shown(), Result(name="x")).markers == ()
 
 
 @pytest.mark.parametrize("at_most", [True, False])
@@ -117,8 +164,37 @@ def test_the_worst_of_parts_is_the_whole_of_one_instant_and_of_many(at_most, ope
         lost = np.isnan(room[as_bad[0]])
         assert parts.governs == as_bad[0 if lost else np.nanargmin(room[as_bad])]
         assert many.verdict[k] == CODES[verdict]
+        assert np.array_equal(
+            [end[k] for end in many.interval], [low[k][parts.governs], high[k][parts.governs]], True
+        )
         if np.isfinite(value[k][parts.governs]):
             assert many.value[k] == value[k][parts.governs]
+
+
+def test_parts_are_told_each_with_its_place_and_the_worst_is_the_whole():
+    value, limit = np.array([0.5, 3.0]), np.array([1.0, NAN])
+    for interval in (None, (value - 0.1, value + 0.1)):
+        parts = Parts(["a", "b"], value, limit, interval)
+        figure = Figure(None, parts=parts)
+        verdict = verdict_of(figure, at_most=True)
+        told = result_of(figure, verdict, Shown(where=("here", "there")), Result(name="x", unit="m"))
+        ends = [None, None] if interval is None else list(zip(*map(np.ndarray.tolist, interval), strict=True))
+        assert [part.interval for part in told.parts] == ends
+        assert [(part.name, part.value, part.limit, part.unit, part.reason) for part in told.parts] == [
+            ("a", 0.5, 1.0, "m", "here"), ("b", 3.0, None, "m", "there"),
+        ]  # fmt: skip
+        assert [part.verdict for part in told.parts] == [Verdict.WITHIN, Verdict.UNDECIDED]
+        assert (told.value, told.limit, told.interval) == (3.0, None, ends[1])
+        quiet = result_of(figure, verdict, Shown(), Result(name="x", unit="m"))
+        assert [part.reason for part in quiet.parts] == ["", ""]
+        both = Parts(
+            ["a", "b"],
+            np.tile(value, (2, 1)),
+            np.tile(limit, (2, 1)),
+            interval and tuple(np.tile(end, (2, 1)) for end in interval),
+        )
+        many = answers_of(Figure(None, parts=both), 2, at_most=True)
+        assert (many.interval is None) is (interval is None)
 
 
 def test_a_whole_with_a_figure_of_its_own_is_no_better_than_its_parts():

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Basis, Finding, Result, Verdict
 from seerob.core.verdict import judge_interval
-from seerob.criteria.between_ticks import FEW, SpanResult, least_margin, watched
+from seerob.criteria.between_ticks import FEW, MOST, SpanResult, least_margin, watched
 from seerob.criteria.contact.regions import REGIONS
 from seerob.criteria.criterion import Criterion, Follows, Moment
 from seerob.criteria.judging import bound_to
@@ -105,6 +106,8 @@ def test_what_is_passed_between_two_ticks_is_exceeded(tmp_path, what, physics):
         ([(0, 1), (0.1906, 0), (0.194, 1), (0.3, 1)], Verdict.EXCEEDED),  # in the second part of a tick
         ([(0, 0), (0.1985, 1), (0.3, 1)], Verdict.WITHIN),
         ([(0, 1), (0.1915, 0), (0.3, 0)], Verdict.WITHIN),
+        ([(0, 1), (0.1915, 0), (0.1985, 1), (0.3, 1)], Verdict.WITHIN),
+        ([(0, 1), (0.1902, 2), (0.1988, 1), (0.3, 1)], Verdict.UNDECIDED),  # neither true nor false
     ],
 )
 @pytest.mark.parametrize("every", ["", "every = 1.0\n"])
@@ -842,18 +845,18 @@ SWITCHED = [
 """When it begins and ceases to apply: within ticks, twice in one, and just at them."""
 
 
-def leaps(folder):
+def leaps(folder, motion=leaping, switched=SWITCHED, more=""):
     """The arm, its ticks, and where its joints are in between, from tick to tick."""
     t = np.arange(0, 0.2001, 0.01)
     files = {
         "arm.urdf": two_r(),
-        "motion.csv": rows(lambda at: tuple(map(tuple, leaping(at))), t.tolist()),
+        "motion.csv": rows(lambda at: tuple(map(tuple, motion(at))), t.tolist()),
         "v.toml": DOOR,
-        "s.csv": "t,x\n" + "".join(f"{at},{x}\n" for at, x in SWITCHED),
+        "s.csv": "t,x\n" + "".join(f"{at},{x}\n" for at, x in switched),
     }
     engine = 'variables = "v.toml"\nengine = { gravity = [0, 0, 0], physics = false }\n'
-    station = made(folder, engine + TWO_R + SOURCE + PLC, files)
-    q, qd = leaping(t)
+    station = made(folder, engine + TWO_R + more + SOURCE + PLC, files)
+    q, qd = map(np.array, zip(*map(motion, t), strict=True))
     s = np.linspace(0, 1, 401)[:, None]
     cubics = [
         (2 * s**3 - 3 * s**2 + 1) * q[k]
@@ -979,7 +982,8 @@ def test_what_nobody_knows_of_the_way_is_undecided_there_and_only_there(tmp_path
     ((*results,),), _ = judged_by(station, [one])
     undecided = [k for k, result in enumerate(results) if result.verdict is Verdict.UNDECIDED]
     assert undecided == [7, 8, 9]
-    assert all("between two ticks" in results[k].reason for k in undecided)
+    reasons = [results[k].reason for k in undecided]
+    assert all(r.startswith("not known to be within") and "between two ticks" in r for r in reasons)
 
 
 @pytest.mark.parametrize("how", HOWS)
@@ -991,6 +995,151 @@ def test_where_there_is_room_nothing_is_asked_between_two_ticks_and_nothing_befo
     else:
         assert looks == 0
     assert asked == (round(0.2 / options["every"]) + 1 if "every" in options else 21)
+
+
+def rising(t):
+    """The first joint turns evenly."""
+    return (t, 0.5), (1.0, 0.0)
+
+
+def bowing(t):
+    """The first joint is at 0 at each tick, and up to 20 mrad up or down in between."""
+    return (0.0, 0.5), (8.0 * (-1) ** round(t / 0.01), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("motion", "how", "switched", "verdict"),
+    [
+        # No instant tells more: whatever it may come to while it does not apply is not asked.
+        (rising, {"limit": 0.1145, "once": True}, [(0, 1), (0.101, 0), (0.109, 1), (0.3, 1)], Verdict.WITHIN),
+        (
+            bowing,
+            {"limit": 0.015, "once": True},
+            [(0, 0), (0.0955, 1), (0.101, 0), (0.109, 1), (0.1105, 0), (0.3, 0)],
+            Verdict.WITHIN,
+        ),
+        # Nobody knows how its limit falls on the way, and just before it ceases to apply it exceeds.
+        (
+            rising,
+            {"limit": 0.603, "follows_other": True, "unknown": (0.0999, 0.1099)},
+            [(0, 1), (0.106, 0), (0.3, 0)],
+            Verdict.EXCEEDED,
+        ),
+    ],
+)
+def test_what_applies_in_parts_of_a_tick_is_judged_in_these_alone(tmp_path, motion, how, switched, verdict):
+    station, *_ = leaps(tmp_path, motion, switched)
+    ((*results,),), _ = judged_by(station, [Turned(name="one", active="door", **how)])
+    assert results[11].verdict is verdict
+    assert {result.verdict for result in results[:11] if not result.muted} == {Verdict.WITHIN}
+
+
+def test_where_somebody_was_hidden_at_a_tick_the_next_one_is_known_all_the_same(tmp_path):
+    """What nobody knows of the way to it is said at the tick before."""
+    for follows in (False, True):
+        one = Turned(name="one", limit=0.9, hidden=(0.055, 0.065), follows_other=follows)
+        ((*results,),), _ = judged_by(leaps(tmp_path / str(follows))[0], [one])
+        undecided = [k for k, result in enumerate(results) if result.verdict is Verdict.UNDECIDED]
+        assert undecided == [6]
+
+
+def test_where_nothing_is_to_judge_after_nobody_saw_the_way_between_is_open(tmp_path):
+    """At the next tick but one it would be too far, and nobody looks in between."""
+    station, *_ = leaps(tmp_path, rising)
+    one = Turned(
+        name="one", limit=0.0755, idle_below=0.075, hidden=(0.055, 0.065), bounds_itself=True, once=True
+    )
+    ((*results,),), _ = judged_by(station, [one])
+    assert all(result.nothing for result in results[:6])
+    assert {result.verdict for result in results[6:8]} == {Verdict.UNDECIDED}
+    assert results[7].reason.startswith("not known to be within")
+
+
+def test_where_nothing_is_to_judge_a_bound_tells_of_what_nobody_sees(tmp_path):
+    """Of the way to where it is seen from either end, though nobody sees it in the middle."""
+    station, *_ = leaps(tmp_path, rising)
+    hidden = {"idle_below": 0.062, "hidden": (0.0512, 0.0588), "bounds_itself": True}
+    ((*results,),), (_, looks) = judged_by(station, [Turned(name="one", limit=0.0635, **hidden)])
+    assert all(result.nothing for result in results[:7])
+    assert looks > 0
+
+
+OTHER = TWO_R.replace('"arm"', '"other"\nq = [0, 0]\nbase = { position = [9, 0, 0] }', 1)
+
+
+@pytest.mark.parametrize("how", [{}, {"bounds_itself": True}, {"follows_other": True}])
+def test_a_jump_leaves_open_the_way_of_who_jumped_and_of_nobody_else(tmp_path, how):
+    station, *_ = leaps(tmp_path, more=OTHER)
+    limits = [0.9, 0.15, 0.1985]
+
+    def told(who):
+        model, points = station.model, Points(station.model)
+        some = [Turned(name=f"{limit}", limit=limit, **how) for limit in limits]
+        bound = [replace(bound_to(model, one, "safety"), watch=watched(one, model, points)) for one in some]
+        judge = Judge(bound)
+
+        def judged(state):
+            if who and abs(state.t - 0.07) < 1e-6:
+                state.path = replace(state.path, broken=(who,))
+            return judge(state)
+
+        feed = pump(station.sources, 0.01)
+        every = [out.results for out, _ in islice(ticks(engine_of(model), judged, feed), 21)]
+        return [[(r.verdict, r.reason) for r in results] for results in every]
+
+    usual, moved, other = map(told, ("", "arm", "other"))
+    assert other == usual
+    assert [k for k in range(21) if moved[k] != usual[k]] == [7]
+    why = "arm jumped: its way between two ticks is not known"
+    assert moved[7][0] == (Verdict.UNDECIDED, why)
+    assert usual[7][0][0] is Verdict.WITHIN
+
+
+def bump(t):
+    """The second joint turns to 0.3 rad and back, fastest 13 and 7 ticks before the end."""
+    q = 0.3 * np.exp(-(((t - 0.1) / 0.03) ** 2))
+    return (0.0, q), (0.0, -2 * (t - 0.1) / 0.03**2 * q)
+
+
+@pytest.mark.parametrize(
+    ("limit", "blind", "kept"),
+    [(0.32, (np.inf, np.inf), True), (0.2, (0.0349, 0.1651), False), (0.5, (0.0349, 0.1651), True)],
+)
+def test_by_how_much_a_limit_fell_while_nobody_asked_is_not_forgotten(tmp_path, limit, blind, kept):
+    """What remembers knows of the instants at which it was asked; where its limit was since, others do."""
+
+    class Blind(Turned, frozen=True, kw_only=True):
+        def _bound(self, model, *, keeps):
+            evaluate = super()._bound(model, keeps=keeps)
+
+            def seen(state):
+                if blind[0] < state.t < blind[1]:
+                    raise Undecided("nobody asks it")
+                return evaluate(state)
+
+            return seen
+
+    one = Blind(name="one", limit=limit, follows_other=True, keeps=True)
+    ((*results,),), _ = judged_by(leaps(tmp_path, bump)[0], [one])
+    assert {result.verdict for result in results[:4]} == {Verdict.WITHIN}
+    assert {result.verdict for result in results[17:]} == {Verdict.WITHIN if kept else Verdict.UNDECIDED}
+
+
+@pytest.mark.parametrize(
+    ("speed", "keeps", "looks"), [(1, False, 0), (1, True, 0), (-1, False, 20 * 7), (-1, True, 7)]
+)
+def test_how_a_limit_falls_is_looked_at_until_little_is_open_and_not_where_an_end_tells(
+    tmp_path, speed, keeps, looks
+):
+    """Bounded by where the second joint was, and how fast it is: halved to less than 0.1 mrad of 10."""
+    station, *_ = leaps(tmp_path, lambda t: ((0.0, 0.5 + speed * t), (0.0, speed)))
+    one = Turned(name="one", limit=3.0, follows_other=True, keeps=keeps)
+    ((*results,),), (_, looked) = judged_by(station, [one])
+    assert looked == looks
+    assert {result.verdict for result in results} == {Verdict.WITHIN}
+    # What has no bound is not halved for one, though looked at for what exceeds.
+    _, (_, more) = judged_by(station, [structs.replace(one, unknown=(0.0999, 0.1099))])
+    assert more == looks + MOST - (looks // 20 if looks > 20 else 0)
 
 
 def test_instants_that_are_looked_at_are_counted_each_and_not_where_an_end_exceeds(tmp_path):
@@ -1015,7 +1164,7 @@ def test_instants_that_are_looked_at_are_counted_each_and_not_where_an_end_excee
 def test_a_bound_is_told_the_least_margin_of_both_ends_less_what_it_may_be_off(tmp_path):
     for each in (False, True):
         station, told = leaps(tmp_path / str(each))[0], {}
-        one = Turned(name="one", limit=0.7, spread=0.02, each=each)
+        one = Turned(name="one", limit=0.7, spread=0.02, each=each, hidden=(0.055, 0.065))
         falls = one.falls(station.model, None)
 
         def telling(span, least, falls=falls, told=told):
@@ -1024,17 +1173,20 @@ def test_a_bound_is_told_the_least_margin_of_both_ends_less_what_it_may_be_off(t
 
         ((first, *results),), _ = judged_by(station, [one], falls=telling)
         assert len(told) == len(results) == 20
-        for before, now, least in zip((first, *results), results, told.values(), strict=False):
-            both = [one.margin(result) for result in (before, now)]
+        ways = zip((first, *results), results, told.values(), strict=False)
+        for k, (before, now, least) in enumerate(ways, 1):
+            both = [one.margin(result) for result in (before, now) if result.verdict is Verdict.WITHIN]
+            assert len(both) == (1 if k in (6, 7) else 2)
             assert least == pytest.approx(np.min([m - off for m, off in both], axis=0))
 
 
-def test_what_nobody_sees_between_two_ticks_is_undecided_with_that_reason(tmp_path):
+@pytest.mark.parametrize(("how", "step"), [({}, 0.001), ({"bounds_itself": True}, 0.004)])
+def test_what_nobody_sees_between_two_ticks_is_undecided_with_that_reason(tmp_path, how, step):
     """Where a bound does not clear it: the arm is hidden from 51 to 59 ms, and seen at each tick."""
     station, reasons = leaps(tmp_path)[0], set()
-    limits = np.arange(0.15, 0.3, 0.0005).tolist()
-    some = [Turned(name=f"{x}", limit=x, hidden=(0.0512, 0.0588)) for x in limits]
-    same = [Turned(name=f"{x}", limit=x) for x in limits]
+    limits = np.arange(0.15, 0.3, step).tolist()
+    some = [Turned(name=f"{x}", limit=x, hidden=(0.0512, 0.0588), **how) for x in limits]
+    same = [Turned(name=f"{x}", limit=x, **how) for x in limits]
     every, _ = judged_by(station, [*some, *same])
     for hidden, seen in zip(every[: len(some)], every[len(some) :], strict=True):
         for k, (one, other) in enumerate(zip(hidden, seen, strict=True)):

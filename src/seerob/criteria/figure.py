@@ -154,7 +154,7 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         value = float(value)
     if figure.interval is not None:
         low, high = figure.interval
-        interval = (float(low), float(high)) if low < high and math.isfinite(high - low) else None
+        interval = (float(low), float(high)) if -math.inf < low < high < math.inf else None
     if figure.parts is not None:
         told = _part_results(figure.parts, shown.where, result)
         parts = (*told, *parts)

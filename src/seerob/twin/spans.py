@@ -276,7 +276,8 @@ class Points:
         """Bound all joints, and with them all points, on cubics through the knots of a path."""
         joint_bounds(path.t, q, v, begin, end, mj.qpos0, self._speed, self._change, self._varies, self._away)
         for name in path.broken:
-            self._speed[self._movers[name]] = np.inf
+            rows = self._movers[name]
+            self._speed[rows] = self._change[rows] = self._varies[rows] = np.inf
         point_bounds(
             self._speed, self._change, self._varies, self._away, end - begin,
             self._start, self._joints, self._turns, self._lengths, fast, quick, bend,

@@ -91,6 +91,8 @@ compiled: $(DEV)
 
 # Without it, every process that a test starts compiles every library again.
 unit: export PYTHONDONTWRITEBYTECODE :=
+# Workers occupy the processors; threads of a library's own would wait for each other there.
+unit: export OPENBLAS_NUM_THREADS := 1
 unit: $(DEV) $(PAGE)
 	$(BIN)/pytest -n 3 --dist loadgroup
 

@@ -1,5 +1,6 @@
 """``seerob`` and ``python -m seerob``: the command line, and Ctrl-C before it is there and after its end."""
 
+import os
 import signal
 import sys
 
@@ -8,6 +9,8 @@ from seerob.core.interrupted import stopped
 
 def program() -> int:
     """Run one command; its exit code."""
+    # Matrices are small here: a library's threads would keep processors busy by waiting for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         try:
             from seerob.app.cli import main

@@ -20,7 +20,7 @@ from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from seerob.core.errors import SeerobError, UnknownName
 
@@ -64,6 +64,7 @@ def _kind_of(package: str, module: str, name: str) -> str:
     return module
 
 
+@cache
 def kinds(package: str) -> tuple[str, ...]:
     """Kinds of a table that ship, sorted."""
     found = importlib.import_module(home(package))
@@ -99,7 +100,7 @@ def load(
     if "." not in kind:
         if kind not in kinds(package):
             raise UnknownName(what, kind, (*kinds(package), *offered(package)))
-        return _only(_imported(package, kind, f"{home(package)}.{kind}"), base)
+        return cast(type[T], _shipped(package, kind, base))
     point = offered(package).get(kind)
     if point is None and not allow_plugins:
         known = ", ".join(offered(package)) or "none"
@@ -119,6 +120,12 @@ def load(
     if not (isinstance(found, type) and issubclass(found, base)):
         raise PluginError(f"the entry point of kind {kind!r} must be a {base.__name__}, it is {found!r}")
     return found
+
+
+@cache
+def _shipped(package: str, kind: str, base: type) -> type:
+    """The plug-in class of a kind that ships, whose module is the same in the whole process."""
+    return _only(_imported(package, kind, f"{home(package)}.{kind}"), base)
 
 
 def _imported(package: str, kind: str, name: str) -> ModuleType:

@@ -5,6 +5,7 @@ Live, replayed and as-fast-as-possible runs are this same loop with another cloc
 
 from __future__ import annotations
 
+import functools
 import gc
 import math
 import time
@@ -253,13 +254,19 @@ def no_greener(
     return judged
 
 
+@functools.cache
+def _spared() -> bool:
+    """Whether the collector is spared what was there before the first loop: counting it takes 20 ms."""
+    return gc.get_freeze_count() > 0
+
+
 @contextmanager
 def settled() -> Iterator[None]:
     """Spare the garbage collector what was made before the loop: it all lives as long as the loop does.
 
     Who has done so already, around many loops, is left to it: it took longer than short loops do.
     """
-    if gc.get_freeze_count():
+    if _spared() or gc.get_freeze_count():
         yield
         return
     gc.collect()

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.model.model import Body, Model
+from seerob.model.model import Body, Mechanism, Model
 from seerob.twin.spans import joints_of
 
 Indices = NDArray[np.int64]
@@ -42,15 +42,33 @@ def levers(data: mujoco.MjData, joints: NDArray[np.signedinteger], body: Body, R
     return np.asarray(np.sqrt(np.maximum(squares, 0.0).max(axis=1)) + body.radius + body.deviation)
 
 
-class _KinematicChain(NamedTuple):
-    """The joints of one robot, machine or person that move a body; k of them."""
+class _Arms(NamedTuple):
+    """The joints of one robot, machine or person that move bodies: r pairs of a body and a joint.
 
-    name: str
+    Pairs of one body follow each other, and so do the points of one pair.
+    """
+
+    bodies: Indices
+    """Those of the asked ones that are moved, shape (c,)."""
+    first: Indices
+    """First pair of each, shape (c,)."""
     joints: Indices
-    """MuJoCo's, shape (k,)."""
+    """MuJoCo's, shape (r,)."""
     turns: NDArray[np.bool_]
+    beyond: Array
+    """How far the body reaches beyond its points [m], shape (r,)."""
     coupling: Array
-    """Share of each commanded joint, not negative, shape (k, n)."""
+    """Share of each commanded joint, not negative, shape (r, n)."""
+    points: Array
+    """Of all of these bodies, in their own frames [m], shape (p, 3)."""
+    of: Indices
+    """The body of each among all of the workstation's, shape (p,)."""
+    at: Indices
+    """The points of all pairs, shape (s,)."""
+    pair: Indices
+    """The pair of each of these, shape (s,)."""
+    begins: Indices
+    """The first of these of each pair, shape (r,)."""
 
 
 class SpeedNoise:
@@ -62,7 +80,7 @@ class SpeedNoise:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._chains: dict[tuple[int, int], list[_KinematicChain]] = {}
+        self._arms: dict[tuple[str, bytes, bytes], _Arms | None] = {}
 
     def of_bodies(
         self,
@@ -84,27 +102,57 @@ class SpeedNoise:
             errors: Of joints by name of who has them [rad/s or m/s], shape (joints,) each.
         """
         found = np.zeros(len(bodies))
-        for k, i in enumerate(bodies.tolist()):
-            for chain in self._of(i, int(ids[i])):
-                error = errors.get(chain.name)
-                if error is None:
-                    continue
-                arms = levers(data, chain.joints, self._model.bodies[i], rotations[i], positions[i])
-                each = np.where(chain.turns, arms, 1.0) @ chain.coupling
-                found[k] += float(((each * error) ** 2).sum())
-        return np.sqrt(found)
+        for name, error in errors.items():
+            arms = self._of(name, ids, bodies)
+            if arms is None:
+                continue
+            # Component by component: what is said of a body does not depend on who else is asked about.
+            R, p = rotations[arms.of], arms.points
+            points = positions[arms.of] + R[..., 0] * p[:, :1] + R[..., 1] * p[:, 1:2] + R[..., 2] * p[:, 2:]
+            x, y, z = (points[arms.at] - data.xanchor[arms.joints][arms.pair]).T
+            u, v, w = data.xaxis[arms.joints][arms.pair].T
+            squares = (y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2
+            far = np.sqrt(np.maximum.reduceat(squares, arms.begins)) + arms.beyond
+            each = np.add.reduceat(np.where(arms.turns, far, 1.0)[:, None] * arms.coupling, arms.first)
+            found[arms.bodies] += ((each * error) ** 2).sum(axis=1)
+        return np.asarray(np.sqrt(found))
 
-    def _of(self, index: int, moved_by: int) -> list[_KinematicChain]:
-        key = index, moved_by
-        if key not in self._chains:
-            mj = self._model.mj
-            joints = set(joints_of(mj, moved_by))
-            self._chains[key] = found = []
-            for mechanism in self._model.mechanisms.values():
-                own = mj.dof_jntid[mechanism.v_address]
-                rows = [row for row, joint in enumerate(own.tolist()) if joint in joints]
-                if rows:
-                    of = own[rows].astype(np.int64)
-                    turns = mj.jnt_type[of] == mujoco.mjtJoint.mjJNT_HINGE
-                    found.append(_KinematicChain(mechanism.name, of, turns, np.abs(mechanism.coupling[rows])))
-        return self._chains[key]
+    def _of(self, name: str, ids: Indices, bodies: Indices) -> _Arms | None:
+        key = name, ids.tobytes(), bodies.tobytes()
+        if key not in self._arms:
+            self._arms[key] = _arms(self._model, self._model.mechanisms[name], ids, bodies)
+        return self._arms[key]
+
+
+def _arms(model: Model, mechanism: Mechanism, ids: Indices, bodies: Indices) -> _Arms | None:
+    """What joints move of some bodies; None where they move none of them."""
+    mj, own = model.mj, model.mj.dof_jntid[mechanism.v_address]
+    moved: list[tuple[int, Body, list[int]]] = []
+    for k, i in enumerate(bodies.tolist()):
+        body, moving = model.bodies[i], set(joints_of(mj, int(ids[i])))
+        rows = [row for row, joint in enumerate(own.tolist()) if joint in moving]
+        if rows and len(body.corners):
+            moved.append((k, body, rows))
+    if not moved:
+        return None
+    rows = [row for _, _, each in moved for row in each]
+    joints = own[rows].astype(np.int64)
+    counts = np.array([len(body.corners) for _, body, _ in moved])
+    pairs = np.array([len(each) for _, _, each in moved])
+    starts = np.cumsum(counts) - counts
+    sizes = np.repeat(counts, pairs)
+    return _Arms(
+        bodies=np.array([k for k, _, _ in moved]),
+        first=np.cumsum(pairs) - pairs,
+        joints=joints,
+        turns=mj.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE,
+        beyond=np.repeat([body.radius + body.deviation for _, body, _ in moved], pairs),
+        coupling=np.abs(mechanism.coupling[rows]),
+        points=np.concatenate([body.corners for _, body, _ in moved]),
+        of=np.repeat([body.index for _, body, _ in moved], counts),
+        at=np.concatenate(
+            [np.arange(s, s + n) for s, n in zip(np.repeat(starts, pairs), sizes, strict=True)]
+        ),
+        pair=np.repeat(np.arange(len(rows)), sizes),
+        begins=np.cumsum(sizes) - sizes,
+    )

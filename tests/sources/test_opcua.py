@@ -501,7 +501,9 @@ def test_values_that_are_played_again_are_a_restart_once_and_a_loop_then(monkeyp
         server.stop()
 
 
-@pytest.mark.parametrize(("back", "doubted"), [(0.25, False), (0.26, True), (9.9, True), (10.1, False)])
+@pytest.mark.parametrize(
+    ("back", "doubted"), [(0.05, True), (0.25, True), (0.26, True), (9.9, True), (10.1, False)]
+)
 def test_a_value_that_is_older_than_one_that_was_heard_is_not_relied_on_until_there_is_a_newer_one(
     back, doubted
 ):
@@ -517,12 +519,33 @@ def test_a_value_that_is_older_than_one_that_was_heard_is_not_relied_on_until_th
     assert not picture.sample(1200.0).doubts
 
 
-def test_a_value_that_was_overtaken_is_no_news():
+def test_a_value_that_was_overtaken_is_of_the_past_that_was_judged_by_another():
+    """It shows as what it was said to be last; nothing rests on it until there is news, and a while after."""
     picture = Picture((SPEED,), by_exception=True)
-    for stamp, raw in ((10.0, 250.0), (9.8, 300.0)):
+    for stamp, raw in ((9.0, 250.0), (10.0, 250.0), (9.8, 300.0)):
         picture.take((Change("belt/speed", raw, stamp=stamp),), 100.0)
     sample = picture.sample(100.0)
-    assert (sample.values, sample.doubts) == ({"belt/speed": 0.25}, {})
-    # What is called bad counts whenever it was so.
+    assert sample.values == {"belt/speed": 0.25}
+    assert "came it late" in sample.doubts["belt/speed"]
+    picture.take((Change("belt/speed", 260.0, stamp=10.1),), 100.001)
+    assert "came it late" in picture.sample(100.5).doubts["belt/speed"]
+    assert not picture.sample(100.6).doubts
+
+
+@pytest.mark.parametrize(("stamp", "raw"), [(10.0, 250.0), (9.9, 260.0), (9.95, 250.0)])
+def test_what_was_told_already_and_what_it_was_all_the_time_is_no_news(stamp, raw):
+    picture = Picture((SPEED,), by_exception=True)
+    for first, told in ((9.7, 250.0), (9.8, 250.0), (9.9, 260.0), (9.93, 250.0), (10.0, 250.0)):
+        picture.take((Change("belt/speed", told, stamp=first),), 100.0 + first)
+    assert not picture.sample(111.0).doubts
+    picture.take((Change("belt/speed", raw, stamp=stamp),), 111.0)
+    assert not picture.sample(111.0).doubts
+    picture.take((Change("belt/speed", 250.0, stamp=9.91),), 111.0)  # it was 260 then
+    assert "came it late" in picture.sample(111.0).doubts["belt/speed"]
+
+
+def test_what_is_called_bad_counts_whenever_it_was_so():
+    picture = Picture((SPEED,), by_exception=True)
+    picture.take((Change("belt/speed", 250.0, stamp=10.0),), 100.0)
     picture.take((Change("belt/speed", 1.0, invalid_reason="the server says Bad", stamp=9.8),), 100.0)
     assert "Bad" in picture.sample(100.0).doubts["belt/speed"]

@@ -1,15 +1,21 @@
-"""What a source did and undid while its packets were held back: no tick of the run was there to see it.
+"""What a source did and undid while its packets were held back or lost: no tick of the run could see it.
 
 A run shows the world a fixed delay ago. Packets that come later than that find the twin gone on without them,
 and of those that come together only the newest is taken. Where the others lie between the last one that came
 in time and the newest, the twin went that way, too. Where they do not, nobody judged what was done meanwhile.
+
+Of packets that are lost nobody knows where they lie. Within a time T a joint whose acceleration is a at most
+goes away by :math:`a T^2 / 16` at most and comes back: it speeds up for T/4, brakes and turns round for T/2,
+and brakes for T/4. Where that is more than noise, nobody knows what a robot did meanwhile.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from seerob.core.samples import BodySample, JointSample, Sample, SignalSample
+from seerob.workstation.source import Target
 
 TOGETHER = 0.02
 """Samples that arrive within this time may be of one tick, of which the newest is taken [s]."""
@@ -21,6 +27,16 @@ FASTER = 0.9
 one."""
 MOST = 1024
 """Samples that are kept; of more nobody knows that they lie between."""
+
+SILENT = 1.0
+"""Longer ones are a silence, after which all begins anew [s]."""
+USUAL = 32
+"""Newest intervals between samples: a quarter of them are as short as usual, however many are lost."""
+MISSING = 1.8
+"""Times the usual interval after which a sample is missing: the next but one is due after two."""
+QUICKEST = 30.0
+"""No joint accelerates harder that states nothing [rad/s² or m/s²]: published stopping tables of arms come to
+that."""
 
 Said = dict[str, float]
 """What a sample says, by what it is about: places [rad or m], and speeds after `RATE`."""
@@ -75,6 +91,37 @@ class HeldBack:
             if not ends or not min(ends) - room <= value <= max(ends) + room:
                 return True
         return False
+
+
+class Lost:
+    """Looks at when the samples of one robot were so, as they arrive, whether some are missing.
+
+    Args:
+        target: With acceleration limits; None where nobody knows them.
+    """
+
+    def __init__(self, target: Target | None) -> None:
+        quickest = max(() if target is None else target.acceleration, default=QUICKEST)
+        self._unseen = 4 * math.sqrt(PLACE / quickest)
+        """So long nobody has to know where it was [s]."""
+        self._intervals: deque[float] = deque(maxlen=USUAL)
+        self._t = -math.inf
+
+    def reason(self, t: float) -> str:
+        """Why nobody knows what it did since its last sample; empty where that is known well enough.
+
+        Args:
+            t: When what is said now was so [s].
+        """
+        interval, self._t = t - self._t, t
+        if not interval < SILENT:
+            self._intervals.clear()
+            return ""
+        self._intervals.append(interval)
+        usual = sorted(self._intervals)[len(self._intervals) // 4]
+        if interval < max(MISSING * usual, self._unseen):
+            return ""
+        return f"what it said for {1e3 * interval:.0f} ms is missing: nobody knows what it did and undid"
 
 
 def said_by(sample: Sample) -> Said:

@@ -39,7 +39,7 @@ from seerob.core.snapshot import Finding
 from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
-from seerob.devices.live.held_back import HeldBack
+from seerob.devices.live.held_back import TOGETHER, HeldBack, Lost
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
 
@@ -376,6 +376,7 @@ class Listener:
         self._posted: dict[tuple[str, ...], Sample] = {}
         self._people: dict[tuple[str, ...], _Person] = {}
         self._held: dict[tuple[str, ...], HeldBack] = {}
+        self._lost: dict[tuple[str, ...], Lost] = {}
         self._lock = Lock()
         self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -548,10 +549,15 @@ class Listener:
         if what not in self._contradictions:
             self._contradictions[what] = Contradictions(self._target)
             self._held[what] = HeldBack(self._source.behind())
+            self._lost[what] = Lost(self._target)
         unseen = self._held[what].reason(sample, t, host)
         if found := self._contradictions[what].find(sample) or unseen:
             self._found[what] = found, host + HOLD
+        lost = self._lost[what].reason(t) if isinstance(sample, JointSample) else ""
         found, until = self._found.get(what, ("", 0.0))
+        if lost and until < host + TOGETHER:
+            # For as long as a tick may take to see it.
+            self._found[what] = found, until = lost, host + TOGETHER
         return found if host <= until else ""
 
     def _lose(self, reason: str) -> None:

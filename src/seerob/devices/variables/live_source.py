@@ -22,7 +22,8 @@ from seerob.core.errors import SeerobError
 from seerob.core.quantities import Seconds
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.devices.live.device_clock import AGAIN, BUFFERED, REORDERED, RESTART_HOLD
+from seerob.devices.live.device_clock import AGAIN, BUFFERED, HOLD, REORDERED, RESTART_HOLD
+from seerob.devices.live.held_back import PLACE, SPEED, TOGETHER
 from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
 from seerob.workstation.variables import BadValue, Value, Variable
@@ -36,6 +37,10 @@ BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""
 REMEMBERED = 1 << 16
 """Stamps of which it is known what was said with them."""
+ROOMS = {"m": PLACE, "rad": PLACE, "m/s": SPEED, "rad/s": SPEED}
+"""How far beyond both others a number may be that no tick has seen, for noise, by unit."""
+OTHER_ROOM = 0.05
+"""Of other units: a share of the largest of them. Own choice."""
 PULSES = 4
 """A device that says nothing is asked so often within its source's time-out whether it is there."""
 
@@ -203,6 +208,10 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         return dict.fromkeys(late, self.delay or 0.0)
 
 
+PASSED = "older, by its own clock, than what it said before: came it late, or was that set back?"
+MISSED = "was something else in between, for less than any tick sees, and was judged at no instant"
+
+
 class Stamps:
     """When variables were what they were said to be, by the device: whether that can be so now."""
 
@@ -211,6 +220,8 @@ class Stamps:
         self._newest: dict[str, float] = {}
         self._said: dict[tuple[str, float], int] = {}
         """What was said of a variable with a stamp."""
+        self._lately: dict[str, list[tuple[float, int]]] = {}
+        """The newest stamps of each and what was said, as far back as something may be overtaken."""
         self._back: dict[str, tuple[float, str]] = {}
         """Variables whose time went back: until when nothing rests on them [s], and why."""
         self._restarted: dict[str, float] = {}
@@ -222,8 +233,9 @@ class Stamps:
 
         What is said again with the stamp that it had is a recording, also over a new connection. On what is
         older than a value that was heard, by less than a buffer explains, nothing rests until something newer
-        comes: it came late, or the clock was set back, and nobody knows which. As
-        `seerob.devices.live.device_clock.DeviceClock` has it of samples.
+        comes: it came late, or the clock was set back, and nobody knows which. Nor for a while after that:
+        what it was then was judged by another value. As `seerob.devices.live.device_clock.DeviceClock` has it
+        of samples.
 
         Args:
             change: What is said.
@@ -233,10 +245,15 @@ class Stamps:
         name, said = change.name, hash(repr(change.raw))
         last = self._last.get(name, -math.inf)
         back = last - stamp
-        if 0 < back <= REORDERED:
+        if 0 < back <= REORDERED and self._was_known(name, stamp, said):
             return True
         if 0 < back < BUFFERED:
             self._passed.setdefault(name, last)
+            if now + HOLD > self._back.get(name, (-math.inf, ""))[0]:
+                self._back[name] = now + HOLD, PASSED
+            if back <= REORDERED:
+                self._keep(name, stamp, said)
+                return True
         elif back > 0 or stamp >= self._passed.get(name, -math.inf):
             self._passed.pop(name, None)
         ago = self._newest.get(name, -math.inf) - stamp
@@ -254,16 +271,29 @@ class Stamps:
             until, before = self._back.get(name, (now, ""))
             self._back[name] = (until, before) if until > now + hold else (now + hold, why)
             self._restarted[name] = now
+        self._keep(name, stamp, said)
+        return False
+
+    def _keep(self, name: str, stamp: float, said: int) -> None:
         if len(self._said) >= REMEMBERED:
             del self._said[next(iter(self._said))]
         self._said[name, stamp] = said
-        return False
+        lately = [*self._lately.get(name, ()), (stamp, said)]
+        old = [k for k, (t, _) in enumerate(lately) if t < self._last[name] - REORDERED]
+        self._lately[name] = sorted(lately[old[-1] if old else 0 :])
+
+    def _was_known(self, name: str, stamp: float, said: int) -> bool:
+        """Whether a variable was what is said now, when that was so and ever since, as was heard before."""
+        if self._said.get((name, stamp)) == said:
+            return True
+        lately = self._lately.get(name, [])
+        before = [known for t, known in lately if t <= stamp][-1:]
+        return bool(before) and {*before, *(known for t, known in lately if t > stamp)} == {said}
 
     def invalid_reasons(self, now: float) -> list[tuple[str, str]]:
         """Variables on which nothing rests at ``now`` [s], each with the reason."""
-        late = "older, by its own clock, than what it said before: came it late, or was that set back?"
         holds = {name: why for name, (until, why) in self._back.items() if now <= until}
-        return [*(dict.fromkeys(self._passed, late) | holds).items()]
+        return [*(dict.fromkeys(self._passed, PASSED) | holds).items()]
 
 
 _STAMPS: ContextVar[Stamps] = ContextVar("stamps")
@@ -296,6 +326,11 @@ class Picture:
         self._said: dict[str, float] = {}
         self._values: dict[str, Value] = {}
         self._bad: dict[str, str] = {}
+        self._lately: dict[str, list[tuple[float, Value]]] = {}
+        """When each became what it is [s], and what it was in the time before in which no tick may have come;
+        the first is what it was when that began."""
+        self._missed: dict[str, float] = {}
+        """Variables that were something else at no instant that was judged: until when that counts [s]."""
         self._stamps = Stamps() if stamps is None else stamps
         self.begun = False
         """Whether the device has said anything yet."""
@@ -324,9 +359,23 @@ class Picture:
                 self._bad[change.name] = f"{change.name}: {change.invalid_reason}"
                 continue
             try:
-                self._values[change.name] = variable.value(change.raw)
+                self._become(variable, variable.value(change.raw), now)
             except BadValue as error:
                 self._bad[change.name] = str(error)
+
+    def _become(self, variable: Variable, value: Value, now: float) -> None:
+        """Take a value; what it was so briefly that no tick has seen it must lie between those that were."""
+        name = variable.name
+        self._values[name] = value
+        lately = self._lately.setdefault(name, [])
+        if lately and lately[-1][1] == value:
+            return
+        while len(lately) > 1 and lately[1][0] < now - TOGETHER:
+            del lately[0]
+        if any(_beyond(each, lately[0][1], value, variable.si_unit) for _, each in lately[1:]):
+            lately.clear()
+            self._missed[name] = now + HOLD
+        lately.append((now, value))
 
     def sample(self, now: float, heard: float | None = None) -> SignalSample:
         """What is known.
@@ -337,7 +386,8 @@ class Picture:
         """
         t = now if heard is None else heard
         doubts = dict(self._bad)
-        for name, why in self._stamps.invalid_reasons(now):
+        missed = [(name, MISSED) for name, until in self._missed.items() if now <= until]
+        for name, why in (*self._stamps.invalid_reasons(now), *missed):
             doubts.setdefault(name, f"{name}: {why}")
         for name, variable in self._variables.items():
             if variable.write or name in doubts:
@@ -354,6 +404,14 @@ class Picture:
         """How much older than ``t`` what is known of a variable may be [s]."""
         said = self._shown if self._by_exception else self._said[name]
         return max(0.0, t - (t if said is None else said)) + self._bounds.get(name, 0.0)
+
+
+def _beyond(value: Value, before: Value, after: Value, unit: str) -> bool:
+    """Whether a value is none of two others, nor a number between them."""
+    if isinstance(value, bool | str) or isinstance(before, bool | str) or isinstance(after, bool | str):
+        return value not in (before, after)
+    room = ROOMS.get(unit, OTHER_ROOM * max(abs(value), abs(before), abs(after)))
+    return not min(before, after) - room <= value <= max(before, after) + room
 
 
 async def _beating(

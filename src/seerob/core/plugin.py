@@ -14,7 +14,7 @@ import inspect
 import os
 import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import cache
 from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
@@ -100,7 +100,7 @@ def load(
     if "." not in kind:
         if kind not in kinds(package):
             raise UnknownName(what, kind, (*kinds(package), *offered(package)))
-        return cast(type[T], _shipped(package, kind, base))
+        return cast(type[T], _shipped(package, kind, cast(Hashable, base)))
     point = offered(package).get(kind)
     if point is None and not allow_plugins:
         known = ", ".join(offered(package)) or "none"

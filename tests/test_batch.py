@@ -112,6 +112,16 @@ kind = "separation"
 name = "open separation"
 between = ["arm", "worker"]
 stop = { acceleration = 0, reaction = 0.1, stopping = 0.2, model = "constant_deceleration" }
+[[safety]]
+kind = "separation_area"
+name = "around"
+separation = "separation"
+of = ["worker", "wall"]
+[[safety]]
+kind = "separation_area"
+name = "open around"
+separation = "open separation"
+of = "wall"
 """
 SLOW = """
 [[safety]]
@@ -175,7 +185,7 @@ def test_values_limits_and_verdicts_are_those_of_the_road(batch, road):
 
 
 def test_the_motion_crosses_limits(batch):
-    for name in ("point", "fastest", "energy", "manipulability", "mass along", "force", "distance"):
+    for name in ("point", "fastest", "energy", "manipulability", "mass along", "force", "distance", "around"):
         assert len(np.unique(batch[name].answers.verdict)) > 1, name
 
 

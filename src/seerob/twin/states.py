@@ -455,25 +455,26 @@ class States:
 
     def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where two sets are nearest, shape (N,)."""
-        return self._distances(gap, Per.SETS).of(slice(None), 0)
+        return self.distances(gap.query, Per.SETS).of(slice(None), 0)
 
     def closest_per_body(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``, shape (N, b)."""
-        return self._distances(gap, Per.BODY)
+        return self.distances(gap.query, Per.BODY)
+
+    def distances(self, query: Query, per: Per) -> Closests:
+        """What a query says, shape (N, g)."""
+        self.require(*filter(None, (self.model.bodies[i].carrier for i in query.bodies)))
+        self._settled(query.bodies)
+        question = query, per
+        if question not in self._answers:
+            self._answers |= self._bench.questions.ask(question, self._rotations, self._positions)
+        return self._answers[question]
 
     def _settled(self, bodies: Sequence[int]) -> None:
         """Refuse what a gripper picks up."""
         for body in (self.model.bodies[i] for i in bodies):
             if body.holder:
                 raise Undecided(unknown_place(body))
-
-    def _distances(self, gap: Gap, per: Per) -> Closests:
-        self.require(*gap.carriers)
-        self._settled(gap.bodies)
-        question = gap.query, per
-        if question not in self._answers:
-            self._answers |= self._bench.questions.ask(question, self._rotations, self._positions)
-        return self._answers[question]
 
 
 WHERE = "batch"

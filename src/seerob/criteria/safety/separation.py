@@ -412,18 +412,12 @@ class Separation(Criterion, frozen=True, kw_only=True):
         names = tuple(model.bodies[i].name for i in gap.b)
         unknown_ever, largest, ends, tops = shared
         ends_of_distance, largest_ends = DistanceEnds(model, gap), (1,) * len(ends.tolerances)
-        everybody = (*self._everybody(model), *gap.carriers, *model.carriers_of(self._sides(model)[1]))
-        courses: Callable[[States], Course] | None = None
+        required: Callable[[States], Array] | None = None
 
         def of_many(states: States, distance: Array) -> Figure:
-            nonlocal courses
-            courses = courses or many_instants.courses(model, self.stop, gap)
-            assert courses is not None
-            seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)
-            S_p = self._distances(courses(states), K, seen)
-            # How much faster noise may make everybody is asked of each instant.
-            states.alone = states.alone | others_noisy(states, everybody)
-            return Figure(None, parts=Parts(names, distance, S_p, open=bool(unknown_ever)))
+            nonlocal required
+            required = required or self._of_many(model, gap)
+            return Figure(None, parts=Parts(names, distance, required(states), open=bool(unknown_ever)))
 
         def compute(twin: Twin) -> Figure:
             found = twin.closest_per_body(gap, allow_estimated=True, strayed=True)
@@ -735,6 +729,28 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 return found
             S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
             return Required(S_p, most, found.unbounded_reason)
+
+        return at
+
+    def required_of_many(self, model: Model) -> Callable[[States], Array]:
+        """S_p of each of `moving` at N instants [m], shape (N, n), where nothing keeps it to `one_by_one`.
+
+        To be asked first: which instants are left alone (`States.alone`) it says anew.
+        """
+        own = self._by_device(model)[0]
+        return own._of_many(model, own._gap(model))
+
+    def _of_many(self, model: Model, gap: Gap) -> Callable[[States], Array]:
+        courses, K = many_instants.courses(model, self.stop, gap), sum(self._terms()[0]) + gap.deviation
+        everybody = (*self._everybody(model), *gap.carriers, *model.carriers_of(self._sides(model)[1]))
+        assert courses is not None
+
+        def at(states: States) -> Array:
+            seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)
+            S_p = self._distances(courses(states), K, seen)
+            # How much faster noise may make everybody is asked of each instant.
+            states.alone = states.alone | others_noisy(states, everybody)
+            return S_p
 
         return at
 

@@ -10,26 +10,29 @@ which stands still, is an entry of ``[[areas]]`` with ``swept.separation``.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, ClassVar
+from functools import cache, partial
+from typing import Annotated, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.core.transforms import Array
-from seerob.core.verdict import ROUNDING, keeps
+from seerob.core.verdict import ROUNDING
 from seerob.criteria.body_parts import seen_first
 from seerob.criteria.criterion import Criterion, Evaluate, Follows
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
 from seerob.criteria.sensors.sensing import Names, bodies_of, names_of
-from seerob.distance.least import Per
+from seerob.distance.least import Closests, Per
 from seerob.distance.voxels import offset_shell
 from seerob.model import provenance
-from seerob.model.model import Model
+from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.spans import Fall, Falls, Points, Span, rows_of
 from seerob.twin.state import State
+from seerob.twin.states import States
 
 
 class SeparationArea(Criterion, frozen=True, kw_only=True):
@@ -75,17 +78,16 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return moving, outside
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
         return self._bind(model, self._criterion(model))
 
     def _bind(self, model: Model, criterion: Any) -> Evaluate:
         moving, outside = self._sides(model)
-        required = criterion.required(model)
-        worst = criterion.at_worst(model)
-        largest = None if worst is criterion else worst.required(model)
+        required = _Required.of(model, criterion)
 
         def bound(outside: tuple[int, ...]) -> Evaluate:
-            return self._bound(model, moving, outside, (required, largest), criterion.unknown(model))
+            gap = model.gap(moving, outside)
+            return self.judging(_rooms(model, gap, required), self._shown(model, gap))
 
         def without(lost: tuple[int, ...]) -> Evaluate | None:
             rest = tuple(i for i in outside if i not in lost)
@@ -93,92 +95,56 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
         return seen_first(outside, bound(outside), without)
 
-    def _bound(
-        self,
-        model: Model,
-        moving: tuple[int, ...],
-        outside: tuple[int, ...],
-        required: tuple[Callable[[State], Any], Callable[[State], Any] | None],
-        unknown_ever: str,
-    ) -> Evaluate:
-        gap = model.gap(moving, outside)
-        off = TrackingError(model, outside)
-        drawn: list[tuple[float, tuple[Hull, ...]]] = []
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes room beyond S_p."""
+        return _rooms(model, model.gap(*self._sides(model)), _Required.of(model, self._criterion(model)))
 
-        def evaluate(state: State) -> Result:
-            state.require_bodies((*moving, *outside))
-            S_p, most, more = required[0](state)
-            if required[1] is not None:
-                most = np.maximum(most, required[1](state).most)  # with its tolerances
-            unknown = "; ".join(filter(None, (unknown_ever, more)))
-            found = state.distances(gap.query, Per.PAIR)
-            room = found.distance.reshape(len(moving), len(outside)) - S_p[:, None]
-            nearest = room.argmin(axis=0)
-            least = room[nearest, np.arange(len(outside))]
-            # What the robot's acceleration and tolerances may add to S_p is as much less room.
-            may = off.at(state) + gap.deviation + float((most - S_p).max())
-            surely = float((least - may).min())
-            k, perhaps = int(least.argmin()), int((least - may).argmin())
-            unbounded_reason = self._unbounded_reason(
-                model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown
-            )
-            verdict = (
-                Verdict.EXCEEDED
-                if least[k] <= ROUNDING
-                else Verdict.UNDECIDED
-                if unbounded_reason
-                else Verdict.WITHIN
-            )
-            parts: list[Result] = []
-            lit: list[Marker] = []
-            for j in np.flatnonzero(least <= ROUNDING).tolist():
-                i, body = int(nearest[j]), model.bodies[outside[j]].name
-                e = i * len(outside) + j
-                parts.append(
-                    Result(
-                        name=body,
-                        value=float(least[j]),
-                        unit="m",
-                        limit=0.0,
-                        at_most=False,
-                        verdict=Verdict.EXCEEDED,
-                        reason=f"{found.distance[e]:.3f} m from {model.bodies[moving[i]].name}, "
-                        f"S_p {S_p[i]:.3f} m",
-                    )
-                )
-                a, b = found.point_a[e].tolist(), found.point_b[e].tolist()
-                lit.append(Highlight(body=body, verdict=Verdict.EXCEEDED))
-                lit.append(Segment(start=tuple(a), end=tuple(b), verdict=Verdict.EXCEEDED))
-            if (
-                not drawn
-                or not 0 <= state.t - drawn[0][0] < self.redraw
-                or drawn[0][1][0].verdict is not verdict
-            ):
-                drawn[:] = [(state.t, _shells(model, state, moving, S_p, verdict))]
-            return Result(
-                name=self.name,
-                value=float(least[k]),
-                unit="m",
-                limit=0.0,
-                at_most=False,
-                verdict=verdict,
-                reason=unbounded_reason if verdict is Verdict.UNDECIDED else model.bodies[outside[k]].name,
-                interval=(surely, float(least[k])) if surely < least[k] else None,
-                parts=(*parts, Result(name="largest S_p", value=float(S_p.max()), unit="m")),
-                markers=(*drawn[0][1], *lit),
-            )
+    def present(self, model: Model) -> Present:
+        """Return the function that says who is inside or nearest, and draws the area."""
+        return self._shown(model, model.gap(*self._sides(model)))
 
-        return evaluate
+    def one_by_one(self, model: Model) -> str:
+        """Say why S_p is; many instants are computed together where S_p is."""
+        return str(self._criterion(model).one_by_one(model))
+
+    def _shown(self, model: Model, gap: Gap) -> Present:
+        drawn: tuple[float, Verdict | None, Callable[[], tuple[Hull, ...]]] | None = None
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            nonlocal drawn
+            near: _Near = figure.beside
+            name = model.bodies[near.who].name
+            reason = self._unbounded_reason(model, near) if verdict is Verdict.UNDECIDED else name
+            if drawn is None or not 0 <= state.t - drawn[0] < self.redraw or drawn[1] is not verdict:
+                # Made once, by whoever looks first.
+                drawn = state.t, verdict, cache(_shells(model, state, gap.a, near.S_p, verdict))
+            shells, parts, found, where = drawn[2], figure.parts, near.found, list[str]()
+            names = () if parts is None else parts.names
+            for e in near.inside:
+                i, _ = divmod(e, len(gap.b))
+                robot = model.bodies[gap.a[i]].name
+                where.append(f"{found.distance[e]:.3f} m from {robot}, S_p {near.S_p[i]:.3f} m")
+
+            def draw() -> tuple[Marker, ...]:
+                lit: list[Marker] = []
+                for body, e in zip(names, near.inside, strict=True):
+                    a, b = found.point_a[e].tolist(), found.point_b[e].tolist()
+                    lit.append(Highlight(body=body, verdict=verdict))
+                    lit.append(Segment(start=tuple(a), end=tuple(b), verdict=verdict))
+                return *shells(), *lit
+
+            largest = Result(name="largest S_p", value=float(near.S_p.max()), unit="m")
+            return Shown(reason, draw, (largest,), where)
+
+        return present
 
     @staticmethod
-    def _unbounded_reason(model: Model, body: int, room: float, deviation: float, unknown: str) -> str:
+    def _unbounded_reason(model: Model, near: _Near) -> str:
         """Why somebody who is outside may be inside all the same."""
-        if unknown:
-            return f"{unknown}; the area is at least what is drawn"
-        if not keeps(room - deviation, 0.0, at_most=False):
-            name = model.bodies[body].name
-            return f"{name} is within {deviation * 1e3:.1f} mm, what shapes, places and S_p may be off by"
-        return ""
+        if near.unknown:
+            return f"{near.unknown}; the area is at least what is drawn"
+        who, off = model.bodies[near.perhaps].name, f"{near.off * 1e3:.1f} mm"
+        return f"{who} is within {off}, what shapes, places and S_p may be off by"
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
@@ -235,17 +201,108 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         )
 
 
+class _Required(NamedTuple):
+    """S_p of each moving part of a robot, by the criterion that is named."""
+
+    now: Callable[[State], Any]
+    largest: Callable[[State], Any] | None
+    """With its tolerances at their worst; None where it has none."""
+    of_many: Callable[[], Callable[[States], Array]]
+    """Binds what says it of N instants."""
+    unknown_ever: str
+    """Why S_p may always be larger than what is computed; empty when it may not."""
+
+    @classmethod
+    def of(cls, model: Model, criterion: Any) -> _Required:
+        worst = criterion.at_worst(model)
+        largest = None if worst is criterion else worst.required(model)
+        of_many = cache(partial(criterion.required_of_many, model))
+        return cls(criterion.required(model), largest, of_many, criterion.unknown(model))
+
+
+class _Near(Struct, frozen=True, eq=False):
+    """Who is nearest to the area or inside it, by index."""
+
+    who: int
+    perhaps: int
+    """Who may be nearest, shapes, places and S_p being what they are."""
+    off: float
+    """By how much that one may be nearer [m]."""
+    inside: list[int]
+    """Pairs of a moving part and who is inside, by their place in ``found``."""
+    found: Closests
+    """Of each moving part to each of who must stay outside."""
+    S_p: Array
+    """Of each moving part [m], shape (n,)."""
+    unknown: str
+    """Why S_p may be larger; empty where it may not."""
+
+
+def _rooms(model: Model, gap: Gap, required: _Required) -> Compute:
+    """How much farther than S_p everybody is from the moving parts."""
+    off, columns = TrackingError(model, gap.b), np.arange(len(gap.b))
+
+    def of_many(states: States) -> Figure:
+        S_p = required.of_many()(states)
+        distance = states.distances(gap.query, Per.PAIR).distance
+        room = distance.reshape(len(states), len(gap.a), len(gap.b)) - S_p[..., None]
+        value = room.min(axis=(1, 2))
+        return Figure(value, 0.0, (value - gap.deviation, value), open=bool(required.unknown_ever))
+
+    def compute(twin: Twin) -> Figure:
+        if twin.many:
+            return of_many(cast("States", twin))
+        state: State = twin  # type: ignore[assignment]
+        found = state.distances(gap.query, Per.PAIR)
+        S_p, most, more = required.now(state)
+        if required.largest is not None:
+            most = np.maximum(most, required.largest(state).most)
+        unknown = "; ".join(filter(None, (required.unknown_ever, more)))
+        room = found.distance.reshape(len(gap.a), len(gap.b)) - S_p[:, None]
+        nearest = room.argmin(axis=0)
+        least = room[nearest, columns]
+        # What the robot's acceleration and tolerances may add to S_p is as much less room.
+        may = off.at(state) + gap.deviation + float((most - S_p).max())
+        left = least - may
+        k, perhaps = int(least.argmin()), int(left.argmin())
+        entered = np.flatnonzero(least <= ROUNDING).tolist()
+        parts = None
+        if entered:
+            names = [model.bodies[gap.b[j]].name for j in entered]
+            parts = Parts(names, least[entered], np.zeros(len(entered)), whole=False)
+        near = _Near(
+            who=gap.b[k],
+            perhaps=gap.b[perhaps],
+            off=float(may[perhaps]),
+            inside=[int(nearest[j]) * len(gap.b) + j for j in entered],
+            found=found,
+            S_p=S_p,
+            unknown=unknown,
+        )
+        value = float(least[k])
+        ends = float(left[perhaps]), value
+        return Figure(value, 0.0, ends, open=bool(unknown), parts=parts, beside=near)
+
+    return compute
+
+
 def _shells(
-    model: Model, state: State, moving: tuple[int, ...], S_p: Array, verdict: Verdict
-) -> tuple[Hull, ...]:
-    shells = []
-    R, x = state.placed(moving)
-    for i, distance in zip(moving, S_p.tolist(), strict=True):
-        if i in state.attachments.away:
-            continue
-        body = model.bodies[i]
-        corners = body.corners @ R[i].T + x[i]
-        vertices, faces = offset_shell(corners, body.radius + max(distance, 0.0))
-        rounded = tuple((x, y, z) for x, y, z in vertices.round(3).tolist())
-        shells.append(Hull(vertices=rounded, faces=faces, verdict=verdict))
-    return tuple(shells)
+    model: Model, state: State, moving: tuple[int, ...], S_p: Array, verdict: Verdict | None
+) -> Callable[[], tuple[Hull, ...]]:
+    """Draws the area around each moving part, from copies of where they are."""
+    rotations, positions = state.placed(moving)
+    shown = [
+        (model.bodies[i], rotations[i].copy(), positions[i].copy(), distance)
+        for i, distance in zip(moving, S_p.tolist(), strict=True)
+        if i not in state.attachments.away
+    ]
+
+    def draw() -> tuple[Hull, ...]:
+        shells = []
+        for body, R, at, distance in shown:
+            vertices, faces = offset_shell(body.corners @ R.T + at, body.radius + max(distance, 0.0))
+            rounded = tuple((x, y, z) for x, y, z in vertices.round(3).tolist())
+            shells.append(Hull(vertices=rounded, faces=faces, verdict=verdict))
+        return tuple(shells)
+
+    return draw

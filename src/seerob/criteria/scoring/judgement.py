@@ -8,11 +8,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Highlight, Level, Result, Row, Verdict
 from seerob.core.verdict import judge, judge_interval
-from seerob.criteria.scoring.score_rows import ANGLES_OF, BONES_OF, Edges, component_rows, total_row
+from seerob.criteria.scoring.score_rows import (
+    ANGLES_OF,
+    BONES_OF,
+    Edges,
+    Ends,
+    component_rows,
+    total_row,
+)
 from seerob.criteria.scoring.spans import Ints, Span, Thresholds
 from seerob.description.humans.angles import SIDED, Angles
 from seerob.description.humans.skeleton import SIDES
@@ -83,79 +91,89 @@ def judged(
         The worse side gives the value. Undecided when a component is not assessed, unless even the
         best that it may be exceeds the limit; and when the accuracy leaves it open.
     """
-    sides = {key: _both(span) for key, span in components.items()}
-    measured = _grand(method, sides)
-    reach = measured if spread is None else _grand(method, {key: _both(s) for key, s in spread.items()})
-    missing = [key for key, span in sides.items() if not span.known]
-    verdicts = [
-        _verdict((int(reach.low[i]), int(reach.high[i])), limit, complete=not missing) for i in range(2)
-    ]
-    low, high = int(reach.low.max()), int(reach.high.max())
-    verdict = _verdict((low, high), limit, complete=not missing)
-    known = int(measured.low.max()) == int(measured.high.max())
-    value = int(measured.high.max()) if known else None
+    ends, wide = _ends(components), None if spread is None else _ends(spread)
+    found = _scored(method, name, human, limit, ends, wide)
+    edges = _edges(method, thresholds)
+    return replace(
+        found,
+        parts=(*found.parts, *_parts(ends, wide, angles)),
+        rows=(
+            *found.rows,
+            *component_rows(
+                ends, wide, angles, human=human, least=method.least, most=method.most, edges=edges
+            ),
+        ),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _scored(
+    method: Method, name: str, human: str, limit: int | None, measured: Ends, spread: Ends | None
+) -> Result:
+    """What of a result follows from scores alone, which seldom change from one tick to the next."""
+    low, high = _grand(method, measured)
+    least, most = (low, high) if spread is None else _grand(method, spread)
+    missing = [key for key, lows, highs in measured if lows != highs]
+    verdicts = [_verdict((least[i], most[i]), limit, complete=not missing) for i in range(len(SIDES))]
+    whole = max(least), max(most)
+    verdict = _verdict(whole, limit, complete=not missing)
+    value = max(high) if max(low) == max(high) else None
     # By what is known at least: what is not assessed drives nothing. Sides that are as bad both count.
-    worst = np.flatnonzero(measured.low == measured.low.max()).tolist()
-    known_least = {key: span.low for key, span in sides.items()}
-    drivers = {side: _drivers(method, _of_side(known_least, side)) for side in worst}
-    reason = _reason(method, sides, drivers, value, (low, high), missing, verdict)
+    worst = [side for side in range(len(SIDES)) if low[side] == max(low)]
+    drivers = {side: _drivers(method, _of_side(measured, side, LOW)) for side in worst}
+    reason = _reason(method, measured, drivers, value, whole, missing, verdict)
     bones = [
         bone.format(side=SIDES[side])
         for side, keys in drivers.items()
         for key in keys
         for bone in BONES_OF.get(key, ())
     ]
-    shown = None if spread is None and not missing else (low, high)
+    shown = spread is not None or bool(missing)
+    reach = None if spread is None else (least, most)
     return Result(
         name=name,
         value=value,
         limit=limit,
         verdict=verdict,
         reason=reason,
-        interval=shown,
-        parts=(
-            *(
-                Result(
-                    name=own,
-                    value=float(measured.high[i]) if measured.low[i] == measured.high[i] else None,
-                    limit=limit,
-                    verdict=verdicts[i],
-                    reason="not assessed" if measured.low[i] != measured.high[i] else "",
-                    interval=None if shown is None else (float(reach.low[i]), float(reach.high[i])),
-                )
-                for i, own in enumerate(SIDES)
-            ),
-            *_parts(components, spread, angles),
+        interval=whole if shown else None,
+        parts=tuple(
+            Result(
+                name=own,
+                value=float(high[i]) if low[i] == high[i] else None,
+                limit=limit,
+                verdict=verdicts[i],
+                reason="not assessed" if low[i] != high[i] else "",
+                interval=(float(least[i]), float(most[i])) if shown else None,
+            )
+            for i, own in enumerate(SIDES)
         ),
         markers=tuple(Highlight(body=f"{human}/{bone}", verdict=verdict) for bone in dict.fromkeys(bones)),
-        rows=(
-            *_totals(method, measured, None if spread is None else reach, limit, (*verdicts, verdict)),
-            *component_rows(
-                components,
-                spread,
-                angles,
-                human=human,
-                least=method.least,
-                most=method.most,
-                edges=method.edges(thresholds),
-            ),
-        ),
+        rows=_totals(method, (low, high), reach, limit, (*verdicts, verdict)),
     )
+
+
+@lru_cache(maxsize=64)
+def _edges(method: Method, thresholds: Thresholds) -> Edges:
+    return method.edges(thresholds)
+
+
+Grands = tuple[tuple[int, ...], tuple[int, ...]]
+"""Least score of each side, and greatest."""
 
 
 def _totals(
     method: Method,
-    measured: Span,
-    reach: Span | None,
+    measured: Grands,
+    reach: Grands | None,
     limit: int | None,
     verdicts: Sequence[Verdict | None],
-) -> list[Row]:
-    def ends(span: Span, side: int) -> tuple[int, int]:
-        if side == len(SIDES):
-            return int(span.low.max()), int(span.high.max())
-        return int(span.low[side]), int(span.high[side])
+) -> tuple[Row, ...]:
+    def ends(span: Grands, side: int) -> tuple[int, int]:
+        low, high = span
+        return (max(low), max(high)) if side == len(SIDES) else (low[side], high[side])
 
-    return [
+    return tuple(
         total_row(
             name,
             ends(measured, i),
@@ -165,31 +183,32 @@ def _totals(
             verdicts[i],
         )
         for i, name in enumerate((*SIDES, ""))
-    ]
-
-
-def _both(span: Span) -> Span:
-    """Central components get a last axis, so that they meet those of both sides."""
-    return span if span.low.ndim else Span(span.low[None], span.high[None])
-
-
-def _grand(method: Method, components: Mapping[str, Span]) -> Span:
-    low, high = (
-        np.array([_score(method, _of_side(ends, side)) for side in range(len(SIDES))], np.int64)
-        for ends in (
-            {key: span.low for key, span in components.items()},
-            {key: span.high for key, span in components.items()},
-        )
     )
-    return Span(low, high)
+
+
+def _ends(components: Mapping[str, Span]) -> Ends:
+    return tuple(
+        (key, tuple(span.low.ravel().tolist()), tuple(span.high.ravel().tolist()))
+        for key, span in components.items()
+    )
+
+
+def _grand(method: Method, components: Ends) -> Grands:
+    low, high = (
+        tuple(_score(method, _of_side(components, side, end)) for side in range(len(SIDES)))
+        for end in (LOW, HIGH)
+    )
+    return low, high
 
 
 Scores = tuple[tuple[str, int], ...]
-"""Components of one side and their scores: they seldom change from one tick to the next."""
+"""Components of one side and their scores."""
+LOW, HIGH = 1, 2
 
 
-def _of_side(scores: Mapping[str, Ints], side: int) -> Scores:
-    return tuple((key, int(score[side % len(score)])) for key, score in scores.items())
+def _of_side(components: Ends, side: int, end: int) -> Scores:
+    # What is not of a side counts on both.
+    return tuple((str(each[0]), int(each[end][side % len(each[end])])) for each in components)
 
 
 @lru_cache(maxsize=4096)
@@ -220,7 +239,7 @@ def _drivers(method: Method, scores: Scores) -> tuple[str, ...]:
 
 def _reason(
     method: Method,
-    sides: Mapping[str, Span],
+    components: Ends,
     drivers: Mapping[int, Sequence[str]],
     value: float | None,
     ends: tuple[int, int],
@@ -234,7 +253,8 @@ def _reason(
         parts.append(f"the accuracy leaves it open: the score lies between {ends[0]} and {ends[1]}")
     said: dict[str, list[str]] = {}
     for side, keys in drivers.items():
-        scores = ", ".join(f"{key} {sides[key].low[side % len(sides[key].low)]}" for key in keys)
+        least = dict(_of_side(components, side, LOW))
+        scores = ", ".join(f"{key} {least[key]}" for key in keys)
         if scores:
             said.setdefault(scores, []).append(SIDES[side])
     for scores, whose in said.items():
@@ -244,14 +264,11 @@ def _reason(
     return "; ".join(parts)
 
 
-def _parts(components: Mapping[str, Span], spread: Mapping[str, Span] | None, angles: Angles) -> list[Result]:
+def _parts(components: Ends, spread: Ends | None, angles: Angles) -> list[Result]:
     found = []
-    for key, span in components.items():
-        wide = span if spread is None else spread[key]
-        for i in range(max(1, span.low.size)):
-            sided = bool(span.low.ndim)
-            low, high = int(span.low.flat[i]), int(span.high.flat[i])
-            ends = (float(wide.low.flat[i]), float(wide.high.flat[i]))
+    for (key, lows, highs), (_, least, most) in zip(components, spread or components, strict=True):
+        sided = len(lows) > 1
+        for i, (low, high) in enumerate(zip(lows, highs, strict=True)):
             shown = _shown(angles, ANGLES_OF.get(key, ()), i if sided else None)
             found.append(
                 Result(
@@ -259,7 +276,7 @@ def _parts(components: Mapping[str, Span], spread: Mapping[str, Span] | None, an
                     value=float(low) if low == high else None,
                     verdict=None if low == high else Verdict.UNDECIDED,
                     reason=shown if low == high else "; ".join(filter(None, ("not assessed", shown))),
-                    interval=None if spread is None and low == high else ends,
+                    interval=None if spread is None and low == high else (float(least[i]), float(most[i])),
                 )
             )
     return found
@@ -268,7 +285,7 @@ def _parts(components: Mapping[str, Span], spread: Mapping[str, Span] | None, an
 def _shown(angles: Angles, names: Sequence[str], side: int | None) -> str:
     words = []
     for name in names:
-        values = getattr(angles, name).tolist()
+        values = angles.listed[name]
         label = name.replace("_", " ")
         if side is not None and name in SIDED:
             words.append(f"{label} {_degrees(values[side])}")

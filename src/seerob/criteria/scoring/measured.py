@@ -103,9 +103,10 @@ class Measured:
 
     def error(self, *names: str) -> float:
         """The largest accuracy of some angles [rad]."""
-        if isinstance(self._accuracy, Mapping):
-            return max(self._accuracy.get(name, 0.0) for name in names)
-        return float(self._accuracy)
+        accuracy = self._accuracy
+        if type(accuracy) is not float and isinstance(accuracy, Mapping):
+            return max(accuracy.get(name, 0.0) for name in names)
+        return float(accuracy)
 
     def graded(
         self, name: str, score: Callable[[Array], Ints], *, within: tuple[int, int], neutral: float = 0.0
@@ -130,7 +131,7 @@ class Measured:
             return 0.0
         aside, whole = LEVERS[name]
         lever = np.cos(getattr(self.angles, aside)) + (1.0 if whole else 0.0)
-        return turned(ROUNDING, lever) if np.any(lever < SHORT) else 0.0
+        return turned(ROUNDING, lever) if np.count_nonzero(lever < SHORT) else 0.0
 
     def beyond(self, name: str, threshold: float, *, signed: bool = False) -> Span:
         """`spans.beyond` of an angle by its name."""

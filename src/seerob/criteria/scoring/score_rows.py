@@ -11,7 +11,7 @@ from functools import cache
 from itertools import pairwise
 
 from seerob.core.snapshot import Aspect, Row, RowState, Verdict
-from seerob.criteria.scoring.spans import Span, Thresholds, fallen, reached
+from seerob.criteria.scoring.spans import Thresholds, fallen, reached
 from seerob.description.humans.angles import SIDED, Angles
 from seerob.description.humans.skeleton import SIDES
 
@@ -90,9 +90,13 @@ ANGLES_OF: dict[str, tuple[str, ...]] = {
 """Component → angles that it is made of, for whoever reads the result."""
 
 
+Ends = tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...]
+"""Components with their least and greatest score: of both sides, or one for both."""
+
+
 def component_rows(
-    components: Mapping[str, Span],
-    spread: Mapping[str, Span] | None,
+    components: Ends,
+    spread: Ends | None,
     angles: Angles,
     *,
     human: str,
@@ -103,8 +107,8 @@ def component_rows(
     """A row per component and side.
 
     Args:
-        components: Score of each component as it was measured, shapes (2,) and ().
-        spread: The same within the accuracy; None when that is not known.
+        components: Scores as they were measured.
+        spread: The same within the accuracy, in the same order; None when that is not known.
         angles: Of the posture.
         human: Whose bones.
         least: Least score of each component.
@@ -112,25 +116,22 @@ def component_rows(
         edges: Bands of the angles.
     """
     rows = []
-    for key, span in components.items():
-        wide = span if spread is None else spread[key]
-        for i in range(max(1, span.low.size)):
-            side = SIDES[i] if span.low.ndim else ""
-            low, high = float(span.low.flat[i]), float(span.high.flat[i])
+    for (key, lows, highs), (_, widest, highest) in zip(components, spread or components, strict=True):
+        sided = len(lows) > 1
+        for i, (low, high) in enumerate(zip(lows, highs, strict=True)):
+            side = SIDES[i] if sided else ""
             known = low == high
             rows.append(
                 Row(
                     name=key,
                     side=side,
                     state=RowState.JUDGED if known else RowState.NOT_ASSESSED,
-                    value=low if known else None,
+                    value=float(low) if known else None,
                     scale=(float(least[key]), float(most[key])),
-                    interval=None
-                    if spread is None and known
-                    else (float(wide.low.flat[i]), float(wide.high.flat[i])),
+                    interval=None if spread is None and known else (float(widest[i]), float(highest[i])),
                     reason="" if known else "not measured or not entered",
                     bones=_bones(human, key, side),
-                    aspects=aspects(angles, ANGLES_OF.get(key, ()), i if side else None, edges),
+                    aspects=aspects(angles, ANGLES_OF.get(key, ()), i if sided else None, edges),
                 )
             )
     return tuple(rows)
@@ -178,7 +179,7 @@ def aspects(angles: Angles, names: Sequence[str], side: int | None, edges: Edges
     """Angles with the bands that they fall into; of both sides where a component has none."""
     found = []
     for name in names:
-        values = getattr(angles, name).tolist()
+        values = angles.listed[name]
         label = name.replace("_", " ")
         if name not in SIDED:
             pairs = [(label, values)]

@@ -124,7 +124,7 @@ def fallen(angle: Array | float, edge: float) -> NDArray[np.bool_] | bool:
 
 def any_of(values: Array | float) -> bool:
     """Whether any of some numbers is not 0."""
-    return bool(values) if type(values) is float else bool(np.any(values))
+    return bool(values) if type(values) is float else bool(np.count_nonzero(values))
 
 
 class Span(NamedTuple):
@@ -158,7 +158,7 @@ def exactly(score: ArrayLike) -> Span:
 def between(low: ArrayLike, high: ArrayLike) -> Span:
     """A score of which the ends are known, whole numbers; ValueError for what are none, or fall."""
     span = Span(_scores(low), _scores(high))
-    if (span.low > span.high).any():
+    if np.count_nonzero(span.low > span.high):
         raise ValueError("a score is at least more than it is at most")
     return span
 
@@ -202,7 +202,7 @@ def graded(
     else:
         low = high = score(angle)
     missing = np.isnan(angle)
-    if missing.any():
+    if np.count_nonzero(missing):  # several times as fast as any() of a single angle
         low, high = np.where(missing, within[0], low), np.where(missing, within[1], high)
     return Span(low, high)
 

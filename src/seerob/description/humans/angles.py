@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,6 +80,11 @@ class Angles:
     """Shank against the vertical, 0 to π, shape (..., 2)."""
     foot_rise: Array
     """Ankle above the lower ankle, seen from the hip over the length of the leg, shape (..., 2)."""
+
+    @cached_property
+    def listed(self) -> dict[str, Any]:
+        """By name, a number [rad] or those of both sides, of one posture."""
+        return {f.name: getattr(self, f.name).tolist() for f in fields(self)}
 
     def without(self, bones: Collection[str]) -> Angles:
         """Return these angles, with NaN for every angle that needs one of the bones: it is not assessed."""
@@ -151,38 +158,47 @@ def angles(rotations: ArrayLike, positions: ArrayLike) -> Angles:
         for bone in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank")
     )
     at = {bone: _sided(p, bone) for bone in ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")}
-    chest = thorax[..., None, :, :]
+    # Of all bones together: numpy takes longer to be asked than for the six or twelve of one posture.
+    middle, chest = np.stack([pelvis, thorax], -3), np.stack([thorax] * 6, -3)
     trunk = _in_heading(pelvis[..., 2], thorax[..., 1])
-    neck = _seen(thorax, head[..., 1])
-    arm, forearm = _seen(chest, -upper[..., 1]), _seen(chest, -fore[..., 1])
-    lateral = _seen(chest, clavicle[..., 2] * _OUTWARD[:, None])
-    bent, wrist, knee = _seen(upper, -fore[..., 1]), _seen(fore, -hand[..., 1]), _seen(thigh, -shank[..., 1])
-    reach = at["hand"] - at["upper_arm"]
-    across = -_OUTWARD * _dot(at["hand"] - p[..., None, _INDEX["thorax"], :], chest[..., 2])
-    leg = at["foot"] - at["thigh"]
+    parents = np.concatenate([chest, thorax[..., None, :, :], upper, fore, thigh], -3)
+    directions = [-upper[..., 1], -fore[..., 1], clavicle[..., 2] * _OUTWARD[:, None], head[..., None, :, 1]]
+    directions += [-fore[..., 1], -hand[..., 1], -shank[..., 1]]
+    seen = _seen(parents, np.concatenate(directions, -2))
+    arm, forearm, lateral = (seen[..., k : k + 2, :] for k in (0, 2, 4))
+    neck, (bent, wrist, knee) = seen[..., 6, :], (seen[..., k : k + 2, :] for k in (7, 9, 11))
+    children = np.concatenate([np.stack([thorax, head], -3), upper, fore], -3)
+    twist = _twist(np.concatenate([middle, chest[..., :2, :, :], upper], -3), children)
+    reach, leg = at["hand"] - at["upper_arm"], at["foot"] - at["thigh"]
+    across = -_OUTWARD * _dot(at["hand"] - p[..., None, _INDEX["thorax"], :], chest[..., :2, :, 2])
     rise = at["foot"][..., 2] - at["foot"][..., 2].min(axis=-1, keepdims=True)
+    sines = [trunk[..., 2:], neck[..., 2:], _OUTWARD * arm[..., 2], lateral[..., 1]]
+    sines += [_OUTWARD * forearm[..., 2], across / np.maximum(_norm(reach), _TINY), -_OUTWARD * wrist[..., 2]]
+    tilt = _arcsin(np.concatenate([*sines, rise / np.maximum(_norm(leg), _TINY)], -1))
+    joints = np.concatenate([arm, bent, knee], -2)
+    folded = np.arctan2(np.hypot(joints[..., 0], joints[..., 2]), -joints[..., 1])
     return Angles(
         trunk_flexion=_bent(np.arctan2(trunk[..., 0], trunk[..., 1])),
-        trunk_side_bend=_arcsin(trunk[..., 2]),
-        trunk_twist=_twist(pelvis, thorax),
+        trunk_side_bend=tilt[..., 0],
+        trunk_twist=twist[..., 0],
         neck_flexion=np.arctan2(neck[..., 0], neck[..., 1]),
-        neck_side_bend=_arcsin(neck[..., 2]),
-        neck_twist=_twist(thorax, head),
+        neck_side_bend=tilt[..., 1],
+        neck_twist=twist[..., 1],
         shoulder_flexion=_forward(np.arctan2(arm[..., 0], -arm[..., 1])),
-        shoulder_elevation=np.arctan2(np.hypot(arm[..., 0], arm[..., 2]), -arm[..., 1]),
-        shoulder_abduction=_arcsin(_OUTWARD * arm[..., 2]),
-        shoulder_rotation=_OUTWARD * _twist(chest, upper),
-        clavicle_elevation=_arcsin(lateral[..., 1]),
+        shoulder_elevation=folded[..., :2],
+        shoulder_abduction=tilt[..., 2:4],
+        shoulder_rotation=_OUTWARD * twist[..., 2:4],
+        clavicle_elevation=tilt[..., 4:6],
         arm_rise=np.maximum(_slope(at["forearm"] - at["upper_arm"]), _slope(reach)),
-        elbow_flexion=np.arctan2(np.hypot(bent[..., 0], bent[..., 2]), -bent[..., 1]),
-        forearm_out=_arcsin(_OUTWARD * forearm[..., 2]),
-        wrist_across=_arcsin(across / np.maximum(_norm(reach), _TINY)),
-        forearm_rotation=_wrapped(_OUTWARD * _twist(upper, fore) - np.pi / 2),
+        elbow_flexion=folded[..., 2:4],
+        forearm_out=tilt[..., 6:8],
+        wrist_across=tilt[..., 8:10],
+        forearm_rotation=_wrapped(_OUTWARD * twist[..., 4:] - np.pi / 2),
         wrist_flexion=np.arctan2(wrist[..., 0], -wrist[..., 1]),
-        wrist_deviation=_arcsin(-_OUTWARD * wrist[..., 2]),
-        knee_flexion=np.arctan2(np.hypot(knee[..., 0], knee[..., 2]), -knee[..., 1]),
+        wrist_deviation=tilt[..., 10:12],
+        knee_flexion=folded[..., 4:],
         shank_tilt=np.arctan2(np.hypot(shank[..., 0, 1], shank[..., 1, 1]), shank[..., 2, 1]),
-        foot_rise=_arcsin(rise / np.maximum(_norm(leg), _TINY)),
+        foot_rise=tilt[..., 12:],
     )
 
 
@@ -199,7 +215,7 @@ def _norm(a: Array) -> Array:
 
 
 def _arcsin(sine: Array) -> Array:
-    return np.asarray(np.arcsin(np.clip(sine, -1.0, 1.0)))
+    return np.arcsin(np.minimum(np.maximum(sine, -1.0), 1.0))
 
 
 def _slope(way: Array) -> Array:

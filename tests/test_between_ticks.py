@@ -1064,6 +1064,25 @@ def test_where_nothing_is_to_judge_a_bound_tells_of_what_nobody_sees(tmp_path):
     assert looks > 0
 
 
+def test_what_nothing_bounds_is_muted_at_each_tick_at_which_it_does_not_apply_whatever_its_period(tmp_path):
+    station, t, *_ = leaps(tmp_path)
+    one = bound_to(station.model, Turned(name="one", limit=0.95, active="door", every=10.0), "safety")
+    feed = pump(station.sources, 0.01)
+    judge = Judge([replace(one, watch=None)])
+    results = [out.results[0] for out, _ in islice(ticks(engine_of(station.model), judge, feed), 21)]
+    on = np.array(SWITCHED)[np.searchsorted([at for at, _ in SWITCHED], t + 1e-9, side="right") - 1, 1] == 1
+    # From 146 to 150 ms it applied, and at neither tick.
+    passed = results.pop(15)
+    assert (passed.verdict, passed.muted) == (Verdict.UNDECIDED, False)
+    assert "from 0.1461 s, between two ticks only" in passed.reason
+    on = np.delete(on, 15)
+    assert [result.muted for result in results] == (~on).tolist()
+    assert {result.verdict for result in results if not result.muted} == {Verdict.WITHIN}
+    # And it is asked when it begins to apply, not again while it goes on.
+    since = [result.t for result in results if not result.muted]
+    assert len({*since}) == 1 + np.count_nonzero(on[1:] & ~on[:-1])
+
+
 OTHER = TWO_R.replace('"arm"', '"other"\nq = [0, 0]\nbase = { position = [9, 0, 0] }', 1)
 
 

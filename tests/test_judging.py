@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.core.markers import Label, Segment
-from seerob.core.snapshot import Finding, Result, Row, Verdict
-from seerob.criteria.judging import Judge, undecided
+from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
+from seerob.core.verdict import judge_interval
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.judging import Judge, bound_to, relied_on, undecided
+from seerob.criteria.noisy_speeds import NOISE, REMEMBERS
+from seerob.description.humans.skeleton import BONES
 from seerob.session import batch
 from seerob.twin.states import motion_of
+from seerob.twin.validity.hearing import BonesHeard, Heard
 
 WITHIN, EXCEEDED = Verdict.WITHIN, Verdict.EXCEEDED
 
@@ -263,3 +269,120 @@ def test_how_fast_a_robot_is_that_nothing_moves_is_not_within(tmp_path, source, 
     assert "arm: no source says how it moves" in given["v"].reasons[0]
     given = station.batch({"arm": zeros}, {"arm": zeros}, t=[0.0, 0.01, 0.02])
     assert {str(given[name].verdict) for name in ("E", "d", "v")} == {"within"}
+
+
+# -- criteria of one's own ----------------------------------------------------------------------
+
+
+class Turning(Criterion, frozen=True, kw_only=True):
+    """How fast the first joint of an arm turns, or whatever it is told to say."""
+
+    limit: float | None = None
+    off: float = 0.0
+    """How far it may be off [rad/s]."""
+    remembering: bool = False
+    says: Result | None = None
+    looks_at: str = ""
+    """A body that it asks for, and does not declare."""
+
+    def remembers(self, model):
+        return self.remembering
+
+    def subjects(self):
+        return ("arm",)
+
+    def basis(self, model):
+        return Basis(formula="q", source="made", inputs=(), not_modelled=())
+
+    def bind(self, model):
+        robot = model.robot("arm")
+
+        def evaluate(state):
+            if self.looks_at:
+                state.placed(model.select(self.looks_at))
+            if self.says is not None:
+                return self.says
+            value = abs(float(state.qd(robot)[0]))
+            ends = (value - self.off, value + self.off)
+            return Result(
+                name=self.name,
+                value=value,
+                limit=self.limit,
+                interval=ends if self.off else None,
+                verdict=judge_interval(ends, self.limit),
+            )
+
+        return evaluate
+
+
+class Knowing(Turning, frozen=True, kw_only=True):
+    by_speed: ClassVar[bool] = True
+
+
+class PartByPart(Turning, frozen=True, kw_only=True):
+    whole: ClassVar[bool] = False
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    text = FLOATING + TWO_R + person("op", 9, 0, 0)
+    return made(tmp_path_factory.mktemp("own"), text, {"arm.urdf": two_r()})
+
+
+def said(station, criterion, state):
+    (result,) = Judge([bound_to(station.model, criterion, "safety")])(state)
+    return result
+
+
+def test_what_noise_of_speeds_changes_is_in_the_interval_of_who_does_not_say_it_and_of_nobody_else(cell):
+    def turned(kind=Turning, noise=(0.1, 0.5), **how):
+        state = state_at(cell, arm=MOVING)
+        state.hearings["arm"].heard[:] = [Heard(0.0, speed_error=np.array(noise))]
+        state.refresh(0.0)
+        return said(cell, kind(name="v", **how), state)
+
+    assert turned(limit=1.2).interval == pytest.approx((0.9, 1.1))
+    assert turned(limit=1.2).verdict == "within"
+    assert turned(limit=1.2, off=0.02).interval == pytest.approx((0.88, 1.12))
+    near = turned(limit=1.05)
+    assert (near.verdict, near.reason[: len(NOISE)], near.value) == ("undecided", NOISE, 1.0)
+    for known in (turned(limit=1.05, noise=(0.0, 0.5)), turned(limit=1.05, noise=(0.0, 0.0))):
+        assert (known.verdict, known.interval) == ("within", None)
+    knows = turned(Knowing, limit=1.05)
+    assert (knows.verdict, knows.interval) == ("within", None)
+    kept = turned(limit=1.2, remembering=True)
+    assert (kept.verdict, kept.reason) == ("undecided", REMEMBERS)
+
+
+def test_who_looks_at_one_bone_unsaid_rests_on_all_of_the_person_unless_it_judges_part_by_part(cell):
+    state = state_at(cell, arm=MOVING)
+    for seen, verdict in ((frozenset(BONES), "within"), (frozenset(BONES) - {"right_hand"}, "undecided")):
+        state.hearings["op"].bones_heard[:] = [BonesHeard(0.0, observed=seen)]
+        state.refresh(0.0)
+        assert said(cell, Turning(name="v", limit=2.0, looks_at="op/head"), state).verdict == verdict
+        assert said(cell, PartByPart(name="v", limit=2.0, looks_at="op/head"), state).verdict == "within"
+    state.hearings["op"].given = False
+    state.refresh(0.0)
+    assert said(cell, PartByPart(name="v", limit=2.0, looks_at="op/head"), state).verdict == "undecided"
+
+
+def test_what_says_nothing_is_undecided_and_not_passed_over_and_told_once(cell, caplog):
+    state = state_at(cell, arm=MOVING)
+    silent = Turning(name="v", says=Result(name="v", nothing=True))
+    judge = Judge([bound_to(cell.model, silent, "safety")])
+    for _ in range(3):
+        (result,) = judge(state)
+        assert (result.verdict, result.nothing) == ("undecided", False)
+    assert [record.name for record in caplog.records] == ["seerob.criteria.judging"]
+
+
+def test_part_by_part_something_must_be_heard_of_whoever_a_name_means(cell):
+    class Of(PartByPart, frozen=True, kw_only=True):
+        about: tuple[str, ...] = ()
+
+        def subjects(self):
+            return self.about
+
+    for names, whom in ((("arm/l2",), ("arm",)), (("op", "arm"), ("op", "arm")), (("op/head",), ("op",))):
+        assert relied_on(Of(name="v", about=names), cell.model) == whom
+    assert relied_on(Turning(name="v"), cell.model) == ()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -60,6 +62,7 @@ def test_links_count_by_half_and_what_is_mounted_in_full_whatever_it_is_called(t
     cell = made(tmp_path, FLOATING + TWO_R + "mass_tolerance = 0.1\n" + tool, {"arm.urdf": two_r()})
     found = MassTolerances(cell.model, cell.model.robot("arm"))
     assert [found.simplified(4.0, shifts) for shifts in ((1, 0), (0, 1))] == pytest.approx([4.1, 4.3])
+    assert found.heaviest_load() == pytest.approx(3.3)
 
 
 def young(state, name, way, lighter, heavier):
@@ -144,3 +147,54 @@ def test_a_link_that_is_heavier_has_more_of_its_own_inertia_too(tmp_path):
         [0.8 * nominal, nominal, 1.2 * nominal]
     )
     assert [found.simplified(1.0, (side,)) for side in (-1, 0, 1)] == pytest.approx([0.8, 1.0, 1.2])
+
+
+def test_bodies_weigh_what_their_own_tolerances_say_and_no_other(tmp_path):
+    """A grip of 3 kg ± 20 % on links ± 10 %, its centre within 2 cm: factors, ways, and the shifted model."""
+    tool = TOOL.format("mass = 3\nmass_tolerance = 0.2\ncom_tolerance = 0.02")
+    other = '[[parts]]\nname = "post"\nshape = { sphere = 0.1 }\nat = { position = [9, 0, 0] }\nmass = 1\n'
+    text = FLOATING + TWO_R + "mass_tolerance = 0.1\n" + tool + other
+    cell = made(tmp_path, text, {"arm.urdf": two_r()})
+    mj = cell.model.mj
+    found = MassTolerances(cell.model, cell.model.robot("arm"))
+    links, grip = [mj.body(name).id for name in ("arm/l1", "arm/l2")], mj.body("grip").id
+    assert [found.heaviest(body) for body in links] == [(pytest.approx(1.1), 0)] * 2
+    assert found.heaviest(grip) == (pytest.approx(1.2), 0.02)
+    assert found.heaviest(0) == (1.0, 0)
+    assert len(found) == len(found.tolerances) == 3
+    assert found.moved == (str(Tolerance("com_tolerance of grip", 0.02, "m")),)
+    for shifts, link, load in (
+        ((0, 0, 1), 1, 1),
+        ((1, 0, 0), 1.1, 1),
+        ((-1, 1, 0), 0.9, 1.2),
+        ((0, -1, 1), 1, 0.8),
+    ):
+        weighed = found.weighed(mj, shifts)
+        factors = np.ones(mj.nbody)
+        factors[links], factors[grip] = link, load
+        np.testing.assert_allclose(weighed.body_mass, mj.body_mass * factors, rtol=1e-12)
+        np.testing.assert_allclose(weighed.body_inertia, mj.body_inertia * factors[:, None], rtol=1e-12)
+        # What follows from masses follows from these.
+        assert weighed.body_subtreemass[0] == pytest.approx(weighed.body_mass.sum())
+
+
+@pytest.mark.parametrize(
+    ("error", "dense", "told"),
+    [(1e-4, 0.3, []), (1.05e-4, 0.3, [0.01365]), (0.05, 0.3, [6.5]), (0.05, None, [5.0])],
+)
+def test_a_volume_that_is_known_to_a_ten_thousandth_is_exact(tmp_path, error, dense, told):
+    """Else its error, which is more of what may be denser, too, is told in percent."""
+    more = f"density_tolerance = {dense}" if dense else ""
+    text = FLOATING + TWO_R + TOOL.format(f"density = {DENSITY}\n{more}")
+    cell = made(tmp_path, text, {"arm.urdf": two_r()})
+    bodies = tuple(
+        replace(body, mass=replace(body.mass, error=error)) if body.name == "grip" else body
+        for body in cell.model.bodies
+    )
+    model = replace(cell.model, bodies=bodies)
+    found = MassTolerances(model, model.robot("arm")).tolerances
+    if dense:
+        assert found[0] == Tolerance("density_tolerance of grip", 30.0, "%")
+        found = found[1:]
+    assert [tolerance.half for tolerance in found] == pytest.approx(told)
+    assert all(t.name == "volume of grip" and t.unit == "%" for t in found)

@@ -139,6 +139,7 @@ def test_what_ends_in_motion_is_in_doubt_once_nothing_follows_and_its_grace_is_o
 def test_who_falls_behind_takes_back_all_that_lies_ahead_and_nothing_after_it() -> None:
     again = 1.0 + REPEATED / 2
     assert doubted((0.0, ""), (1.0, ""), (again, "late")).invalid_reason(0.5) == "late"
+    assert doubted((0.0, ""), (1.0, ""), (again, "late"), (2.0, "")).invalid_reason(0.5) == "late"
     assert doubted((0.0, ""), (1.0, ""), (again, ""), (2.0, "late")).invalid_reason(0.5) == ""
     assert doubted((0.0, ""), (1.0, ""), (2.0, "late")).invalid_reason(0.5) == ""
     assert doubted((0.0, ""), (1.0, ""), (2.0, "late")).invalid_reason(1.5) == "late"
@@ -168,6 +169,7 @@ def test_what_is_heard_ahead_is_known_to_the_end_of_the_span_and_not_beside_it()
     assert why([(-SLACK, ""), (0.4, "late")], -0.2, 0.0) == ""
     assert why([(-2 * SLACK, ""), (0.4, "late")], -0.2, 0.0) == "late"
     assert why([(0.0, ""), (0.5 + SLACK, "")], 0.1, 0.2) == ""
+    assert why([(1.0, ""), (1.4, "")], 1.1, 1.2) == ""
     assert why([(0.0, ""), (0.51, "")], 0.1, 0.2) == "nothing is heard from 0.000 s to 0.510 s"
     assert why([(0.0, "")], -0.1, SLACK, leaves=1.0) == ""
     assert why([(0.0, "")], -0.1, 0.1, leaves=0.01) == ""

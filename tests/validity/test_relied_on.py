@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
-from seerob.core.errors import Undecided
+from seerob.core.errors import NotAsked, Undecided
 from seerob.description.humans.skeleton import BONES
 from seerob.twin.signals import Signals
 from seerob.twin.validity.hearing import BonesHeard
+from seerob.twin.validity.validity import Validity
 
 UNSEEN = person("guessed", -9, 0, 0) + "unseen_uncertainty = 0.1\n"
 
@@ -128,8 +129,8 @@ def test_bones_that_nobody_sees_will_do_only_where_the_file_accepts_them_and_not
         assert relied_on(state, hand, allow_estimated=True) is (name == "guessed")
         state.heard()
         assert state.input_reason(name) == ""
-        both = bodies_of(state, name, "arm")
-        assert state.invalid_bodies(both) == hand
+        both, every = bodies_of(state, name, "arm"), bodies_of(state, "op", "guessed", "arm")
+        assert state.invalid_bodies(both) == state.invalid_bodies(every) == hand
         hearing.bones_heard[:] = [BonesHeard(0.0, (("smeared", ("right_hand",)),), seen)]
         assert not relied_on(state, hand, allow_estimated=True)
         assert state.input_reason(name) == f"{name}: smeared"
@@ -149,6 +150,10 @@ def test_a_doubt_that_names_no_bone_is_one_of_the_whole_person(state):
     with pytest.raises(Undecided, match="op: out of step"):
         state.require("op")
     state.require("arm", "guessed")
+    # Nor is a bone relied on that is in doubt without a word.
+    hearing.bones_heard[:] = [BonesHeard(0.0, (("", ("head",)),), frozenset(BONES))]
+    assert not relied_on(state, bodies_of(state, "op/head"))
+    assert relied_on(state, bodies_of(state, "op/right_hand"))
 
 
 def test_a_body_that_moved_to_where_nobody_knows_is_in_doubt_whoever_it_belonged_to(state):
@@ -161,8 +166,11 @@ def test_a_body_that_moved_to_where_nobody_knows_is_in_doubt_whoever_it_belonged
         state.require_bodies(head)
 
 
-def test_a_state_without_machines_has_signals_all_the_same(state):
-    assert isinstance(state.signals, Signals)
+def test_what_would_not_say_whether_it_may_be_relied_on_is_closed_while_a_criterion_is_asked(state):
+    with state.asking(), pytest.raises(NotAsked, match="hearings does not say"):
+        print(state.hearings)
+    assert set(state.hearings) == {"arm", "op", "guessed"}
+    assert isinstance(Validity(state.model, {}).signals, Signals)
 
 
 def test_how_fast_a_robot_is_its_own_source_tells_or_that_of_what_carries_it_each_heard_more_than_once(

@@ -10,7 +10,7 @@ from seerob.criteria.judging import Judge
 from seerob.description.humans.skeleton import BONES
 from seerob.distance.least import Query
 from seerob.twin.accuracy.tracking_error import TrackingError, tracking
-from seerob.twin.validity.hearing import BonesHeard
+from seerob.twin.validity.hearing import EVERYWHERE, BonesHeard
 
 PEOPLE = person("op", 3, 0, 0) + person("other", -9, 0, 0)
 AREA = '[[areas]]\nname = "zone"\nshape = { box = [1, 1, 3] }\n'
@@ -73,6 +73,41 @@ def test_a_bone_that_is_not_aimed_is_on_a_circle_around_its_joint(tmp_path):
         assert off(station, state, HEAD, HAND, "op/left_hand") == pytest.approx(
             [0.02 + 2 * r * np.sin(angle / 2), 0.01 + 0.9 * reach(station, HAND), 0.0]
         )
+
+
+def test_what_is_held_or_seen_elsewhere_too_may_be_farther_by_so_much(tmp_path):
+    station, state = twin(tmp_path)
+    hearing = state.hearings["op"]
+    places = EVERYWHERE._replace(slack={"head": 0.25})
+    hearing.bones = {"head": (0.02, 0.0), "right_hand": (0.01, 0.0)}
+    hearing.bones_heard[:] = [BonesHeard(0.0, places=places)]
+    assert off(station, state, HEAD, HAND, "other/head") == pytest.approx([0.27, 0.01, 0.0])
+
+
+def test_a_twin_that_is_held_elsewhere_is_off_by_its_way_from_where_it_was_captured(tmp_path):
+    """And by what devices are off from there: every bone by how far its joint is, and how it is turned."""
+    station, state = twin(tmp_path)
+    human, hearing = station.model.human("op"), state.hearings["op"]
+    names = [f"op/{bone}" for bone in BONES]
+    bodies = tuple(next(b.index for b in station.model.bodies if b.name == name) for name in names)
+    q = state.q(human).copy()
+    for shift, turn in (((0.3, 0.0, 0.4), 0.0), ((0.3, 0.0, 0.0), 0.5)):
+        hearing.captured = q.copy()
+        hearing.captured[:6] += np.array([*shift, 0.0, 0.0, turn])
+        hearing.error, hearing.bones = 9.0, dict.fromkeys(BONES, (5.0, 5.0))
+        hearing.residual = dict.fromkeys(BONES, (0.02, 0.0))
+        state.refresh(0.0)
+        R, x = state.captured("op", bodies)
+        away = np.linalg.norm(x - state.positions[list(bodies)], axis=1)
+        turned = np.einsum("nij,nij->n", R, state.rotations[list(bodies)])
+        angle = np.arccos(np.clip((turned - 1) / 2, -1, 1))
+        assert away[0] == pytest.approx(np.linalg.norm(shift), abs=1e-6)
+        assert angle == pytest.approx(turn, abs=1e-6)
+        expected = [
+            0.02 + a + 2 * reach(station, name) * np.sin(turn / 2)
+            for a, name in zip(away, names, strict=True)
+        ]
+        assert off(station, state, *names) == pytest.approx(expected, abs=1e-6)
 
 
 def test_what_no_device_sees_is_off_by_what_the_file_accepts_or_by_more(tmp_path):

@@ -343,7 +343,7 @@ class Points:
             ends = points @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
             anchors = data.xanchor[chain]
             if chain:
-                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max()) if len(ends) else 0.0
+                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max(initial=0.0))
                 lengths += [*np.linalg.norm(np.diff(anchors, axis=0), axis=1).tolist(), far + radius]
             joints += [int(mj.jnt_dofadr[j]) for j in chain]
             turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in chain]

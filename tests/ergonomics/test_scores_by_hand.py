@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from made_postures import NEUTRAL
 
-from seerob.core.snapshot import Verdict
+from seerob.core.snapshot import Result, Verdict
 from seerob.criteria.ergonomics.reba import Coupling, Reba, RebaPhase
 from seerob.criteria.ergonomics.rula import LoadUse, Profile, Rula, RulaPhase
-from seerob.criteria.scoring.judgement import judged
+from seerob.criteria.figure import result_of, verdict_of
+from seerob.criteria.scoring.judgement import score, shown
 from seerob.description.humans.angles import SIDED, Angles
 
 RULA_A = [
@@ -180,10 +181,10 @@ BY_HAND = {Rula: (RulaPhase, rula_of), Reba: (RebaPhase, reba_of)}
 
 
 def scored(rule, angles, phase, limit=None):
-    return judged(
-        rule.METHOD, name="r", human="op", limit=limit, angles=angles,
-        components=rule.components(angles, phase), spread=None, thresholds=rule.thresholds,
-    )  # fmt: skip
+    figure = score(rule.METHOD, angles, rule.components(angles, phase), None, limit)
+    verdict = verdict_of(figure, at_most=True)
+    said = shown(rule.METHOD, figure, verdict, limit=limit, human="op", thresholds=rule.thresholds)
+    return result_of(figure, verdict, said, Result(name="r"))
 
 
 @pytest.mark.parametrize("kind", [Rula, Reba])

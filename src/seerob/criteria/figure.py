@@ -17,7 +17,7 @@ import numpy as np
 from msgspec import Struct
 
 from seerob.core.markers import Marker, drawn
-from seerob.core.snapshot import Result
+from seerob.core.snapshot import Result, Row
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, Verdict, judge, judge_interval, worst
 from seerob.kernels.verdicts import judged, judged_many
@@ -69,14 +69,18 @@ class Figure(Struct, frozen=True, eq=False):
     limit: float | Array | None = None
     """Admissible value; None where there is none."""
     interval: tuple[float | Array, float | Array] | None = None
-    """Where the true value lies, as far as tolerances are known: that decides, then. It is not shown where
-    an end of it is infinite."""
+    """Where the true value lies, as far as tolerances are known: that decides, then. It is shown where its
+    ends are finite and differ, or are whole numbers."""
     nothing: bool | Flags = False
     """Whether there is nothing to judge, and `Shown.reason` says why."""
     exceeded: bool | Flags = False
     """Whether a limit is exceeded whatever the value, which is a bound."""
     open: bool | Flags = False
     """Whether more may be than what is known: it may exceed, and is never within."""
+    exact: bool = False
+    """Whether values and intervals of N instants are whole numbers, as an ``int`` of one instant is."""
+    undecided: bool | Flags = False
+    """Whether nobody may say whether it keeps its limit, whatever it is."""
     parts: Parts | None = None
     """No better than the worst of them is the whole."""
     beside: Any = None
@@ -99,6 +103,8 @@ class Shown(NamedTuple):
     """Figures that are shown beside those that are judged (`Figure.parts`), after them."""
     where: Sequence[str] | None = None
     """What is said of each of `Figure.parts`."""
+    rows: tuple[Row, ...] = ()
+    """Of the places of a person's body."""
 
 
 Compute = Callable[[Twin], Figure]
@@ -126,13 +132,17 @@ def _own_verdict(figure: Figure, *, at_most: bool) -> Verdict | None:
     assert not isinstance(limit, np.ndarray)
     if figure.nothing:
         return None
-    if limit is not None and figure.exceeded:
-        return _EXCEEDED
-    if value is None or math.isnan(value):
-        return _UNDECIDED
+    if limit is not None and (figure.exceeded or figure.undecided):
+        return _UNDECIDED if figure.undecided else _EXCEEDED
+    known = value is not None and not math.isnan(value)
     if figure.interval is not None:
-        low, high = figure.interval
-        verdict = judge_interval((float(low), float(high)), limit, at_most=at_most)
+        low, high = (end if type(end) is int else float(end) for end in figure.interval)
+        verdict = judge_interval((low, high), limit, at_most=at_most)
+        if not known:  # wherever it lies in there
+            informs = verdict is None and not figure.open
+            return verdict if informs or verdict is _EXCEEDED else _UNDECIDED
+    elif value is None or not known:
+        return _UNDECIDED
     else:
         verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
     # Nothing could exceed a limit without end.
@@ -149,12 +159,16 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         shown: What is said and drawn of it.
         result: What is the same at all instants: name, unit, side of the limit.
     """
-    value, limit, parts, interval = figure.value, figure.limit, shown.parts, None
+    value, limit, parts = figure.value, figure.limit, shown.parts
+    interval: tuple[float, float] | None = None
     if value is not None and type(value) is not int:
         value = float(value)
     if figure.interval is not None:
         low, high = figure.interval
-        interval = (float(low), float(high)) if -math.inf < low < high < math.inf else None
+        if type(low) is type(high) is int:
+            interval = (low, high)
+        else:
+            interval = (float(low), float(high)) if -math.inf < low < high < math.inf else None
     if figure.parts is not None:
         told = _part_results(figure.parts, shown.where, result)
         parts = (*told, *parts)
@@ -174,6 +188,7 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         interval=interval,
         nothing=bool(figure.nothing) or (verdict is None and known is None),
         parts=parts,
+        rows=shown.rows,
         markers=() if shown.draw is None else drawn(shown.draw),
     )
 
@@ -221,15 +236,22 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
     if figure.parts is not None:
         return _answers_of_parts(figure.parts, at_most=at_most)
     limit = None if figure.limit is None else each(figure.limit)
-    found = Answers.against(each(figure.value), limit, at_most=at_most)
+    found = Answers.against(each(figure.value), limit, at_most=at_most, exact=figure.exact)
     if figure.interval is not None:
         low, high = map(each, figure.interval)
         if not ((low == high) & (low == found.value)).all():  # also where one is not a number
             found = found.between(low, high, at_most=at_most)
     unknown = np.isnan(found.value)
-    found = replace(found, verdict=np.where(unknown, CODES[_UNDECIDED], found.verdict).astype(np.uint8))
+    verdict = np.where(unknown & (found.verdict != CODES[_EXCEEDED]), CODES[_UNDECIDED], found.verdict)
+    if limit is None and found.interval is not None:  # it informs of where the value lies
+        known = ~np.isnan(found.interval).any(axis=0) & ~np.asarray(figure.open)
+        verdict = np.where(unknown & known, CODES[None], verdict)
+    found = replace(found, verdict=verdict.astype(np.uint8))
     if limit is not None and np.any(figure.exceeded):
         found = found.exceeded(np.broadcast_to(figure.exceeded, (n,)))
+    if limit is not None and np.any(figure.undecided):
+        codes = np.where(figure.undecided, CODES[_UNDECIDED], found.verdict)
+        found = replace(found, verdict=codes.astype(np.uint8))
     open_ = figure.open if limit is None else figure.open | np.isinf(limit)
     found = found.finite().open(open_) if np.any(open_) else found.finite()
     return found.without_verdict(np.broadcast_to(figure.nothing, (n,))) if np.any(figure.nothing) else found

@@ -33,16 +33,20 @@ class Answers:
     """Where the true values lie, as far as tolerances are known, shape (N,) each."""
     nothing: Flags | None = None
     """Where there is nothing to judge, shape (N,); without that, who says nothing is UNDECIDED."""
+    exact: bool = False
+    """Whether values are scores or counts, which keep the limit that they are on."""
 
     @classmethod
-    def against(cls, value: Array, limit: Array | float | None, *, at_most: bool) -> Answers:
-        """Values against a limit or limits, by the rule of `seerob.criteria.criterion.judge`."""
+    def against(
+        cls, value: Array, limit: Array | float | None, *, at_most: bool, exact: bool = False
+    ) -> Answers:
+        """Values against a limit or limits, by the rule of `seerob.core.verdict.judge`."""
         limits = np.full(value.shape, np.nan) if limit is None else np.broadcast_to(limit, value.shape)
-        return cls(value, limits, judge_many(value, limit, at_most=at_most))
+        return cls(value, limits, judge_many(value, limit, at_most=at_most, exact=exact), exact=exact)
 
     def between(self, low: Array, high: Array, *, at_most: bool) -> Answers:
-        """Judge values that lie between two ends (`seerob.criteria.criterion.judge_interval`)."""
-        ends = [judge_many(end, self.limit, at_most=at_most) for end in (low, high)]
+        """Judge values that lie between two ends (`seerob.core.verdict.judge_interval`)."""
+        ends = [judge_many(end, self.limit, at_most=at_most, exact=self.exact) for end in (low, high)]
         either = np.where(ends[0] == ends[1], ends[0], UNDECIDED).astype(np.uint8)
         informs = np.isnan(self.limit) & ~np.isnan(low) & ~np.isnan(high)
         verdict = np.where(informs, self.verdict, either)
@@ -77,7 +81,9 @@ class Answers:
             return np.full(len(self.value), "", object)
         low, high = (self.value, self.value) if self.interval is None else self.interval
         ends = np.array([self.value, low, high], float)
-        kept = keep_many(ends, self.limit, at_most=at_most).all(axis=0) & np.isfinite(self.value)
+        kept = keep_many(ends, self.limit, at_most=at_most, exact=self.exact).all(axis=0) & np.isfinite(
+            self.value
+        )
         kept &= ~np.isinf(self.limit)
         if not (wordless or (within & (nothing | ~kept)).any()):
             return np.full(len(self.value), "", object)
@@ -95,16 +101,17 @@ class Answers:
         )
 
 
-def judge_many(value: Array, limit: Array | float | None, *, at_most: bool) -> Codes:
-    """Verdicts of values against a limit or limits; the rule is `seerob.criteria.criterion.judge`."""
+def judge_many(value: Array, limit: Array | float | None, *, at_most: bool, exact: bool = False) -> Codes:
+    """Verdicts of values against a limit or limits; the rule is `seerob.core.verdict.judge`."""
     if limit is None:
         return np.where(np.isnan(value), UNDECIDED, NO_VERDICT).astype(np.uint8)
-    within = keep_many(value, limit, at_most=at_most)
+    within = keep_many(value, limit, at_most=at_most, exact=exact)
     return np.where(np.isnan(value), UNDECIDED, np.where(within, WITHIN, EXCEEDED)).astype(np.uint8)
 
 
-def keep_many(value: Array, limit: Array | float, *, at_most: bool = True) -> Flags:
-    """Whether computed figures keep a limit or limits; the rule is `seerob.core.verdict.keeps`."""
+def keep_many(value: Array, limit: Array | float, *, at_most: bool = True, exact: bool = False) -> Flags:
+    """Whether computed or exact figures keep a limit or limits; the rule is `seerob.core.verdict.keeps`."""
     limits = np.asarray(limit, float)
-    room = np.where(np.isinf(limits), 0.0, ROUNDING * np.maximum(1.0, np.abs(limits)))
+    inexact = ~np.isinf(limits) & (not exact)
+    room = np.where(inexact, ROUNDING * np.maximum(1.0, np.abs(limits)), 0.0)
     return np.asarray(value <= limits - room if at_most else value >= limits + room)

@@ -8,7 +8,7 @@ memory of earlier instants, is asked instant by instant as on the road, in the o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -400,8 +400,6 @@ def _able(
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
             notes[criterion.name] = "asked instant by instant: masses are not known"
-        elif question.turns is not None:
-            notes[criterion.name] = "asked instant by instant: it judges by phases of a task"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
@@ -456,6 +454,8 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
         states.speeds_asked.clear()
         states.alone = np.zeros(len(states), bool)
         answers, reasons = _said(one, states)
+        if one.question.turns is not None:
+            states.alone |= _passed_over(one.question.turns, motion)
         with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
         movers = (with_carriers | states.speeds_asked) & motion.speed_errors.keys()
         noisy = np.any([motion.speed_errors[who].any(axis=1) for who in movers], axis=0)
@@ -483,6 +483,14 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
     if motion.ways is not None and kept:
         return found, states.largest_speeds(), alone
     return found, np.full((len(states), len(bench.ids)), np.nan), alone
+
+
+def _passed_over(turns: Callable[[float, float], Sequence[float]], motion: Motion) -> Flags:
+    """Instants since the one before which what is entered changed more than once, shape (N,)."""
+    whole = motion.t if motion.of is None else motion.of.t
+    t = whole[max(motion.begin - 1, 0) : motion.begin + len(motion.t)].tolist()
+    found = [len(turns(before, now)) > 1 for before, now in pairwise(t)]
+    return np.array([False, *found][-len(motion.t) :], bool)
 
 
 def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:

@@ -291,6 +291,20 @@ class States:
         rotations[:, rows], positions[:, rows] = self._rotations[:, rows], self._positions[:, rows]
         return rotations, positions
 
+    def captured(self, name: str, bodies: Sequence[int]) -> tuple[Array, Array]:
+        """Where bones of a person were captured: nothing stops a twin that is put where the samples say.
+
+        Args:
+            name: Of the person.
+            bodies: Its bones, by index.
+
+        Returns:
+            World from bone, shape (N, n, 3, 3), and the bones' origins in the world [m], (N, n, 3), in the
+            order of ``bodies``.
+        """
+        self.require(name)
+        return self._rotations[:, list(bodies)], self._positions[:, list(bodies)]
+
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities [rad/s or m/s], shape (N, n)."""
         self.require(mechanism.name)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import cache
 from itertools import pairwise
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, cast
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -21,8 +21,8 @@ from msgspec.structs import asdict
 from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
-from seerob.core.verdict import judge_interval
-from seerob.criteria.criterion import Evaluate
+from seerob.core.verdict import keeps
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import chosen, entered, posture_quality
 from seerob.criteria.scoring.held_work import GAP
 from seerob.criteria.scoring.measured import Accuracy, Measured
@@ -433,6 +433,26 @@ OTHERS = ("forces", "loads", "upper_limbs")
 """Sections 2 to 4."""
 
 
+class Screened(NamedTuple):
+    """What the points of a cycle up to one instant were made from."""
+
+    now: tuple[str, ...]
+    """Lines that the posture of this instant may have, the lightest first."""
+    low: Points
+    high: Points
+    ends: tuple[float, float]
+    """Points with those that were entered, at least and at most."""
+    missing: tuple[str, ...]
+    """What nobody entered."""
+    counting: bool
+    """Whether the cycle is not whole."""
+    heard: float
+    """[s]"""
+    silent: float
+    """[s]"""
+    coverage: float
+
+
 class EawsPosture(PostureRule, frozen=True, kw_only=True):
     """EAWS-style posture screening (sections 0-1 only); not the EAWS."""
 
@@ -451,76 +471,95 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
     thresholds: EawsThresholds = EawsThresholds()
     """Angles at which a posture belongs to a line."""
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the points."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, EawsPhase.from_task)
         error = self.error()
         screening = Screening(self.cycle, self.minimum_hold, self.interpolation)
+        given = asdict(self.entered)
+        missing = tuple(name.replace("_", " ") for name, value in given.items() if value is None)
+        whole = sum(value or 0.0 for name, value in given.items() if name != "upper_limbs")
+        limbs = given["upper_limbs"] or 0.0
 
-        def evaluate(state: State) -> Result:
-            angles = read(state)
-            phase = phase_at(phases, state.t, EawsPhase())
-            found = possible_lines(
+        def compute(twin: Twin) -> Figure:
+            assert isinstance(twin, State)
+            angles, phase = read(twin), phase_at(phases, twin.t, EawsPhase())
+            now = possible_lines(
                 angles,
                 legs=phase.legs,
                 supported=phase.back_supported,
                 thresholds=self.thresholds,
                 accuracy=0.0 if error is None else error,
             )
-            screening.add(state.t, found, angles, 0.0 if error is None else error)
-            return self._result(found, screening)
+            screening.add(twin.t, now, angles, 0.0 if error is None else error)
+            low, high = screening.points()
+            ends = (max(low.total + whole, limbs), max(high.total + whole, limbs))
+            known = ends[1] - ends[0] < 1e-9
+            rests = self.limit is not None and (bool(missing) or screening.silent > 0)
+            # Points of a cycle only grow until it is whole: what is too much already stays so.
+            counting = not screening.complete
+            exceeds = self.limit is not None and not keeps(ends[0], self.limit)
+            return Figure(
+                ends[0] if known else None,
+                self.limit,
+                interval=None if known else ends,
+                nothing=counting and not exceeds and not rests,
+                undecided=rests,
+                beside=Screened(
+                    now,
+                    low,
+                    high,
+                    ends,
+                    missing,
+                    counting,
+                    screening.heard,
+                    screening.silent,
+                    screening.coverage,
+                ),
+            )
 
-        return evaluate
+        return compute
 
-    def _result(self, now: tuple[str, ...], screening: Screening) -> Result:
-        low, high = screening.points()
-        given = asdict(self.entered)
-        missing = [name.replace("_", " ") for name, value in given.items() if value is None]
-        whole = sum(value or 0.0 for name, value in given.items() if name != "upper_limbs")
-        ends = (low.total + whole, high.total + whole)
-        limbs = given["upper_limbs"] or 0.0
-        ends = (max(ends[0], limbs), max(ends[1], limbs))
-        every = not missing
-        known = ends[1] - ends[0] < 1e-9
-        reasons = [f"{WHAT}, no rating: lower bound" if not every else "with entered sections 2-4"]
+    def present(self, model: Model) -> Present:
+        """Return the function that says and colours which lines hold."""
+        return lambda state, figure, verdict: self._shown(figure, verdict)
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so: shares of time are counted as it goes."""
+        return "shares of the cycle are counted as it goes"
+
+    def _shown(self, figure: Figure, verdict: Verdict | None) -> Shown:
+        found = cast("Screened", figure.beside)
+        low, high, ends, missing = found.low, found.high, found.ends, found.missing
+        known = figure.value is not None
+        reasons = [f"{WHAT}, no rating: lower bound" if missing else "with entered sections 2-4"]
         if missing:
             reasons.append(f"not entered: {', '.join(missing)}")
-        if screening.silent > 0:
-            reasons.append(f"coverage {100 * screening.coverage:.1f} %: {screening.silent:.1f} s not heard")
+        if found.silent > 0:
+            reasons.append(f"coverage {100 * found.coverage:.1f} %: {found.silent:.1f} s not heard")
         if not known:
             reasons.append(f"the points lie between {ends[0]:.1f} and {ends[1]:.1f}")
-        counting = not screening.complete
-        if counting:
-            reasons.append(f"counting: {screening.heard:.1f} of {self.cycle:g} s, judged after a whole cycle")
-        verdict = judge_interval(ends, self.limit)
-        # Points of a cycle only grow until it is whole: what is too much already stays so, the rest is open.
-        if counting and verdict is not Verdict.EXCEEDED:
-            verdict = None
-        if self.limit is not None and (not every or screening.silent > 0):
-            verdict = Verdict.UNDECIDED
-        if every and known and not counting and screening.silent == 0:
+        if found.counting:
+            reasons.append(f"counting: {found.heard:.1f} of {self.cycle:g} s, judged after a whole cycle")
+        if known and not missing and not found.counting and found.silent == 0:
             reasons.append(_rating(ends[0]))
         if verdict in (Verdict.WITHIN, Verdict.EXCEEDED):
             reasons.append("by figures of one public code and of memory, not verified (1 + M)")
-        best = lines()[now[-1]]
-        reasons.append(f"now line {' or '.join(now)}" + (f": {best.name}" if len(now) == 1 else ""))
-        value = ends[0] if known else None
-        return Result(
-            name=self.name,
-            value=value,
-            limit=self.limit,
-            verdict=verdict,
-            nothing=counting and verdict is None,
-            reason="; ".join(reasons),
-            interval=None if known else ends,
+        best = lines()[found.now[-1]]
+        several = len(found.now) > 1
+        reasons.append(f"now line {' or '.join(found.now)}" + ("" if several else f": {best.name}"))
+        return Shown(
+            "; ".join(reasons),
+            lambda: (
+                tuple(Highlight(body=f"{self.human}/{bone}", verdict=verdict) for bone in _BONES)
+                if low.lines
+                else ()
+            ),
             parts=tuple(
                 Result(name=name, value=a if abs(a - b) < 1e-9 else None, interval=None if a == b else (a, b))
                 for name, a, b in _pairs(low, high)
             ),
-            markers=tuple(Highlight(body=f"{self.human}/{bone}", verdict=verdict) for bone in _BONES)
-            if low.lines
-            else (),
             rows=(
                 total_row("", ends, None, (0.0, 100.0), self.limit, verdict),
                 *(self._row(name, a, b) for name, a, b in _pairs(low, high)),

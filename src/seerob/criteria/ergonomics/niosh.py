@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 from msgspec import Meta, Struct, structs
@@ -19,15 +19,14 @@ from numpy.typing import ArrayLike
 
 from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
-from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.core.snapshot import Basis, Input, Origin, Result
 from seerob.core.transforms import Array
-from seerob.core.verdict import judge
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
 from seerob.criteria.scoring.phases import Kilograms, Seconds
 from seerob.criteria.scoring.spans import published
 from seerob.model.model import Model
 from seerob.model.provenance import given, limit
-from seerob.twin.state import State
 
 MIDDLE = 0.75
 """Height at which the tables of frequency and coupling change [m]."""
@@ -312,8 +311,8 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         """Nobody: lifts are entered."""
         return ()
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant.
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that tells the index.
 
         Raises:
             InputError: The equation does not apply.
@@ -321,12 +320,16 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         model.human(self.human)
         lifts = self.entered(model)
         self._refuse(lifts)
-        result = self._result(lifts)
+        figure = self._index(lifts)
 
-        def evaluate(state: State) -> Result:
-            return result
+        def compute(twin: Twin) -> Figure:
+            return figure
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what governs, and shows each lift."""
+        return lambda state, figure, verdict: cast("Shown", figure.beside)
 
     def entered(self, model: Model) -> tuple[Lift, ...]:
         """The lifts with what they take from the phases that every rule shares.
@@ -372,19 +375,33 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         if problems:
             raise InputError(problems)
 
-    def _result(self, lifts: tuple[Lift, ...]) -> Result:
-        absent = [f"{what} of lift {i + 1}" for i, lift in enumerate(lifts) for what in lift.missing()]
-        if absent:
-            reason = f"not entered: {', '.join(absent)}"
-            return Result(name=self.name, limit=self.limit, verdict=Verdict.UNDECIDED, reason=reason)
-        spell = duration(self.work, self.recovery)
+    def one_by_one(self, model: Model) -> str:
+        """Nothing: what is entered is the same at every instant."""
+        return ""
+
+    def _tasks(self, lifts: tuple[Lift, ...]) -> list[Task]:
+        """The lifts as the equation takes them; none where something of them is not entered."""
+        if any(lift.missing() for lift in lifts):
+            return []
         tasks = [lift.task() for lift in lifts]
         if len(tasks) == 1:
             # The composite index takes the greatest mass only from the second task on.
             tasks = [replace(tasks[0], average=tasks[0].heaviest)]
-        index = composite_index(tasks, spell)
+        return tasks
+
+    def _index(self, lifts: tuple[Lift, ...]) -> Figure:
+        tasks = self._tasks(lifts)
+        index = composite_index(tasks, duration(self.work, self.recovery)) if tasks else math.nan
+        # An infinite index exceeds each limit, but is no figure.
+        unknown = math.isnan(index) or (math.isinf(index) and self.limit is None)
+        return Figure(None if unknown else index, self.limit, beside=self._shown(lifts, index))
+
+    def _shown(self, lifts: tuple[Lift, ...], index: float) -> Shown:
+        if absent := [f"{what} of lift {i + 1}" for i, lift in enumerate(lifts) for what in lift.missing()]:
+            return Shown(f"not entered: {', '.join(absent)}")
+        spell = duration(self.work, self.recovery)
         parts, zero = [], []
-        for i, task in enumerate(tasks):
+        for i, task in enumerate(self._tasks(lifts)):
             weight, end = recommended_weight(task, spell), governing(task)[1]
             own = composite_index([task], spell)
             if weight == 0:
@@ -394,26 +411,17 @@ class Niosh(Criterion, frozen=True, kw_only=True):
                     name=f"lift {i + 1}",
                     value=own if math.isfinite(own) else None,
                     limit=self.limit,
-                    verdict=judge(own, self.limit),
+                    verdict=verdict_of(Figure(own, self.limit), at_most=True),
                     reason=f"recommended weight {weight:.1f} kg, governed by the {end}",
                 )
             )
         if math.isinf(index):
             why = f"of {', '.join(zero)} " if zero else "at the frequency of all lifts together "
             reason = f"the recommended weight {why}is 0: beyond the reach of the equation's tables"
-            # An infinite index exceeds each limit, but is no figure.
-            verdict = Verdict.UNDECIDED if self.limit is None else Verdict.EXCEEDED
-            return Result(
-                name=self.name, limit=self.limit, verdict=verdict, reason=reason, parts=tuple(parts)
-            )
-        return Result(
-            name=self.name,
-            value=index,
-            limit=self.limit,
-            verdict=judge(index, self.limit),
-            reason=parts[0].reason if len(parts) == 1 else f"composite index of {len(parts)} lifts",
-            parts=tuple(parts) if len(parts) > 1 else (),
-        )
+            return Shown(reason, parts=tuple(parts))
+        if len(parts) == 1:
+            return Shown(parts[0].reason)
+        return Shown(f"composite index of {len(parts)} lifts", parts=tuple(parts))
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from msgspec import Struct
@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from seerob.core.domains import number, whole
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
-from seerob.core.verdict import judge, judge_interval
-from seerob.criteria.criterion import Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
+from seerob.criteria.scoring.judgement import together
 from seerob.criteria.scoring.measured import Accuracy, Measured
-from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, shared_phases
+from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, phases_of, shared_phases
 from seerob.criteria.scoring.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.score_rows import aspects, total_row
 from seerob.criteria.scoring.spans import ROUNDING, Angle, Ints, Span, cells, either, published
@@ -31,7 +31,7 @@ from seerob.description.humans.angles import Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.twin.state import State
+from seerob.twin.states import States
 
 CODES = {"back": 4, "arms": 3, "legs": 7, "load": 3}
 """Components in the order of `owas`, and how many codes each has."""
@@ -88,33 +88,39 @@ def owas(back: ArrayLike, arms: ArrayLike, legs: ArrayLike, load: ArrayLike) -> 
     return np.asarray(cells("owas", "category")[tuple(code - 1 for code in codes)])
 
 
-def category_span(back: Possible, arms: Possible, legs: Possible, load: Possible) -> Span:
-    """Least and greatest category of all codes that are possible, shape (...)."""
-    every = (
+def _together(back: Possible, arms: Possible, legs: Possible, load: Possible) -> Possible:
+    """Whether each combination of codes is possible, shape (..., 4, 3, 7, 3)."""
+    return np.asarray(
         back[..., :, None, None, None]
         & arms[..., None, :, None, None]
         & legs[..., None, None, :, None]
         & load[..., None, None, None, :]
     )
-    table = cells("owas", "category")
+
+
+def category_span(back: Possible, arms: Possible, legs: Possible, load: Possible) -> Span:
+    """Least and greatest category of all codes that are possible, shape (...)."""
+    every, table = _together(back, arms, legs, load), cells("owas", "category")
     axes = (-4, -3, -2, -1)
     low = np.where(every, table, table.max()).min(axis=axes)
     return Span(low, np.where(every, table, table.min()).max(axis=axes))
 
 
 def settled(codes: Mapping[str, Possible], around: Mapping[str, Possible]) -> dict[str, Possible]:
-    """Codes of a posture at a threshold: those of the greatest category, which does not grow with each code.
+    """Codes of postures at a threshold: those of the greatest category, which does not grow with each code.
 
     Args:
-        codes: Possible codes by component, in the order of `owas`, shape (number of codes) each.
+        codes: Possible codes by component, in the order of `owas`, shape (..., number of codes) each.
         around: The same with every angle off by rounding.
     """
-    sets = {key: own if own.sum() > 1 else around[key] for key, own in codes.items()}
-    every = np.ix_(*(np.flatnonzero(sets[key]) for key in CODES))
-    found = cells("owas", "category")[every]
-    worst = np.unravel_index(found.argmax(), found.shape)
-    picked = {key: int(every[k].ravel()[i]) for (k, key), i in zip(enumerate(CODES), worst, strict=True)}
-    return {key: own if own.sum() > 1 else only(picked[key] + 1, len(own)) for key, own in codes.items()}
+    table = cells("owas", "category")
+    several = {key: own.sum(axis=-1, keepdims=True) > 1 for key, own in codes.items()}
+    found = np.where(_together(*(np.where(several[key], codes[key], around[key]) for key in CODES)), table, 0)
+    worst = np.unravel_index(found.reshape(*found.shape[:-4], -1).argmax(axis=-1), table.shape)
+    return {
+        key: np.where(several[key], codes[key], np.arange(CODES[key]) == worst[k][..., None])
+        for k, key in enumerate(CODES)
+    }
 
 
 def only(code: int, of: int) -> Possible:
@@ -218,6 +224,19 @@ class OwasPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return {"legs": next((code for code in Legs if code == task.legs), None)}
 
 
+class Coded(NamedTuple):
+    """What a category of one instant was looked up by."""
+
+    angles: Angles
+    measured: Mapping[str, Possible]
+    spread: Mapping[str, Possible] | None
+    """Codes within the accuracy; None when that is not known."""
+    span: Span
+    ends: tuple[int, int]
+    """Of the category within the accuracy."""
+    missing: tuple[str, ...]
+
+
 class Owas(PostureRule, frozen=True, kw_only=True):
     """OWAS action category of a person's posture."""
 
@@ -242,19 +261,52 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         """Phases of the rule, or else those that every rule shares."""
         return shared_phases(model, self.human, self.phases, OwasPhase.from_task)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the category."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), OwasPhase(), self.error()
 
-        def evaluate(state: State) -> Result:
-            angles = read(state)
-            phase = phase_at(phases, state.t, unknown)
+        def found(angles: Angles, phase: Phase) -> tuple[dict[str, Possible], dict[str, Possible] | None]:
+            assert isinstance(phase, OwasPhase)
             measured = settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
-            spread = None if error is None else self.codes(angles, phase, error)
-            return self._result(angles, measured, spread)
+            return measured, None if error is None else self.codes(angles, phase, error)
 
-        return evaluate
+        def category(angles: Angles, phase: Phase) -> Figure:
+            measured, spread = found(angles, phase)
+            span = category_span(**measured)
+            reach = span if spread is None else category_span(**spread)
+            several = np.any([possible.sum(axis=-1)[..., 0] > 1 for possible in measured.values()], axis=0)
+            value = np.where(span.low == span.high, span.high, np.nan)
+            ends = reach.low[..., 0].astype(float), reach.high[..., 0].astype(float)
+            return Figure(value[..., 0], self.limit, interval=ends, open=several, exact=True)
+
+        def compute(twin: Twin) -> Figure:
+            angles = read(twin)
+            if isinstance(twin, States):
+                parts = phases_of(phases, twin.motion.t, unknown)
+                return together([(where, category(angles[where], phase)) for phase, where in parts])
+            measured, spread = found(angles, phase_at(phases, twin.t, unknown))
+            span = category_span(**measured)
+            reach = span if spread is None else category_span(**spread)
+            missing = tuple(key for key, possible in measured.items() if possible.sum() > 1)
+            ends = int(reach.low), int(reach.high)
+            return Figure(
+                int(span.high) if span.known else None,
+                self.limit,
+                interval=None if spread is None and not missing else ends,
+                open=bool(missing),
+                beside=Coded(angles, measured, spread, span, ends, missing),
+            )
+
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says and colours what drives the category."""
+        return lambda state, figure, verdict: self._shown(figure, verdict)
+
+    def one_by_one(self, model: Model) -> str:
+        """Nothing: the category is of one posture."""
+        return ""
 
     def codes(self, angles: Angles, phase: OwasPhase, accuracy: Accuracy = 0.0) -> dict[str, Possible]:
         """Possible codes of postures in a phase, each of shape (..., number of codes)."""
@@ -271,21 +323,10 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             "load": load_codes(phase.load),
         }
 
-    def _result(
-        self,
-        angles: Angles,
-        measured: Mapping[str, Possible],
-        spread: Mapping[str, Possible] | None,
-    ) -> Result:
-        span = category_span(**measured)
-        reach = span if spread is None else category_span(**spread)
-        low, high = int(reach.low), int(reach.high)
-        missing = [key for key, possible in measured.items() if possible.sum() > 1]
-        verdict = judge_interval((low, high), self.limit)
-        if missing and judge(low, self.limit) is not Verdict.EXCEEDED:
-            verdict = Verdict.UNDECIDED
+    def _shown(self, figure: Figure, verdict: Verdict | None) -> Shown:
+        angles, measured, spread, span, (low, high), missing = cast("Coded", figure.beside)
         drivers = self._drivers(measured, span)
-        value = int(span.high) if span.known else None
+        value = None if figure.value is None else int(figure.value)
         reasons = []
         if missing:
             said = whatever_is_missing("category", low, high)
@@ -296,20 +337,15 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             reasons.append(", ".join(f"{key} {_text(measured[key])}" for key in drivers))
         if value is not None:
             reasons.append(f"action category {value:.0f}: {published('owas')['actions'][int(value) - 1]}")
-        return Result(
-            name=self.name,
-            value=value,
-            limit=self.limit,
-            verdict=verdict,
-            reason="; ".join(reasons),
-            interval=None if spread is None and not missing else (low, high),
-            parts=tuple(
-                _part(key, measured[key], None if spread is None else spread[key]) for key in measured
-            ),
-            markers=tuple(
+        return Shown(
+            "; ".join(reasons),
+            lambda: tuple(
                 Highlight(body=f"{self.human}/{bone}", verdict=verdict)
                 for key in drivers
                 for bone in BONES_OF[key]
+            ),
+            parts=tuple(
+                _part(key, measured[key], None if spread is None else spread[key]) for key in measured
             ),
             rows=(
                 total_row(

@@ -1,4 +1,4 @@
-"""From spans of component scores to a `Result`: worst side, what drives it, and what is not assessed."""
+"""From spans of component scores to a score: worst side, what drives it, and what is not assessed."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from msgspec.structs import replace
 
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Highlight, Level, Result, Row, Verdict
-from seerob.core.verdict import judge, judge_interval
+from seerob.core.transforms import Array
+from seerob.criteria.figure import Figure, Shown, verdict_of
 from seerob.criteria.scoring.score_rows import (
     ANGLES_OF,
     BONES_OF,
@@ -24,6 +26,7 @@ from seerob.criteria.scoring.score_rows import (
 from seerob.criteria.scoring.spans import Ints, Span, Thresholds
 from seerob.description.humans.angles import SIDED, Angles
 from seerob.description.humans.skeleton import SIDES
+from seerob.recording.answers import Flags
 
 Grand = Callable[[Mapping[str, Ints]], Ints]
 """Score of component scores; central components have a last axis of 1, sided ones of 2."""
@@ -31,7 +34,7 @@ Grand = Callable[[Mapping[str, Ints]], Ints]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
-    """What `judged` needs to know of a rule."""
+    """What a score is made by, and called."""
 
     grand: Grand
     least: Mapping[str, int]
@@ -64,38 +67,140 @@ class Method:
         return f"action level {k + self.first_level}: {self.actions[k]}"
 
 
-def judged(
+class Scored(NamedTuple):
+    """What a score of one instant was made from."""
+
+    angles: Angles
+    components: Ends
+    """Score of each component as it was measured."""
+    spread: Ends | None
+    """Score of each component when each angle may be off by its accuracy; None when that is not known."""
+
+
+class Summed(NamedTuple):
+    """Scores of both sides, and what is not known of them."""
+
+    low: tuple[int, ...]
+    """Least score of each side as it was measured."""
+    high: tuple[int, ...]
+    """Greatest score likewise."""
+    least: tuple[int, ...]
+    """Least score of each side within the accuracy."""
+    most: tuple[int, ...]
+    """Greatest score likewise."""
+    missing: tuple[str, ...]
+    """Components that are not assessed."""
+
+
+@lru_cache(maxsize=4096)
+def _summed(method: Method, measured: Ends, spread: Ends | None) -> Summed:
+    """What follows from scores alone, which seldom change from one tick to the next."""
+    low, high = _grand(method, measured)
+    least, most = (low, high) if spread is None else _grand(method, spread)
+    return Summed(low, high, least, most, tuple(key for key, lows, highs in measured if lows != highs))
+
+
+def score(
     method: Method,
-    *,
-    name: str,
-    human: str,
-    limit: int | None,
     angles: Angles,
     components: Mapping[str, Span],
     spread: Mapping[str, Span] | None,
-    thresholds: Thresholds,
-) -> Result:
-    """The result of a rule at one instant.
+    limit: int | None,
+) -> Figure:
+    """Score of one posture, or of N.
 
     Args:
         method: The rule.
-        name: Of the result.
-        human: Whose bones are coloured.
+        angles: Of the postures.
+        components: Score of each component as it was measured: shape () of central ones and (2,) of sided
+            ones; of N postures also (N, 1) and (N, 1, 2).
+        spread: Likewise when each angle may be off by its accuracy; None when that is not known.
         limit: Greatest admissible score.
-        angles: Of the posture, to be shown.
-        components: Score of each component as it was measured.
-        spread: The same when each angle may be off by its accuracy; None when that is not known.
-        thresholds: For the bands that are shown.
 
     Returns:
-        The worse side gives the value. Undecided when a component is not assessed, unless even the
-        best that it may be exceeds the limit; and when the accuracy leaves it open.
+        The worse side gives the value. Open where a component is not assessed, so that only the best that
+        it may be decides.
     """
+    if angles.trunk_flexion.ndim:
+        return _score_of_many(method, components, spread, limit)
     ends, wide = _ends(components), None if spread is None else _ends(spread)
-    found = _scored(method, name, human, limit, ends, wide)
-    edges = _edges(method, thresholds)
+    low, high, least, most, missing = _summed(method, ends, wide)
+    return Figure(
+        max(high) if max(low) == max(high) else None,
+        limit,
+        interval=None if wide is None and not missing else (max(least), max(most)),
+        open=bool(missing),
+        beside=Scored(angles, ends, wide),
+    )
+
+
+def _score_of_many(
+    method: Method, components: Mapping[str, Span], spread: Mapping[str, Span] | None, limit: int | None
+) -> Figure:
+    measured = [_of_both_sides(method, components, end) for end in range(2)]
+    reach = measured if spread is None else [_of_both_sides(method, spread, end) for end in range(2)]
+    least, most = (ends.max(axis=-1)[:, 0].astype(float) for ends in measured)
+    low, high = (ends.max(axis=-1)[:, 0].astype(float) for ends in reach)
+    unknown = np.zeros((len(least), 1, 1), bool)
+    for span in components.values():
+        unknown = unknown | (_on_sides(span.low) != _on_sides(span.high)).any(axis=-1, keepdims=True)
+    value = np.where(least == most, most, np.nan)
+    return Figure(value, limit, interval=(low, high), open=unknown[:, 0, 0], exact=True)
+
+
+def _of_both_sides(method: Method, components: Mapping[str, Span], end: int) -> Ints:
+    return method.grand({key: _on_sides(span[end]) for key, span in components.items()})
+
+
+def _on_sides(scores: Ints) -> Ints:
+    """Central components get a last axis, so that they meet those of both sides."""
+    return scores if scores.ndim % 2 else scores[..., None]
+
+
+def together(parts: Sequence[tuple[Flags, Figure]]) -> Figure:
+    """Scores of N instants from those of some of them each.
+
+    Args:
+        parts: Which of the N instants, shape (N,), and their scores.
+    """
+    every = [np.flatnonzero(where) for where, _ in parts]
+    order = np.argsort(np.concatenate(every), kind="stable")
+
+    def joined(columns: Sequence[Any]) -> Array:
+        return np.asarray(np.concatenate(columns)[order])
+
+    figures = [figure for _, figure in parts]
+    ends = [figure.interval for figure in figures if figure.interval is not None]
     return replace(
-        found,
+        figures[0],
+        value=joined([figure.value for figure in figures]),
+        interval=(joined([low for low, _ in ends]), joined([high for _, high in ends])),
+        open=joined([figure.open for figure in figures]),
+    )
+
+
+def shown(
+    method: Method,
+    figure: Figure,
+    verdict: Verdict | None,
+    *,
+    limit: int | None,
+    human: str,
+    thresholds: Thresholds,
+) -> Shown:
+    """What is said and coloured of one posture.
+
+    Args:
+        method: The rule.
+        figure: From `score`.
+        verdict: Of it.
+        limit: Greatest admissible score.
+        human: Whose bones are coloured.
+        thresholds: For the bands that are shown.
+    """
+    angles, ends, wide = cast("Scored", figure.beside)
+    found, edges = _said(method, human, limit, ends, wide, verdict), _edges(method, thresholds)
+    return found._replace(
         parts=(*found.parts, *_parts(ends, wide, angles)),
         rows=(
             *found.rows,
@@ -107,49 +212,52 @@ def judged(
 
 
 @lru_cache(maxsize=4096)
-def _scored(
-    method: Method, name: str, human: str, limit: int | None, measured: Ends, spread: Ends | None
-) -> Result:
-    """What of a result follows from scores alone, which seldom change from one tick to the next."""
-    low, high = _grand(method, measured)
-    least, most = (low, high) if spread is None else _grand(method, spread)
-    missing = [key for key, lows, highs in measured if lows != highs]
-    verdicts = [_verdict((least[i], most[i]), limit, complete=not missing) for i in range(len(SIDES))]
-    whole = max(least), max(most)
-    verdict = _verdict(whole, limit, complete=not missing)
+def _said(
+    method: Method,
+    human: str,
+    limit: int | None,
+    measured: Ends,
+    spread: Ends | None,
+    verdict: Verdict | None,
+) -> Shown:
+    """What follows from scores alone, which seldom change from one tick to the next."""
+    low, high, least, most, missing = _summed(method, measured, spread)
     value = max(high) if max(low) == max(high) else None
+    sided = [
+        Figure(
+            high[i] if low[i] == high[i] else None, limit, interval=(least[i], most[i]), open=bool(missing)
+        )
+        for i in range(len(SIDES))
+    ]
+    verdicts = [verdict_of(one, at_most=True) for one in sided]
     # By what is known at least: what is not assessed drives nothing. Sides that are as bad both count.
     worst = [side for side in range(len(SIDES)) if low[side] == max(low)]
     drivers = {side: _drivers(method, _of_side(measured, side, LOW)) for side in worst}
-    reason = _reason(method, measured, drivers, value, whole, missing, verdict)
     bones = [
         bone.format(side=SIDES[side])
         for side, keys in drivers.items()
         for key in keys
         for bone in BONES_OF.get(key, ())
     ]
-    shown = spread is not None or bool(missing)
-    reach = None if spread is None else (least, most)
-    return Result(
-        name=name,
-        value=value,
-        limit=limit,
-        verdict=verdict,
-        reason=reason,
-        interval=whole if shown else None,
+    markers = tuple(Highlight(body=f"{human}/{bone}", verdict=verdict) for bone in dict.fromkeys(bones))
+    shows = spread is not None or bool(missing)
+    return Shown(
+        _reason(method, measured, drivers, value, (max(least), max(most)), missing, verdict),
+        lambda: markers,
         parts=tuple(
             Result(
                 name=own,
-                value=float(high[i]) if low[i] == high[i] else None,
+                value=None if one.value is None else float(one.number),
                 limit=limit,
                 verdict=verdicts[i],
-                reason="not assessed" if low[i] != high[i] else "",
-                interval=(float(least[i]), float(most[i])) if shown else None,
+                reason="not assessed" if one.value is None else "",
+                interval=(float(least[i]), float(most[i])) if shows else None,
             )
-            for i, own in enumerate(SIDES)
+            for i, (own, one) in enumerate(zip(SIDES, sided, strict=True))
         ),
-        markers=tuple(Highlight(body=f"{human}/{bone}", verdict=verdict) for bone in dict.fromkeys(bones)),
-        rows=_totals(method, (low, high), reach, limit, (*verdicts, verdict)),
+        rows=_totals(
+            method, (low, high), None if spread is None else (least, most), limit, (*verdicts, verdict)
+        ),
     )
 
 
@@ -214,13 +322,6 @@ def _of_side(components: Ends, side: int, end: int) -> Scores:
 @lru_cache(maxsize=4096)
 def _score(method: Method, scores: Scores) -> int:
     return int(method.grand({key: np.array([score]) for key, score in scores})[0])
-
-
-def _verdict(interval: tuple[int, int], limit: int | None, *, complete: bool) -> Verdict | None:
-    verdict = judge_interval(interval, limit)
-    if complete or judge(interval[0], limit) is Verdict.EXCEEDED:
-        return verdict
-    return Verdict.UNDECIDED
 
 
 @lru_cache(maxsize=4096)

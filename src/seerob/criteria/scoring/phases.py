@@ -10,8 +10,10 @@ from typing import TypeVar
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.transforms import Array
 from seerob.criteria.scoring.spans import Span, between, exactly
 from seerob.model.model import Model
+from seerob.recording.answers import Flags
 from seerob.workstation.tables.task_phase import (
     ROUNDING,
     Kilograms,
@@ -37,6 +39,7 @@ __all__ = [
     "entered_for",
     "on_sides",
     "phase_at",
+    "phases_of",
     "shared_phases",
     "turns",
 ]
@@ -112,6 +115,21 @@ def turns(phases: Sequence[Phase]) -> Callable[[float, float], Sequence[float]]:
         return [edge for edge in every if first < edge <= last][:3]
 
     return between
+
+
+def phases_of(phases: Sequence[P], t: Array, unknown: P) -> list[tuple[P, Flags]]:
+    """Each phase that is entered at some of N instants [s], and which these are, shape (N,).
+
+    Args:
+        phases: In their order.
+        t: Instants [s], shape (N,).
+        unknown: The phase of instants that belong to none.
+    """
+    if not phases:
+        return [(unknown, np.ones(len(t), bool))]
+    every = [phase_at(phases, instant, unknown) for instant in t.tolist()]
+    found = {id(phase): phase for phase in every}
+    return [(phase, np.array([one is phase for one in every])) for phase in found.values()]
 
 
 def on_sides(sides: Sides | None) -> Span:

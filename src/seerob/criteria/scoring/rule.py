@@ -12,8 +12,10 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.snapshot import Basis, Input, Level, Result
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.core.snapshot import Basis, Input, Level
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import (
     ACCURACY_NOTE,
     PROJECTION_NOTE,
@@ -23,15 +25,16 @@ from seerob.criteria.scoring.basis import (
     watched,
 )
 from seerob.criteria.scoring.held_work import GAP, Watch, WorkDetection
-from seerob.criteria.scoring.judgement import Method, judged
+from seerob.criteria.scoring.judgement import Method, score, shown, together
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, JointAccuracy, accuracy_of
-from seerob.criteria.scoring.phases import Phase, check_order, phase_at, shared_phases
+from seerob.criteria.scoring.phases import Phase, check_order, phase_at, phases_of, shared_phases
 from seerob.criteria.scoring.spans import Span, Thresholds
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.skeleton import BONES
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State
+from seerob.twin.states import States
 
 
 def posture(state: State, human: Mechanism) -> Angles:
@@ -52,8 +55,10 @@ def bone_rows(model: Model, human: Mechanism) -> list[int]:
     return [slots[f"{human.name}/{bone}"] for bone in BONES]
 
 
-def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> Callable[[State], Angles]:
+def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> Callable[[Twin], Angles]:
     """`posture` of one person with the names resolved, without what nobody measures.
+
+    Of N instants the angles have the shapes (N, 1) and (N, 1, 2).
 
     Args:
         model: The compiled workstation.
@@ -69,7 +74,12 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
             raise UnknownName("bone", bone, BONES)
     bones = tuple(bone_rows(model, human))
 
-    def read(state: State) -> Angles:
+    def read(state: Twin) -> Angles:
+        if isinstance(state, States):
+            # Of whom more is known than where they are is asked instant by instant.
+            R, x = state.captured(human.name, bones)
+            found = angles(R[:, None], x[:, None])
+            return found.without(unmeasured) if unmeasured else found
         invalid = state.invalid_orientations(human.name)
         hearing = state.hearing(human.name, strayed=True)
         # How a hand is turned of which only the wrist is seen is a guess, too.
@@ -167,8 +177,8 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         own: tuple[Phase, ...] = getattr(self, "phases", ())
         return shared_phases(model, self.human, own, self.PHASE.from_task)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes scores."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), self.PHASE(), self.error()
         watch = None if self.detect is None else Watch(self.detect, hold=self.static, count=self.REPEATED)
@@ -180,23 +190,35 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
                 f"at most {GAP:g} s, or none",
             )
 
-        def evaluate(state: State) -> Result:
-            angles = read(state)
+        def scored(angles: Angles, phase: Phase) -> Figure:
+            measured = self.components(angles, phase, watch=watch)
+            spread = None if error is None else self.components(angles, phase, error, watch)
+            return score(self.METHOD, angles, measured, spread, self.limit)
+
+        def compute(twin: Twin) -> Figure:
+            angles = read(twin)
+            if isinstance(twin, States):
+                parts = phases_of(phases, twin.motion.t, unknown)
+                return together([(where, scored(angles[where], phase)) for phase, where in parts])
             if watch is not None:
-                watch.add(state.t, angles)
-            phase = phase_at(phases, state.t, unknown)
-            return judged(
-                self.METHOD,
-                name=self.name,
-                human=self.human,
-                limit=self.limit,
-                angles=angles,
-                components=self.components(angles, phase, watch=watch),
-                spread=None if error is None else self.components(angles, phase, error, watch),
-                thresholds=self.thresholds,
+                watch.add(twin.t, angles)
+            return scored(angles, phase_at(phases, twin.t, unknown))
+
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says and colours what drives the score."""
+
+        def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+            return shown(
+                self.METHOD, figure, verdict, limit=self.limit, human=self.human, thresholds=self.thresholds
             )
 
-        return evaluate
+        return present
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so of what is found in the movement so far."""
+        return "" if self.detect is None else "static and repeated work is found as it happens"
 
     def based(
         self,

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple, cast
 
 from msgspec import Meta
 
 from seerob.core.errors import InputError
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Aspect, Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
-from seerob.core.verdict import judge, judge_interval
-from seerob.criteria.criterion import Evaluate
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, entered, posture_quality
 from seerob.criteria.scoring.phases import Phase, Sides, on_sides, phase_at, shared_phases
 from seerob.criteria.scoring.rule import PostureRule, bind_posture
@@ -35,6 +34,17 @@ class SupportPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Arms whose weight is fully supported."""
     back_supported: bool | None = None
     """The trunk is well supported."""
+
+
+class Zoned(NamedTuple):
+    """What a score of one instant was looked up by."""
+
+    angles: Angles
+    scores: Scores
+    ends: tuple[float, float]
+    """Score of the worse side, at least and at most."""
+    absent: tuple[tuple[str, int], ...]
+    """Angles that are not measured."""
 
 
 class ZoneRule(PostureRule, frozen=True, kw_only=True):
@@ -61,21 +71,41 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         """How the scores of several angles become one."""
         return self.COMBINE
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes the score."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, SupportPhase.from_task)
         rows, error = self.zones(model).rows, self.error()
         self._refuse_idle(rows)
         watch = ZoneWatch(rows, from_rest=self.from_rest)
 
-        def evaluate(state: State) -> Result:
-            angles = read(state)
-            phase = phase_at(phases, state.t, SupportPhase())
-            scores = watch.add(state.t, angles, 0.0 if error is None else error, _support(phase))
-            return self._result(rows, angles, scores)
+        def compute(twin: Twin) -> Figure:
+            assert isinstance(twin, State)
+            angles, phase = read(twin), phase_at(phases, twin.t, SupportPhase())
+            scores = watch.add(twin.t, angles, 0.0 if error is None else error, _support(phase))
+            joined = [self._joined(scores, side) for side in range(2)]
+            low, high = max(ends[0] for ends in joined), max(ends[1] for ends in joined)
+            absent = tuple(key for key in scores if math.isnan(value_of(*key, angles, 0.0)[0]))
+            known = low == high and not absent
+            return Figure(
+                low if known else None,
+                self.limit,
+                interval=None if known and error is None else (low, high),
+                # Without an accuracy it is what was before that nobody knows.
+                open=bool(absent) or (not known and error is None),
+                beside=Zoned(angles, scores, (low, high), absent),
+            )
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says and colours which rows of the table hold."""
+        rows = self.zones(model).rows
+        return lambda state, figure, verdict: self._shown(rows, figure, verdict)
+
+    def one_by_one(self, model: Model) -> str:
+        """Say so: how long something is held, and how often, is found as it happens."""
+        return "what is held and repeated is found as it happens"
 
     def _refuse_idle(self, rows: tuple[ZoneRow, ...]) -> None:
         """Refuse a limit that no posture exceeds.
@@ -90,16 +120,9 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
             remedy = "give less, or leave it out to be told the score alone"
             raise InputError.at(self.name, "limit", what, remedy)
 
-    def _result(self, rows: tuple[ZoneRow, ...], angles: Angles, scores: Scores) -> Result:
-        joined = [self._joined(scores, side) for side in range(2)]
-        low, high = max(ends[0] for ends in joined), max(ends[1] for ends in joined)
-        absent = [key for key in scores if math.isnan(value_of(*key, angles, 0.0)[0])]
+    def _shown(self, rows: tuple[ZoneRow, ...], figure: Figure, verdict: Verdict | None) -> Shown:
+        angles, scores, (low, high), absent = cast("Zoned", figure.beside)
         missing = [_label(*key) for key in absent]
-        known = low == high and not missing
-        verdict = judge_interval((low, high), self.limit)
-        open_history = not known and verdict is None and self.error() is None
-        if open_history or (missing and judge(low, self.limit) is not Verdict.EXCEEDED):
-            verdict = Verdict.UNDECIDED
         worst = [key for key, ends in scores.items() if ends[1] == max(e[1] for e in scores.values())]
         drivers = [key for key in worst if scores[key][1] > 0 and key not in absent]
         reasons = []
@@ -114,13 +137,12 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
             reasons.append(FROM_MEMORY)
         best = max((row.score for row in rows), default=0.0)
         top = best if self.combination() == "max" else sum(_tops(rows, scores).values())
-        return Result(
-            name=self.name,
-            value=low if known else None,
-            limit=self.limit,
-            verdict=verdict,
-            reason="; ".join(reasons),
-            interval=None if known and self.error() is None else (low, high),
+        return Shown(
+            "; ".join(reasons),
+            lambda: tuple(
+                Highlight(body=body, verdict=verdict)
+                for body in dict.fromkeys(b for key in drivers for b in self._bones(*key))
+            ),
             parts=tuple(
                 Result(
                     name=_label(*key),
@@ -130,10 +152,6 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
                     interval=None if ends[0] == ends[1] else ends,
                 )
                 for key, ends in scores.items()
-            ),
-            markers=tuple(
-                Highlight(body=body, verdict=verdict)
-                for body in dict.fromkeys(b for key in drivers for b in self._bones(*key))
             ),
             rows=(
                 total_row("", (low, high), None, (0.0, top), self.limit, verdict),

@@ -134,6 +134,22 @@ def test_whatever_ships_is_asked(everything):
         assert set(plugin.kinds(group)) - set(LEFT_OUT) <= set(kinds)
 
 
+CART = """
+[[machines]]
+name = "cart"
+shape = { box = [0.6, 0.5, 0.3] }
+mass = 50
+at = { position = [0, 0, 0.15] }
+vehicle = {}
+"""
+
+
+def test_energy_of_a_machine_depends_on_who_rides_on_it(tmp_path):
+    arm = ARM + 'on = "cart"\nbase = { position = [0, 0, 0.3] }\n'
+    asked = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "cart"\nlimit = 100\n'
+    never_within(made(tmp_path, FLOATING + CART + arm + asked, {"arm.urdf": two_r()}))
+
+
 # -- criteria that forget --------------------------------------------------------------------------
 
 HEAD = """

@@ -132,9 +132,35 @@ def test_whatever_moves_is_looked_at(rest, away):
     assert burst(rest, rest, rest) == ""
 
 
-def test_nothing_is_said_of_signals():
-    on, off = (SignalSample(source="s", seq=0, t=0.0, values={"door": value}) for value in (True, False))
-    assert burst(on, off, on) == ""
+def signals(**values):
+    return SignalSample(source="s", seq=0, t=0.0, values=values)
+
+
+@pytest.mark.parametrize(
+    ("values", "found"),
+    [
+        ((True, False, True), True),
+        ((True, False, True, False), True),
+        ((True, True, False, False), False),
+        (("idle", "runs", "idle"), True),
+        (("idle", "runs", "runs"), False),
+        ((1.0, 1.049, 1.0), False),
+        ((1.0, 1.06, 1.0), True),
+        ((1.0, 0.8, 1.0), True),
+        ((1.0, 0.8, 0.5), False),
+        ((0.0, 0.004, 0.0), False),
+        ((0.0, float("nan"), 0.5, 0.2), True),
+    ],
+)
+def test_what_nobody_took_before_the_next_was_judged_at_no_instant(values, found):
+    """While the run is held up nobody takes anything: the last one stands where the first one did."""
+    for waits in (True, False):
+        held = HeldBack(BEHIND)
+        said = [
+            held.unjudged(signals(door=value, other=1.0), 0.01 * k, 0.01 * k, waits=waits and k > 1)
+            for k, value in enumerate(values)
+        ]
+        assert ["door"] in said if found and waits else not any(said)
 
 
 def test_both_signs_of_a_quaternion_are_one_orientation():

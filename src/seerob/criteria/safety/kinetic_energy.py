@@ -67,6 +67,13 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         """The robot."""
         return (self.robot,)
 
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """The robot, and whoever rides on it."""
+        robot = model.mover(self.robot)
+        return tuple(
+            dict.fromkeys((robot.name, *robot.riders, *(each.name for each in _aboard(model, robot))))
+        )
+
     def compute(self, model: Model) -> Compute:
         """Look up every name in the model once and return the function that computes the energy."""
         robot = model.mover(self.robot)

@@ -23,7 +23,7 @@ from seerob.core.quantities import Seconds
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import AGAIN, BUFFERED, HOLD, REORDERED, RESTART_HOLD
-from seerob.devices.live.held_back import PLACE, SPEED, TOGETHER
+from seerob.devices.live.held_back import MISSED, PLACE, SPEED, TOGETHER, is_beyond
 from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
 from seerob.workstation.variables import BadValue, Value, Variable
@@ -209,7 +209,6 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
 
 
 PASSED = "older, by its own clock, than what it said before: came it late, or was that set back?"
-MISSED = "was something else in between, for less than any tick sees, and was judged at no instant"
 
 
 class Stamps:
@@ -408,10 +407,9 @@ class Picture:
 
 def _beyond(value: Value, before: Value, after: Value, unit: str) -> bool:
     """Whether a value is none of two others, nor a number between them."""
-    if isinstance(value, bool | str) or isinstance(before, bool | str) or isinstance(after, bool | str):
-        return value not in (before, after)
-    room = ROOMS.get(unit, OTHER_ROOM * max(abs(value), abs(before), abs(after)))
-    return not min(before, after) - room <= value <= max(before, after) + room
+    sizes = [abs(x) for x in (value, before, after) if not isinstance(x, str)]
+    room = ROOMS.get(unit, OTHER_ROOM * max(sizes, default=0.0))
+    return is_beyond(value, (before, after), room)
 
 
 async def _beating(

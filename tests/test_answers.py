@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from seerob.core.markers import Label
 from seerob.core.snapshot import Result, Verdict
-from seerob.core.verdict import ROUNDING, judge, judge_interval, worst
+from seerob.core.verdict import ROUNDING, judge, judge_interval, keeps, worst
+from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Figure, Parts, Shown, answers_of, result_of, verdict_of
+from seerob.criteria.judging import contradiction, unsaid
 from seerob.kernels import verdicts
-from seerob.recording.answers import Answers, judge_many
+from seerob.recording.answers import Answers, judge_many, keep_many
 from seerob.recording.series import CODES, NO_VERDICT
 
 EDGES = np.array([-1.0, np.nextafter(1.0, 0), 1.0, np.nextafter(1.0, 2), np.inf, np.nan])
@@ -204,3 +207,56 @@ def test_a_whole_with_a_figure_of_its_own_is_no_better_than_its_parts():
         assert verdict_of(Figure(own, 1.0, open=True, parts=parts), at_most=True) == told.replace(
             "within", "undecided"
         )
+
+
+@pytest.mark.parametrize("at_most", [True, False])
+def test_of_many_a_limit_is_kept_by_what_keeps_it_of_one(at_most):
+    limits = np.array([0.0, 0.5, -0.5, 1.05, 5e3, -2e3, INF, -INF])
+    for off in (0.99, 1.0, 1.01, -0.99, -1.01, 0.5, 1e6):
+        at = np.where(np.isinf(limits), 0.0, limits)
+        values = at - (1 if at_most else -1) * off * ROUNDING * np.maximum(1.0, np.abs(at))
+        expected = [
+            keeps(float(v), float(limit), at_most=at_most) for v, limit in zip(values, limits, strict=True)
+        ]
+        assert keep_many(values, limits, at_most=at_most).tolist() == expected
+        if at_most:
+            assert keep_many(values, limits).tolist() == expected
+
+
+class Any(Criterion, frozen=True, kw_only=True):
+    """Says whatever it is told to say."""
+
+
+class AtLeast(Any, frozen=True, kw_only=True):
+    at_most: ClassVar[bool] = False
+
+
+@pytest.mark.parametrize("at_most", [True, False])
+@pytest.mark.parametrize("n", [1, 2, 300])
+def test_many_instants_contradict_themselves_where_one_does(n, at_most):
+    criterion, rng = (Any if at_most else AtLeast)(name="x"), np.random.default_rng(n)
+    codes = [0, 1, 2, NO_VERDICT]
+    met = set()
+    for turn in range(1 if n > 2 else 150):
+        value, limit = rng.choice([0.0, 1.0, 2.0, NAN], n), rng.choice([0.5, 1.0, 1.5, NAN, INF, -INF], n)
+        ends = value - rng.choice([0.0, 0.7], n), value + rng.choice([0.0, 0.7], n)
+        interval, nothing = (ends if turn % 2 else None), (rng.random(n) < 0.3 if turn % 3 else None)
+        verdict = rng.choice(codes, n).astype(np.uint8)
+        found = Answers(value, limit, verdict, interval, nothing).contradictions(at_most=at_most)
+        for k in range(n):
+            result = Result(
+                name="x",
+                value=None if np.isnan(value[k]) else float(value[k]),
+                limit=None if np.isnan(limit[k]) else float(limit[k]),
+                at_most=at_most,
+                verdict={CODES[v]: v for v in Verdict}.get(int(verdict[k])),
+                interval=None
+                if interval is None or np.isnan(value[k])
+                else (float(ends[0][k]), float(ends[1][k])),
+                nothing=nothing is not None and bool(nothing[k]),
+                reason="nobody is near",
+            )
+            why = contradiction(result, criterion) or unsaid(result, criterion)
+            assert bool(found[k]) is bool(why), (result, why)
+            met.add(found[k])
+    assert len(met) > 4

@@ -1083,6 +1083,17 @@ def test_what_nothing_bounds_is_muted_at_each_tick_at_which_it_does_not_apply_wh
     assert len({*since}) == 1 + np.count_nonzero(on[1:] & ~on[:-1])
 
 
+def test_what_applied_at_the_last_tick_is_muted_once_it_does_not_however_often_that_was_switched(tmp_path):
+    station, *_ = leaps(tmp_path, switched=[(0, 1), (0.012, 0), (0.014, 1), (0.016, 0), (0.3, 0)])
+    one = bound_to(station.model, Turned(name="one", limit=0.95, active="door"), "safety")
+    judge = Judge([replace(one, watch=None)])
+    results = [
+        out.results[0]
+        for out, _ in islice(ticks(engine_of(station.model), judge, pump(station.sources, 0.01)), 4)
+    ]
+    assert [result.muted for result in results] == [False, False, True, True]
+
+
 OTHER = TWO_R.replace('"arm"', '"other"\nq = [0, 0]\nbase = { position = [9, 0, 0] }', 1)
 
 

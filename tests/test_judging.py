@@ -14,9 +14,10 @@ from seerob.core.markers import Label, Segment
 from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.core.verdict import judge_interval
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.judging import Judge, bound_to, relied_on, undecided
+from seerob.criteria.judging import UNBOUNDED, Judge, bound_to, relied_on, undecided
 from seerob.criteria.noisy_speeds import NOISE, REMEMBERS
 from seerob.description.humans.skeleton import BONES
+from seerob.recording.series import INFORMS
 from seerob.session import batch
 from seerob.twin.states import motion_of
 from seerob.twin.validity.hearing import BonesHeard, Heard
@@ -386,3 +387,10 @@ def test_part_by_part_something_must_be_heard_of_whoever_a_name_means(cell):
     for names, whom in ((("arm/l2",), ("arm",)), (("op", "arm"), ("op", "arm")), (("op/head",), ("op",))):
         assert relied_on(Of(name="v", about=names), cell.model) == whom
     assert relied_on(Turning(name="v"), cell.model) == ()
+
+
+def test_what_nothing_bounds_says_so_and_without_a_limit_that_it_informs(cell):
+    assert bound_to(cell.model, Turning(name="v", limit=1.0), "safety").between == UNBOUNDED
+    assert bound_to(cell.model, Turning(name="v"), "safety").between == INFORMS
+    accepted = Turning(name="v", limit=1.0, between_samples="accepted: it is slow")
+    assert bound_to(cell.model, accepted, "safety").between == "accepted: it is slow"

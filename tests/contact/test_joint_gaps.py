@@ -14,7 +14,7 @@ from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact import joint_gaps
 from seerob.criteria.contact.clamped_regions import Clamping
-from seerob.criteria.contact.clamping import OwnJoints
+from seerob.criteria.contact.clamping import STILL, OwnJoints
 from seerob.criteria.contact.joint_gaps import Looks, _Joint, closing, places
 from seerob.session.station import Station, load
 
@@ -360,3 +360,151 @@ def test_places_lie_on_the_surface_and_their_normals_point_outward() -> None:
     # None of the rod's lie inside the box.
     on = places([Solid(mesh=mesh), rod])
     assert (np.max(np.abs(on.points) - half, axis=1) > -1e-9).all()
+
+
+def _spread(on: joint_gaps.Places, surface: np.ndarray) -> float:
+    """How far the farthest of some points of a surface is from a place [m]."""
+    return max(float(np.linalg.norm(on.points - point, axis=1).min()) for point in surface)
+
+
+def test_no_point_of_a_surface_is_farther_from_a_place_than_its_piece_is_large() -> None:
+    """And there are hardly more places than pieces; of what is large pieces are larger."""
+    h, rng = joint_gaps.PIECES[-1], np.random.default_rng(5)
+    half = np.array([0.1, 0.05, 0.025])
+    box = trimesh.creation.box(2 * half)
+    solid = Solid(mesh=Mesh(np.array(box.vertices), np.array(box.faces, np.int32)))
+    surface = rng.uniform(-1, 1, (300, 3)) * half
+    sides = rng.integers(0, 3, 300)
+    surface[np.arange(300), sides] = rng.choice([-1, 1], 300) * half[sides]
+    on = places([solid])
+    assert on.about == h / 2
+    assert _spread(on, surface) < 1.2 * h
+    assert len(on.points) < 1.5 * box.area / h**2
+    axis = np.array([0.3, 0.0, 0.4])
+    rod = capsule(np.zeros(3), axis, 0.05)
+    angles, along = rng.uniform(0, 2 * np.pi, 300), rng.random(300)
+    round_ = np.cos(angles)[:, None] * [0.0, 1.0, 0.0] + np.sin(angles)[:, None] * [0.8, 0.0, -0.6]
+    on = places([rod])
+    assert _spread(on, along[:, None] * axis + 0.05 * round_) < 0.75 * h
+    out = rng.normal(size=(300, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    ends = np.where((out @ axis > 0)[:, None], axis, 0.0)
+    assert _spread(on, ends + 0.05 * out) < 0.75 * h
+    assert _spread(on, np.array([[-0.03, 0, -0.04], [0.33, 0, 0.44]])) < 1e-9
+    assert len(on.points) < 1.3 * (0.5 * 2 * np.pi * 0.05 + 4 * np.pi * 0.05**2) / h**2
+    a, b, c = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.05, 0.1, 0.0]])
+    pad = Solid(points=np.array([a, b, c]), radius=0.02)
+    uv = rng.random((300, 2))
+    flat = a + uv[:, :1] * (b - a) + uv[:, 1:] * (c - a)
+    on = places([pad])
+    assert _spread(on, flat + rng.choice([-0.02, 0.02], (300, 1)) * [0.0, 0.0, 1.0]) < 1.2 * h
+    np.testing.assert_allclose(np.abs(on.points[:, 2]), 0.02)
+    np.testing.assert_allclose(on.normals[:, 2], np.sign(on.points[:, 2]))
+    # A thin needle is as round as eight places say; a point has an axis, too.
+    needle = places([capsule(np.zeros(3), np.array([0.0, 0.0, 0.05]), 1e-3)])
+    assert len(needle.points) == 8 * 5 + 2
+    ball = places([Solid(points=np.zeros((2, 3)), radius=0.1)])
+    np.testing.assert_allclose(np.linalg.norm(ball.points, axis=1), 0.1)
+    assert _spread(ball, 0.1 * out) < 0.75 * h
+    for long, thick in ((5.0, 0.5), (10.0, 0.1)):
+        large = [capsule(np.zeros(3), np.array([0.0, 0.0, long]), thick), capsule(np.zeros(3), axis, 0.01)]
+        assert places(large).about == pytest.approx((long + 2 * thick) / joint_gaps.MOST_PIECES / 2)
+
+
+def test_a_pair_clamps_as_fast_as_its_joint_closes_it_where_it_is_and_no_slower_joint_does() -> None:
+    rates = np.zeros((2, joint_gaps.STEPS, 3))
+    rates[0, 10, 0], rates[1, 20, 1], rates[0, 12, 2] = 5.0, 3.0, 100.0
+    table = joint_gaps._Table(_Joint("hand", 0, 0.0, 0.01, False), (0,), rates)
+    assert table.at((0.105, 0.105), (-0.1, 0.2)).tolist() == pytest.approx([1.0, 0.0, 0.0])
+    assert table.at((0.105, 0.205), (-0.1, 0.2)).tolist() == pytest.approx([1.0, 0.3, 20.0])
+    assert table.at((0.205, 0.205), (-0.4, -0.1)).tolist() == pytest.approx([0.0, 1.2, 0.0])
+    assert not table.at((0.205, 0.205), (0.1, 0.4)).any()
+    assert not table.at((0.125, 0.125), (0.0, joint_gaps.RIPPLE)).any()
+    assert table.at((0.125, 0.125), (0.0, 1.05 * joint_gaps.RIPPLE))[2] == pytest.approx(0.021)
+    # What closes by no more than a hair stands still.
+    rates[0, 12, 2] = STILL / 0.5
+    assert not table.at((0.125, 0.125), (0.0, 0.5)).any()
+    assert table.at((0.125, 0.125), (0.0, 0.51))[2] == pytest.approx(STILL * 1.02)
+
+
+@pytest.mark.parametrize("off", [-1e-6, 1e-6])
+def test_each_threshold_of_what_clamps_is_where_it_is_said_to_be(off: float) -> None:
+    """A gap that closes evenly from a width: how much it opens, how wide, how narrow, and how fast."""
+    step = np.full(4, 0.25)
+
+    def clamps(
+        gaps: list[float], thick: float, thin: float, least: float = 0.004, about: float = 0.0
+    ) -> list[bool]:
+        g = np.array(gaps)[:, None]
+        near = np.minimum(g[1:], g[:-1])
+        looks = Looks(
+            g, np.ones(g.shape, bool), -np.gradient(g, 0.25, axis=0), near, np.ones(near.shape, bool)
+        )
+        found = closing(looks, np.full((1, 1), about), step, np.array([thick]), np.array([thin]), least=least)
+        assert not found[1].any()
+        return (found[0, :, 0] > 0).tolist()
+
+    even = [0.1, 0.075, 0.05, 0.025, 0.0]
+    assert any(clamps(even, 0.5, 0.1 - off)) is (off > 0)  # opens as wide as the thinnest
+    assert any(clamps(even, 0.5, 0.12 - off, about=0.02)) is (off > 0)
+    assert any(clamps(even, 0.5, 0.05, least=0.1 - off)) is (off > 0)  # and by more than a fingertip
+    assert clamps(even, 0.05 + off, 0.05) == [False, off > 0, True, True]
+    assert clamps(even, 0.03 + off, 0.05, about=0.02) == [False, off > 0, True, True]
+    slow = [0.5 - x for x in np.cumsum([0, *[0.25 * (joint_gaps.SLOWEST + off)] * 4])]
+    assert all(clamps(slow, 0.6, 0.05)) is any(clamps(slow, 0.6, 0.05)) is (off > 0)
+    # In a narrower gap what would shut it within a radian is fast enough, down to a fingertip.
+    least = 0.004
+    narrow = [0.01 * (1 - (1 + off) * x) for x in (0, 0.25, 0.5, 0.75, 1.0)]
+    assert clamps(narrow, 0.6, 0.005, least=least)[0] is True
+    crawling = [0.004 + off * 5 - x * (0.004 + off) for x in (0, 0.25, 0.5, 0.75, 1.0)]
+    assert clamps(crawling, 0.6, 0.003, least=least)[-1] is (off > 0)
+
+
+def test_a_place_between_two_that_it_faces_from_one_only_closes_with_the_faster_of_all() -> None:
+    gaps = np.array([[0.3], [0.2], [0.0]])
+    near, step = np.zeros((2, 1)), np.array([0.5, 0.5])
+    for faces, growing in (
+        ([1, 0, 0], [True, False]),
+        ([0, 1, 0], [True, True]),
+        ([0, 0, 0], [False, False]),
+    ):
+        looks = Looks(gaps, np.array(faces, bool)[:, None], np.array([[0.1], [0.9], [0.0]]), near, near == 0)
+        found = closing(looks, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
+        np.testing.assert_allclose(found[0], np.where(growing, 0.9, 0.0))
+        assert not found[1].any()
+        opening = Looks(gaps[::-1], looks.faces, -looks.falls, near, near == 0)
+        back = closing(opening, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
+        np.testing.assert_allclose(back[1], np.where(growing, 0.9, 0.0))
+        assert not back[0].any()
+        unasked = closing(
+            Looks(gaps, looks.faces, looks.falls, near, near > 0),
+            np.zeros((1, 1)),
+            step,
+            np.array([1.0]),
+            np.array([0.1]),
+            least=0.004,
+        )
+        assert not unasked.any()
+
+
+def test_two_balls_clamp_as_early_whichever_way_they_come_together(tmp_path: Path) -> None:
+    """Along their poles, across them and aslant: the gap is that between them."""
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    counts = []
+    for k, way in enumerate(((0, 0, 1), (1, 0, 0), (1, 0, 1), (1, 1, 1))):
+        x, y, z = np.array(way) / np.linalg.norm(way)
+        urdf = (
+            f'<robot name="r"><link name="base">{mass}{ball}</link><link name="l1">{mass}{ball}</link>'
+            '<joint name="j1" type="prismatic"><parent link="base"/><child link="l1"/>'
+            f'<origin xyz="{0.2 * x} {0.2 * y} {0.2 * z}"/><axis xyz="{x} {y} {z}"/>'
+            '<limit effort="100" velocity="1" lower="0" upper="0.72"/></joint></robot>'
+        )
+        model = made(tmp_path / str(k), FLOATING + ARM, {"arm.urdf": urdf}).model
+        (table,) = Clamping(model, model.robot("arm"), {}, (HAND, CHEST), None)._joints._tables
+        assert not table.rates[0].any()
+        counts.append((table.rates[1] > 0).sum(axis=0).tolist())
+        np.testing.assert_allclose(table.rates[1].max(), 1.0, atol=0.01)
+    # Of 10 mm each.
+    assert np.ptp(counts, axis=0).max() <= 1
+    assert np.min(counts) > 3

@@ -425,14 +425,30 @@ def _of_solid(solid: Solid, h: float) -> tuple[Array, Array]:
     axis = (end - start) / length if length > 0 else np.array([0.0, 0, 1])
     side = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     side /= np.linalg.norm(side)
-    count = max(ROUND, math.ceil(2 * np.pi * solid.radius / h))
-    angles = 2 * np.pi * np.arange(count) / count
-    around = np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * np.cross(axis, side)
+    around = _circle(axis, side, max(ROUND, math.ceil(2 * np.pi * solid.radius / h)))
     along = np.linspace(0, 1, int(np.ceil(length / h)) + 1)[:, None] * (end - start) + start
-    points = (along[:, None] + solid.radius * around).reshape(-1, 3)
-    caps = np.array([start - solid.radius * axis, end + solid.radius * axis])
-    normals = np.concatenate([np.tile(around, (len(along), 1)), [-axis, axis]])
-    return np.concatenate([points, caps]), normals
+    caps = [_cap(way, side, solid.radius / h) for way in (-axis, axis)]
+    normals = np.concatenate([np.tile(around, (len(along), 1)), *caps])
+    inside = np.concatenate([np.repeat(along, len(around), axis=0), *(
+        np.tile(at, (len(cap), 1)) for at, cap in zip((start, end), caps, strict=True)
+    )])  # fmt: skip
+    return inside + solid.radius * normals, normals
+
+
+def _circle(axis: Array, side: Array, count: int) -> Array:
+    """So many directions around an axis, of which ``side`` is one, shape (count, 3)."""
+    angles = (2 * np.pi * np.arange(count) / count)[:, None]
+    return np.asarray(np.cos(angles) * side + np.sin(angles) * np.cross(axis, side))
+
+
+def _cap(axis: Array, side: Array, radius: float) -> Array:
+    """Directions all over a hemisphere, its rim left out, shape (k, 3); its radius in pieces."""
+    rings = math.ceil(np.pi / 2 * radius)
+    found = [axis[None]]
+    for up in (np.pi / 2 * np.arange(1, rings) / rings).tolist():
+        ring = _circle(axis, side, math.ceil(2 * np.pi * radius * math.cos(up)))
+        found.append(math.cos(up) * ring + math.sin(up) * axis)
+    return np.concatenate(found)
 
 
 def _on_triangles(triangles: Array, h: float, radius: float) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from seerob.criteria.contact.clamping import (
     STILL,
     OwnJoints,
     clamps,
-    distances,
+    distances_from,
     getting_in,
     pinch_pairs,
     robot_pinch_pairs,
@@ -290,7 +290,7 @@ def test_own_parts_open_as_wide_as_any_place_gets_from_the_other_part(tmp_path: 
             )
             seen = np.einsum("nij,kj->nki", R[:, a], points) + (x[:, a] - x[:, b])[:, None]
             seen = np.einsum("nki,nij->nkj", seen, R[:, b]).reshape(-1, 3)
-            far = max(far, float(distances(model.bodies[b].solids, seen)[0].max()))
+            far = max(far, float(distances_from(model.bodies[b].solids)(seen)[0].max()))
         opens = found[one.split("/")[1], other]
         assert far <= opens <= far + 0.75
         # Where that is enough, nobody looks for more.

@@ -26,8 +26,10 @@ from the shapes and the ranges of the joints:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -318,18 +320,19 @@ def robot_pinch_pairs(
     pairs = pinch_pairs(model.shapes, robot.moving, surfaces, excluded, others=others, still=still, cap=cap)
     opens = np.full(len(pairs.first), np.inf)
     poses: list[tuple[Array, Array]] = []
+    distances = cache(lambda body: distances_from(model.bodies[body].solids))
     for gap in np.flatnonzero(pairs.inner).tolist():
         i, j = pairs.moving[pairs.first[gap]], int(pairs.across[gap])
         if (min(i, j), max(i, j)) in always:
             continue
-        ways = (_Way(model, i, j), _Way(model, j, i))
+        ways = (_Way(model, i, j, distances), _Way(model, j, i, distances))
         opens[gap] = max(way.least for way in ways)
         if opens[gap] < enough and not poses:
             poses = _some_poses(joints, set().union(*between.values()))
-        for some in poses:
+        for some, way in product(poses, ways):
             if opens[gap] >= enough:
                 break
-            opens[gap] = max(opens[gap], *(way.at(*some) for way in ways))
+            opens[gap] = max(opens[gap], way.at(*some))
     return pairs, opens, placed
 
 
@@ -341,21 +344,30 @@ def _some_poses(joints: OwnJoints, coordinates: Iterable[Coordinate]) -> list[tu
     return [joints.poses(dict(zip(every, some.T, strict=True))) for some in np.split(at, SAMPLED // TOGETHER)]
 
 
-def distances(solids: Sequence[Solid], points: Array) -> tuple[Array, Array]:
-    """How far points are from a body, shape (k,), and where it is nearest, (k, 3) [m]."""
+Distances = Callable[[Array], tuple[Array, Array]]
+"""How far points (k, 3) in a body's frame are from it, shape (k,), and where it is nearest, (k, 3) [m]."""
+
+
+def distances_from(solids: Sequence[Solid]) -> Distances:
+    """What tells the distances of points from a body."""
     shapes = Shapes.build([("body", solids), ("point", [Solid(points=np.zeros((2, 3)))])])
-    positions = np.zeros((len(points), 2, 3))
-    positions[:, 1] = points
-    found = Query(shapes, [0], [1]).batch(np.broadcast_to(np.eye(3), (len(points), 2, 3, 3)), positions)
-    return found.distance[:, 0], found.point_a[:, 0]
+    query = Query(shapes, [0], [1])
+
+    def distances(points: Array) -> tuple[Array, Array]:
+        positions = np.zeros((len(points), 2, 3))
+        positions[:, 1] = points
+        found = query.batch(np.broadcast_to(np.eye(3), (len(points), 2, 3, 3)), positions)
+        return found.distance[:, 0], found.point_a[:, 0]
+
+    return distances
 
 
 class _Way:
     """How far any place of a body gets from another one, at most [m]."""
 
-    def __init__(self, model: Model, one: int, other: int) -> None:
+    def __init__(self, model: Model, one: int, other: int, distances: Callable[[int], Distances]) -> None:
         body, self._one, self._other = model.bodies[one], one, other
-        self._corners, self._solids = body.corners, model.bodies[other].solids
+        self._corners, self._distances = body.corners, distances
         self.least = JUNG * float(np.linalg.norm(np.ptp(body.corners, axis=0))) + body.radius
         """No point of a hull is farther from all of its corners than their ball is wide (Jung)."""
 
@@ -364,4 +376,4 @@ class _Way:
         points = np.einsum("nij,kj->nki", rotations[:, self._one], self._corners)
         points += positions[:, self._one, None] - positions[:, self._other, None]
         points = np.einsum("nki,nij->nkj", points, rotations[:, self._other]).reshape(-1, 3)
-        return self.least + float(distances(self._solids, points)[0].max())
+        return self.least + float(self._distances(self._other)(points)[0].max())

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Solid
 from seerob.core.transforms import Array
-from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints, distances
+from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints, distances_from
 from seerob.kernels._kept_loops import key_of
 from seerob.model.model import Mechanism, Model
 from seerob.twin.spans import Span
@@ -191,7 +191,7 @@ class _Side:
         asked[:-1] |= wanted
         asked |= ~varies
         place, node = np.nonzero(asked.T)
-        distance, nearest = distances(self._other, points[node, place])
+        distance, nearest = distances_from(self._other)(points[node, place])
         way = nearest - points[node, place]
         gaps, faces, falls = known.copy(), np.zeros(known.shape, bool), np.zeros(known.shape)
         gaps[node, place] = np.maximum(distance, 0.0)
@@ -479,5 +479,5 @@ def _outside(found: tuple[Array, Array], k: int, solids: Sequence[Solid]) -> tup
     points, normals = found
     if not len(points):
         return found
-    free = distances([solid for i, solid in enumerate(solids) if i != k], points)[0] >= 0
+    free = distances_from([solid for i, solid in enumerate(solids) if i != k])(points)[0] >= 0
     return points[free], normals[free]

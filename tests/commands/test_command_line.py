@@ -98,6 +98,25 @@ def test_python_m_seerob_is_the_command_line():
 # -- new, check-file, kinds, schema -------------------------------------------------------------
 
 
+def test_a_command_ends_at_once_after_what_is_to_be_done_at_the_end():
+    """Only who traces it, say, has the interpreter take itself apart."""
+    program = (
+        "import atexit, sys\n"
+        "from seerob.__main__ import program\n"
+        "atexit.register(print, 'done at the end')\n"
+        "sys.argv = ['seerob', 'kinds']\n"
+        "sys.settrace({trace})\n"
+        "program()\n"
+        "print('not at once')\n"
+    )
+    for trace, end in (("None", "done"), ("lambda *_: None", "not at once\ndone")):
+        command = [sys.executable, "-c", program.format(trace=trace)]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        kinds, _, last = done.stdout.rpartition(end)
+        assert (kinds.startswith("[[sources]]"), "not at once" in kinds) == (True, False)
+        assert (last, done.stderr) == (" at the end\n", "")
+
+
 def test_new_makes_a_folder_that_is_fine_and_touches_nothing_that_exists(capsys, tmp_path):
     code, out, _ = seerob(capsys, "new", tmp_path / "cell")
     assert code == 0

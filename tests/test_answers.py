@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from seerob.core.markers import Label
-from seerob.core.snapshot import Result, Verdict
+from seerob.core.snapshot import Result, Row, Verdict
 from seerob.core.verdict import ROUNDING, judge, judge_interval, keeps, worst
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Figure, Parts, Shown, answers_of, result_of, verdict_of
@@ -172,6 +172,47 @@ def test_the_worst_of_parts_is_the_whole_of_one_instant_and_of_many(at_most, ope
         )
         if np.isfinite(value[k][parts.governs]):
             assert many.value[k] == value[k][parts.governs]
+
+
+@pytest.mark.parametrize("at_most", [True, False])
+def test_what_is_said_of_some_parts_counts_of_one_instant_and_of_many(at_most):
+    """More than is known, exceeded whatever its value, judged by nobody; without a limit it is the worst."""
+    rng = np.random.default_rng(4)
+    side = 1.0 if at_most else -1.0
+    value, limit = np.zeros((300, 4)), side * rng.choice([-2.0, -1.0, 1.0, 2.0, NAN], (300, 4))
+    unsure, exceeded, informs = rng.random((3, 300, 4)) < 0.25
+    said = {"unsure": unsure, "exceeded": exceeded, "informs": informs}
+    many = answers_of(Figure(None, parts=Parts("abcd", value, limit, **said)), 300, at_most=at_most)
+    for k in range(300):
+        each = {key: flags[k] for key, flags in said.items()}
+        parts = Parts("abcd", value[k], limit[k], **each)
+        verdict = verdict_of(Figure(None, parts=parts), at_most=at_most)
+        alone = []
+        for i in range(4):
+            told = Verdict.UNDECIDED if np.isnan(limit[k, i]) else judge(0.0, limit[k, i], at_most=at_most)
+            told = Verdict.UNDECIDED if unsure[k, i] and told is Verdict.WITHIN else told
+            told = Verdict.EXCEEDED if exceeded[k, i] else told
+            alone.append(None if informs[k, i] else told)
+        assert list(parts.verdicts) == alone
+        assert verdict is worst(alone)
+        room = np.where(np.isnan(limit[k]), -INF, side * limit[k])
+        as_bad = [i for i, told in enumerate(alone) if told is verdict]
+        assert parts.governs == min(as_bad, key=lambda i: room[i])
+        assert many.verdict[k] == CODES[verdict]
+        np.testing.assert_array_equal(many.limit[k], limit[k, parts.governs])
+
+
+def test_what_lies_beneath_parts_and_rows_are_shown():
+    value = np.array([0.5, 3.0])
+    ends = np.array([0.4, NAN]), np.array([0.6, NAN])
+    parts = Parts(["a", "b"], value, np.array([1.0, NAN]), ends, informs=np.array([False, True]))
+    figure, beneath, row = Figure(None, parts=parts), (Result(name="c", value=1.0),), Row(name="d", group="e")
+    verdict = verdict_of(figure, at_most=True)
+    told = result_of(figure, verdict, Shown(beneath=((), beneath), rows=(row,)), Result(name="x", unit="m"))
+    assert [part.parts for part in told.parts] == [(), beneath]
+    assert [part.interval for part in told.parts] == [(0.4, 0.6), None]
+    assert [part.verdict for part in told.parts] == [Verdict.WITHIN, None]
+    assert told.rows == (row,)
 
 
 def test_parts_are_told_each_with_its_place_and_the_worst_is_the_whole():

@@ -128,9 +128,12 @@ def judged_chest(folder: Path) -> tuple[Contacts, Judged, Result, int]:
 
 def test_a_value_below_its_limit_is_within_and_one_on_it_is_not(tmp_path: Path) -> None:
     contacts, judged, chest, row = judged_chest(tmp_path)
+    pressed = contacts.rows.by_pressure(judged)
     for least in chest.parts:
         for value, expected in ((least.limit - 2e-9, "within"), (least.limit, "exceeded")):
-            rows = contacts.rows.of([(replace(chest, value=value), row)], judged, lambda _: ())
+            rows = contacts.rows.of(
+                [(replace(chest, value=value), row)], judged, lambda _: (), pressed=pressed
+            )
             (found,) = [r for r in rows if r.name == least.name]
             assert (found.limit, found.verdict) == (least.limit, expected)
 
@@ -146,6 +149,7 @@ def test_what_a_tolerance_leaves_open_says_which(tmp_path: Path) -> None:
 
 def test_the_side_of_a_row_is_that_of_all_its_bones(tmp_path: Path) -> None:
     contacts, judged, chest, row = judged_chest(tmp_path)
+    pressed = contacts.rows.by_pressure(judged)
     for bones, side in (
         ((), ""),
         (("op/right_hand",), "right"),
@@ -154,5 +158,5 @@ def test_the_side_of_a_row_is_that_of_all_its_bones(tmp_path: Path) -> None:
         (("op/right_hand", "op/thorax"), ""),
         (("op/thorax",), ""),
     ):
-        rows = contacts.rows.of([(chest, row)], judged, lambda _, bones=bones: bones)
+        rows = contacts.rows.of([(chest, row)], judged, lambda _, bones=bones: bones, pressed=pressed)
         assert {found.side for found in rows} == {side}, bones

@@ -13,11 +13,12 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Result, Verdict
+from seerob.core.snapshot import Verdict
 from seerob.core.tolerances import Spread
 from seerob.core.verdict import judge, judge_interval, worst
+from seerob.criteria.contact.collision import speed_at_force
 from seerob.criteria.contact.limits import Judged, RegionArrays, area_verdict, ranks
-from seerob.criteria.contact.rows import area_results, margin
+from seerob.criteria.contact.rows import area_results
 from seerob.criteria.contact.shape import ContactShape, force_at_pressure
 from seerob.criteria.judging import Judge
 from seerob.criteria.safety.effective_mass import inverse_effective_mass, principal_masses
@@ -213,10 +214,7 @@ def test_on_its_limit_a_figure_is_beyond_it_wherever_the_cell_stands(tmp_path, t
     assert {told[name].verdict for name in told} == {WITHIN if deviation else EXCEEDED}
 
 
-def test_what_is_least_permitted_and_how_far_it_is():
-    part = Result(name="Chest", value=1.0, limit=3.0)
-    assert margin((part, 0)) == 2.0
-    assert margin((Result(name="Chest", value=1.0), 0)) == margin((Result(name="C", limit=1.0), 0)) == -np.inf
+def test_what_is_least_permitted():
     arrays = RegionArrays.of(shipped())
     n = len(arrays.regions)
     speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
@@ -263,9 +261,10 @@ def test_areas_on_and_beside_the_speed_that_each_allows():
     )  # fmt: skip
 
     def areas(v, force=1e9, unknown="", ends=None, whole=WITHIN):
-        forces = np.full(len(arrays.owner), force)
+        forces = np.full((arrays.owner == column).sum(), force)
+        pressed = speed_at_force(forces, speeds.mu[0, column], arrays.stiffness[column]).tolist()
         return area_results(
-            arrays, forces, (0, column), replace(judged, ends=ends), whole=whole, unknown=unknown, v=v
+            arrays, pressed, (0, column), replace(judged, ends=ends), whole=whole, unknown=unknown, v=v
         )
 
     limit = float(min(speeds.force[0, column], speeds.energy[0, column]))

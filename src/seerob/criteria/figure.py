@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from msgspec import Struct
+from numpy.typing import NDArray
 
 from seerob.core.markers import Marker, drawn
 from seerob.core.snapshot import Result, Row
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, Verdict, judge, judge_interval, worst
-from seerob.kernels.verdicts import judged, judged_many
+from seerob.kernels.verdicts import Codes, judged, judged_many
 from seerob.recording.answers import Answers, Flags
 from seerob.recording.series import CODES
 
@@ -29,7 +30,10 @@ if TYPE_CHECKING:
     from seerob.twin.states import States
 
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
-_VERDICTS = {code: verdict for verdict, code in CODES.items() if verdict is not None}
+_VERDICTS = {code: verdict for verdict, code in CODES.items()}
+_RANKS = np.zeros(max(CODES.values()) + 1, np.int64)
+"""By code of a verdict: the higher, the worse."""
+_RANKS[[CODES[each] for each in (None, _WITHIN, _UNDECIDED, _EXCEEDED)]] = range(4)
 Twin: TypeAlias = "State | States"
 """The twin at one instant, or at N; accessors of both have the same names, with instants in front."""
 
@@ -50,14 +54,25 @@ class Parts(Struct, eq=False):
     """Where the true values lie, shape (..., n) each."""
     open: bool | Flags = False
     """Whether more may be than what is known, shape (...): then none of them is within."""
+    unsure: Flags | None = None
+    """Which may be more than what is known of them, shape (..., n): they are not within."""
+    exceeded: Flags | None = None
+    """Which exceed whatever their value, as what nobody may touch, shape (..., n)."""
+    informs: Flags | None = None
+    """Which nobody judges, shape (..., n): they have no verdict."""
     units: Sequence[str] | None = None
     """Of each; that of the criterion when not given."""
     whole: bool = True
     """Whether the worst of them is the whole: its value, its limit and its interval."""
-    verdicts: Sequence[Verdict] = ()
+    verdicts: Sequence[Verdict | None] = ()
     """Of each."""
     governs: int = 0
     """Which is the worst: of those with the worst verdict the nearest to its limit, or farthest beyond."""
+
+    @property
+    def apart(self) -> bool:
+        """Whether something is said of some of them."""
+        return not (self.unsure is self.exceeded is self.informs is None)
 
 
 class Figure(Struct, frozen=True, eq=False):
@@ -103,6 +118,8 @@ class Shown(NamedTuple):
     """Figures that are shown beside those that are judged (`Figure.parts`), after them."""
     where: Sequence[str] | None = None
     """What is said of each of `Figure.parts`."""
+    beneath: Sequence[tuple[Result, ...]] | None = None
+    """Figures that are shown beneath each of `Figure.parts`."""
     rows: tuple[Row, ...] = ()
     """Of the places of a person's body."""
 
@@ -123,8 +140,28 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     parts.governs = k = judged(
         parts.value, low, high, parts.limit, ROUNDING, at_most, bool(parts.open), codes
     )
+    if parts.apart:
+        parts.governs = k = int(_said_of_each(parts, codes, at_most=at_most))
     parts.verdicts = verdicts = list(map(_VERDICTS.__getitem__, codes.tolist()))
     return verdicts[k] if parts.whole else worst([verdicts[k], _own_verdict(figure, at_most=at_most)])
+
+
+def _said_of_each(parts: Parts, codes: Codes, *, at_most: bool) -> NDArray[np.int64]:
+    """Write what is said of some parts into their verdicts, shape (..., n), and find which one governs.
+
+    One without a limit is the worst of its verdict: nothing is permitted, or known to be.
+    """
+    if parts.unsure is not None:
+        codes[parts.unsure & (codes == CODES[_WITHIN])] = CODES[_UNDECIDED]
+    if parts.exceeded is not None:
+        codes[parts.exceeded] = CODES[_EXCEEDED]
+    if parts.informs is not None:
+        codes[parts.informs] = CODES[None]
+    rank = _RANKS[codes]
+    room = parts.limit - parts.value if at_most else parts.value - parts.limit
+    room = np.where(np.isnan(room), -np.inf, np.minimum(room, np.finfo(float).max))
+    worst = rank == rank.max(axis=-1, keepdims=True)
+    return np.asarray(np.where(worst, room, np.inf).argmin(axis=-1))
 
 
 def _own_verdict(figure: Figure, *, at_most: bool) -> Verdict | None:
@@ -170,7 +207,7 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         else:
             interval = (float(low), float(high)) if -math.inf < low < high < math.inf else None
     if figure.parts is not None:
-        told = _part_results(figure.parts, shown.where, result)
+        told = _part_results(figure.parts, shown, result)
         parts = (*told, *parts)
         if figure.parts.whole:
             governs = told[figure.parts.governs]
@@ -193,7 +230,7 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
     )
 
 
-def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> list[Result]:
+def _part_results(parts: Parts, shown: Shown, result: Result) -> list[Result]:
     unit, at_most = result.unit, result.at_most
     ends: Iterable[tuple[float, float] | None] = repeat(None)
     limits = parts.limit.tolist()
@@ -201,7 +238,8 @@ def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> 
         limits = [None if math.isnan(limit) else limit for limit in limits]
     if parts.interval is not None:
         low, high = parts.interval
-        ends = zip(low.tolist(), high.tolist(), strict=True)
+        both = zip(low.tolist(), high.tolist(), strict=True)
+        ends = (None if math.isnan(least) else (least, most) for least, most in both)
     every = zip(
         parts.names,
         parts.value.tolist(),
@@ -209,7 +247,8 @@ def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> 
         limits,
         parts.verdicts,
         ends,
-        where or repeat(""),
+        shown.where or repeat(""),
+        shown.beneath or repeat(()),
         strict=False,
     )
     return [
@@ -222,8 +261,9 @@ def _part_results(parts: Parts, where: Sequence[str] | None, result: Result) -> 
             verdict=verdict,
             interval=interval,
             reason=reason,
+            parts=beneath,
         )
-        for name, value, own, limit, verdict, interval, reason in every
+        for name, value, own, limit, verdict, interval, reason, beneath in every
     ]
 
 
@@ -264,6 +304,8 @@ def _answers_of_parts(parts: Parts, *, at_most: bool) -> Answers:
     verdicts, governs = np.empty(value.shape, np.uint8), np.empty(len(value), np.int64)
     open_ = np.broadcast_to(np.asarray(parts.open), len(value)).copy()
     judged_many(value, low, high, limit, ROUNDING, at_most, open_, verdicts, governs)
+    if parts.apart:
+        governs = _said_of_each(parts, verdicts, at_most=at_most)
     rows = np.arange(len(value)), governs
     interval = None if parts.interval is None else (low[rows], high[rows])
     return Answers(value[rows], limit[rows], verdicts[rows], interval).finite()

@@ -26,7 +26,6 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 from msgspec import Meta, Struct
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob.core.domains import number
@@ -230,12 +229,6 @@ def judged(
         open_ = tuple(above)
         return (Verdict.UNDECIDED, "; ".join(open_)) if open_ else (Verdict.EXCEEDED, "")
     return (Verdict.UNDECIDED, "; ".join(undecided_reasons)) if undecided_reasons else (Verdict.WITHIN, "")
-
-
-def with_measured(predicted: Result, measured: Sequence[Result]) -> Result:
-    """The prediction of a body region with what was measured of it: the worse verdict counts."""
-    verdict, reason = worse(predicted.verdict, predicted.reason, measured)
-    return replace(predicted, verdict=verdict, reason=reason, parts=(*measured, *predicted.parts))
 
 
 def worse(verdict: Verdict | None, reason: str, measured: Sequence[Result]) -> tuple[Verdict | None, str]:

@@ -19,7 +19,6 @@ from seerob.core import figures
 from seerob.core.snapshot import Arrow, Aspect, Highlight, Marker, Result, Row, RowState, Sphere, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import keeps
-from seerob.criteria.contact import collision
 from seerob.criteria.contact.collision import Governing, speed_at_force
 from seerob.criteria.contact.limits import Judged, RegionArrays, area_verdict
 from seerob.criteria.contact.measured import worse
@@ -47,7 +46,7 @@ NOT_MODELLED = (
 
 def area_results(
     arrays: RegionArrays,
-    forces: Array,
+    pressed: Sequence[float],
     at: tuple[int, int],
     judged: Judged,
     *,
@@ -59,7 +58,8 @@ def area_results(
 
     Args:
         arrays: The limits.
-        forces: Of the surface, that keep the pressure of every area of the table, shape (a,) [N].
+        pressed: Speed that the pressure of each of these areas allows the surface [m/s]; NaN where it is not
+            known.
         at: The surface and the region.
         judged: What the region was judged by.
         whole: Verdict of the region.
@@ -69,10 +69,8 @@ def area_results(
     row, column = at
     speeds, region = judged.speeds, arrays.regions[column]
     others = min(float(speeds.force[row, column]), float(speeds.energy[row, column]))
-    own = forces[arrays.owner == column]
-    pressed = collision.speed_at_force(own, speeds.mu[row, column], region.stiffness.value)
     found = []
-    for area, v_P in zip(region.areas, pressed.tolist(), strict=True):
+    for area, v_P in zip(region.areas, pressed, strict=True):
         open_ = math.isnan(v_P)
         limit = others if open_ else min(others, v_P)
         verdict = Verdict.EXCEEDED if not keeps(v, limit) else Verdict.UNDECIDED if open_ else Verdict.WITHIN
@@ -80,12 +78,6 @@ def area_results(
         reason = "" if verdict is not Verdict.UNDECIDED else unknown or "decided as its region is"
         found.append(Result(name=area.name, value=v, unit="m/s", limit=limit, verdict=verdict, reason=reason))
     return tuple(found)
-
-
-def margin(entry: tuple[Result, int]) -> float:
-    """Without a limit it is the worst: nothing is permitted or known."""
-    part = entry[0]
-    return -math.inf if part.limit is None or part.value is None else part.limit - part.value
 
 
 class _Place(NamedTuple):
@@ -137,6 +129,7 @@ class ContactRows:
         judged: Judged,
         bones: Callable[[str], tuple[str, ...]],
         *,
+        pressed: Sequence[float],
         measured: Mapping[str, Sequence[Result]] | None = None,
     ) -> tuple[Row, ...]:
         """Rows of all areas of the regions that can be hit.
@@ -145,9 +138,9 @@ class ContactRows:
             found: Result of a region, and the row of the moving body that governs it.
             judged: What they were made from.
             bones: Full names of the bones of a region that can be hit; none without a person.
+            pressed: What `by_pressure` says.
             measured: What was measured of regions by name: of each row the worse counts.
         """
-        pressed = self._speeds_by_pressure(judged)
         rows: list[Row] = []
         for part, row in found:
             column = self._columns.get(part.name)
@@ -160,7 +153,12 @@ class ContactRows:
                     rows.append(replace(one, verdict=verdict, reason=reason) if told else one)
         return tuple(rows)
 
-    def _speeds_by_pressure(self, judged: Judged) -> list[float]:
+    def areas_of(self, column: int) -> slice:
+        """Where the areas of a region are among those of `by_pressure`."""
+        first = self._first[column]
+        return slice(first, first + len(self._arrays.regions[column].areas))
+
+    def by_pressure(self, judged: Judged) -> list[float]:
         """At the body that governs each region: permissible speed by the pressure of each area [m/s]."""
         owner = self._arrays.owner
         row = judged.rows[self._in_regions][owner]
@@ -292,39 +290,47 @@ class ContactMarkers:
         self._columns = {region.name: k for k, region in enumerate(arrays.regions)}
         self._least: dict[tuple[int, int, bool], int | None] = {}
 
-    def of(self, state: State, part: Result, row: int, judged: Judged) -> tuple[Marker, ...]:
-        """Markers of a region and the row of the moving body that governs it."""
+    def of(self, state: State, part: Result, row: int, judged: Judged) -> Callable[[], tuple[Marker, ...]]:
+        """Draws a region and the row of the moving body that governs it, from copies."""
         body = self._bodies[row]
         _, point, velocity = state.fastest_point(body)
-        shown = figures.against(part.value, part.limit, part.unit, at_most=True)
-        label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
-        arrow = Arrow(
-            origin=tuple(point.tolist()),
-            vector=tuple((ARROW * velocity).tolist()),
-            label=label,
-            verdict=part.verdict,
-        )
-        lit = Highlight(body=self._model.bodies[body].name, verdict=part.verdict)
-        return arrow, lit, *self._patch(state, part, row, judged)
+        R, x = state.placed((body,))
+        point, velocity, R, x = point.copy(), velocity.copy(), R[body].copy(), x[body].copy()
 
-    def _patch(self, state: State, part: Result, row: int, judged: Judged) -> tuple[Sphere, ...]:
-        """Where a pressure governs, or is open because the mesh does not resolve an edge: there."""
+        def draw() -> tuple[Marker, ...]:
+            shown = figures.against(part.value, part.limit, part.unit, at_most=True)
+            label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
+            arrow = Arrow(
+                origin=tuple(point.tolist()),
+                vector=tuple((ARROW * velocity).tolist()),
+                label=label,
+                verdict=part.verdict,
+            )
+            lit = Highlight(body=self._model.bodies[body].name, verdict=part.verdict)
+            patch = self._patch(part, row, judged)
+            if patch is None:
+                return arrow, lit
+            at, label = patch
+            center = tuple((x + R @ at).tolist())
+            return arrow, lit, Sphere(center=center, radius=BALL, label=label, verdict=part.verdict)
+
+        return draw
+
+    def _patch(self, part: Result, row: int, judged: Judged) -> tuple[Array, str] | None:
+        """Where a pressure governs, or is open because the mesh does not resolve an edge: there, in words."""
         shape, column = self._shapes[row], self._columns.get(part.name)
         if shape is None or column is None or part.limit is None:
-            return ()
+            return None
         if math.isnan(judged.speeds.pressure[row, column]):
             edges = shape.unknown_at
-            if edges is None or not len(edges):
-                return ()
-            return (self._ball(state, row, edges[0], "edge radius unknown", part.verdict),)
+            return None if edges is None or not len(edges) else (edges[0], "edge radius unknown")
         if judged.speeds.governing[row, column] != Governing.PRESSURE:
-            return ()
+            return None
         patch = self._least_patch(shape, row, column, bool(judged.clamped[row, column]))
         if patch is None:
-            return ()
+            return None
         radius = float(shape.radii[patch, 0])
-        label = f"edge radius {figures.figure(radius * 1e3, 'mm')}"
-        return (self._ball(state, row, shape.points[patch], label, part.verdict),)
+        return shape.points[patch], f"edge radius {figures.figure(radius * 1e3, 'mm')}"
 
     def _least_patch(self, shape: ContactShape, row: int, column: int, clamped: bool) -> int | None:
         """The patch that permits the least force on any area of a region; None of a flat surface."""
@@ -336,9 +342,3 @@ class ContactMarkers:
             forces = force_at_pressure(shape.radii[round_], p, self._arrays.stiffness[column], self._cap)
             self._least[key] = int(round_[forces.argmin()]) if len(round_) else None
         return self._least[key]
-
-    def _ball(self, state: State, row: int, point: Array, label: str, verdict: Verdict | None) -> Sphere:
-        body = self._bodies[row]
-        R, x = state.placed((body,))
-        center = x[body] + R[body] @ point
-        return Sphere(center=tuple(center.tolist()), radius=BALL, label=label, verdict=verdict)

@@ -3,12 +3,13 @@ r"""Power and force limiting: permissible speed of contact, ISO/TS 15066:2016 5.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
-from msgspec import Meta, field
+from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
@@ -17,7 +18,6 @@ from seerob.core.quantities import Coordinate, Tolerance
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.tolerances import Spread, deciding
 from seerob.core.transforms import Array
-from seerob.core.verdict import worst
 from seerob.criteria.body_parts import seen_first
 from seerob.criteria.contact import collision
 from seerob.criteria.contact import limits as contact_limits
@@ -26,11 +26,12 @@ from seerob.criteria.contact.clamped_regions import Clamping, floor_input
 from seerob.criteria.contact.clamping import STILL
 from seerob.criteria.contact.impact_mass import Behind, moving_masses, train
 from seerob.criteria.contact.limits import NOT_GIVEN, ContactEnds, Judged, pushed, ranks, robot_masses
-from seerob.criteria.contact.measured import Measurements, with_measured
+from seerob.criteria.contact.measured import Measurements, worse
 from seerob.criteria.contact.regions import REGIONS, HeightReach, Person, reach_inputs, without_limit
-from seerob.criteria.contact.rows import NOT_MODELLED, ContactMarkers, ContactRows, area_results, margin
+from seerob.criteria.contact.rows import NOT_MODELLED, ContactMarkers, ContactRows, area_results
 from seerob.criteria.contact.shape import given_contacts
 from seerob.criteria.criterion import Criterion, Evaluate, Lowest
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown
 from seerob.description.humans.anthropometry import STATURE_RANGE
 from seerob.description.norms import body_limits
 from seerob.description.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
@@ -49,6 +50,7 @@ ADMITTED = 1e-6
 FAR = 1e6
 """Larger than any margin of speed [m/s]."""
 GOVERNING = tuple(limit.name.lower() for limit in collision.Governing)
+_BY_RANK = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)
 CAP = 1e-4
 """Contact area that the stiffness of the table is good for [m²] (STIMBA PFL calculator, 1S)."""
 
@@ -135,10 +137,22 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         return tuple(model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
-        """Look up every name in the model once and return the function that judges one instant."""
+        """Return the function that judges one instant: of who is partly seen, what is seen first."""
         contacts = Contacts(self, model)
         bones = () if contacts.people is None else contacts.people.bodies
-        return contacts.whoever_is_known(seen_first(bones, contacts.evaluate, contacts.without))
+        return contacts.whoever_is_known(seen_first(bones, contacts.judging(), contacts.without))
+
+    def compute(self, model: Model) -> Compute:
+        """Look up every name in the model once and return the function that computes relative speeds."""
+        return Contacts(self, model).computing()
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says what of a person each moving part may hit, and draws the worst."""
+        return Contacts(self, model).present
+
+    def one_by_one(self, model: Model) -> str:
+        """Say why there are no arrays of what clamps."""
+        return "what clamps, and where, is searched for at each instant"
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         """Judge the least margin within a span."""
@@ -300,6 +314,21 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         )
 
 
+class _Hits(Struct, frozen=True, eq=False):
+    """What of people can be hit at an instant, and by what."""
+
+    judged: Judged
+    people: Person | None
+    hit: NDArray[np.int64] = np.zeros(0, np.int64)
+    """Which of `REGIONS` can be, shape (h,)."""
+    measured: Mapping[int, tuple[Result, ...]] = {}
+    """What was measured of them."""
+    touched: NDArray[np.bool_] | None = None
+    """Which moving body touches which of `REGIONS`; None where none is kept from contact."""
+    invalid_reason: str = ""
+    """Why that is not known; then all are."""
+
+
 class Contacts:
     """What is resolved once, and the judgement of a state."""
 
@@ -318,6 +347,8 @@ class Contacts:
         self.arrays = contact_limits.RegionArrays.of(self.limits, multiplier=spec.multiplier)
         self.columns = {region.name: k for k, region in enumerate(self.arrays.regions)}
         self.in_regions = np.array([REGIONS.index(name) for name in self.columns], int)
+        self.column_of = np.array([self.columns.get(name, -1) for name in REGIONS])
+        self.excluded = np.array([name in spec.excluded for name in REGIONS])
         shapes = spec.shapes(model)
         placed = [
             None if i in spec.given_contacts(model) else shape
@@ -355,6 +386,8 @@ class Contacts:
         )
         self.people = None if spec.human is None else everybody
         self.everybody = everybody if spec.human is None and spec.excluded else None
+        without = (None if name in self.columns else self._without_limit(name, "")[0] for name in REGIONS)
+        self.forbidden = np.array([verdict is Verdict.EXCEEDED for verdict in without])
         hands = {human.hand for human in model.workstation.humans}
         hand = hands.pop() if spec.human is not None and len(hands) == 1 else None
         self.rows = ContactRows(self, hand=hand)
@@ -368,27 +401,37 @@ class Contacts:
             else None
         )  # fmt: skip
 
+    def computing(self, people: Person | None = None) -> Compute:
+        """Return the function that computes all contacts with these people; with everybody when not given."""
+        people = people or self.people
+        return lambda twin: self._compute(cast("State", twin), people)
+
+    def judging(self, people: Person | None = None) -> Evaluate:
+        """Judge contacts with these people; with everybody when not given."""
+        return self.spec.judging(self.computing(people), self.present)
+
     def without(self, lost: tuple[int, ...]) -> Evaluate | None:
         """Judge contacts with the other bones of these people; None when there are none."""
         if {i for name in self.humans for i in self.model.human(name).bodies} <= set(lost):
             return None
-        rest = Person(self.model, self.robot, *self.humans, horizon=self.spec.horizon, without=lost)
-        return lambda state: self.evaluate(state, rest)
+        return self.judging(
+            Person(self.model, self.robot, *self.humans, horizon=self.spec.horizon, without=lost)
+        )
 
     def whoever_is_known(self, judge: Evaluate) -> Evaluate:
         """Judge several people: if one is not known, another's contact may be exceeded, never within."""
         if self.people is None or not self.people.several:
             return judge
         horizon = self.spec.horizon
-        alone = [Person(self.model, self.robot, name, horizon=horizon) for name in self.humans]
+        alone = [self.judging(Person(self.model, self.robot, name, horizon=horizon)) for name in self.humans]
 
         def evaluate(state: State) -> Result:
             try:
                 return judge(state)
             except Undecided:
-                for person in alone:
+                for each in alone:
                     with suppress(Undecided):
-                        result = self.evaluate(state, person)
+                        result = each(state)
                         if result.verdict is Verdict.EXCEEDED:
                             return result
                 raise
@@ -483,7 +526,7 @@ class Contacts:
         moving = rows_of(self.moving)
         reach = np.array([model.bodies[i].radius + model.bodies[i].deviation for i in self.moving])
         changes = change_of_motion(model, robot.mj_bodies, robot.v_address, points)
-        excluded = np.array([name in spec.excluded for name in REGIONS])
+        excluded = self.excluded
         limited = np.isin(np.arange(len(REGIONS)), self.in_regions)
         simplified = self.behind.simplified(None)
 
@@ -551,57 +594,106 @@ class Contacts:
 
         return lowest
 
-    def evaluate(self, state: State, people: Person | None = None) -> Result:
-        """The result at a state; see `judge`."""
-        people = people or self.people
+    def _compute(self, state: State, people: Person | None) -> Figure:
+        """Relative speeds of each region that can be hit; see `judge`."""
         spec, judged = self.spec, self.judge(state, people)
-        near, projected = judged.near, judged.projected
-        found: list[tuple[Result, int]] = []
-        measured: dict[str, tuple[Result, ...]] = {}
+        near, speeds, ends = judged.near, judged.speeds, judged.ends
+        hit = np.flatnonzero(near.any(axis=0))
+        if not len(hit):
+            return Figure(None, nothing=True, beside=_Hits(judged, people))
         # Who is touched all the same was not kept from contact.
         touched, invalid_reason = self._touched(state, people, near) if spec.excluded else (None, "")
-        for k in np.flatnonzero(near.any(axis=0)).tolist():
-            part, row = self._region(k, judged)
+        row, column, kept_off = judged.rows[hit], self.column_of[hit], self.excluded[hit]
+        value, limit = judged.v[row, hit], np.full(len(hit), np.nan)
+        limited = (column >= 0) & ~kept_off
+        at = row[limited], column[limited]
+        limit[limited] = speeds.permissible[at]
+        interval = None
+        if ends is not None:
+            low, high = np.full((2, len(hit)), np.nan)
+            low[limited] = value[limited] - (ends.high[at] - limit[limited])
+            high[limited] = value[limited] + (limit[limited] - ends.low[at])
+            interval = low, high
+        unsure = np.zeros(len(hit), bool)
+        unsure[limited] = np.isnan(speeds.pressure[at])
+        exceeded = self.forbidden[hit] & ~kept_off
+        measured: dict[int, tuple[Result, ...]] = {}
+        for i in np.flatnonzero(limited).tolist() if self.measured.every else ():
+            if told := self._measured(int(hit[i]), judged):
+                measured[int(hit[i])] = told
+                # Of what is predicted and what was measured the worse counts.
+                unsure[i] |= any(part.verdict is Verdict.UNDECIDED for part in told)
+                exceeded[i] |= any(part.verdict is Verdict.EXCEEDED for part in told)
+        informs = kept_off
+        if touched is not None:
+            informs = kept_off & ~np.asarray(touched[:, hit]).any(axis=0)
+        names = [REGIONS[k] for k in hit.tolist()]
+        parts = Parts(names, value, limit, interval, unsure=unsure, exceeded=exceeded, informs=informs)
+        return Figure(None, parts=parts, beside=_Hits(judged, people, hit, measured, touched, invalid_reason))
+
+    def present(self, state: State, figure: Figure, verdict: Verdict | None) -> Shown:
+        """Say what governs each region that can be hit, and draw the worst."""
+        at: _Hits = figure.beside
+        judged, people, parts = at.judged, at.people, figure.parts
+        beside = self._masses(judged)
+        if parts is None:
+            nobody = f"nobody within {self.spec.horizon:g} m of a moving part"
+            return Shown(nobody if judged.moves.any() else "no part moves", None, beside)
+        if people is not None:
+            left = [REGIONS[k] for k in np.flatnonzero(~judged.near.any(axis=0)).tolist()]
+            far = f"farther than {self.spec.horizon:g} m from every moving part: {', '.join(left)}"
+            beside = (*beside, *((Result(name="out of reach", reason=far),) if left else ()))
+        pressed = self.rows.by_pressure(judged)
+        found: list[tuple[Result, int]] = []
+        beneath: list[tuple[Result, ...]] = []
+        figures = zip(parts.value.tolist(), parts.limit.tolist(), parts.verdicts, strict=True)
+        for k, (value, limit, told) in zip(at.hit.tolist(), figures, strict=True):
+            name, row, measured = REGIONS[k], int(judged.rows[k]), at.measured.get(k, ())
+            reason, areas = self._region(k, row, value, judged, pressed)
             if people is not None and people.several:
-                part = replace(part, reason=f"{part.reason}; {', '.join(people.owners(REGIONS[k]))}")
-            if touched is not None and REGIONS[k] in spec.excluded and touched[:, k].any():
-                row = int(touched[:, k].argmax())
-                reason = f"{part.reason}, and {invalid_reason or f'touched by {self.names[row]} here'}"
-                part = replace(part, verdict=Verdict.UNDECIDED, reason=reason)
-            if parts := self._measured(k, judged):
-                part, measured[part.name] = with_measured(part, parts), parts
-            found.append((part, row))
-        found += self._out_of_reach(judged)
-        known = projected[np.isfinite(projected)]
+                reason = f"{reason}; {', '.join(people.owners(name))}"
+            if at.touched is not None and name in self.spec.excluded and at.touched[:, k].any():
+                row = int(at.touched[:, k].argmax())
+                reason = f"{reason}, and {at.invalid_reason or f'touched by {self.names[row]} here'}"
+            if measured:
+                _, reason = worse(_BY_RANK[int(judged.ranks[k])], reason, measured)
+            found.append(
+                (
+                    Result(
+                        name=name,
+                        value=value,
+                        unit="m/s",
+                        limit=None if math.isnan(limit) else limit,
+                        verdict=told,
+                        reason=reason,
+                    ),
+                    row,
+                )
+            )
+            beneath.append((*measured, *areas))
+        part, row = found[parts.governs]
+        out = self._out_of_reach(judged)
+        return Shown(
+            f"{part.name}: {part.reason}",
+            self.markers.of(state, part, row, judged),
+            (*(each for each, _ in out), *beside),
+            [each.reason for each, _ in found],
+            beneath,
+            self.rows.of(
+                [*found, *out],
+                judged,
+                (lambda _: ()) if people is None else people.hit,
+                pressed=pressed,
+                measured={REGIONS[k]: told for k, told in at.measured.items()},
+            ),
+        )
+
+    def _masses(self, judged: Judged) -> tuple[Result, ...]:
+        known = judged.projected[np.isfinite(judged.projected)]
         heaviest, still = (float(known.max()), "") if len(known) else (None, "no part moves")
-        mass_parts: tuple[Result, ...] = (
+        return (
             Result(name="whole mass" if judged.whole else "M/2 + m_L", value=judged.simplified, unit="kg"),
             Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg", reason=still),
-        )
-        if people is not None and found:
-            left = [REGIONS[k] for k in np.flatnonzero(~near.any(axis=0)).tolist()]
-            far = f"farther than {spec.horizon:g} m from every moving part: {', '.join(left)}"
-            mass_parts = (*mass_parts, *((Result(name="out of reach", reason=far),) if left else ()))
-        if not found:
-            nobody = f"nobody within {spec.horizon:g} m of a moving part"
-            reason = nobody if judged.moves.any() else "no part moves"
-            return Result(name=spec.name, unit="m/s", reason=reason, nothing=True, parts=mass_parts)
-        verdict = worst([part.verdict for part, _ in found])
-        chosen = [entry for entry in found if entry[0].verdict is verdict]
-        part, row = min(chosen, key=margin)
-        return Result(
-            name=spec.name,
-            value=part.value,
-            unit=spec.unit,
-            limit=part.limit,
-            verdict=verdict,
-            reason=f"{part.name}: {part.reason}",
-            interval=part.interval,
-            parts=(*(part for part, _ in found), *mass_parts),
-            markers=self.markers.of(state, part, row, judged),
-            rows=self.rows.of(
-                found, judged, (lambda _: ()) if people is None else people.hit, measured=measured
-            ),
         )
 
     def _touched(
@@ -627,23 +719,18 @@ class Contacts:
         known = ranks(v[:, self.in_regions], speeds, ends)
         return governing(v, near, self.in_regions, speeds.permissible, known, FAR)
 
-    def _region(self, k: int, judged: Judged) -> tuple[Result, int]:
-        """The result of one of `REGIONS`, and the row of the moving body that governs it."""
-        name, row = REGIONS[k], int(judged.rows[k])
-        value = float(judged.v[row, k])
-        body = self.model.bodies[self.moving[row]].name
-        column = self.columns.get(name)
+    def _region(
+        self, k: int, row: int, value: float, judged: Judged, pressed: Sequence[float]
+    ) -> tuple[str, tuple[Result, ...]]:
+        """What is said of one of `REGIONS` and the row of the moving body that governs it; its areas."""
+        name, column = REGIONS[k], self.columns.get(REGIONS[k])
+        body = self.names[row]
         if name in self.spec.excluded:
-            reason = "kept from contact by the workstation file"
-            return Result(name=name, value=value, unit="m/s", reason=reason), row
+            return "kept from contact by the workstation file", ()
         if column is None:
-            region = self.limits.region(name)
-            within = None if self.people is None else f"{body} moves within {self.spec.horizon:g} m"
-            permitted = region is None or region.permitted
-            verdict, reason = without_limit(name, permitted, within, self.limits.file)
-            return Result(name=name, value=value, unit="m/s", verdict=verdict, reason=reason), row
-        speeds = judged.speeds
-        verdict = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)[int(judged.ranks[k])]
+            return self._without_limit(name, body)[1], ()
+        speeds, ends = judged.speeds, judged.ends
+        verdict = _BY_RANK[int(judged.ranks[k])]
         how = "clamped" if judged.clamped[row, column] else "free"
         reason = f"{GOVERNING[int(speeds.governing[row, column])]}, {how}, {body}"
         if judged.on_floor is not None and judged.on_floor[row, column]:
@@ -654,33 +741,21 @@ class Contacts:
             )
         if verdict is Verdict.WITHIN and how == "free" and name not in self.spec.thickness:
             reason += f"; not clamped {NOT_VERIFIED}"
-        limit, interval, ends = float(speeds.permissible[row, column]), None, judged.ends
-        if ends is not None:
-            low, high = float(ends.low[row, column]), float(ends.high[row, column])
-            interval = value - (high - limit), value + (limit - low)
         if verdict is Verdict.UNDECIDED and ends is not None and not math.isnan(speeds.pressure[row, column]):
             why = deciding(self.ends.tolerances, ends.widths[:, row, column]) if self.ends.tolerances else ""
             reason += f"; {judged.pushed or why}"
         elif verdict is Verdict.UNDECIDED:
             reason = f"contact pressure of {body} ({how}): {self.unknown[row]}"
-        return Result(
-            name=name,
-            value=value,
-            unit="m/s",
-            limit=limit,
-            verdict=verdict,
-            reason=reason,
-            interval=interval,
-            parts=area_results(
-                self.arrays,
-                self.forces[row, int(judged.clamped[row, column])],
-                (row, column),
-                judged,
-                whole=verdict,
-                unknown=self.unknown[row],
-                v=value,
-            ),
-        ), row
+        of_areas, unknown = pressed[self.rows.areas_of(column)], self.unknown[row]
+        at = row, column
+        return reason, area_results(
+            self.arrays, of_areas, at, judged, whole=verdict, unknown=unknown, v=value
+        )
+
+    def _without_limit(self, name: str, body: str) -> tuple[Verdict, str]:
+        region = self.limits.region(name)
+        within = None if self.people is None else f"{body} moves within {self.spec.horizon:g} m"
+        return without_limit(name, region is None or region.permitted, within, self.limits.file)
 
     def _out_of_reach(self, judged: Judged) -> list[tuple[Result, int]]:
         """Regions that no moving part can hit by its height."""

@@ -32,15 +32,14 @@ class Stream:
         packets: Arrival [s], device time [s] and what is said, in order of arrival.
         pauses: Tick → how long the run is held still in front of it [s].
         again: When the connection is made anew [s].
-        driven: What the source is told of that one; nothing when None.
     """
 
-    def __init__(self, station, patch, target, packets, *, pauses=None, again=(), driven=None):
+    def __init__(self, station, patch, target, packets, *, pauses=None, again=()):
         self.now = BEGIN
         patch.setattr(receivers, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
         (source,) = station.workstation.sources
         self.box = Mailbox()
-        self.listener = Listener(source, driven, self.box.post, waits=self.box.waits)
+        self.listener = Listener(source, None, self.box.post)
         self.delay = delay_of([source])
         self.target, self.packets, self.again = target, list(packets), list(again)
         self.pauses = pauses or {}

@@ -67,19 +67,10 @@ def wave(t):
     return Q0 + AMPLITUDE * np.sin(2 * t), 2 * AMPLITUDE * np.cos(2 * t)
 
 
-def below(z: float = -1.0, name: str = "op", i: int = 0) -> str:
-    """Confirm that the origin is so far above the floor on which somebody stands, which is not drawn [m]."""
-    return (
-        f'[[confirmed]]\nkey = "humans[{i}].feet"\nof = "{name}"\nvalue = {z}\n'
-        'why = "the origin is at the base of the robot"\n'
-    )
-
-
-def person(name: str = "op", *at: float, i: int = 0) -> str:
-    """A man of 1.75 m and 75 kg who stands at x, y, z [m], the i-th one of a cell."""
+def person(name: str = "op", *at: float) -> str:
+    """A man of 1.75 m and 75 kg who stands at x, y, z [m]."""
     place = f"at = {{ position = [{', '.join(map(str, at))}] }}\n" if at else ""
-    meant = below(at[2], name, i) if at and at[2] < 0 else ""
-    return meant + f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n{place}'
+    return f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n{place}'
 
 
 def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None, **allowed: bool) -> Station:

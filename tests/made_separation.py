@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from made_cell import FLOATING, TWO_R, below, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
 
-PERSON = below() + (
+PERSON = (
     '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = {{ position = [{x}, 0, -1] }}\n'
 )
 KNOWN = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\n"

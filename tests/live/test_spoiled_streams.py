@@ -13,7 +13,6 @@ from live_stream import BEGIN, OFFSET, Stream
 from made_cell import TWO_R, made, two_r
 from seerob.core.samples import JointSample
 from seerob.devices.live.device_clock import SETTLED, SLEW
-from seerob.session.opening import source_target
 from seerob.session.run import Judge, bind, engine_of, ticks
 from seerob.twin.engine import NEAR
 
@@ -184,8 +183,8 @@ SPOILED = {
     "jitter of 5 ms": Case(stream(way=jitter(0.005)), gap=0.03, least=0.97),
     "jitter of 20 ms": Case(stream(way=jitter(0.02)), gap=0.1, least=0.8),
     "jitter, no velocities": Case(silent(stream(way=jitter(0.005))), gap=0.03, least=0.97),
-    "half is lost": Case(lossy(0.5), gap=0.06, least=0.85, why="is missing"),
-    "nineteen of twenty are lost": Case(lossy(0.95), gap=TIMEOUT, least=0.25, why="is missing"),
+    "half is lost": Case(lossy(0.5), gap=0.06, least=0.97),
+    "nineteen of twenty are lost": Case(lossy(0.95), gap=TIMEOUT, least=0.4),
     "bursts": Case(stream(way=burst), gap=0.1),
     "held back": Case(stream(way=half), gap=0.15, least=0.98),
     "held back, no velocities": Case(silent(stream(way=half)), gap=0.15, least=0.97),
@@ -353,42 +352,6 @@ def test_what_was_done_and_undone_while_packets_were_held_back_is_not_within(tmp
         results = [result for _, (result,), _ in live.ticks(600)]
         assert any(result.verdict == verdict for result in results)
     assert any("held back" in result.reason for result in results)
-
-
-@pytest.mark.parametrize("speeds", [True, False])
-def test_what_was_done_and_undone_while_the_run_was_held_up_is_not_within(tmp_path, monkeypatch, speeds):
-    """Every packet comes in time, and is replaced by the next before a tick has taken it."""
-    station, packets = made(tmp_path, SEEN, {"arm.urdf": two_r()}), stream(said=to_and_fro(0.03, 3.0))
-    live = Stream(station, monkeypatch, "arm", packets if speeds else silent(packets), pauses={294: 0.17})
-    results = [result for _, (result,), _ in live.ticks(400)]
-    assert any("held back" in result.reason for result in results)
-    assert {result.verdict for result in results} == {"within", "undecided"}
-
-
-def lost(packets):
-    begin, seconds = HELD
-    return [p for p in packets if not begin <= p[0] < begin + seconds]
-
-
-@pytest.mark.parametrize("speeds", [True, False])
-def test_what_was_done_and_undone_while_packets_were_lost_is_not_within(tmp_path, monkeypatch, speeds):
-    """The last sample before and the first one after say that it stands where it stood."""
-    station = made(tmp_path, SEEN, {"arm.urdf": two_r()})
-    packets = lost(stream(said=to_and_fro(0.03, HELD[0] + 0.002)))
-    live = Stream(station, monkeypatch, "arm", packets if speeds else silent(packets))
-    results = [result for _, (result,), _ in live.ticks(600)]
-    missing = [k for k, result in enumerate(results) if "is missing" in result.reason]
-    assert 0 < len(missing) < 10
-    assert all(results[k].verdict == "undecided" for k in missing)
-
-
-def test_what_is_lost_of_an_arm_that_cannot_do_much_meanwhile_is_followed(tmp_path, monkeypatch):
-    """Within 60 ms no joint that accelerates by 10 rad/s² goes away by more than 2.3 mrad and comes back."""
-    text = STATION.replace(TWO_R, TWO_R + "acceleration_limits = [10, 10]\n")
-    station = made(tmp_path, text, {"arm.urdf": two_r()})
-    driven = source_target(station.model, station.workstation.sources[0])
-    told = Spoiled(station, monkeypatch, lossy(0.5), driven=driven).live()
-    assert sum(tick.decided for tick in told) >= 0.97 * len(told)
 
 
 @pytest.mark.parametrize("said", [motion, to_and_fro(0.002, HELD[0]), to_and_fro(0.03, 4.0)])

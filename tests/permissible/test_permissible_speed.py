@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, below, heard, made, meant, state_at, two_r
+from made_cell import FLOATING, TWO_R, heard, made, meant, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError
 from seerob.session.permissible import evaluation
@@ -16,7 +16,7 @@ from seerob.session.permissible.evaluation import Wish
 from seerob.session.permissible.rescaled import Rescaled
 
 LIMITS = "acceleration_limits = [6.0, 6.0]\njerk_limits = [60.0, 60.0]\n"
-PERSON = below() + (
+PERSON = (
     '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = {{ position = [{x}, 0, -1] }}\n'
 )
 SSM = (

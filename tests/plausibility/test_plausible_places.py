@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from made_cell import FLOATING, TWO_R, below, heard, made, person, two_r
+from made_cell import FLOATING, TWO_R, heard, made, person, two_r
 from seerob.core.samples import Quality
 from seerob.core.verdict import Verdict
 from seerob.criteria.judging import Judge
@@ -74,32 +74,6 @@ def test_where_a_device_puts_somebody_is_looked_at(tmp_path, shift, why):
     found = results(tmp_path, [shift])
     assert {verdict for verdict, _ in found} == {Verdict.UNDECIDED if why else Verdict.WITHIN}
     assert all(why in reason for _, reason in found)
-
-
-STOOD = '[[parts]]\nname = "{0}"\nshape = {{ box = [1, 1, {1}] }}\nat = {{ position = [9, 0, {2}] }}\n'
-
-
-@pytest.mark.parametrize(
-    ("more", "held"),
-    [
-        ("", True),
-        (person("two", 0, 3, -1, i=1), True),  # who may be as wrong
-        (below(), False),
-        (below(-0.7), True),
-        (STOOD.format("crate", 0.4, -0.8), False),
-        (STOOD.format("crate", 0.4, -0.5), True),
-        (STOOD.format("floor", 0.1, 0.05) + below(), False),
-        (STOOD.format("floor", 0.1, 0.05), True),
-        (STOOD.format("slab", 0.3, -1.15).replace("[9", "[3"), False),
-    ],
-)
-def test_who_is_a_metre_below_the_base_stands_on_something_that_is_drawn_or_confirmed(tmp_path, more, held):
-    """Without a floor the origin may be anywhere; nobody stands where nothing else does all the same."""
-    low = person("op", 3, 0, 0).replace("[3, 0, 0]", "[3, 0, -1]")
-    text = FLOATING + TWO_R + "q = [0, 0]\n" + low + CELL[CELL.index("[[safety]]") :]
-    found = made(tmp_path, text + more, {"arm.urdf": two_r()}).run().results["distance"]
-    assert found.verdict is (Verdict.UNDECIDED if held else Verdict.WITHIN)
-    assert ("humans[0].feet" in found.worst().reason) is held
 
 
 def test_what_is_plausible_once_is_not_held_any_more(tmp_path):

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from made_cell import FLOATING, TWO_R, below, heard, made, two_r
+from made_cell import FLOATING, TWO_R, heard, made, two_r
 from seerob.description.humans.skeleton import BONES
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
 from seerob.twin.validity.hearing import BonesHeard
 
-CELL = (
-    below()
-    + """[[humans]]
+CELL = """[[humans]]
 name = "op"
 stature = 1.75
 mass = 75
@@ -34,7 +32,6 @@ response = 0.02
 source = "data sheet"
 pressure_mat = { corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]] }
 """
-)
 SAFETY = {
     "safety_area": 'area = "zone"\nof = "op"',
     "separation_area": 'separation = "S"\nof = "op"',

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, below, heard, judged, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, Result, Verdict
 from seerob.criteria.contact.regions import FORBIDDEN, REGIONS
@@ -260,7 +260,7 @@ def test_gap_wider_than_the_body_part_does_not_clamp_it(tmp_path: Path) -> None:
 
 
 def person(x: float) -> str:
-    return below() + (
+    return (
         '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
         f"at = {{ position = [{x}, 0, -1.0] }}\n"
     )

@@ -5,20 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, basis_in, below, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, basis_in, made, results_at, two_r
 from seerob.core.errors import InputError
 from seerob.criteria.safety.separation import separation_bound
 
-PERSON = (
-    below()
-    + """[[humans]]
+PERSON = """[[humans]]
 name = "op"
 stature = 1.75
 mass = 75
 sex = "male"
 at = {{ position = [{x}, 0, -1] }}
 """
-)
 FULL = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\n"
 
 

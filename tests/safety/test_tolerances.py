@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, basis_in, below, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, basis_in, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.tolerances import Tolerance, deciding, spread
 from seerob.criteria.contact.impact_mass import simplified_mass
@@ -22,16 +22,13 @@ GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nm
 PART = (
     '[[workpieces]]\nname = "part"\non = "grip"\nshape = {{ box = [0.1, 0.2, 0.3] }}\nmass = {mass}\n{more}\n'
 )
-PERSON = (
-    below()
-    + """[[humans]]
+PERSON = """[[humans]]
 name = "op"
 stature = 1.75
 mass = 75
 sex = "male"
 at = {{ position = [{x}, 0, -1] }}
 """
-)
 PLATE = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 9, 9] }\nat = { position = [-3, 0, 0] }\n'
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from contextlib import aclosing
 
 import pytest
@@ -55,47 +54,6 @@ def test_a_doubt_is_there_until_a_good_value_comes():
         assert sample.values["speed"] == 0.5
     picture.take((Change("speed", 100),), 2.0)
     assert picture.sample(2.0).doubts == {}
-
-
-PLACE = Variable(name="gate", source="plc", address=4, unit="m")
-FORCE = Variable(name="force", source="plc", address=5, unit="N")
-
-
-@pytest.mark.parametrize(
-    ("name", "values", "apart", "missed"),
-    [
-        ("door", (False, True, False), 0.019, True),
-        ("door", (False, True, False), 0.021, False),
-        ("door", (False, True), 0.001, False),
-        ("door", (False, True, False, True), 0.001, True),
-        ("gate", (0.0, 0.3, 0.0), 0.01, True),
-        ("gate", (0.0, 0.3, 0.6), 0.01, False),
-        ("gate", (0.0, 0.004, 0.0), 0.01, False),
-        ("force", (100.0, 104.0, 100.0), 0.01, False),
-        ("force", (100.0, 150.0, 100.0), 0.01, True),
-        ("force", (100.0, 50.0, 100.0), 0.01, True),
-    ],
-)
-def test_what_a_variable_was_for_less_than_any_tick_sees_was_judged_at_no_instant(
-    name, values, apart, missed
-):
-    """A light curtain that is interrupted for 10 ms; a gate that moves through, or trembles, is followed."""
-    picture = Picture((DOOR, PLACE, FORCE), by_exception=True)
-    doubts = []
-    for k, value in enumerate(values):
-        now = 10.0 + (1.0 + apart * k) * (k > 0)
-        picture.take((Change(name, value),), now)
-        doubts.append(picture.sample(now).doubts.get(name, ""))
-    assert any("at no instant" in why for why in doubts) is missed
-    assert "at no instant" not in picture.sample(now + 0.6).doubts.get(name, "")
-
-
-def test_a_variable_that_changes_all_the_time_is_followed():
-    """To and fro at up to 2 m/s, told every 5 ms: every tick sees where it is."""
-    picture = Picture((PLACE,), by_exception=True)
-    for k in range(400):
-        picture.take((Change("gate", 0.5 * math.sin(0.02 * k)),), 10.0 + 0.005 * k)
-        assert not picture.sample(10.0 + 0.005 * k).doubts
 
 
 def test_old_news_is_as_old_as_it_says():

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, person, results_at, two_r
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.criteria.stopping import many_instants
 from seerob.recording.series import CODES, NO_VERDICT
 
-PERSON = person("op", 6, 0, -1)
+PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [6, 0, -1] }\n'
 ASKED = (
     '[[safety]]\nkind = "separation"\nname = "{name}"\nbetween = ["arm", "op"]\nhuman_uncertainty = 0\n'
     "robot_uncertainty = 0\nstop = {{ acceleration = 0, reaction = 0.1, {stop} }}\n{more}\n"

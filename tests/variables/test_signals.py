@@ -13,7 +13,7 @@ from made_cell import person
 from seerob import load
 from seerob.core.samples import SignalSample
 from seerob.devices.sources.web import Web
-from seerob.session.run import Judge, engine_of
+from seerob.session.run import engine_of
 from seerob.twin.signals import Signals
 from seerob.workstation.source import Target
 from seerob.workstation.variables import Variable
@@ -119,48 +119,3 @@ def test_a_machine_is_as_old_as_the_question_too(tmp_path):
     late = [next(k for k, why in enumerate(doubts) if "not heard for" in why) for doubts in (fresh, old)]
     assert late[0] - late[1] == pytest.approx(30, abs=1)
     assert late[0] < 51
-
-
-JUDGED = """
-[[variables]]
-name = "door/shut"
-source = "plc"
-address = ADDRESS
-type = "bool"
-[[safety]]
-kind = "variable"
-name = "shut"
-variable = "door/shut"
-expected = true
-[[safety]]
-kind = "minimum_distance"
-name = "apart"
-between = ["gate", "op"]
-limit = 0.1
-active = "door/shut"
-"""
-TIMED = '{ topic = "door", pointer = "/x", time = "/t" }'
-
-
-@pytest.mark.parametrize(
-    ("more", "address", "known"),
-    [("", '"door"', False), ("delay = 0.1", '"door"', True), ("", TIMED, True)],
-)
-@pytest.mark.parametrize("shut", [True, False])
-def test_nothing_is_judged_or_muted_by_who_sends_no_time(tmp_path, more, address, known, shut):
-    """What was so some time ago, of which nobody knows how long that is, mutes no criterion either."""
-    variables, criteria = JUDGED.split("[[safety]]", 1)
-    moved = POSITION.replace("ADDRESS", '{ topic = "gate", pointer = "/x", time = "/t" }')
-    (tmp_path / "workstation.toml").write_text(STATION.replace("MORE", more) + "[[safety]]" + criteria)
-    (tmp_path / "variables.toml").write_text(moved + variables.replace("ADDRESS", address))
-    station = load(tmp_path)
-    engine = engine_of(station.model)
-    values = {"gate/position": 0.25, "door/shut": shut}
-    engine.take([SignalSample(source="plc", seq=0, t=0.0, values=values)])
-    state = engine.start()
-    found = Judge(station.bound)(state)
-    if known:
-        assert [r.verdict for r in found] == (["within", "within"] if shut else ["exceeded", None])
-    else:
-        assert {r.verdict for r in found} == {"undecided"}
-        assert all("sends no time" in r.reason for r in found)

@@ -166,7 +166,7 @@ def _lateness(model: Model, source: Source) -> Iterator[Finding]:
         yield Finding(
             level="warning",
             subject=source.name,
-            text=f"{text}, and what rests on it is undecided: give the time of the value, or delay",
+            text=f"{text}, and what moves by it is undecided: give the time of the value, or delay",
         )
     else:
         yield Finding(

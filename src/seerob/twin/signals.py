@@ -34,7 +34,8 @@ class Signals:
     Args:
         dictionary: Variables by name.
         timeouts: Of variables, or of their sources [s], by name.
-        untimed: Why nobody knows how late something is, by variable; it shows, and nothing rests on it.
+        untimed: Why nobody knows how late something is, by variable; it shows, and nothing that moves by it
+            is known.
     """
 
     def __init__(
@@ -89,14 +90,10 @@ class Signals:
         Raises:
             Undecided: It is not known, or may not be relied on.
         """
-        value, reason = self.at(name, t).value, self.invalid_reason(name, t)
-        if value is None or reason:
-            raise Undecided(reason or f"{name}: not heard")
-        return value
-
-    def invalid_reason(self, name: str, t: float) -> str:
-        """Why nothing rests on what is known of a variable at an instant [s]; empty where it may."""
-        return self.at(name, t).invalid_reason or self.untimed.get(name, "")
+        known = self.at(name, t)
+        if known.value is None or known.invalid_reason:
+            raise Undecided(known.invalid_reason or f"{name}: not heard")
+        return known.value
 
     def meanwhile(self, name: str, begin: float, t: float) -> tuple[Value, ...]:
         """Every value of a variable that was told after one instant and before another [s], in their order.

@@ -39,7 +39,7 @@ from seerob.core.snapshot import Finding
 from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
-from seerob.devices.live.held_back import MISSED, TOGETHER, HeldBack, Lost
+from seerob.devices.live.held_back import HeldBack
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
 
@@ -349,7 +349,6 @@ class Listener:
         post: Called with each sample, on the host's clock; from the listener's thread.
         again: Whether it was heard before, and lost.
         known: What was known of its clock then.
-        waits: Whether what was posted last of a kind (`seerob.core.samples.key`) was taken by nobody yet.
     """
 
     def __init__(
@@ -360,9 +359,7 @@ class Listener:
         *,
         again: bool = False,
         known: Known | None = None,
-        waits: Callable[[tuple[str, ...]], bool] = lambda _: False,
     ) -> None:
-        self._waits = waits
         self.name = name_of(source)
         self.drives = bool(source.target())
         """Whether it drives a robot or a person, or only has signals."""
@@ -379,9 +376,6 @@ class Listener:
         self._posted: dict[tuple[str, ...], Sample] = {}
         self._people: dict[tuple[str, ...], _Person] = {}
         self._held: dict[tuple[str, ...], HeldBack] = {}
-        self._lost: dict[tuple[str, ...], Lost] = {}
-        self._missed: dict[str, float] = {}
-        """Variables that were something that nobody judged, and until when that counts [s]."""
         self._lock = Lock()
         self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -464,7 +458,7 @@ class Listener:
         if not math.isfinite(sample.t):
             raise SeerobError(f"it yields a sample without the time of its arrival (t is {sample.t})")
         if isinstance(sample, SignalSample):
-            self._news(self._signals(replace(sample, source=self.name)), sample.t, self.drives)
+            self._news(replace(sample, source=self.name), sample.t, self.drives)
             return
         sample = replace(sample, source=self.name)
         host, what = sample.t, key(sample)
@@ -505,15 +499,6 @@ class Listener:
             quality = Quality.DEGRADED
         reason = reason and f"{self.name}: {reason}"
         self._news(replace(sample, t=heard.t, quality=quality, reason=reason, late=late), host, quiet=False)
-
-    def _signals(self, sample: SignalSample) -> SignalSample:
-        """What variables are, with a doubt about those that were something that nobody judged."""
-        what = key(sample)
-        held = self._held.setdefault(what, HeldBack(self._source.behind()))
-        unjudged = held.unjudged(sample, sample.t, sample.t, waits=self._waits(what))
-        self._missed |= dict.fromkeys(unjudged, sample.t + HOLD)
-        doubts = {name: f"{name}: {MISSED}" for name, until in self._missed.items() if sample.t <= until}
-        return replace(sample, doubts=doubts | sample.doubts) if doubts else sample
 
     def _news(self, sample: Sample, host: float, quiet: bool) -> None:
         """Post what is new.
@@ -563,15 +548,10 @@ class Listener:
         if what not in self._contradictions:
             self._contradictions[what] = Contradictions(self._target)
             self._held[what] = HeldBack(self._source.behind())
-            self._lost[what] = Lost(self._target)
-        unseen = self._held[what].reason(sample, t, host, waits=self._waits(what))
+        unseen = self._held[what].reason(sample, t, host)
         if found := self._contradictions[what].find(sample) or unseen:
             self._found[what] = found, host + HOLD
-        lost = self._lost[what].reason(t) if isinstance(sample, JointSample) else ""
         found, until = self._found.get(what, ("", 0.0))
-        if lost and until < host + TOGETHER:
-            # For as long as a tick may take to see it.
-            self._found[what] = found, until = lost, host + TOGETHER
         return found if host <= until else ""
 
     def _lose(self, reason: str) -> None:

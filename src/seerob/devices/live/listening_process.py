@@ -106,8 +106,7 @@ def _listener(order: Order) -> Listener:
     # All of this stays: it need not be looked through while somebody listens.
     gc.collect()
     gc.freeze()
-    box = SharedMailbox(order.memory)
-    return Listener(source, target, box.post, again=order.again, known=order.known, waits=box.waits)
+    return Listener(source, target, SharedMailbox(order.memory).post, again=order.again, known=order.known)
 
 
 def main() -> int:

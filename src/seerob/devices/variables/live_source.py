@@ -23,7 +23,6 @@ from seerob.core.quantities import Seconds
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import AGAIN, BUFFERED, HOLD, REORDERED, RESTART_HOLD
-from seerob.devices.live.held_back import MISSED, PLACE, SPEED, TOGETHER, is_beyond
 from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
 from seerob.workstation.variables import BadValue, Value, Variable
@@ -37,10 +36,6 @@ BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""
 REMEMBERED = 1 << 16
 """Stamps of which it is known what was said with them."""
-ROOMS = {"m": PLACE, "rad": PLACE, "m/s": SPEED, "rad/s": SPEED}
-"""How far beyond both others a number may be that no tick has seen, for noise, by unit."""
-OTHER_ROOM = 0.05
-"""Of other units: a share of the largest of them. Own choice."""
 PULSES = 4
 """A device that says nothing is asked so often within its source's time-out whether it is there."""
 
@@ -325,11 +320,6 @@ class Picture:
         self._said: dict[str, float] = {}
         self._values: dict[str, Value] = {}
         self._bad: dict[str, str] = {}
-        self._lately: dict[str, list[tuple[float, Value]]] = {}
-        """When each became what it is [s], and what it was in the time before in which no tick may have come;
-        the first is what it was when that began."""
-        self._missed: dict[str, float] = {}
-        """Variables that were something else at no instant that was judged: until when that counts [s]."""
         self._stamps = Stamps() if stamps is None else stamps
         self.begun = False
         """Whether the device has said anything yet."""
@@ -358,23 +348,9 @@ class Picture:
                 self._bad[change.name] = f"{change.name}: {change.invalid_reason}"
                 continue
             try:
-                self._become(variable, variable.value(change.raw), now)
+                self._values[change.name] = variable.value(change.raw)
             except BadValue as error:
                 self._bad[change.name] = str(error)
-
-    def _become(self, variable: Variable, value: Value, now: float) -> None:
-        """Take a value; what it was so briefly that no tick has seen it must lie between those that were."""
-        name = variable.name
-        self._values[name] = value
-        lately = self._lately.setdefault(name, [])
-        if lately and lately[-1][1] == value:
-            return
-        while len(lately) > 1 and lately[1][0] < now - TOGETHER:
-            del lately[0]
-        if any(_beyond(each, lately[0][1], value, variable.si_unit) for _, each in lately[1:]):
-            lately.clear()
-            self._missed[name] = now + HOLD
-        lately.append((now, value))
 
     def sample(self, now: float, heard: float | None = None) -> SignalSample:
         """What is known.
@@ -385,8 +361,7 @@ class Picture:
         """
         t = now if heard is None else heard
         doubts = dict(self._bad)
-        missed = [(name, MISSED) for name, until in self._missed.items() if now <= until]
-        for name, why in (*self._stamps.invalid_reasons(now), *missed):
+        for name, why in self._stamps.invalid_reasons(now):
             doubts.setdefault(name, f"{name}: {why}")
         for name, variable in self._variables.items():
             if variable.write or name in doubts:
@@ -403,13 +378,6 @@ class Picture:
         """How much older than ``t`` what is known of a variable may be [s]."""
         said = self._shown if self._by_exception else self._said[name]
         return max(0.0, t - (t if said is None else said)) + self._bounds.get(name, 0.0)
-
-
-def _beyond(value: Value, before: Value, after: Value, unit: str) -> bool:
-    """Whether a value is none of two others, nor a number between them."""
-    sizes = [abs(x) for x in (value, before, after) if not isinstance(x, str)]
-    room = ROOMS.get(unit, OTHER_ROOM * max(sizes, default=0.0))
-    return is_beyond(value, (before, after), room)
 
 
 async def _beating(

@@ -39,9 +39,6 @@ FEET = "humans.feet"
 """Kind of the quantity that says how far somebody is from what they stand or sit on."""
 LEVEL = 0.05
 """What is not farther from z = 0 stands there [m]."""
-ROUGHLY = 0.2
-"""Where no floor is drawn, who is no farther below z = 0 than this is where a device has them who stand there
-[m]: own choice, twice what captures of whole bodies sink into a floor."""
 TOUCHES = 0.01
 """A base that is so near to something stands on it, or beside it [m]."""
 SIGHT = 50.0
@@ -351,23 +348,20 @@ def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity
     """How far people who stand still are from what they stand or sit on."""
     parts = [b for b in _seen(model.bodies) if b.role in ("part", "machine")]
     under = [b.index for b in parts]
+    # Where nothing stands at 0, the origin is somewhere else, such as at the base of the robot.
     floor = any(abs(place.lowest([b])) <= LEVEL for b in parts)
-    # Where nothing stands at 0, the origin is somewhere else: people stand where other things do.
-    levels = [] if floor else [place.lowest([b]) for b in _standing(model)]
     for i, human in enumerate(model.workstation.humans):
         if human.name not in who:
             continue
         bodies = _of(model, model.mechanisms[human.name])
-        gap = low = place.lowest(bodies)
+        gap = place.lowest(bodies)
+        if gap < 0 and not floor:
+            continue
         feet = [b.index for b in bodies if b.name.rpartition("/")[2].endswith(SUPPORTED)]
         said = f"the lowest point of {human.name} is {gap:.3g} m above the floor z = 0"
-        if low < 0 and not floor:
-            said = f"the lowest point of {human.name} is {-gap:.3g} m below z = 0, where nothing else stands"
-            gap = min((low - level for level in (0.0, *levels)), key=abs)
-            gap = gap if abs(gap) > ROUGHLY else 0.0
-        if (low > 0 or not floor) and feet and under:
-            on = place.distance(feet, under, abs(gap))
-            if on < abs(gap):
+        if gap > 0 and feet and under:
+            on = place.distance(feet, under, gap)
+            if on < gap:
                 gap, said = max(on, 0.0), f"from what {human.name} stands or sits on"
         yield Quantity(f"humans[{i}].feet", FEET, "m", (gap,), (human.name,), said, human.name)
 

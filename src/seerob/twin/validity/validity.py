@@ -205,7 +205,7 @@ class Validity:
 
     def _input_reason(self, name: str) -> str:
         if name.startswith(VARIABLE):
-            return self._signals.invalid_reason(name.removeprefix(VARIABLE), self.t)
+            return self._signals.at(name.removeprefix(VARIABLE), self.t).invalid_reason
         if reason := self.invalid_place_reason(name):
             return reason
         hearing = self._hearings[name]

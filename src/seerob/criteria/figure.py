@@ -213,6 +213,8 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
             governs = told[figure.parts.governs]
             value, limit, interval = governs.value, governs.limit, governs.interval
     known = None if value is None or math.isinf(value) else value
+    # Where a value lies informs, too.
+    silent = known is None and (value is not None or interval is None)
     assert not isinstance(limit, np.ndarray)
     return Result(
         name=result.name,
@@ -223,7 +225,7 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         verdict=verdict,
         reason=shown.reason,
         interval=interval,
-        nothing=bool(figure.nothing) or (verdict is None and known is None),
+        nothing=bool(figure.nothing) or (verdict is None and silent),
         parts=parts,
         rows=shown.rows,
         markers=() if shown.draw is None else drawn(shown.draw),
@@ -281,12 +283,17 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
         low, high = map(each, figure.interval)
         if not ((low == high) & (low == found.value)).all():  # also where one is not a number
             found = found.between(low, high, at_most=at_most)
-    unknown = np.isnan(found.value)
+    unknown, silent = np.isnan(found.value), np.zeros(n, bool)
     verdict = np.where(unknown & (found.verdict != CODES[_EXCEEDED]), CODES[_UNDECIDED], found.verdict)
     if limit is None and found.interval is not None:  # it informs of where the value lies
         known = ~np.isnan(found.interval).any(axis=0) & ~np.asarray(figure.open)
         verdict = np.where(unknown & known, CODES[None], verdict)
+        low, high = found.interval
+        shown = np.isfinite(low) & np.isfinite(high) & ((low < high) | figure.exact)
+        silent = unknown & known & ~shown
     found = replace(found, verdict=verdict.astype(np.uint8))
+    if silent.any():
+        found = found.without_verdict(silent)
     if limit is not None and np.any(figure.exceeded):
         found = found.exceeded(np.broadcast_to(figure.exceeded, (n,)))
     if limit is not None and np.any(figure.undecided):

@@ -50,6 +50,36 @@ RULES = {
     "destination = { horizontal = 0.3, vertical = 1.1, asymmetry = 0 } }]\nwork = 3000\nrecovery = 3000\n"
     "exclusions = []",
 }
+OWN = """
+from seerob.api import Basis, Criterion, Figure, bind_posture
+
+
+class Stooping(Criterion, frozen=True, kw_only=True):
+    \"\"\"How far somebody stoops.\"\"\"
+
+    unit = "rad"
+    human: str
+    limit: float
+    between_samples: str = "accepted: postures that are looked at"
+
+    def subjects(self):
+        return (self.human,)
+
+    def compute(self, model):
+        read = bind_posture(model, self.human)
+
+        def compute(twin):
+            found = read(twin).trunk_flexion
+            return Figure(found[:, 0] if twin.many else found, self.limit)
+
+        return compute
+
+    def one_by_one(self, model):
+        return ""
+
+    def basis(self, model):
+        return Basis(formula="x", source="x")
+"""
 PASSED_OVER = "owas, in turns"
 
 
@@ -95,3 +125,20 @@ def test_a_score_keeps_the_limit_that_it_is_on(asked):
     on = many["owas"].value == 2
     assert on.any()
     assert set(many["owas"].answers.verdict[on]) == {CODES[Verdict.WITHIN]}
+
+
+def test_a_rule_of_ones_own_reads_the_angles_of_many_postures(tmp_path, monkeypatch):
+    (tmp_path / "own_rules").mkdir()
+    (tmp_path / "own_rules/stooping.py").write_text(OWN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "cell").mkdir()
+    rule = '[[ergonomics]]\nkind = "own_rules.stooping"\nname = "own"\nhuman = "op"\nlimit = 0.2\n'
+    station = made(tmp_path / "cell", STANDS + rule)
+    q = random_q(N)
+    many = station.batch({"op": q}, {"op": np.zeros_like(q)}, t=T)["own"]
+    monkeypatch.setattr(Criterion, "batch", lambda *_: None)
+    each = station.batch({"op": q}, {"op": np.zeros_like(q)}, t=T)["own"]
+    assert (many.note, each.note[:15]) == ("", "asked instant b")
+    np.testing.assert_allclose(many.value, each.value, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(many.answers.verdict, each.answers.verdict)
+    assert set(many.answers.verdict) == {CODES[Verdict.WITHIN], CODES[Verdict.EXCEEDED]}

@@ -38,9 +38,9 @@ SHARED = frozenset({"asked", "attachments", "columns"})
 """Those of the names that give what everybody uses: copies of it."""
 OF_MANY = frozenset(
     {
-        "along", "asked", "closest", "closest_per_body", "fastest_points", "held", "inverse_effective_mass",
-        "jacobian", "many", "mass_matrix", "model", "placed", "pose", "qd", "require", "singular_values",
-        "speed_error", "velocity",
+        "along", "asked", "captured", "closest", "closest_per_body", "fastest_points", "held",
+        "inverse_effective_mass", "jacobian", "many", "mass_matrix", "model", "placed", "pose", "qd",
+        "require", "singular_values", "speed_error", "velocity",
     }
 )  # fmt: skip
 """Names of `seerob.twin.states.States`, likewise."""

@@ -6,7 +6,7 @@ What it asks of the twin are the anatomical angles of a person at this tick.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 from msgspec import Meta
@@ -75,11 +75,14 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
     bones = tuple(bone_rows(model, human))
 
     def read(state: Twin) -> Angles:
-        if isinstance(state, States):
+        if state.many:
             # Of whom more is known than where they are is asked instant by instant.
             R, x = state.captured(human.name, bones)
             found = angles(R[:, None], x[:, None])
             return found.without(unmeasured) if unmeasured else found
+        return one(cast("State", state))
+
+    def one(state: State) -> Angles:
         invalid = state.invalid_orientations(human.name)
         hearing = state.hearing(human.name, strayed=True)
         # How a hand is turned of which only the wrist is seen is a guess, too.

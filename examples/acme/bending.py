@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from seerob.api import Basis, Criterion, Evaluate, Model, Result, State, Verdict, beyond, bind_posture, judge
+from seerob.api import Basis, Compute, Criterion, Figure, Model, Present, Shown, Twin, beyond, bind_posture
 
 BENT = 0.7
 """The trunk counts as bent beyond this [rad]."""
@@ -24,33 +24,32 @@ class Bending(Criterion, frozen=True, kw_only=True):
         """Who it speaks of."""
         return (self.human,)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look the person up once, and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look the person up once, and return the function that computes how long they bend."""
         read = bind_posture(model, self.human)  # a name that does not exist fails here, not in the loop
         since: list[float] = []
 
-        def evaluate(state: State) -> Result:
-            bent = beyond(read(state).trunk_flexion, BENT, signed=True)
+        def compute(twin: Twin) -> Figure:
+            bent, t = beyond(read(twin).trunk_flexion, BENT, signed=True), float(twin.t)
             if not bent.known:  # an angle that nobody measures is not assessed
-                return Result(
-                    name=self.name, limit=self.limit, verdict=Verdict.UNDECIDED, reason="trunk not measured"
-                )
+                return Figure(None, self.limit)
             # Only what was before an instant counts, so that a replay finds the same.
-            if not bent.low or (since and state.t < since[0]):
+            if not bent.low or (since and t < since[0]):
                 since.clear()
             if bent.low and not since:
-                since.append(state.t)
-            held = state.t - since[0] if since else 0.0
-            return Result(
-                name=self.name,
-                value=held,
-                unit=self.unit,
-                limit=self.limit,
-                verdict=judge(held, self.limit),
-                reason="trunk bent forward" if since else "upright",
-            )
+                since.append(t)
+            return Figure(t - since[0] if since else 0.0, self.limit, beside=bool(since))
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Say what was found."""
+        words = {True: "trunk bent forward", False: "upright", None: "trunk not measured"}
+        return lambda state, figure, verdict: Shown(words[figure.beside])
+
+    def one_by_one(self, model: Model) -> str:
+        """Say why many instants are not computed together."""
+        return "how long somebody bends is counted as it happens"
 
     def basis(self, model: Model) -> Basis:
         """State formula and source."""

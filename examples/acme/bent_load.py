@@ -9,18 +9,18 @@ import numpy as np
 
 from seerob.api import (
     Basis,
-    Evaluate,
+    Compute,
+    Figure,
     Model,
     Phase,
-    Result,
+    Present,
     Rule,
-    State,
-    Verdict,
+    Shown,
+    Twin,
     between,
     beyond,
     bind_posture,
     exactly,
-    judge_interval,
     phase_at,
     shared_phases,
 )
@@ -46,39 +46,30 @@ class BentLoad(Rule, frozen=True, kw_only=True):
     limit: int = 1
     """Most points that are admissible."""
 
-    def bind(self, model: Model) -> Evaluate:
-        """Look up person and phases once, and return the function that judges one instant."""
+    def compute(self, model: Model) -> Compute:
+        """Look up person and phases once, and return the function that counts the points."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, (), Handled.from_task)
         error = self.error() or 0.0  # of all angles, or by the name of each
         accuracy = error.get("trunk_flexion", 0.0) if isinstance(error, Mapping) else error
 
-        def evaluate(state: State) -> Result:
-            flexion = read(state).trunk_flexion
+        def compute(twin: Twin) -> Figure:
+            flexion = read(twin).trunk_flexion
             if np.isnan(flexion):  # an angle that nobody measures is not assessed, whatever the limit
-                return Result(
-                    name=self.name, limit=self.limit, verdict=Verdict.UNDECIDED, reason="trunk not measured"
-                )
-            load = phase_at(phases, state.t, Handled()).load
+                return Figure(None, self.limit, beside="trunk not measured")
+            load = phase_at(phases, float(twin.t), Handled()).load
             bent = beyond(flexion, BENT, accuracy=accuracy, signed=True)
             heavy = between(0, 1) if load is None else exactly(int(load > HEAVY))
             points = bent + heavy
             low, high = int(points.low), int(points.high)  # counts are exact, and keep the limit they are on
-            return Result(
-                name=self.name,
-                value=high,  # the worst that may be true
-                interval=(low, high),
-                unit=self.unit,
-                limit=self.limit,
-                verdict=judge_interval((low, high), self.limit),
-                reason=""
-                if points.known
-                else "trunk not measured"
-                if heavy.known
-                else "nobody said the load",
-            )
+            missing = "" if points.known else "trunk not measured" if heavy.known else "nobody said the load"
+            return Figure(high, self.limit, interval=(low, high), beside=missing)
 
-        return evaluate
+        return compute
+
+    def present(self, model: Model) -> Present:
+        """Say what is missing."""
+        return lambda state, figure, verdict: Shown(figure.beside)
 
     def basis(self, model: Model) -> Basis:
         """State formula and source."""

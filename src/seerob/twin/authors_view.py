@@ -40,7 +40,7 @@ OF_MANY = frozenset(
     {
         "along", "asked", "captured", "closest", "closest_per_body", "fastest_points", "held",
         "inverse_effective_mass", "jacobian", "many", "mass_matrix", "model", "placed", "pose", "qd",
-        "require", "singular_values", "speed_error", "velocity",
+        "require", "singular_values", "speed_error", "t", "velocity",
     }
 )  # fmt: skip
 """Names of `seerob.twin.states.States`, likewise."""

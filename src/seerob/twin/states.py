@@ -210,6 +210,11 @@ class States:
         return len(self._motion.t)
 
     @property
+    def t(self) -> Array:
+        """Run times [s], shape (N,)."""
+        return self._motion.t
+
+    @property
     def motion(self) -> Motion:
         """Where everybody is, whoever was heard."""
         return self._motion

@@ -283,7 +283,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         def compute(twin: Twin) -> Figure:
             angles = read(twin)
             if isinstance(twin, States):
-                parts = phases_of(phases, twin.motion.t, unknown)
+                parts = phases_of(phases, twin.t, unknown)
                 return together([(where, category(angles[where], phase)) for phase, where in parts])
             measured, spread = found(angles, phase_at(phases, twin.t, unknown))
             span = category_span(**measured)

@@ -201,7 +201,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         def compute(twin: Twin) -> Figure:
             angles = read(twin)
             if isinstance(twin, States):
-                parts = phases_of(phases, twin.motion.t, unknown)
+                parts = phases_of(phases, twin.t, unknown)
                 return together([(where, scored(angles[where], phase)) for phase, where in parts])
             if watch is not None:
                 watch.add(twin.t, angles)

@@ -1002,6 +1002,11 @@ def rising(t):
     return (t, 0.5), (1.0, 0.0)
 
 
+def falling(t):
+    """And back."""
+    return (0.2 - t, 0.5), (-1.0, 0.0)
+
+
 def bowing(t):
     """The first joint is at 0 at each tick, and up to 20 mrad up or down in between."""
     return (0.0, 0.5), (8.0 * (-1) ** round(t / 0.01), 0.0)
@@ -1018,6 +1023,8 @@ def bowing(t):
             [(0, 0), (0.0955, 1), (0.101, 0), (0.109, 1), (0.1105, 0), (0.3, 0)],
             Verdict.WITHIN,
         ),
+        # Where it ceases to apply it is asked as if it did: both ends together leave it room.
+        (falling, {"limit": 0.101, "once": True}, [(0, 0), (0.0995, 1), (0.106, 0), (0.3, 0)], None),
         # Nobody knows how its limit falls on the way, and just before it ceases to apply it exceeds.
         (
             rising,

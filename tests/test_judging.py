@@ -13,7 +13,7 @@ from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.core.markers import Label, Segment
 from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.core.verdict import judge_interval
-from seerob.criteria.criterion import Criterion
+from seerob.criteria.criterion import Claim, Criterion
 from seerob.criteria.judging import UNBOUNDED, Judge, bound_to, relied_on, undecided
 from seerob.criteria.noisy_speeds import NOISE, REMEMBERS
 from seerob.description.humans.skeleton import BONES
@@ -285,6 +285,11 @@ class Turning(Criterion, frozen=True, kw_only=True):
     says: Result | None = None
     looks_at: str = ""
     """A body that it asks for, and does not declare."""
+    stated: tuple[Claim, ...] = ()
+    """What it rests on."""
+
+    def claims(self, model):
+        return self.stated
 
     def remembers(self, model):
         return self.remembering
@@ -394,3 +399,40 @@ def test_what_nothing_bounds_says_so_and_without_a_limit_that_it_informs(cell):
     assert bound_to(cell.model, Turning(name="v"), "safety").between == INFORMS
     accepted = Turning(name="v", limit=1.0, between_samples="accepted: it is slow")
     assert bound_to(cell.model, accepted, "safety").between == "accepted: it is slow"
+
+
+class Steady:
+    """That the arm does something until an instant."""
+
+    def __init__(self, until, name="arm"):
+        self.holds, self.until, self.asked = (name,), until, []
+
+    def of_motion(self, motion, what=""):
+        return None
+
+    def __call__(self, state):
+        self.asked.append(state.t)
+        text = f"no more {self.until}"
+        return (
+            Finding(level="warning", subject="arm", text=text, holds=self.holds)
+            if state.t >= self.until
+            else None
+        )
+
+
+def test_what_the_twin_contradicts_holds_from_then_on_and_is_asked_no_more(cell):
+    state, first, later = state_at(cell, arm=MOVING), Steady(0.02), Steady(0.04)
+    bound = [bound_to(cell.model, Turning(name="v", limit=2.0, stated=(first, later)), "safety")]
+    judge, told = Judge(bound), []
+    for k in range(6):
+        state.refresh(k / 100)
+        told.append(judge(state)[0])
+    assert [result.verdict for result in told] == ["within"] * 2 + ["undecided"] * 4
+    assert ["0.04" in result.reason for result in told] == [False] * 4 + [True] * 2
+    assert all("0.02" in result.reason for result in told[2:])
+    assert (first.asked, later.asked) == ([0.0, 0.01, 0.02], [0.0, 0.01, 0.02, 0.03, 0.04])
+    # What is known to be contradicted is not asked, and holds at once.
+    known = Finding(level="warning", subject="file", text="never was", holds=("arm",))
+    state.refresh(0.0)
+    assert Judge(bound, [known])(state)[0].verdict == "undecided"
+    assert first.asked[3:] == []

@@ -311,7 +311,7 @@ def test_the_steps_that_a_way_sees_are_all_between_its_ends(turns: bool) -> None
         start, way = rng.uniform(-2, 2), rng.choice([-1, 1]) * rng.uniform(0, 3) ** 2
         cells = np.floor((np.linspace(start, start + way, 5000) - low) / step).astype(int)
         seen = cells % joint_gaps.STEPS if turns else np.clip(cells, 0, joint_gaps.STEPS - 1)
-        assert set(seen.tolist()) <= set(joint.seen(start, start + way).tolist())
+        assert set(seen.tolist()) == set(joint.seen(start, start + way).tolist())
 
 
 def test_a_place_closes_where_it_faces_is_narrow_and_opens_wide_enough() -> None:
@@ -340,6 +340,9 @@ def test_a_place_closes_where_it_faces_is_narrow_and_opens_wide_enough() -> None
     gaps[:, 4] += 0.03
     assert not rates([4]).any()
     assert rates([0]).max() == pytest.approx(0.3)
+    together = np.max([rates([k]) for k in range(5)], axis=0)
+    np.testing.assert_array_equal(rates([0, 1, 2, 3, 4]), together)
+    assert together.any()
     # A piece of surface as large as that may be narrower than the place that stands for it.
     assert (rates([0], about=0.03)[0] > 0).sum(axis=0).tolist() == [5, 10]
 
@@ -357,9 +360,12 @@ def test_places_lie_on_the_surface_and_their_normals_point_outward() -> None:
     axis = np.clip(on.points[:, 2], 0, 0.5)[:, None] * [0, 0, 1]
     np.testing.assert_allclose(np.linalg.norm(on.points - axis, axis=1), 0.05)
     np.testing.assert_allclose(on.points - axis, 0.05 * on.normals, atol=1e-12)
-    # None of the rod's lie inside the box.
+    # None of the rod's lie inside the box, and all others are there; so are those where both are the same.
+    alone, both = len(places([Solid(mesh=mesh)]).points), len(on.points)
     on = places([Solid(mesh=mesh), rod])
     assert (np.max(np.abs(on.points) - half, axis=1) > -1e-9).all()
+    assert 0.7 * (alone + both) < len(on.points) < alone + both
+    assert len(places([Solid(mesh=mesh)] * 2).points) > 0
 
 
 def _spread(on: joint_gaps.Places, surface: np.ndarray) -> float:
@@ -380,19 +386,21 @@ def test_no_point_of_a_surface_is_farther_from_a_place_than_its_piece_is_large()
     assert on.about == h / 2
     assert _spread(on, surface) < 1.2 * h
     assert len(on.points) < 1.5 * box.area / h**2
-    axis = np.array([0.3, 0.0, 0.4])
-    rod = capsule(np.zeros(3), axis, 0.05)
-    angles, along = rng.uniform(0, 2 * np.pi, 300), rng.random(300)
-    round_ = np.cos(angles)[:, None] * [0.0, 1.0, 0.0] + np.sin(angles)[:, None] * [0.8, 0.0, -0.6]
-    on = places([rod])
-    assert _spread(on, along[:, None] * axis + 0.05 * round_) < 0.75 * h
+    start, axis = np.array([0.7, -0.2, 0.1]), np.array([0.2, 0.3, -0.4])
+    rod = capsule(start, start + axis, 0.05)
     out = rng.normal(size=(300, 3))
     out /= np.linalg.norm(out, axis=1)[:, None]
-    ends = np.where((out @ axis > 0)[:, None], axis, 0.0)
+    across = np.cross(axis, out)
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    on = places([rod])
+    assert _spread(on, start + rng.random((300, 1)) * axis + 0.05 * across) < 0.75 * h
+    ends = np.where((out @ axis > 0)[:, None], start + axis, start)
     assert _spread(on, ends + 0.05 * out) < 0.75 * h
-    assert _spread(on, np.array([[-0.03, 0, -0.04], [0.33, 0, 0.44]])) < 1e-9
-    assert len(on.points) < 1.3 * (0.5 * 2 * np.pi * 0.05 + 4 * np.pi * 0.05**2) / h**2
-    a, b, c = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.05, 0.1, 0.0]])
+    poles = 0.05 * axis / np.linalg.norm(axis)
+    assert _spread(on, np.array([start - poles, start + axis + poles])) < 1e-9
+    length = np.linalg.norm(axis)
+    assert len(on.points) < 1.3 * (length * 2 * np.pi * 0.05 + 4 * np.pi * 0.05**2) / h**2
+    a, b, c = np.array([[0.3, -0.2, 0.0], [0.5, -0.2, 0.0], [0.3, -0.1, 0.0]])
     pad = Solid(points=np.array([a, b, c]), radius=0.02)
     uv = rng.random((300, 2))
     flat = a + uv[:, :1] * (b - a) + uv[:, 1:] * (c - a)
@@ -401,13 +409,22 @@ def test_no_point_of_a_surface_is_farther_from_a_place_than_its_piece_is_large()
     np.testing.assert_allclose(np.abs(on.points[:, 2]), 0.02)
     np.testing.assert_allclose(on.normals[:, 2], np.sign(on.points[:, 2]))
     # A thin needle is as round as eight places say; a point has an axis, too.
-    needle = places([capsule(np.zeros(3), np.array([0.0, 0.0, 0.05]), 1e-3)])
-    assert len(needle.points) == 8 * 5 + 2
+    for way in (1.0, -1.0):
+        needle = places([capsule(np.zeros(3), np.array([0.0, 0.0, 0.05 * way]), 1e-3)])
+        assert len(needle.points) == 8 * 5 + 2
+    # Around and along there is one more than whole pieces.
+    pin = places([capsule(np.zeros(3), np.array([0.0, 0.0, 4.4 * h]), 2.45 * h)])
+    rings, counts = np.unique(pin.points[(pin.normals[:, 2] == 0)][:, 2].round(9), return_counts=True)
+    assert rings == pytest.approx(np.arange(6) / 5 * 4.4 * h, abs=1e-8)
+    assert set(counts.tolist()) == {16}
+    _, counts = np.unique(pin.points[pin.normals[:, 2] > 0][:, 2].round(9), return_counts=True)
+    assert counts.tolist() == [15, 11, 6, 1]
     ball = places([Solid(points=np.zeros((2, 3)), radius=0.1)])
     np.testing.assert_allclose(np.linalg.norm(ball.points, axis=1), 0.1)
     assert _spread(ball, 0.1 * out) < 0.75 * h
     for long, thick in ((5.0, 0.5), (10.0, 0.1)):
-        large = [capsule(np.zeros(3), np.array([0.0, 0.0, long]), thick), capsule(np.zeros(3), axis, 0.01)]
+        half = np.array([0.0, 0.0, long / 2])
+        large = [capsule(-half, half, thick), capsule(np.zeros(3), axis, 0.01)]
         assert places(large).about == pytest.approx((long + 2 * thick) / joint_gaps.MOST_PIECES / 2)
 
 
@@ -427,7 +444,7 @@ def test_a_pair_clamps_as_fast_as_its_joint_closes_it_where_it_is_and_no_slower_
     assert table.at((0.125, 0.125), (0.0, 0.51))[2] == pytest.approx(STILL * 1.02)
 
 
-@pytest.mark.parametrize("off", [-1e-6, 1e-6])
+@pytest.mark.parametrize("off", [-1e-6, 0.0, 1e-6])
 def test_each_threshold_of_what_clamps_is_where_it_is_said_to_be(off: float) -> None:
     """A gap that closes evenly from a width: how much it opens, how wide, how narrow, and how fast."""
     step = np.full(4, 0.25)
@@ -441,23 +458,25 @@ def test_each_threshold_of_what_clamps_is_where_it_is_said_to_be(off: float) -> 
             g, np.ones(g.shape, bool), -np.gradient(g, 0.25, axis=0), near, np.ones(near.shape, bool)
         )
         found = closing(looks, np.full((1, 1), about), step, np.array([thick]), np.array([thin]), least=least)
+        assert found.shape == (2, 4, 1)
         assert not found[1].any()
         return (found[0, :, 0] > 0).tolist()
 
     even = [0.1, 0.075, 0.05, 0.025, 0.0]
-    assert any(clamps(even, 0.5, 0.1 - off)) is (off > 0)  # opens as wide as the thinnest
-    assert any(clamps(even, 0.5, 0.12 - off, about=0.02)) is (off > 0)
-    assert any(clamps(even, 0.5, 0.05, least=0.1 - off)) is (off > 0)  # and by more than a fingertip
-    assert clamps(even, 0.05 + off, 0.05) == [False, off > 0, True, True]
-    assert clamps(even, 0.03 + off, 0.05, about=0.02) == [False, off > 0, True, True]
+    assert any(clamps(even, 0.5, 0.1 - off)) is (off >= 0)  # opens as wide as the thinnest
+    assert any(clamps(even, 0.5, 0.12 - off, about=0.02)) is (off >= 0)
+    wider = [0.02 + x for x in even]
+    assert any(clamps(wider, 0.5, 0.05, least=0.1 - off)) is (off >= 0)  # and by more than a fingertip
+    assert clamps(even, 0.05 + off, 0.05) == [False, off >= 0, True, True]
+    assert clamps(even, 0.03 + off, 0.05, about=0.02) == [False, off >= 0, True, True]
     slow = [0.5 - x for x in np.cumsum([0, *[0.25 * (joint_gaps.SLOWEST + off)] * 4])]
-    assert all(clamps(slow, 0.6, 0.05)) is any(clamps(slow, 0.6, 0.05)) is (off > 0)
+    assert all(clamps(slow, 0.6, 0.05)) is any(clamps(slow, 0.6, 0.05)) is (off >= 0)
     # In a narrower gap what would shut it within a radian is fast enough, down to a fingertip.
     least = 0.004
     narrow = [0.01 * (1 - (1 + off) * x) for x in (0, 0.25, 0.5, 0.75, 1.0)]
     assert clamps(narrow, 0.6, 0.005, least=least)[0] is True
     crawling = [0.004 + off * 5 - x * (0.004 + off) for x in (0, 0.25, 0.5, 0.75, 1.0)]
-    assert clamps(crawling, 0.6, 0.003, least=least)[-1] is (off > 0)
+    assert clamps(crawling, 0.6, 0.003, least=least)[-1] is (off >= 0)
 
 
 def test_a_place_between_two_that_it_faces_from_one_only_closes_with_the_faster_of_all() -> None:
@@ -472,6 +491,9 @@ def test_a_place_between_two_that_it_faces_from_one_only_closes_with_the_faster_
         found = closing(looks, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
         np.testing.assert_allclose(found[0], np.where(growing, 0.9, 0.0))
         assert not found[1].any()
+        jump = Looks(gaps, np.ones((3, 1), bool), np.zeros((3, 1)), near, near == 0)
+        mean = closing(jump, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
+        np.testing.assert_allclose(mean, [[0.2, 0.4], [0.0, 0.0]])
         opening = Looks(gaps[::-1], looks.faces, -looks.falls, near, near == 0)
         back = closing(opening, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
         np.testing.assert_allclose(back[1], np.where(growing, 0.9, 0.0))
@@ -508,3 +530,19 @@ def test_two_balls_clamp_as_early_whichever_way_they_come_together(tmp_path: Pat
     # Of 10 mm each.
     assert np.ptp(counts, axis=0).max() <= 1
     assert np.min(counts) > 3
+
+
+def test_a_triangle_without_a_surface_has_no_place() -> None:
+    flat = np.array([[[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]])
+    thin = np.array([[[0.0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]])
+    (points, normals), alone = (
+        joint_gaps._on_triangles(triangles, 0.0125, 0.0) for triangles in (np.concatenate([flat, thin]), flat)
+    )
+    np.testing.assert_array_equal(points, alone[0])
+    np.testing.assert_array_equal(normals, alone[1])
+    np.testing.assert_array_equal(normals, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    assert [part.shape for part in joint_gaps._on_triangles(thin, 0.0125, 0.0)] == [(0, 3), (0, 3)]
+    # One that is thinner than a piece has pieces along it all the same.
+    strip = np.array([[[0.0, 0, 0], [0.4, 0, 0], [0.4, 0.01, 0]]])
+    points, _ = joint_gaps._on_triangles(strip, 0.0125, 0.0)
+    assert np.diff(np.sort([0.0, *points[:, 0].tolist(), 0.4])).max() < 2 * 0.0125

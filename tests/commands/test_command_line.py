@@ -462,7 +462,15 @@ def test_live_for_a_while_writes_everything_and_ends_with_the_verdict(capsys, tm
     assert (code, err) == (1, "")
     assert "http://127.0.0.1:" in out
     assert "ends at 0.3 s; what depends on it is undecided from then on" in " ".join(out.split())
+    assert "goes on" not in out
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == FILES
+
+
+def test_what_of_a_motion_was_not_run_is_said_beside_the_verdict(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell", limit=100, more="")
+    code, out, _ = seerob(capsys, "run", cell, "--port", "0", "--seconds", "0.1", "--no-record")
+    assert code in (0, 2)
+    assert "goes on to 0.30 s: 0.20 s of it were not evaluated" in " ".join(out.split())
 
 
 def test_output_into_a_closed_pipe_is_quiet():

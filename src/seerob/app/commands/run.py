@@ -127,6 +127,7 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             writers += _targets(station, allow=options.allow_writing)
             summary = station.run(writers=writers, live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
+    _tell_rest(station, summary.duration)
     for name, (late, bound) in summary.late.items():
         text = f"{name}: heard up to {1e3 * late:.0f} ms later than at its best; {1e3 * bound:.0f} ms may be"
         line("late", text, "yellow" if late > bound else "")
@@ -143,6 +144,23 @@ def _tell_ends(station: Station) -> None:
                 "is undecided from then on (loop = true in its source starts it again)"
             )
             line("note", text)
+
+
+def _tell_rest(station: Station, ran: float) -> None:
+    """Say whose file goes on where the run was ended: nobody has judged that.
+
+    Args:
+        station: The workstation.
+        ran: How long it ran [s].
+    """
+    for source, opened in station.sources:
+        rest = opened.duration - ran
+        if source.target() and rest > station.model.workstation.engine.tick:
+            text = (
+                f"{source.target()}: {source.name or 'its source'} goes on to {opened.duration:.2f} s: "
+                f"{rest:.2f} s of it were not evaluated, of which the verdict says nothing"
+            )
+            line("warning", text, "yellow")
 
 
 def _triggers(station: Station, *, allow: bool) -> list[Triggers]:

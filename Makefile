@@ -50,7 +50,7 @@ $(RUN): $(VENV)/bin/python requirements/run.txt pyproject.toml
 	touch $@
 
 $(DEV): $(RUN) requirements/dev.txt
-	$(BIN)/python -m pip install -q --require-hashes -r requirements/dev.txt
+	$(BIN)/python -m pip install -q --no-compile --require-hashes -r requirements/dev.txt
 	touch $@
 
 $(NODE): $(VENV)/bin/python requirements/node.txt

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.signal import lfilter
-from scipy.stats import t as student
 
 from oracles.pinocchio_oracle import pinocchio_model
 from seerob.app import cli
@@ -130,6 +128,8 @@ def test_the_mass_alone_explains_no_log(what) -> None:
 
 def test_the_truth_lies_in_95_of_100_intervals() -> None:
     """Many noises on one motion; white, and such that neighbours are alike."""
+    from scipy.signal import lfilter
+
     _, q, qd, qdd = motion(5, 1000)
     without, columns = cell()[1](q, qd, qdd)
     both = np.concatenate([columns, friction(qd)], axis=-1)
@@ -152,6 +152,8 @@ def test_the_truth_lies_in_95_of_100_intervals() -> None:
 
 def test_errors_that_are_much_alike_do_not_make_a_payload_surer_than_it_is() -> None:
     """400 samples of 2 motions: 28 smooth columns make residuals look less alike than errors are."""
+    from scipy.signal import lfilter
+
     alike, inside = 0.95, []
     for seed in (5, 6):
         _, q, qd, qdd = motion(seed, 400)
@@ -190,6 +192,8 @@ def test_torques_that_come_late_do_not_make_a_payload_surer_than_it_is() -> None
 
 def test_few_rows_make_wide_intervals() -> None:
     """Student's distribution, by SciPy."""
+    from scipy.stats import t as student
+
     for freedom in (4, 5, 10, 30, 1000):
         assert wider(freedom) * NORMAL_95 == pytest.approx(student.ppf(0.975, freedom), rel=0.02)
     assert wider(1.0) * NORMAL_95 == pytest.approx(student.ppf(0.975, 1), rel=1e-4)

@@ -527,6 +527,7 @@ class BetweenTicks:
             data = mujoco.MjData(state.model.mj)
             self._shadow = State(state.model, data, state.hearings, state.signals)
             self._shadow.attachments = state.attachments
+            self._shadow.between = True
         shadow = self._shadow
         shadow.columns, shadow.foresee, shadow.knots = state.columns, state.foresee, state.knots
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)

@@ -106,6 +106,8 @@ class State(Validity):
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
         self._others_of: dict[tuple[str, ...], Others] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
+        self.between = False
+        """Whether it is at an instant between two ticks: what is within there is shown to nobody."""
         self.captured_between: tuple[Array, Array] | None = None
         """Of an instant between two ticks: ``qpos`` and ``qvel`` with people as they were captured; None at a
         tick, and where nobody is held (`seerob.twin.spans.Path.captured`)."""

@@ -476,8 +476,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 *self._shown(at.now, k, limit, rest, at.seen[0]),
                 *given,
                 *self._more(S_p, at.most, at.unbounded_reason),
-                *self._permissible(at.stop, state, at.course, at.now, found.distance, K, at.seen, at.stray),
             )
+            if not (state.between and verdict is Verdict.WITHIN):  # which nobody is shown, and it takes long
+                beside += self._permissible(
+                    at.stop, state, at.course, at.now, found.distance, K, at.seen, at.stray
+                )
             return Shown(where, draw, beside, list(map(names.__getitem__, found.body_a.tolist())))
 
         return present

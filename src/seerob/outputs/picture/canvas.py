@@ -128,10 +128,11 @@ class Canvas:
         self.depth: Array = self._room.array("depth", shape, np.float64)
         self.owner: NDArray[np.int32] = self._room.array("owner", shape, np.int32)
         self.rgb: NDArray[np.float32] = self._room.array("rgb", (*shape, 3), np.float32)
-        ramp = np.linspace(1.0, 0.93, shape[0], dtype=np.float32)[:, None, None]
+        ramp = np.linspace(1.0, 0.93, shape[0], dtype=np.float32)[:, None]
         self.depth.fill(0)
         self.owner.fill(-1)
-        self.rgb[:] = np.array(PAPER, np.float32) * ramp
+        # Row by row: pixel by pixel it takes four times as long.
+        np.multiply(ramp, np.tile(np.array(PAPER, np.float32), shape[1]), out=self.rgb.reshape(shape[0], -1))
 
     def bodies(
         self, vertices: Array, normals: Array, faces: NDArray[np.int32], ids: NDArray[np.int32], colors: Array

@@ -251,3 +251,35 @@ def test_a_name_of_no_more_than_a_mebibyte_is_read(size, told):
         _record(McapIndex(), io.BytesIO(name), 0x0C, 0, 2**20)
     with pytest.raises(Damaged, match="metadata is too long"):
         _record(McapIndex(), io.BytesIO(name), 0x0C, 0, 2**20 + 1)
+
+
+def test_a_file_that_is_cut_anywhere_is_read_up_to_its_last_whole_record(whole, tmp_path):
+    """And it is finished from its end mark on, whatever of its summary is there, and whatever lies behind."""
+    data, file = whole.read_bytes(), tmp_path / "cut.mcap"
+    ends, chunks = [8], [0]
+    while data[ends[-1]] != 0x0F:
+        chunks.append(chunks[-1] + (data[ends[-1]] == 0x06))
+        ends.append(ends[-1] + 9 + struct.unpack_from("<Q", data, ends[-1] + 1)[0])
+    mark = ends[-1] + 9 + struct.unpack_from("<Q", data, ends[-1] + 1)[0]
+    entire = scan(whole)
+    assert (entire.finished, entire.unread, entire.beyond, len(entire.chunks)) == (True, 0, 0, chunks[-1])
+    assert all(chunk.channels for chunk in entire.chunks)
+    near = [*range(6), *range(len(ends) // 2, len(ends) // 2 + 6), *range(len(ends) - 5, len(ends))]
+    cuts = {ends[k] + off for k in near for off in (-1, 0, 1, 8, 9, 10)} | {mark - 1}
+    for cut in sorted(cut for cut in cuts if 8 <= cut < mark):
+        file.write_bytes(data[:cut])
+        found, last = scan(file), max(k for k, end in enumerate(ends) if end <= cut)
+        assert (found.finished, found.unread, found.beyond) == (False, cut - ends[last], 0), cut
+        assert len(found.chunks) == chunks[last], cut
+        assert found.chunks[:-1] == entire.chunks[: max(chunks[last] - 1, 0)]
+        # Which channels the last one has may be cut off as well.
+        assert [chunk.channels for chunk in found.chunks[-1:]] == [[]] * (chunks[last] > 0)
+    for more in (data[: mark + 1], data[: mark + 9], data[:-9], data[:-8], data[:-1], data):
+        file.write_bytes(more)
+        assert (scan(file).finished, scan(file).unread, scan(file).beyond) == (True, 0, 0)
+    for behind in (b"x", b"12345678", b"123456789", data):
+        file.write_bytes(data + behind)
+        assert (scan(file).finished, scan(file).beyond) == (True, len(behind))
+    file.write_bytes(data[:7])
+    with pytest.raises(InputError, match="is not an MCAP file"):
+        scan(file)

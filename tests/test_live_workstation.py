@@ -58,7 +58,7 @@ def test_the_live_workstation_runs_decided_and_is_reported(tmp_path, capsys):
             said = capsys.readouterr().out
             if "behind real time" not in said and "its clock is being found" not in said:
                 break
-            # What a machine that cannot keep up says of itself, or of when it hears: a busy one is asked again.
+            # What a machine that cannot keep up says of itself or of when it hears: it is asked again.
             assert ended in (Exit.WITHIN, Exit.UNDECIDED)
     assert ended == Exit.WITHIN
     assert "preliminary until it is confirmed on the controller" in said

@@ -8,6 +8,7 @@ verdict is known.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import repeat
@@ -159,7 +160,7 @@ def _said_of_each(parts: Parts, codes: Codes, *, at_most: bool) -> NDArray[np.in
         codes[parts.informs] = CODES[None]
     rank = _RANKS[codes]
     room = parts.limit - parts.value if at_most else parts.value - parts.limit
-    room = np.where(np.isnan(room), -np.inf, np.minimum(room, np.finfo(float).max))
+    room = np.where(np.isnan(room), -np.inf, np.minimum(room, sys.float_info.max))
     worst = rank == rank.max(axis=-1, keepdims=True)
     return np.asarray(np.where(worst, room, np.inf).argmin(axis=-1))
 

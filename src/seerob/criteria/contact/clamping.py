@@ -132,10 +132,9 @@ class PinchPairs:
     def per_body(self, clamped: Flags) -> Flags:
         """Which moving bodies clamp, shape (..., b, r), given which gaps do, shape (..., g, r)."""
         found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
-        if not clamped.any():
-            return found
+        some = clamped.any(axis=(*range(clamped.ndim - 2), -1))
         for side in (self.first, self.second):
-            for gap in np.flatnonzero(side >= 0):
+            for gap in np.flatnonzero((side >= 0) & some):
                 found[..., side[gap], :] |= clamped[..., gap, :]
         return found
 

@@ -185,6 +185,7 @@ class ContactRows:
         by_others = f"{'force' if others == v_F else 'energy'}, {how}, {self._bodies[row]}"
         shared = (Aspect(name="contact", band=how), Aspect(name="allowed by force", value=v_F, unit=unit))
         last = Aspect(name="allowed by energy", value=v_E, unit=unit)
+        one_side = _side(bones)
         for i, place in enumerate(self._places[part.name], self._first[column]):
             v_P = pressed[i]
             open_ = math.isnan(v_P)
@@ -202,7 +203,7 @@ class ContactRows:
             yield Row(
                 name=place.name,
                 group=part.name,
-                side=_side(place, bones),
+                side=place.side or one_side,
                 value=value,
                 unit=unit,
                 limit=limit,
@@ -219,11 +220,12 @@ class ContactRows:
             )
 
     def _unlimited(self, part: Result, bones: tuple[str, ...]) -> Iterable[Row]:
+        one_side = _side(bones)
         for place in self._places.get(part.name, (_Place(part.name, (), "", ()),)):
             yield Row(
                 name=place.name,
                 group=part.name,
-                side=_side(place, bones),
+                side=place.side or one_side,
                 state=_state(part),
                 value=part.value,
                 unit=part.unit,
@@ -250,10 +252,8 @@ def _place(region: BodyRegion, area: BodyArea, hand: str | None) -> _Place:
     return _Place(area.name, (area.number,), side, inputs)
 
 
-def _side(place: _Place, bones: Sequence[str]) -> str:
-    """Of the area, or the one side of the body that can be hit."""
-    if place.side or not bones:
-        return place.side
+def _side(bones: Sequence[str]) -> str:
+    """The one side of the body that can be hit; empty where there are more, or none."""
     sides = {side for bone in bones for side in SIDES if f"/{side}_" in bone}
     central = any(not any(f"/{side}_" in bone for side in SIDES) for bone in bones)
     return sides.pop() if len(sides) == 1 and not central else ""

@@ -19,7 +19,16 @@ from seerob.criteria.judging import Judge
 from seerob.outputs.sinks import recorder
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.format import END_METADATA, SAMPLES, Tick
-from seerob.recording.recording import ChunkPlace, Damaged, McapIndex, Recording, _record, read_chunk, scan
+from seerob.recording.recording import (
+    ChunkPlace,
+    Damaged,
+    McapIndex,
+    Recording,
+    _record,
+    read_attachment,
+    read_chunk,
+    scan,
+)
 from seerob.session import run, scene
 from seerob.session.station import load, load_recorded
 
@@ -283,3 +292,36 @@ def test_a_file_that_is_cut_anywhere_is_read_up_to_its_last_whole_record(whole, 
     file.write_bytes(data[:7])
     with pytest.raises(InputError, match="is not an MCAP file"):
         scan(file)
+
+
+def test_what_is_read_is_what_the_other_library_reads(whole, tmp_path):
+    index, read, topics = scan(whole), [], {}
+    with whole.open("rb") as file:
+        reader = make_reader(file)
+        told = [(m.channel_id, m.log_time, m.data) for *_, m in reader.iter_messages(log_time_order=False)]
+        named = {key: channel.topic for key, channel in reader.get_summary().channels.items()}
+        attached = {each.name: each.data for each in reader.iter_attachments()}
+        metadata = {each.name: each.metadata for each in reader.iter_metadata()}
+    for chunk in index.chunks:
+        of, messages = read_chunk(whole, chunk)
+        assert {message.channel for message in messages} == set(chunk.channels)
+        assert read_chunk(whole, chunk._replace(crc=0))[1] == messages
+        topics |= of
+        read += map(tuple, messages)
+    assert sorted(read) == sorted(told)
+    assert topics == named
+    assert {name: read_attachment(whole, each) for name, each in index.attachments.items()} == attached
+    assert index.metadata == metadata
+    first = index.chunks[0]
+    for damaged in (first._replace(crc=first.crc + 1), first._replace(size=first.size + 1)):
+        with pytest.raises(Damaged):
+            read_chunk(whole, damaged)
+    # Two channels without compression, whole and without their last byte.
+    record = struct.pack("<BQHHI3s", 0x04, 11, 7, 0, 3, b"one")
+    raw = tmp_path / "raw"
+    raw.write_bytes(record + struct.pack("<BQHHI3s", 0x04, 11, 8, 0, 3, b"two"))
+    whole_one = ChunkPlace(0, 0, 0, 2 * len(record), 2 * len(record), 0, "", [])
+    assert read_chunk(raw, whole_one) == ({7: "one", 8: "two"}, [])
+    cut = 2 * len(record) - 1
+    with pytest.raises(Damaged, match="longer than its chunk"):
+        read_chunk(raw, whole_one._replace(length=cut, size=cut))

@@ -265,6 +265,19 @@ BALL = 0.01
 """Radius of what is drawn at a patch [m]."""
 
 
+class Placed(NamedTuple):
+    """Where a moving body is when it is drawn."""
+
+    point: Array
+    """Its fastest one in the world [m], shape (3,)."""
+    velocity: Array
+    """Of that point [m/s], shape (3,)."""
+    R: Array
+    """World from body, shape (3, 3)."""
+    x: Array
+    """Its origin in the world [m], shape (3,)."""
+
+
 class ContactMarkers:
     """Of the moving bodies of a robot, bound once."""
 
@@ -290,31 +303,30 @@ class ContactMarkers:
         self._columns = {region.name: k for k, region in enumerate(arrays.regions)}
         self._least: dict[tuple[int, int, bool], int | None] = {}
 
-    def of(self, state: State, part: Result, row: int, judged: Judged) -> Callable[[], tuple[Marker, ...]]:
-        """Draws a region and the row of the moving body that governs it, from copies."""
+    def place(self, state: State, row: int) -> Placed:
+        """Where the moving body of a row is, in copies."""
         body = self._bodies[row]
         _, point, velocity = state.fastest_point(body)
         R, x = state.placed((body,))
-        point, velocity, R, x = point.copy(), velocity.copy(), R[body].copy(), x[body].copy()
+        return Placed(point.copy(), velocity.copy(), R[body].copy(), x[body].copy())
 
-        def draw() -> tuple[Marker, ...]:
-            shown = figures.against(part.value, part.limit, part.unit, at_most=True)
-            label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
-            arrow = Arrow(
-                origin=tuple(point.tolist()),
-                vector=tuple((ARROW * velocity).tolist()),
-                label=label,
-                verdict=part.verdict,
-            )
-            lit = Highlight(body=self._model.bodies[body].name, verdict=part.verdict)
-            patch = self._patch(part, row, judged)
-            if patch is None:
-                return arrow, lit
-            at, label = patch
-            center = tuple((x + R @ at).tolist())
-            return arrow, lit, Sphere(center=center, radius=BALL, label=label, verdict=part.verdict)
-
-        return draw
+    def of(self, at: Placed, part: Result, row: int, judged: Judged) -> tuple[Marker, ...]:
+        """Markers of a region and the row of the moving body that governs it."""
+        shown = figures.against(part.value, part.limit, part.unit, at_most=True)
+        label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
+        arrow = Arrow(
+            origin=tuple(at.point.tolist()),
+            vector=tuple((ARROW * at.velocity).tolist()),
+            label=label,
+            verdict=part.verdict,
+        )
+        lit = Highlight(body=self._model.bodies[self._bodies[row]].name, verdict=part.verdict)
+        patch = self._patch(part, row, judged)
+        if patch is None:
+            return arrow, lit
+        point, label = patch
+        center = tuple((at.x + at.R @ point).tolist())
+        return arrow, lit, Sphere(center=center, radius=BALL, label=label, verdict=part.verdict)
 
     def _patch(self, part: Result, row: int, judged: Judged) -> tuple[Array, str] | None:
         """Where a pressure governs, or is open because the mesh does not resolve an edge: there, in words."""

@@ -672,10 +672,10 @@ class Contacts:
             )
             beneath.append((*measured, *areas))
         part, row = found[parts.governs]
-        out = self._out_of_reach(judged)
+        out, place = self._out_of_reach(judged), self.markers.place(state, row)
         return Shown(
             f"{part.name}: {part.reason}",
-            self.markers.of(state, part, row, judged),
+            lambda: self.markers.of(place, part, row, judged),
             (*(each for each, _ in out), *beside),
             [each.reason for each, _ in found],
             beneath,

@@ -39,7 +39,7 @@ class Stream:
         patch.setattr(receivers, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
         (source,) = station.workstation.sources
         self.box = Mailbox()
-        self.listener = Listener(source, None, self.box.post)
+        self.listener = Listener(source, None, self.box.post, waits=self.box.waits)
         self.delay = delay_of([source])
         self.target, self.packets, self.again = target, list(packets), list(again)
         self.pauses = pauses or {}

@@ -8,7 +8,7 @@ from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample, 
 from seerob.devices.live.held_back import HeldBack
 
 BEHIND, PERIOD = 0.03, 0.01
-PLACE, SPEED, TOGETHER, FASTER, MOST = 5e-3, 0.05, 0.02, 0.9, 1024
+PLACE, SPEED, TOGETHER, FASTER = 5e-3, 0.05, 0.02, 0.9
 """As they were chosen."""
 
 
@@ -98,9 +98,9 @@ def test_it_is_said_once():
     assert [bool(each) for each in found] == [False, False, True, False, False]
 
 
-def test_of_too_many_nobody_knows_that_they_lie_between():
-    assert burst(*[REST] * (MOST + 2), period=1e-4) == ""
-    assert "held back" in burst(*[REST] * (MOST + 3), period=1e-4)
+def test_of_very_many_it_is_known_whether_they_lie_between():
+    assert burst(*[REST] * 3000, period=1e-5) == ""
+    assert "held back" in burst(REST, *[AWAY] * 3000, REST, period=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -132,6 +132,28 @@ def test_whatever_moves_is_looked_at(rest, away):
 def test_nothing_is_said_of_signals():
     on, off = (SignalSample(source="s", seq=0, t=0.0, values={"door": value}) for value in (True, False))
     assert burst(on, off, on) == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "away", "found"), [(0.049, 1.0, False), (0.052, 1.0, True), (0.2, 0.004, False)]
+)
+def test_what_nobody_took_for_longer_than_a_few_ticks_was_judged_at_no_instant(seconds, away, found):
+    """While the run is held up the newest one stands where the last that was taken did."""
+    held, said = HeldBack(BEHIND), []
+    n = round(seconds / 0.001)
+    for k in range(n + 1):
+        q = away if k == 2 else 0.0
+        sample = JointSample(source="s", seq=k, target="arm", t=0.001 * k, q=(q,))
+        said.append(held.reason(sample, 0.001 * k, 0.001 * k, waits=k > 1))
+    assert any(said) is found
+    assert sum(map(bool, said)) <= 1
+
+
+def test_what_nobody_took_before_the_first_was_taken_is_not_looked_at():
+    held = HeldBack(BEHIND)
+    for k in range(400):
+        sample = JointSample(source="s", seq=k, target="arm", t=0.001 * k, q=(float(k % 2),))
+        assert not held.reason(sample, 0.001 * k, 0.001 * k, waits=k > 0)
 
 
 def test_both_signs_of_a_quaternion_are_one_orientation():

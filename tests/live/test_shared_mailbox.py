@@ -13,7 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.core.errors import SeerobError
-from seerob.core.samples import BodyPoint, BodySample, JointSample, Mailbox, PoseSample, Quality, SignalSample
+from seerob.core.samples import (
+    BodyPoint,
+    BodySample,
+    JointSample,
+    Mailbox,
+    PoseSample,
+    Quality,
+    SignalSample,
+    key,
+)
 from seerob.devices.live import source_process
 from seerob.devices.live.source_process import SharedMailbox, memory
 
@@ -64,8 +73,10 @@ def test_it_is_the_mailbox_of_one_process(batches):
     os.close(file)
     for batch in batches:
         for sample in batch:
+            assert here.waits(key(sample)) is one.waits(key(sample))
             here.post(sample)
             one.post(sample)
+            assert [box.waits(key(sample)) for box in (here, one)] == [True, True]
         found, expected = there.take(), one.take()
         assert sorted(map(repr, found)) == sorted(map(repr, expected))
 

@@ -354,6 +354,19 @@ def test_what_was_done_and_undone_while_packets_were_held_back_is_not_within(tmp
     assert any("held back" in result.reason for result in results)
 
 
+@pytest.mark.parametrize("pause", [0.14, 0.17])
+@pytest.mark.parametrize("speeds", [True, False])
+def test_what_was_done_and_undone_while_the_run_was_held_up_is_not_within(
+    tmp_path, monkeypatch, speeds, pause
+):
+    """Every packet comes in time, and is replaced by the next before a tick has taken it."""
+    station, packets = made(tmp_path, SEEN, {"arm.urdf": two_r()}), stream(said=to_and_fro(0.03, 3.0))
+    live = Stream(station, monkeypatch, "arm", packets if speeds else silent(packets), pauses={294: pause})
+    results = [result for _, (result,), _ in live.ticks(400)]
+    assert any("held back" in result.reason for result in results)
+    assert {result.verdict for result in results} == {"within", "undecided"}
+
+
 @pytest.mark.parametrize("said", [motion, to_and_fro(0.002, HELD[0]), to_and_fro(0.03, 4.0)])
 def test_a_motion_that_goes_on_while_packets_are_held_back_is_followed(station, monkeypatch, said):
     live = Stream(station, monkeypatch, "arm", stream(way=held_back, said=said))

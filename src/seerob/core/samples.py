@@ -208,6 +208,10 @@ class Mailbox:
         with self._lock:
             self._latest[key(sample)] = sample
 
+    def waits(self, what: tuple[str, ...]) -> bool:
+        """Whether there is a sample of a kind (`key`) that nobody took."""
+        return what in self._latest
+
     def take(self) -> tuple[Sample, ...]:
         """The samples posted since the last call, in order of first posting; empties the box."""
         with self._lock:

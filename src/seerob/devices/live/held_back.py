@@ -1,8 +1,9 @@
-"""What a source did and undid while its packets were held back: no tick of the run was there to see it.
+"""What a source did and undid while its packets, or the run, were held back: no tick was there to see it.
 
 A run shows the world a fixed delay ago. Packets that come later than that find the twin gone on without them,
-and of those that come together only the newest is taken. Where the others lie between the last one that came
-in time and the newest, the twin went that way, too. Where they do not, nobody judged what was done meanwhile.
+and of those that come together, or while the run is held up, only the newest is taken. Where the others lie
+between the last one that was taken in time and the newest, the twin went that way, too. Where they do not,
+nobody judged what was done meanwhile.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ and of orientations a share of a quaternion; rad/s or m/s]. Own choice."""
 FASTER = 0.9
 """Share of the time between two samples within which they arrive that were held back; others come late one by
 one."""
-MOST = 1024
-"""Samples that are kept; of more nobody knows that they lie between."""
+HELD_UP = 0.05
+"""A run that took nothing for longer is held up [s]: of several samples within a tick the newest speaks."""
 
 Said = dict[str, float]
 """What a sample says, by what it is about: places [rad or m], and speeds after `RATE`."""
@@ -38,43 +39,56 @@ class HeldBack:
         self._behind = behind
         self._taken: Said = {}
         """By the last sample that a run has taken."""
-        self._missed: list[Said] = []
-        """By those since then that none may have taken."""
+        self._missed: dict[str, tuple[float, float]] = {}
+        """Least and largest by those since then that none may have taken."""
+        self._since = math.inf
+        """When the first of those arrived [s]."""
         self._last: Said = {}
-        self._t = self._arrived = -math.inf
-        """When the last one was so, and when it arrived [s]; -inf where that was in time."""
+        self._t = self._host = -math.inf
+        """When the last one was so, and when it arrived [s]."""
+        self._late = -math.inf
+        """When it arrived, if that was too late [s]; -inf where that was in time."""
 
-    def reason(self, sample: Sample, t: float, host: float) -> str:
+    def reason(self, sample: Sample, t: float, host: float, *, waits: bool = False) -> str:
         """Why what a source did until now was not judged; empty when it was.
 
         Args:
             sample: That arrives now.
             t: When what it says was so, on the host's clock [s].
             host: When it arrives [s].
+            waits: Whether the one before was taken by nobody yet, whose place this one takes.
         """
-        since = host - self._arrived
-        if since <= TOGETHER and since < FASTER * (t - self._t):
-            self._missed.append(self._last)
+        since = host - self._late
+        together = since <= TOGETHER and since < FASTER * (t - self._t)
+        # Before any was taken nothing is judged.
+        if together or (waits and self._taken):
+            self._miss(self._last)
+            self._since = min(self._since, self._host)
         else:
-            self._taken, self._missed = self._last, []
-        self._last, self._t = said_by(sample), t
-        self._arrived = host if host - t > self._behind else -math.inf
-        if not self._missed:
+            self._begin()
+        self._last, self._t, self._host = said_by(sample), t, host
+        self._late = host if host - t > self._behind else -math.inf
+        if not (together or host - self._since > HELD_UP) or not any(map(self._beyond, self._missed)):
             return ""
-        beyond = len(self._missed) > MOST or any(map(self._beyond, self._missed))
-        if not beyond:
-            return ""
-        self._taken, self._missed = self._last, []  # is said once
+        self._begin()  # is said once
         return "its packets were held back, and what it did meanwhile and undid was judged at no instant"
 
-    def _beyond(self, missed: Said) -> bool:
-        """Whether a sample lies beyond what the last that was taken and the newest say."""
-        for what, value in missed.items():
-            ends = [each[what] for each in (self._taken, self._last) if what in each]
-            room = SPEED if what.startswith(RATE) else PLACE
-            if not ends or not min(ends) - room <= value <= max(ends) + room:
-                return True
-        return False
+    def _begin(self) -> None:
+        """The last one was taken."""
+        self._taken, self._missed, self._since = self._last, {}, math.inf
+
+    def _miss(self, said: Said) -> None:
+        for what, value in said.items():
+            number = math.inf if math.isnan(value) else value  # which lies nowhere
+            low, high = self._missed.get(what, (number, number))
+            self._missed[what] = min(low, number), max(high, number)
+
+    def _beyond(self, what: str) -> bool:
+        """Whether any that was missed lies beyond what the last that was taken and the newest say."""
+        low, high = self._missed[what]
+        ends = [each[what] for each in (self._taken, self._last) if what in each]
+        room = SPEED if what.startswith(RATE) else PLACE
+        return not ends or not (min(ends) - room <= low and high <= max(ends) + room)
 
 
 def said_by(sample: Sample) -> Said:

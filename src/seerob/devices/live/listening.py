@@ -349,6 +349,7 @@ class Listener:
         post: Called with each sample, on the host's clock; from the listener's thread.
         again: Whether it was heard before, and lost.
         known: What was known of its clock then.
+        waits: Whether what was posted last of a kind (`seerob.core.samples.key`) was taken by nobody yet.
     """
 
     def __init__(
@@ -359,7 +360,9 @@ class Listener:
         *,
         again: bool = False,
         known: Known | None = None,
+        waits: Callable[[tuple[str, ...]], bool] = lambda _: False,
     ) -> None:
+        self._waits = waits
         self.name = name_of(source)
         self.drives = bool(source.target())
         """Whether it drives a robot or a person, or only has signals."""
@@ -548,7 +551,7 @@ class Listener:
         if what not in self._contradictions:
             self._contradictions[what] = Contradictions(self._target)
             self._held[what] = HeldBack(self._source.behind())
-        unseen = self._held[what].reason(sample, t, host)
+        unseen = self._held[what].reason(sample, t, host, waits=self._waits(what))
         if found := self._contradictions[what].find(sample) or unseen:
             self._found[what] = found, host + HOLD
         found, until = self._found.get(what, ("", 0.0))

@@ -106,7 +106,8 @@ def _listener(order: Order) -> Listener:
     # All of this stays: it need not be looked through while somebody listens.
     gc.collect()
     gc.freeze()
-    return Listener(source, target, SharedMailbox(order.memory).post, again=order.again, known=order.known)
+    box = SharedMailbox(order.memory)
+    return Listener(source, target, box.post, again=order.again, known=order.known, waits=box.waits)
 
 
 def main() -> int:

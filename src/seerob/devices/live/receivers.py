@@ -53,7 +53,7 @@ class Receivers:
             if pair is None:
                 if offers is not None and isinstance(source, TakesOffers):
                     source = source.taking(offers)  # noqa: PLW2901
-                self._here.append(Listener(source, target, self._box.post))
+                self._here.append(Listener(source, target, self._box.post, waits=self._box.waits))
             else:
                 self._processes.append(SourceProcess(name_of(source), pair))
 

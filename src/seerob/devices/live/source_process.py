@@ -8,7 +8,8 @@ is started again.
 
 In that memory nothing queues and nobody waits: who writes replaces, who reads takes what is there. A kind of
 sample (`seerob.core.samples.key`) has a slot of two halves, written in turn; a number says which is the newer
-one. What is copied while it is overwritten is found by that half's own number and checksum, and copied again.
+one, and another which was read last. What is copied while it is overwritten is found by that half's own
+number and checksum, and copied again.
 """
 
 from __future__ import annotations
@@ -121,6 +122,14 @@ class SharedMailbox:
         if number == 1:
             _COUNT.pack_into(self._memory, 0, index + 1)
 
+    def waits(self, what: tuple[str, ...]) -> bool:
+        """Whether there is a sample of a kind, posted here, that nobody took at the other end."""
+        index = self._places.get(what)
+        if index is None or index >= len(self._written):
+            return False
+        (read,) = _COUNT.unpack_from(self._memory, _HEAD + index * _SLOT + _COUNT.size)
+        return bool(read != self._written[index])
+
     def take(self) -> tuple[Sample, ...]:
         """The samples posted since the last call, in order of the first one of their kind."""
         (count,) = _COUNT.unpack_from(self._memory, 0)
@@ -147,6 +156,7 @@ class SharedMailbox:
             # With the number: what was read of two samples in turn would be taken twice.
             if zlib.crc32(data, number & 0xFFFFFFFF) == checksum:
                 self._seen[index] = number
+                _COUNT.pack_into(self._memory, start + _COUNT.size, number)
                 return data
         return None
 

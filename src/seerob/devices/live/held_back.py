@@ -64,7 +64,7 @@ class HeldBack:
         if together or (waits and self._taken):
             self._miss(self._last)
             self._since = min(self._since, self._host)
-        else:
+        elif not waits:
             self._begin()
         self._last, self._t, self._host = said_by(sample), t, host
         self._late = host if host - t > self._behind else -math.inf

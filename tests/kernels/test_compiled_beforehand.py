@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from importlib import import_module
@@ -64,29 +63,3 @@ def test_what_is_listed_is_there(name):
         assert len(normalize_signature(LOOPS[name])[0]) == len(signature(loop.py_func).parameters)
     else:
         assert not loop._can_compile, "its decorator has no types"
-
-
-COMPILED = """
-import re, sys
-from importlib import import_module
-from seerob.kernels import _beforehand
-
-if sys.argv[1] == "quickened":
-    _beforehand.quicken_numba()
-_beforehand.compile_loop(sys.argv[2])
-module, function = sys.argv[2].split()
-loop = getattr(import_module(f"seerob.kernels.{module}"), function)
-for types in loop.signatures:
-    print(re.sub(r"-?0x[0-9a-f]+|[0-9]{9,}", "", loop.inspect_llvm(types)))
-"""
-
-
-def test_a_quickened_numba_gives_the_same_code(tmp_path):
-    def code(how):
-        command = [sys.executable, "-P", "-c", COMPILED, how, "speed carried"]
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / how), "PYTHONHASHSEED": "0"}
-        done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
-        return done.stdout
-
-    assert (plain := code("as it is"))
-    assert code("quickened") == plain

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.snapshot import Basis, Marker, Segment, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.figure import Figure, Shown, Twin
 from seerob.criteria.sensors.sensing import (
+    InField,
     Names,
     Presence,
     Seen,
@@ -21,12 +21,10 @@ from seerob.criteria.sensors.sensing import (
     carriers_of,
     names_of,
     others,
-    seen_in_field,
     sensor_of,
 )
 from seerob.distance.scan import Rays, met_beside
 from seerob.model.model import Model
-from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State
 from seerob.twin.states import States
 from seerob.workstation.tables.sensors import Sensor
@@ -36,12 +34,8 @@ FINER = 16
 MOST_DRAWN = 60
 
 
-class LightCurtain(Criterion, frozen=True, kw_only=True):
+class LightCurtain(InField, frozen=True, kw_only=True):
     """Whether a light curtain is interrupted, by which body, and whether one reaches through unseen."""
-
-    unit: ClassVar[str] = "m"
-    whole: ClassVar[bool] = False
-    at_most: ClassVar[bool] = False
 
     sensor: str
     """An entry of ``[[sensors]]`` that is a light curtain."""
@@ -52,37 +46,17 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
         """The curtain and who may reach through."""
         return self.sensor, *names_of(self.of)
 
-    def _curtain(self, model: Model) -> _Curtain:
+    def device(self, model: Model) -> _Curtain:
+        """Look up every name in the model once."""
         return _Curtain(model, sensor_of(model, self.sensor, "light_curtain"), bodies_of(model, self.of))
 
     def depends(self, model: Model) -> tuple[str, ...]:
         """Whoever may stand in a beam."""
         return (*self.subjects(), *model.mechanisms)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Return the function that judges one instant: of who is partly seen, what is seen first."""
-        curtain = self._curtain(model)
-        return seen_in_field(self, curtain.presence, curtain.compute, curtain.shown)
-
-    def compute(self, model: Model) -> Compute:
-        """Look up every name in the model once and return the function that computes distances and beams."""
-        return self._curtain(model).compute
-
-    def present(self, model: Model) -> Present:
-        """Return the function that says who interrupts the curtain, and draws the interrupted beams."""
-        return self._curtain(model).shown
-
-    def one_by_one(self, model: Model) -> str:
-        """Many instants are computed together."""
-        return ""
-
-    def falls(self, model: Model, points: Points) -> Falls:
-        """Bound how far a body can move into the field between two instants at which this is asked."""
-        return self._curtain(model).presence.falls()
-
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
-        curtain = self._curtain(model)
+        curtain = self.device(model)
         return Basis(
             formula=f"{len(curtain.heights)} beams, {curtain.pitch * 1e3:.1f} mm apart; detected when what "
             "interrupts them is not lower than the detection capability",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Annotated, ClassVar, cast
+from typing import Annotated, cast
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -16,9 +16,9 @@ from seerob.core.shapes import contains
 from seerob.core.snapshot import Basis, Result
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
-from seerob.criteria.criterion import Criterion, Evaluate
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.figure import Figure, Shown, Twin
 from seerob.criteria.sensors.sensing import (
+    InField,
     Names,
     Presence,
     Seen,
@@ -27,12 +27,10 @@ from seerob.criteria.sensors.sensing import (
     carriers_of,
     names_of,
     others,
-    seen_in_field,
     sensor_of,
 )
 from seerob.distance.scan import Coverage, Rays, beam_angles, directions, met_beside, outline, spans
 from seerob.model.model import Model
-from seerob.twin.spans import Falls, Points
 from seerob.twin.state import State
 from seerob.twin.states import States
 from seerob.workstation.tables.sensors import MonitoredField as Field
@@ -46,12 +44,8 @@ _Beams = tuple[Array, NDArray[np.int64]]
 """How far each beam gets [m], and the body that it meets (-1: none)."""
 
 
-class ScannerField(Criterion, frozen=True, kw_only=True):
+class ScannerField(InField, frozen=True, kw_only=True):
     """Whether a laser scanner's field is entered, by which body, and whether the scanner sees it."""
-
-    unit: ClassVar[str] = "m"
-    whole: ClassVar[bool] = False
-    at_most: ClassVar[bool] = False
 
     sensor: str
     """An entry of ``[[sensors]]`` that is a laser scanner."""
@@ -66,7 +60,8 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
         """The scanner and who may enter."""
         return self.sensor, *names_of(self.of)
 
-    def _scan(self, model: Model) -> _Scan:
+    def device(self, model: Model) -> _Scan:
+        """Look up every name in the model once."""
         sensor = sensor_of(model, self.sensor, "laser_scanner")
         try:
             chosen = sensor.field(self.field)
@@ -78,30 +73,9 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
         """Whoever may stand in a beam."""
         return (*self.subjects(), *model.mechanisms)
 
-    def bind(self, model: Model) -> Evaluate:
-        """Return the function that judges one instant: of who is partly seen, what is seen first."""
-        scan = self._scan(model)
-        return seen_in_field(self, scan.presence, scan.compute, scan.shown)
-
-    def compute(self, model: Model) -> Compute:
-        """Look up every name in the model once and return the function that computes distances and beams."""
-        return self._scan(model).compute
-
-    def present(self, model: Model) -> Present:
-        """Return the function that says whom the scanner sees, and draws what it sees."""
-        return self._scan(model).shown
-
-    def one_by_one(self, model: Model) -> str:
-        """Many instants are computed together, but for those at which a beam may end beside the field."""
-        return ""
-
-    def falls(self, model: Model, points: Points) -> Falls:
-        """Bound how far a body can move into the field between two instants at which this is asked."""
-        return self._scan(model).presence.falls()
-
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
-        scan = self._scan(model)
+        scan = self.device(model)
         return Basis(
             formula="first point that each beam meets; in the field where it lies inside the polygon; "
             "detected when the width that the beams see is not below the detection capability",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, cast
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from msgspec import Struct
@@ -23,7 +23,7 @@ from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.recording.answers import Flags
 from seerob.twin.accuracy.tracking_error import TrackingError
-from seerob.twin.spans import Falls, approaching
+from seerob.twin.spans import Falls, Points, approaching
 from seerob.twin.state import State
 from seerob.twin.states import States
 from seerob.workstation.tables.sensors import Sensor
@@ -317,31 +317,64 @@ class _Near(Struct, frozen=True, eq=False):
     """What the device shows besides."""
 
 
-def seen_in_field(criterion: Criterion, presence: Presence, compute: Compute, present: Present) -> Evaluate:
-    """Judge people of whom a part is seen: who is in the field with that part is in it.
+class Device(Protocol):
+    """A protective device of the workstation, with the names of a criterion resolved."""
 
-    What the device makes of it stays open, since a bone that nobody sees may shade another.
+    presence: Presence
 
-    Args:
-        criterion: Which is asked.
-        presence: Of the whole question.
-        compute: Its figures.
-        present: What is shown of them.
-    """
-    model, (field,) = presence.model, presence.gap.a
+    def compute(self, twin: Twin, /) -> Figure:
+        """How far everybody is from its field, and what it makes of who is in it."""
 
-    def without(lost: tuple[int, ...]) -> Evaluate | None:
-        bodies = tuple(i for i in presence.bodies if i not in lost)
-        if not bodies:
-            return None
-        rest = Presence(model, presence.sensor, field, bodies)
+    def shown(self, state: State, figure: Figure, verdict: Verdict | None, /) -> Shown:
+        """What is said and drawn of that."""
+
+
+class InField(Criterion, frozen=True, kw_only=True):
+    """Base of the criteria about who is in the field of a protective device."""
+
+    unit: ClassVar[str] = "m"
+    whole: ClassVar[bool] = False
+    at_most: ClassVar[bool] = False
+
+    def device(self, model: Model) -> Device:
+        """Look up every name in the model once."""
+        raise NotImplementedError
+
+    def bind(self, model: Model) -> Evaluate:
+        """Return the function that judges one instant: of who is partly seen, what is seen first.
+
+        What the device makes of those stays open, since a bone that nobody sees may shade another.
+        """
+        device = self.device(model)
+        presence, (field,) = device.presence, device.presence.gap.a
         sight = Sight(Seen.MAYBE, "whether the device sees it is open")
 
-        def compute(twin: Twin) -> Figure:
-            state = cast("State", twin)
-            found = state.closest_per_body(rest.gap)
-            return rest.of_one(state, found, dict.fromkeys(rest.inside(found), sight))
+        def without(lost: tuple[int, ...]) -> Evaluate | None:
+            bodies = tuple(i for i in presence.bodies if i not in lost)
+            if not bodies:
+                return None
+            rest = Presence(model, presence.sensor, field, bodies)
 
-        return criterion.judging(compute, rest.shown)
+            def compute(twin: Twin) -> Figure:
+                found = twin.closest_per_body(rest.gap)
+                return rest.of_one(cast("State", twin), found, dict.fromkeys(rest.inside(found), sight))
 
-    return seen_first(presence.bodies, criterion.judging(compute, present), without)
+            return self.judging(compute, rest.shown)
+
+        return seen_first(presence.bodies, self.judging(device.compute, device.shown), without)
+
+    def compute(self, model: Model) -> Compute:
+        """Return the function that computes distances from the field, and what the device sees."""
+        return self.device(model).compute
+
+    def present(self, model: Model) -> Present:
+        """Return the function that says who is in the field, and draws what the device sees."""
+        return self.device(model).shown
+
+    def one_by_one(self, model: Model) -> str:
+        """Many instants are computed together, but for those at which a beam may end beside the field."""
+        return ""
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """Bound how far a body can move into the field between two instants at which this is asked."""
+        return self.device(model).presence.falls()

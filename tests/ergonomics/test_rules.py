@@ -11,7 +11,7 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, RowState, Verdict
 from seerob.criteria.ergonomics import reba, rula
 from seerob.criteria.ergonomics.owas import Legs
-from seerob.criteria.scoring.rule import posture as angles_of
+from seerob.criteria.scoring.rule import bind_posture
 from seerob.criteria.scoring.score_rows import band_of
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.posture import posture
@@ -320,7 +320,7 @@ def test_how_the_legs_are_used_is_entered(tmp_path, kind, legs, expected):
 def test_the_twin_is_asked_for_the_angles_that_its_joints_have(tmp_path):
     stage = station(tmp_path, "")
     q = posture(PERSON, "reach_low", heading=1.2)
-    found = angles_of(state_at(stage, op=(q, STILL)), stage.model.human("op"))
+    found = bind_posture(stage.model, "op")(state_at(stage, op=(q, STILL)))
     expected = angles(*bone_poses(PERSON, q))
     for field in fields(Angles):
         assert getattr(found, field.name) == pytest.approx(getattr(expected, field.name), abs=1e-9)

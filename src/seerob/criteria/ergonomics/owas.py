@@ -19,19 +19,17 @@ from numpy.typing import ArrayLike, NDArray
 from seerob.core.domains import number, whole
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.figure import Compute, Figure, Present, Shown
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
-from seerob.criteria.scoring.judgement import together
 from seerob.criteria.scoring.measured import Accuracy, Measured
-from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, phases_of, shared_phases
-from seerob.criteria.scoring.rule import PostureRule, bind_posture
+from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, shared_phases
+from seerob.criteria.scoring.rule import PostureRule, bind_posture, by_phase
 from seerob.criteria.scoring.score_rows import aspects, total_row
 from seerob.criteria.scoring.spans import ROUNDING, Angle, Ints, Span, cells, either, published
 from seerob.description.humans.angles import Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.twin.states import States
 
 CODES = {"back": 4, "arms": 3, "legs": 7, "load": 3}
 """Components in the order of `owas`, and how many codes each has."""
@@ -266,39 +264,27 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), OwasPhase(), self.error()
 
-        def found(angles: Angles, phase: Phase) -> tuple[dict[str, Possible], dict[str, Possible] | None]:
-            assert isinstance(phase, OwasPhase)
+        def category(angles: Angles, phase: OwasPhase) -> Figure:
             measured = settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
-            return measured, None if error is None else self.codes(angles, phase, error)
-
-        def category(angles: Angles, phase: Phase) -> Figure:
-            measured, spread = found(angles, phase)
+            spread = None if error is None else self.codes(angles, phase, error)
             span = category_span(**measured)
             reach = span if spread is None else category_span(**spread)
-            several = np.any([possible.sum(axis=-1)[..., 0] > 1 for possible in measured.values()], axis=0)
-            value = np.where(span.low == span.high, span.high, np.nan)
-            ends = reach.low[..., 0].astype(float), reach.high[..., 0].astype(float)
-            return Figure(value[..., 0], self.limit, interval=ends, open=several, exact=True)
-
-        def compute(twin: Twin) -> Figure:
-            angles = read(twin)
-            if isinstance(twin, States):
-                parts = phases_of(phases, twin.t, unknown)
-                return together([(where, category(angles[where], phase)) for phase, where in parts])
-            measured, spread = found(angles, phase_at(phases, twin.t, unknown))
-            span = category_span(**measured)
-            reach = span if spread is None else category_span(**spread)
+            if span.low.ndim:
+                several = np.any([codes.sum(axis=-1)[..., 0] > 1 for codes in measured.values()], axis=0)
+                value = np.where(span.low == span.high, span.high, np.nan)[:, 0]
+                ends = reach.low[:, 0].astype(float), reach.high[:, 0].astype(float)
+                return Figure(value, self.limit, interval=ends, open=several, exact=True)
             missing = tuple(key for key, possible in measured.items() if possible.sum() > 1)
-            ends = int(reach.low), int(reach.high)
+            low, high = int(reach.low), int(reach.high)
             return Figure(
                 int(span.high) if span.known else None,
                 self.limit,
-                interval=None if spread is None and not missing else ends,
+                interval=None if spread is None and not missing else (low, high),
                 open=bool(missing),
-                beside=Coded(angles, measured, spread, span, ends, missing),
+                beside=Coded(angles, measured, spread, span, (low, high), missing),
             )
 
-        return compute
+        return lambda twin: by_phase(twin.t, read(twin), phases, unknown, category)
 
     def present(self, model: Model) -> Present:
         """Return the function that says and colours what drives the category."""

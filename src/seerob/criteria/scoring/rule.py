@@ -5,7 +5,7 @@ What it asks of the twin are the anatomical angles of a person at this tick.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import Annotated, ClassVar, cast
 
 import numpy as np
@@ -13,6 +13,7 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Input, Level
+from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
@@ -27,26 +28,13 @@ from seerob.criteria.scoring.basis import (
 from seerob.criteria.scoring.held_work import GAP, Watch, WorkDetection
 from seerob.criteria.scoring.judgement import Method, score, shown, together
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, JointAccuracy, accuracy_of
-from seerob.criteria.scoring.phases import Phase, check_order, phase_at, phases_of, shared_phases
+from seerob.criteria.scoring.phases import P, Phase, check_order, phase_at, phases_of, shared_phases
 from seerob.criteria.scoring.spans import Span, Thresholds
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.skeleton import BONES
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State
-from seerob.twin.states import States
-
-
-def posture(state: State, human: Mechanism) -> Angles:
-    """Angles of a person of the workstation, without batch dimensions.
-
-    Raises:
-        Undecided: The person was not heard lately, or does not follow what was heard.
-    """
-    state.require(human.name)
-    rows = bone_rows(state.model, human)
-    R, x = state.placed(tuple(rows))
-    return angles(R[rows], x[rows])
 
 
 def bone_rows(model: Model, human: Mechanism) -> list[int]:
@@ -56,7 +44,7 @@ def bone_rows(model: Model, human: Mechanism) -> list[int]:
 
 
 def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> Callable[[Twin], Angles]:
-    """`posture` of one person with the names resolved, without what nobody measures.
+    """Look the names up, and return what reads the angles of one person, without what nobody measures.
 
     Of N instants the angles have the shapes (N, 1) and (N, 1, 2).
 
@@ -96,6 +84,23 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
         return found.masked(undetermined) if undetermined else found
 
     return read
+
+
+def by_phase(
+    t: float | Array, angles: Angles, phases: Sequence[P], unknown: P, scored: Callable[[Angles, P], Figure]
+) -> Figure:
+    """Score of one posture in its phase, or of N postures in those of each.
+
+    Args:
+        t: Instants of the run [s], shape () or (N,).
+        angles: Of the postures.
+        phases: What was entered.
+        unknown: The phase of instants that belong to none.
+        scored: Scores postures in a phase.
+    """
+    if not isinstance(t, np.ndarray):
+        return scored(angles, phase_at(phases, t, unknown))
+    return together([(where, scored(angles[where], phase)) for phase, where in phases_of(phases, t, unknown)])
 
 
 class PostureRule(Criterion, frozen=True, kw_only=True):
@@ -200,12 +205,9 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
 
         def compute(twin: Twin) -> Figure:
             angles = read(twin)
-            if isinstance(twin, States):
-                parts = phases_of(phases, twin.t, unknown)
-                return together([(where, scored(angles[where], phase)) for phase, where in parts])
             if watch is not None:
-                watch.add(twin.t, angles)
-            return scored(angles, phase_at(phases, twin.t, unknown))
+                watch.add(float(twin.t), angles)
+            return by_phase(twin.t, angles, phases, unknown, scored)
 
         return compute
 

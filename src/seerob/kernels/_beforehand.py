@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import gc
 import sys
-from contextlib import suppress
 from importlib import import_module
-from typing import Any
 
 LOOPS = {
     "nearest nearest": ("(f8[:,:,::1], f8[:,::1], i8, i8[:,::1], f8[::1], f8[:,::1], i8[:,::1], i1[::1])"),
@@ -72,58 +70,9 @@ def compile_loop(name: str) -> None:
         loop.compile(normalize_signature(LOOPS[name])[0])  # type: ignore[no-untyped-call]
 
 
-def quicken_numba() -> None:
-    """Spare Numba, in a process that only compiles, what it works out again and again to the same end.
-
-    That was a quarter of the time: flags are compared option by option at each overload, operators of the
-    same types are resolved each time, every step is announced to listeners that are not there, and variables
-    are looked for in texts and numbers.
-    """
-    from numba.core import event, ir, targetconfig
-    from numba.core.types.functions import BaseFunction
-
-    flags: Any = targetconfig.TargetConfig
-    instructions: Any = ir.Inst
-    listed, equal, resolve = instructions._rec_list_vars, flags.__eq__, BaseFunction.get_call_type
-    resolved: dict[Any, Any] = {}
-
-    def same(one: Any, other: Any) -> Any:
-        return (type(one) is type(other) and one._values == other._values) or equal(one, other)
-
-    def signature(function: Any, context: Any, args: Any, kws: Any) -> Any:
-        flags_now = targetconfig.ConfigStack.top_or_none()  # type: ignore[no-untyped-call]
-        key = function, context, tuple(args), tuple(kws.items()), flags_now
-        if (found := resolved.get(key)) is None:
-            found = resolved[key] = resolve(function, context, args, kws)
-        return found
-
-    def variables(inst: Any, value: Any) -> Any:
-        return [] if isinstance(value, _NO_VARIABLES) else listed(inst, value)
-
-    replaced: list[tuple[Any, dict[str, Any]]] = [
-        # Numba's own hash is that of the options' names, which are those of the class.
-        (flags, {"__eq__": same, "__hash__": lambda one: hash(type(one))}),
-        (BaseFunction, {"get_call_type": signature}),
-        (event, {"start_event": _tell_nobody, "end_event": _tell_nobody}),
-        (instructions, {"_rec_list_vars": variables}),
-    ]
-    for owner, functions in replaced:
-        for name, function in functions.items():
-            setattr(owner, name, function)
-
-
-_NO_VARIABLES = (str, int, float, type(None))
-
-
-def _tell_nobody(kind: str, data: Any = None, exc_details: Any = None) -> None:
-    """No step of the compilation is listened to."""
-
-
 def main() -> None:
     """Compile what is asked for, until nothing is asked for any more."""
     gc.disable()  # what is made lives on, and looking through it took 4 to 7 % of the time
-    with suppress(AttributeError):  # another version of Numba, which takes longer
-        quicken_numba()
     for line in sys.stdin:
         compile_loop(line.strip())
         print(line.strip(), flush=True)  # noqa: T201 - to whoever asked

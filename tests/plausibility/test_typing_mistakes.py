@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -15,118 +14,30 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from made_sensible import CELL, STANDS, cell, doubted, station_of, verdicts
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.core import plugin
-from seerob.core.errors import InputError
-from seerob.core.snapshot import Finding, Verdict
+from seerob.core.snapshot import Verdict
 from seerob.criteria.safety.velocity import Velocity
 from seerob.devices.live.listening import LiveSource
 from seerob.model.mounting.in_place import implausible
 from seerob.session.reading import BASES, read
-from seerob.session.station import Station, load
+from seerob.session.station import load
 from seerob.workstation.conversion import is_struct, members, unit_of
 from seerob.workstation.plausibility.ranges import (
     FOLLOWS,
     LISTS,
     PLUGINS,
-    Quantity,
-    Range,
-    converted_twice,
     data,
     entries_of,
     findings,
-    how_to_confirm,
     listed,
-    same,
-    scaled,
-    sentence,
-    turned_in_another_order,
     unknown,
 )
-from seerob.workstation.plausibility.ranges import implausible as implausible_of
 from seerob.workstation.workstation import TABLES, Confirmed, Engine, Workstation
 
 ROOT = Path(__file__).parents[2]
-CELL = {
-    "base": "position = [0, 0, 0.75]",
-    "tool": "shape = { box = [0.08, 0.1, 0.12] }\nmass = 1.2",
-    "at": "at = { position = [1.75, 0, 0], rpy_deg = [0, 0, 180] }",
-    "stop": "reaction = 0.1, stopping = 0.35",
-    "separation": "human_speed = 1.6",
-    "limit": "limit = 1.0",
-    "table": "at = { position = [0.8, 0, 0.37] }",
-    "more": "",
-    "person": "stature = 1.75\nmass = 75",
-}
-
-
-def cell(**changed: str) -> str:
-    """A sensible cell whose three criteria are within, but for what is changed."""
-    c = CELL | changed
-    return f"""
-[[robots]]
-name = "ur5"
-model = "library:ur5"
-base = {{ {c["base"]} }}
-q_deg = [180, -90, -90, -90, 90, 0]
-[[tools]]
-name = "gripper"
-on = "ur5/tool0"
-{c["tool"]}
-[[parts]]
-name = "table"
-shape = {{ box = [0.8, 1.4, 0.74] }}
-{c["table"]}
-[[humans]]
-name = "operator"
-sex = "male"
-{c["person"]}
-{c["at"]}
-[[safety]]
-kind = "velocity"
-name = "speed"
-at = "ur5"
-{c["limit"]}
-[[safety]]
-kind = "minimum_distance"
-name = "distance"
-between = ["ur5", "operator"]
-limit = 0.2
-[[safety]]
-kind = "separation"
-name = "separation"
-between = ["ur5", "operator"]
-stop = {{ {c["stop"]} }}
-{c["separation"]}
-intrusion = 0.0
-human_uncertainty = 0.05
-robot_uncertainty = 0.005
-{c["more"]}
-"""
-
-
-STANDS = np.radians([180, -90, -90, -90, 90, 0]), np.zeros(6)
-"""Its robot, heard."""
-
-
-def station_of(folder: Path, text: str) -> Station:
-    """The workstation of a text."""
-    (folder / "workstation.toml").write_text(text)
-    return load(folder, allow_plugins=True)
-
-
-def doubted(station: Station) -> list[Finding]:
-    """What is implausible of it."""
-    return [f for f in station.model.findings if "not plausible" in f.text]
-
-
-def verdicts(station: Station) -> dict[str, Verdict | None]:
-    """At the first tick."""
-    from seerob.session.run import Judge, bind
-    from seerob.twin.engine import Engine as Twin
-
-    return {r.name: r.verdict for r in Judge(bind(station.model))(Twin(station.model).start())}
 
 
 def test_a_sensible_cell_is_within_and_nothing_of_it_is_implausible(tmp_path: Path) -> None:
@@ -600,30 +511,6 @@ def test_two_things_that_stand_on_one_floor_in_one_place_are_found(tmp_path: Pat
     assert found.text.startswith("parts[1].inside.table = ")
 
 
-def test_a_confirmation_says_why_in_words(tmp_path: Path) -> None:
-    confirmed = '[[confirmed]]\nkey = "safety[0].limit"\nof = "speed"\nvalue = 250\nwhy = " "\n'
-    with pytest.raises(InputError, match=r"confirmed\[0\].why"):
-        station_of(tmp_path, cell(limit="limit = 250", more=confirmed))
-
-
-def test_another_value_is_not_confirmed(tmp_path: Path) -> None:
-    confirmed = (
-        '[[confirmed]]\nkey = "safety[2].stop.reaction"\nof = "separation"\nvalue = 3\nwhy = "measured"\n'
-    )
-    mine, typed = ("reaction = 3, stopping = 0.35", "reaction = 30, stopping = 0.35")
-    assert doubted(station_of(tmp_path, cell(stop=mine, more=confirmed))) == []
-    (found,) = doubted(station_of(tmp_path, cell(stop=typed, more=confirmed)))
-    assert "the file confirms 3.0, another value" in found.text
-
-
-def test_a_confirmation_may_have_the_unit_of_the_file(tmp_path: Path) -> None:
-    confirmed = (
-        '[[confirmed]]\nkey = "safety[2].human_speed_mm_s"\nof = "separation"\nvalue = 1.6\nwhy = "a snail"\n'
-    )
-    station = station_of(tmp_path, cell(separation="human_speed_mm_s = 1.6", more=confirmed))
-    assert doubted(station) == []
-
-
 VARIABLES = """
 [[variables]]
 name = "muted"
@@ -643,15 +530,6 @@ def test_a_time_out_of_a_variable_is_looked_at(
     text = cell(limit='limit = 1.0\nactive = "muted"', more=PLC)
     station = station_of(tmp_path, 'variables = "variables.toml"\n' + text)
     assert [f.holds for f in doubted(station)] == holds
-
-
-@pytest.mark.parametrize(
-    "key", ["robots[1].base.rpy", "safety[0].limits", "humans[0].inside.nobody", "x", ""]
-)
-def test_a_confirmation_of_nothing_is_a_mistake(key: str, tmp_path: Path) -> None:
-    confirmed = f'[[confirmed]]\nkey = "{key}"\nvalue = 1\nwhy = "because"\n'
-    with pytest.raises(InputError, match=r"confirmed\[0\].key: .* is no quantity of this file"):
-        station_of(tmp_path, cell(more=confirmed))
 
 
 OWN = '''
@@ -821,81 +699,6 @@ limit = 0.2
         assert not doubted(station_of(tmp_path, text + own))
 
 
-ORDER = """
-[[robots]]
-name = "{}"
-model = "library:ur5"
-base = {{ position = [62, 0, 0.75] }}
-[[robots]]
-name = "{}"
-model = "library:ur5"
-base = {{ position = [0, 0, 0.75] }}
-"""
-
-
-@pytest.mark.parametrize(
-    ("names", "of", "words"),
-    [
-        ("ab", 'of = "a"', ""),
-        (
-            "ba",
-            'of = "a"',
-            "robots[0] is 'b', not 'a': nothing is confirmed; key = \"robots[1].base.position\"",
-        ),
-        ("bc", 'of = "a"', "robots[0] is 'b', not 'a': nothing is confirmed; confirm it anew"),
-        ("ab", "", 'missing: nothing says which of robots it is of; of = "a", if that is meant'),
-    ],
-)
-def test_a_confirmation_does_not_slide_onto_what_stands_in_its_place(tmp_path, names, of, words) -> None:
-    word = f'[[confirmed]]\nkey = "robots[0].base.position"\n{of}\nvalue = [62, 0, 0.75]\nwhy = "a hall"\n'
-    text = ORDER.format(*names) + word
-    if not words:
-        assert not any("base.position" in f.text for f in doubted(station_of(tmp_path, text)))
-        return
-    with pytest.raises(InputError, match=re.escape(f"confirmed[0].of: {words}")):
-        station_of(tmp_path, text)
-
-
-@pytest.mark.parametrize(("name", "told"), [("", True), ('name = "near"', False)])
-def test_a_name_that_another_has_in_another_order_is_none(tmp_path, name, told) -> None:
-    of = "near" if name else "minimum distance ur5 – table"
-    one = '[[safety]]\nkind = "minimum_distance"\nbetween = ["ur5", "table"]\nlimit = {}\n{}\n'
-    word = f'[[confirmed]]\nkey = "safety[3].limit"\nof = "{of}"\nvalue = 90\nwhy = "far"\n'
-    text = cell(more=one.format(90, name) + one.format(0.1, "") + word)
-    if not told:
-        assert not any("limit = 90" in f.text for f in doubted(station_of(tmp_path, text)))
-        return
-    with pytest.raises(InputError, match=r"confirmed\[0\].of: several of safety are called"):
-        station_of(tmp_path, text)
-
-
-def test_a_vector_is_confirmed_by_all_its_numbers(tmp_path: Path) -> None:
-    """One that is equal in some is another value."""
-    said = '[[confirmed]]\nkey = "robots[0].base.position"\nof = "ur5"\nvalue = {}\nwhy = "a hall"\n'
-    for value, told in (
-        ("[75, 0, 0.75]", False),
-        ("[75, 0, 0.5]", True),
-        ("[60, 0, 0.75]", True),
-        ("75", True),
-    ):
-        text = cell(base="position = [75, 0, 0.75]", more=said.format(value))
-        found = [f for f in doubted(station_of(tmp_path, text)) if f.text.startswith("robots[0].base")]
-        assert bool(found) is told
-        assert {f.subject for f in found} <= {"ur5"}
-
-
-def test_one_of_several_that_are_called_the_same_is_not_confirmed_by_name() -> None:
-    """Nor is what stands in another file looked for in this one."""
-    speeds = [Velocity(name=name, at="ur5", limit=250.0) for name in ("one", "one", "two", "three")]
-    entries = {"safety": dict(enumerate(speeds))}
-    said = [Confirmed(key=f"safety[{k}].limit", of=speed.name, value=250, why="fast")
-            for k, speed in enumerate(speeds)]  # fmt: skip
-    said.append(Confirmed(key="variables.muted.timeout", value=10, why="slow"))
-    problems = unknown(dict(enumerate(said)), entries, Engine(), "w.toml", numbered=["three"])
-    assert [p.key for p in problems] == [f"confirmed[{k}].of" for k in (0, 1, 3)]
-    assert all("several of safety are called" in p.what for p in problems)
-
-
 @pytest.mark.parametrize("by", ['sensor = "curtain"', ""])
 def test_what_is_implausible_of_a_sensor_is_of_criteria_that_name_it(tmp_path: Path, by: str) -> None:
     curtain = "light_curtain = { ends = [[-0.5, 0, 0], [0.5, 0, 0]], height = 1, pitch = 0.1 }"
@@ -906,101 +709,3 @@ def test_what_is_implausible_of_a_sensor_is_of_criteria_that_name_it(tmp_path: P
     (found,) = findings(listed(entries_of(station), station.engine), ())
     assert found.text.startswith("sensors[0].response = 100")
     assert set(found.holds) == {"curtain", *(["separation"] if by else [])}
-
-
-def row(**more: Any) -> Range:
-    """A range of 1 to 2 m, but for what is changed."""
-    words = dict.fromkeys(("because", "right", "source", "confidence"), "w")
-    return Range(**({"unit": "m", "low": 1.0, "high": 2.0} | words | more))
-
-
-def quantity(*values: float, said: str = "", of: str = "") -> Quantity:
-    return Quantity("parts[0].x", "parts.x", "m", values, ("a",), said, of)
-
-
-ROUND_ANGLE = math.radians(math.pi)
-"""180° that were typed in radians and read in degrees."""
-
-
-@pytest.mark.parametrize(
-    ("values", "more", "found"),
-    [
-        ((1.0,), {}, None), ((2.0,), {}, None), ((-1.5,), {}, None), ((1.5, 2.0), {}, None),
-        ((0.999,), {}, 0.999), ((2.001,), {}, 2.001), ((1.5, -2.5), {}, -2.5), ((math.nan,), {}, math.nan),
-        ((0.0,), {}, 0.0), ((0.0,), {"zero": True}, None), ((0.5,), {"zero": True}, 0.5),
-        ((1.2, 1.2), {"norm": True}, None), ((1.5, 1.5), {"norm": True}, math.hypot(1.5, 1.5)),
-        ((0.0, 0.0), {"norm": True, "zero": True}, None),
-        ((0.1, ROUND_ANGLE), {"low": 0.0, "twice": True}, ROUND_ANGLE),
-        ((-ROUND_ANGLE,), {"low": 0.0, "twice": True}, -ROUND_ANGLE),
-        ((ROUND_ANGLE,), {"low": 0.0}, None),
-        ((0.0, 0.0, 0.6, 0.8), {"low": 0.0, "last": True}, 0.8),
-        ((0.0, 0.0, 0.6, 0.8), {"low": 0.0}, None),
-    ],
-)  # fmt: skip
-def test_the_first_value_outside_of_a_range_is_told(values, more, found) -> None:
-    assert implausible_of(values, row(**more)) == (
-        found if found is None else pytest.approx(found, nan_ok=True)
-    )
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_round_angles_in_radians_that_were_read_in_degrees(sign) -> None:
-    """Multiples of 45° up to 360°, to 6 in 10 000 as 3.14 is."""
-    for k, told in ((0, False), (1, True), (4, True), (8, True), (9, False)):
-        assert converted_twice(sign * math.radians(k * math.pi / 4)) is told
-    for off, told in ((5.7e-4, True), (6.3e-4, False)):
-        for side in (1 + off, 1 - off):
-            assert converted_twice(sign * math.radians(math.pi * side)) is told
-    assert converted_twice(sign * math.radians(3.14))
-
-
-def test_quaternions_about_z_with_w_last() -> None:
-    told = {(0.0, 0.0, 0.6, 0.8), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, -0.6, -0.8)}
-    others = {(0.0, 0.0, 1.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), (0.6, 0.0, 0.0, 0.8)}
-    assert {q for q in told | others if turned_in_another_order(q)} == told
-
-
-@pytest.mark.parametrize(
-    ("values", "value", "more", "words"),
-    [
-        ((2.5,), 2.5, {}, "parts[0].x = 2.5 m: more than 2 m, which"),
-        ((-2.5,), -2.5, {"twice": True}, "parts[0].x = -2.5 m: more than 2 m, which"),
-        ((0.5,), 0.5, {}, "parts[0].x = 0.5 m: less than 1 m, which"),
-        ((1.5, 2.5), 2.5, {}, "parts[0].x = [1.5, 2.5] m: 2.5 is more than 2 m, which"),
-        (
-            (ROUND_ANGLE,),
-            ROUND_ANGLE,
-            {"unit": "rad", "low": 0.0, "twice": True},
-            "3.14159°, which would be 180° were it in radians, which",
-        ),
-        (
-            (0.0, 0.0, 0.6, 0.8),
-            0.8,
-            {"unit": "", "low": 0.0, "last": True},
-            f"a turn of {2 * math.degrees(math.acos(0.8)):.4g}° about z with w last, which",
-        ),
-        ((0.0, 0.0, 0.0, -1.1), -1.1, {"unit": "", "low": 0.0, "last": True}, "a turn of 0° about z"),
-    ],
-)
-def test_what_is_not_plausible_is_told_with_its_bound(values, value, more, words) -> None:
-    told = sentence(quantity(*values), value, row(**more))
-    assert words in told
-    assert told.endswith("is not plausible: w; w")
-
-
-def test_what_is_confirmed_is_the_value_to_rounding_and_of_what_was_read_off_a_message_to_its_digits() -> (
-    None
-):
-    for said, near in (("", 1e-6), ("of others", 5e-3)):
-        for share, equal in ((0.95, True), (1.05, False)):
-            for side in (1 + share * near, 1 - share * near):
-                assert same(2 * side, quantity(2.0, said=said)) is equal
-                assert same([3.0, 2 * side], quantity(3.0, 2.0, said=said)) is equal
-    assert not same([2.0, 2.0], quantity(2.0))
-    assert not same(2.0, quantity(2.0, 2.0))
-    assert scaled([1.0, [2.0]], 1e-3) == [1e-3, [2e-3]]
-    assert "value = 2.0, why" in how_to_confirm(quantity(2.0))
-    assert "of =" not in how_to_confirm(quantity(2.0))
-    assert 'of = "a", value = [2.0, 3.0], why' in how_to_confirm(quantity(2.0, 3.0, of="a"))
-    assert "value = 0.333333, why" in how_to_confirm(quantity(1 / 3, said="of others"))
-    assert f"value = {1 / 3!r}, why" in how_to_confirm(quantity(1 / 3))

@@ -74,6 +74,18 @@ def test_what_a_file_does_ahead_is_that_of_each_instant_by_itself(tmp_path, monk
     cell = made(tmp_path, text, files)
     found = cell.batch()["apart"]
     assert not found.note
+    ahead = many_instants._Ahead.at
+
+    def left_alone(self, states, v_r):
+        """Whoever was asked before may have left instants to be asked one by one, and they stay so."""
+        states.alone[::3] = True
+        onset = ahead(self, states, v_r)
+        assert states.alone[::3].all()
+        return onset
+
+    with monkeypatch.context() as patch:
+        patch.setattr(many_instants._Ahead, "at", left_alone)
+        np.testing.assert_array_equal(cell.batch()["apart"].answers.verdict, found.answers.verdict)
     monkeypatch.setattr(many_instants._Ahead, "of", lambda *_: None)
     alone = cell.batch()["apart"]
     assert "worked out at each instant" in alone.note

@@ -736,10 +736,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return at
 
     def required_of_many(self, model: Model) -> Callable[[States], Array]:
-        """S_p of each of `moving` at N instants [m], shape (N, n), where nothing keeps it to `one_by_one`.
-
-        To be asked first: which instants are left alone (`States.alone`) it says anew.
-        """
+        """S_p of each of `moving` at N instants [m], shape (N, n), where nothing keeps it to `one_by_one`."""
         own = self._by_device(model)[0]
         return own._of_many(model, own._gap(model))
 

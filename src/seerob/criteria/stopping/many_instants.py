@@ -75,9 +75,9 @@ class _Ahead:
         """
         n, motion = len(states), states.motion
         whole, begin = (motion if motion.of is None else motion.of), motion.begin
-        states.alone |= True
         nothing = Onset(v_r, v_r * self._T_r, v_r, None, None)
         if not whole.foreseen or not isinstance(whole.ways, Ways):
+            states.alone = np.ones(n, bool)
             return nothing
         period, T_r, chains, ways = self._period, self._T_r, self._chains, whole.ways
         every = np.arange(len(whole.t))
@@ -89,6 +89,7 @@ class _Ahead:
         known = (k < count) & (ends < count)
         top = np.minimum(ends, len(whole.t) - 1)
         known &= invalid[top + 1] == invalid[k]
+        states.alone = states.alone | ~known
         if not known.any():
             return nothing
         a, b = int(ways.first[begin]), int(ways.first[top[known][-1]])
@@ -107,7 +108,6 @@ class _Ahead:
             t, joint_q, joint_v, speeds, self._home,
             chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, bounds,
         )  # fmt: skip
-        states.alone &= ~known
         S_r, v_s = nothing.S_r.copy(), v_r.copy()
         ways_there, tops = np.empty((2, int(known.sum()), len(self._parts)))
         first, last = (np.asarray(ways.first[each[known]] - a, np.int64) for each in (k, ends))

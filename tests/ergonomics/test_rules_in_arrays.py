@@ -6,28 +6,18 @@ import numpy as np
 import pytest
 from made_postures import random_q
 
-from made_cell import made
+from made_cell import made, person
 from seerob.core.snapshot import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.recording.series import CODES
 
 N = 60
 T = 0.05 * np.arange(N)
-STANDS = """
-[engine]
-physics = false
-[[humans]]
-name = "op"
-stature = 1.75
-mass = 75
-sex = "male"
-at = { position = [0, 0, 1] }
-[[confirmed]]
-key = "humans[0].feet"
-of = "op"
-value = 1
-why = "postures of a table, wherever they stand"
-"""
+STANDS = (
+    "engine = { physics = false }\n"
+    + person("op", 0, 0, 1)
+    + '[[confirmed]]\nkey = "humans[0].feet"\nof = "op"\nvalue = 1\nwhy = "postures of a table, wherever"\n'
+)
 ENTERED = (
     'load = 3, load_use = "intermittent", muscle_arms = false, muscle_body = false, '
     'supported_arms = "none", back_supported = false, legs = "posture"'

@@ -455,7 +455,7 @@ def read(path: Path) -> tuple[Measurement, ...]:
         found = msgspec.convert(table, _File).measurements
     except msgspec.ValidationError as error:
         raise InputError.at(
-            path, "measurements", str(error), "see docs/safety.md, “Measured contact”"
+            path, "measurements", str(error), "see docs/safety/measured_contact.md"
         ) from error
     problems = [
         Problem(str(path), f"measurements[{i}]", what, remedy)

@@ -110,7 +110,11 @@ def mistakes(row: ZoneRow) -> list[tuple[str, str, str]]:
     found = []
     if row.angle not in MEASURES:
         found.append(
-            ("angle", str(UnknownName("angle", row.angle, MEASURES)), "docs/ergonomics.md lists all of them")
+            (
+                "angle",
+                str(UnknownName("angle", row.angle, MEASURES)),
+                "docs/ergonomics/posture_table.md lists all of them",
+            )
         )
     elif row.side is not None and not sided(row.angle):
         found.append(("side", f"{row.angle} has no side", "leave it empty"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -44,9 +45,9 @@ limit = 0.1
 LIVE = 'kind = "ros_tcp"\nrobot = "arm"\nhost = "127.0.0.1"'
 
 
-def results(folder, shifts, *, more=""):
+def results(folder, shifts, *, more="", text=CELL):
     """Verdicts and reasons with the person moved by each of the shifts [m] for 1.2 s each."""
-    station = made(folder, CELL + more, {"arm.urdf": two_r()})
+    station = made(folder, text + more, {"arm.urdf": two_r()})
     human = station.model.mechanisms["op"]
     engine = Engine(station.model, driven={"op": 1.0}, live={"op"})
     judge, found, state = Judge(station.bound, station.model.findings), [], None
@@ -74,6 +75,53 @@ def test_where_a_device_puts_somebody_is_looked_at(tmp_path, shift, why):
     found = results(tmp_path, [shift])
     assert {verdict for verdict, _ in found} == {Verdict.UNDECIDED if why else Verdict.WITHIN}
     assert all(why in reason for _, reason in found)
+
+
+STOOD = '[[parts]]\nname = "{0}"\nshape = {{ box = [1, 1, {1}] }}\nat = {{ position = [9, 0, {2}] }}\n'
+UNSEEN = "nothing is drawn that stands at z = 0: nobody looks at what op stands on"
+
+
+@pytest.mark.parametrize(
+    ("low", "more", "held", "told"),
+    [
+        (-1.0, "", False, True),
+        (-1.49, "", False, True),
+        (-1.52, "", True, True),
+        (-1.52, STOOD.format("crate", 0.4, -0.8), False, True),
+        (-3.0, STOOD.format("crate", 0.4, -0.8), True, True),
+        (-1.0, STOOD.format("floor", 0.1, 0.05), True, False),
+        (0.0, "", False, False),
+        (-0.04, "", False, False),
+    ],
+)
+def test_who_is_below_all_that_stands_is_held_and_told_of_where_no_floor_is_drawn(
+    tmp_path, low, more, held, told
+):
+    """Without a floor the origin may be at the base of the robot, on a bench; no bench is 1.5 m high."""
+    text = FLOATING + TWO_R + "q = [0, 0]\n" + person("op", 3, 0, low) + CELL[CELL.index("[[safety]]") :]
+    station = made(tmp_path, text + more, {"arm.urdf": two_r()})
+    assert any(UNSEEN in f.text and not f.holds for f in station.model.findings) is told
+    found = station.run().results["distance"]
+    assert found.verdict is (Verdict.UNDECIDED if held else Verdict.WITHIN)
+    key = "feet" if "floor" in more else "feet_below"
+    assert (f"humans[0].{key} =" in found.worst().reason) is held
+    if held:
+        depth = low - min(0.0, -1.0 if "crate" in more else 0.0)
+        said = f'key = "humans[0].{key}"\nof = "op"\nvalue = {depth}\nwhy = "a pit"\n'
+        confirmed = made(tmp_path, f"{text}{more}[[confirmed]]\n{said}", {"arm.urdf": two_r()})
+        assert confirmed.run().results["distance"].verdict is Verdict.WITHIN
+
+
+def test_who_is_put_below_all_that_stands_by_a_device_is_held(tmp_path):
+    """As whoever the file puts there; who comes up again, from a pit that nobody drew, is not."""
+    text = re.sub(r"\[\[parts\]\].*?(?=\[\[sources)", "", CELL, flags=re.DOTALL)
+    assert "op stands on where a source puts them" in "".join(
+        f.text for f in made(tmp_path, text, {"arm.urdf": two_r()}).model.findings
+    )
+    found = results(tmp_path, [[0, 0, -2.0], [0, 0, -1.0]], text=text)
+    assert found[0][0] is Verdict.UNDECIDED
+    assert "humans[0].feet_below" in found[0][1]
+    assert found[-1][0] is Verdict.WITHIN
 
 
 def test_what_is_plausible_once_is_not_held_any_more(tmp_path):

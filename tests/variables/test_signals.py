@@ -9,11 +9,15 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from live_story import listening, wait_for
-from made_cell import person
+from made_cell import made, person
 from seerob import load
 from seerob.core.samples import SignalSample
+from seerob.core.snapshot import Basis, Result, Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.judging import bound_to
 from seerob.devices.sources.web import Web
-from seerob.session.run import engine_of
+from seerob.session.opening import open_sources
+from seerob.session.run import Judge, engine_of
 from seerob.twin.signals import Signals
 from seerob.workstation.source import Target
 from seerob.workstation.variables import Variable
@@ -119,3 +123,109 @@ def test_a_machine_is_as_old_as_the_question_too(tmp_path):
     late = [next(k for k, why in enumerate(doubts) if "not heard for" in why) for doubts in (fresh, old)]
     assert late[0] - late[1] == pytest.approx(30, abs=1)
     assert late[0] < 51
+
+
+JUDGED = """
+[[variables]]
+name = "door/shut"
+source = "plc"
+address = ADDRESS
+type = "bool"
+[[safety]]
+kind = "variable"
+name = "shut"
+variable = "door/shut"
+expected = true
+[[safety]]
+kind = "minimum_distance"
+name = "near"
+between = ["gate", "op"]
+limit = 0.1
+active = "door/shut"
+[[safety]]
+kind = "minimum_distance"
+name = "far"
+between = ["gate", "op"]
+limit = 3
+active = "door/shut"
+"""
+TIMED = '{ topic = "door", pointer = "/x", time = "/t" }'
+
+
+def judged(folder, more, address, shut, ticks=3):
+    """What each criterion says at the last of some ticks."""
+    variables, criteria = JUDGED.split("[[safety]]", 1)
+    moved = POSITION.replace("ADDRESS", TIMED.replace("door", "gate"))
+    (folder / "workstation.toml").write_text(STATION.replace("MORE", more) + "[[safety]]" + criteria)
+    (folder / "variables.toml").write_text(moved + variables.replace("ADDRESS", address))
+    station = load(folder)
+    engine, judge = engine_of(station.model), Judge(station.bound)
+    for k in range(ticks):
+        values = {"gate/position": 0.25, "door/shut": shut[min(k, len(shut) - 1)]}
+        engine.take([SignalSample(source="plc", seq=k, t=0.01 * k, values=values)])
+        found = judge(engine.start() if k == 0 else engine.tick())
+    return [str(r.verdict) if r.verdict else "muted" if r.muted else None for r in found], found
+
+
+@pytest.mark.parametrize(("more", "address"), [("delay = 0.1", '"door"'), ("", TIMED)])
+def test_what_is_known_not_to_apply_is_muted(tmp_path, more, address):
+    assert judged(tmp_path, more, address, [False])[0] == ["exceeded", "muted", "muted"]
+    assert judged(tmp_path, more, address, [True])[0] == ["within", "within", "exceeded"]
+
+
+@pytest.mark.parametrize("shut", [[False], [True, False], [False, True, False]])
+def test_nothing_that_moves_is_muted_by_who_sends_no_time(tmp_path, shut):
+    """It may have been true for long: what is within all the same is, and what would be exceeded is open."""
+    verdicts, found = judged(tmp_path, "", '"door"', shut)
+    assert verdicts == ["exceeded", "within", "undecided"]
+    assert found[2].reason.startswith("exceeded were it true: door/shut: plc sends no time")
+    assert judged(tmp_path, "", '"door"', [True])[0] == ["within", "within", "exceeded"]
+
+
+class Parted(Criterion, frozen=True):
+    """As long as the door is shut a gate may be anywhere."""
+
+    def depends(self, model):
+        return ("gate",)
+
+    def variables(self):
+        return {"door/shut": "bool"}
+
+    def bind(self, model):
+        def evaluate(state):
+            shut = state.signal("door/shut")
+            verdict = Verdict.WITHIN if shut else Verdict.EXCEEDED
+            return Result(name=self.name, value=1.0 - shut, limit=0.5, verdict=verdict)
+
+        return evaluate
+
+    def basis(self, model):
+        return Basis(formula="", source="")
+
+
+@pytest.mark.parametrize(("more", "known"), [("delay = 0.1", True), ("", False)])
+@pytest.mark.parametrize("shut", [True, False])
+def test_nothing_that_moves_is_within_for_ones_own_by_who_sends_no_time(tmp_path, more, known, shut):
+    judged(tmp_path, more, '"door"', [True], ticks=1)
+    station = load(tmp_path)
+    engine = engine_of(station.model)
+    values = {"gate/position": 0.25, "door/shut": shut}
+    engine.take([SignalSample(source="plc", seq=0, t=0.0, values=values)])
+    (found,) = Judge([bound_to(station.model, Parted(name="own"), "safety")])(engine.start())
+    assert found.verdict == ("exceeded" if not shut else "within" if known else "undecided")
+
+
+MODBUS = ('kind = "modbus"\nport = 1\nevery = 0.3', '{ table = "coil", at = 1, type = "bit" }')
+UNSEEN = (
+    "door/shut: heard every 0.3 s; what one is for less than that is not seen, and nothing is judged by it"
+)
+
+
+@pytest.mark.parametrize(("kind", "told"), [(MODBUS, [UNSEEN]), (('kind = "mqtt"', '"door"'), [])])
+def test_how_long_is_not_seen_between_two_questions_is_told(tmp_path, kind, told):
+    source, address = kind
+    text = f'variables = "v.toml"\n{person()}\n[[sources]]\nname = "plc"\nhost = "127.0.0.1"\n{source}\n'
+    variable = f'[[variables]]\nname = "door/shut"\nsource = "plc"\ntype = "bool"\naddress = {address}\n'
+    station = made(tmp_path, text, {"v.toml": variable})
+    every = [f.text for _, one in open_sources(station.model) for f in one.findings]
+    assert [text for text in every if "heard every" in text] == told

@@ -65,6 +65,8 @@ class Watch:
     """What its limit follows from, when that is bounded apart."""
     within: Follows | None
     """Another one of it, which is asked of instants between ticks."""
+    moves: bool
+    """Whether it is about bodies."""
     people: tuple[str, ...]
     """Whose place it depends on: how well devices know that changes from tick to tick."""
     looks: int
@@ -88,7 +90,8 @@ def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     within = criterion.follows(model, points)
     again = follows.again if follows is not None else lambda: criterion.bind(model)
     looks = 0 if criterion.bounded_once(model) else MOST if lowest is None else FEW
-    return Watch(criterion, points, falls, lowest, remembers, again, follows, within, people, looks)
+    moves = bool(criterion.depends(model))
+    return Watch(criterion, points, falls, lowest, remembers, again, follows, within, moves, people, looks)
 
 
 def _losing(falls: Falls, span: Span, margin: float | Array) -> Fall:
@@ -340,6 +343,8 @@ class BetweenTicks:
         active = watch.criterion.active
         if active is None or before is None:
             return ()
+        if watch.moves and active in state.signals.untimed:
+            return ()  # nobody knows when: it is asked throughout
         return state.signals.switches(active, before.t, state.t)
 
     def _switched(

@@ -368,6 +368,8 @@ class Question:
     """Whom it says that it rests on, and the variables."""
     unmentioned: dict[str, str]
     """By robot that no subject means, what no shape shows of it."""
+    moves: bool = True
+    """Whether it is about bodies: what is late of that was elsewhere."""
     relied_on: tuple[str, ...] = ()
     """Of whom something must be heard where it is within."""
     held: str = ""
@@ -418,6 +420,17 @@ class Question:
         for name in self.relied_on:
             yield twin.invalid_source_reason(name)
 
+    @property
+    def muted_by(self) -> str:
+        """The variable that says whether it applies, as inputs are called; empty for none."""
+        return "" if self.criterion.active is None else VARIABLE + self.criterion.active
+
+    def muted_late(self, state: State) -> str:
+        """Why it may apply though a variable says that it does not; empty where that is known."""
+        if not (self.muted_by and self.moves and (late := state.late_reason((self.muted_by,)))):
+            return ""
+        return late if state.signals.at(self.criterion.active or "", state.t).value is False else ""
+
     def pulse(self, state: State) -> str:
         """Why one that does not apply is not muted: it did, between two ticks only; empty where it did not.
 
@@ -464,7 +477,8 @@ def question_of(bound: Bound, model: Model) -> Question:
     shapeless, rests = unmentioned(bound.criterion, model), relied_on(bound.criterion, model)
     phases = entered_for(model, bound.criterion)
     changes = turns(phases) if phases else None
-    return Question(bound, bound.criterion, names, bodies, declared, shapeless, rests, turns=changes)
+    moves = bool(bound.criterion.depends(model))
+    return Question(bound, bound.criterion, names, bodies, declared, shapeless, moves, rests, turns=changes)
 
 
 class Judge:
@@ -574,13 +588,27 @@ class Judge:
         return _unknown(criterion, reason)
 
     def _now(self, question: Question, evaluate: Evaluate, state: State, *, applies: bool = False) -> Result:
-        """What a criterion says of a state, muted where it does not apply there; as if it ``applies``."""
+        """What a criterion says of a state, muted where it does not apply there; as if it ``applies``.
+
+        Where nobody knows how late what mutes it is, it is asked all the same, and exceeds nothing.
+        """
+        late = "" if applies else question.muted_late(state)
+        result = self._says(question, evaluate, state, applies=applies, late=bool(late))
+        if not late or result.verdict is not _EXCEEDED:
+            return result
+        doubt = _unknown(question.criterion, f"exceeded were it true: {late}")
+        return replace(doubt, value=result.value, limit=result.limit, interval=result.interval)
+
+    def _says(
+        self, question: Question, evaluate: Evaluate, state: State, *, applies: bool, late: bool
+    ) -> Result:
+        """What a criterion says of a state; as if it applied where what mutes it may be ``late``."""
         criterion = question.criterion
         try:
             with state.asking():
                 if criterion.active is not None and not applies:
                     muted = self._muted(criterion, state)
-                    if muted is not None:
+                    if muted is not None and not late:
                         return muted
                 return self._asked(question, evaluate, state)
         except Unweighed as reason:
@@ -624,6 +652,10 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
+        if bound.own and question.moves and state.late_reason(state.asked):
+            # What it says where it applies is so where it does not. Of those that ship none is greener by it.
+            late = state.late_reason(state.asked - {question.muted_by})
+            result = undecided(result, late) if late else result
         if result.verdict is _WITHIN or question.relied_on:
             for said in question.undecided_reasons(state):
                 if said:

@@ -16,7 +16,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
-from seerob.model.mounting.in_place import FEET, placed
+from seerob.model.mounting.in_place import BELOW, FEET, placed
 from seerob.twin.state import State
 from seerob.workstation.plausibility.ranges import Quantity, canonical, findings, scaled
 
@@ -93,7 +93,7 @@ class PlausiblePlaces:
         found: list[Finding] = []
         for quantity in placed(self._model, q, feet=feet):
             key, again = quantity.key, quantity.key in self._plausible
-            if again and quantity.kind != FEET:
+            if again and quantity.kind not in (FEET, BELOW):
                 continue
             implausible = [f for f in findings([quantity], ()) if f.holds]
             if not implausible or self._confirmed(quantity):

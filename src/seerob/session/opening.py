@@ -150,28 +150,34 @@ def _too_short(model: Model, source: Source, delay: float) -> Iterator[Problem]:
 
 
 def _lateness(model: Model, source: Source) -> Iterator[Finding]:
-    """What nobody would see of how late variables are heard."""
+    """What nobody would see of variables: how late they are heard, and what they are between two answers."""
     if not isinstance(source, VariablesSource):
         return
-    blind = [
-        v.name
-        for v in model.dictionary.values()
-        if v.source == source.name and not (v.write or source.times(v))
-    ]
+    read = [v for v in model.dictionary.values() if v.source == source.name and not v.write]
+    if read and source.unseen() > 0:
+        text = (
+            f"{_named([v.name for v in read])}: heard every {source.unseen():g} s; what one is for less than "
+            "that is not seen, and nothing is judged by it"
+        )
+        yield Finding(level="note", subject=source.name, text=text)
+    blind = [v.name for v in read if not source.times(v)]
     if not blind:
         return
-    shown = ", ".join(blind[:MOST_NAMED]) + (" …" if len(blind) > MOST_NAMED else "")
-    text = f"no time is sent with {shown}: a delay on the way is not seen"
+    text = f"no time is sent with {_named(blind)}: a delay on the way is not seen"
     if source.delay is None:
-        yield Finding(
-            level="warning",
-            subject=source.name,
-            text=f"{text}, and what moves by it is undecided: give the time of the value, or delay",
+        remedy = (
+            "and what moves by it, or is beyond its limit while muted by it, is undecided: give the time of "
+            "the value, or delay"
         )
+        yield Finding(level="warning", subject=source.name, text=f"{text}, {remedy}")
     else:
         yield Finding(
             level="assumed", subject=source.name, text=f"{text}; the file says {source.delay:g} s at most"
         )
+
+
+def _named(names: Sequence[str]) -> str:
+    return ", ".join(names[:MOST_NAMED]) + (" …" if len(names) > MOST_NAMED else "")
 
 
 def _begun(source: Source, i: int, file: str) -> Iterator[Problem]:

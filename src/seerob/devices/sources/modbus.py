@@ -62,6 +62,10 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self, folder, target)
 
+    def unseen(self) -> float:
+        """Between two questions."""
+        return self.every
+
     def times(self, variable: Variable) -> bool:
         """It is asked."""
         return True

@@ -87,6 +87,10 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def unseen(self) -> float:
+        """The server keeps the newest value of each interval."""
+        return self.interval
+
     def times(self, variable: Variable) -> bool:
         """The server is asked whether it has said everything."""
         return True

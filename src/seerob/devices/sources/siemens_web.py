@@ -89,6 +89,10 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def unseen(self) -> float:
+        """Between two questions."""
+        return self.every
+
     def times(self, variable: Variable) -> bool:
         """It is asked."""
         return True

@@ -154,6 +154,10 @@ class Web(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def unseen(self) -> float:
+        """Between two questions, over HTTP."""
+        return 0.0 if self._pushed else self.every
+
     def times(self, variable: Variable) -> bool:
         """It is asked, or the document says when it was so."""
         return not self._pushed or spot(variable.address).time is not None

@@ -144,6 +144,10 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         """Whether it shows how late a variable is heard: it is asked for it, or told when it was so."""
         return False
 
+    def unseen(self) -> float:
+        """How long a variable may be something else that is never heard [s]; 0 where each change is told."""
+        return 0.0
+
     def stamps(self, variable: Variable) -> bool:
         """Whether the device says when a variable was so: else values that are played again look like new."""
         return False

@@ -37,6 +37,8 @@ SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
 """Bones that a person stands, sits or kneels with."""
 FEET = "humans.feet"
 """Kind of the quantity that says how far somebody is from what they stand or sit on."""
+BELOW = "humans.feet_below"
+"""Kind of the quantity that says how far somebody is below all that stands, where no floor is drawn."""
 LEVEL = 0.05
 """What is not farther from z = 0 stands there [m]."""
 TOUCHES = 0.01
@@ -49,7 +51,21 @@ def implausible(model: Model) -> tuple[Finding, ...]:
     """Everything that is implausible of a workstation, and what its file confirms of that."""
     station = model.workstation
     every = [*listed(entries_of(station), station.engine), *_variables(model), *_following(model)]
-    return tuple(findings(every, station.confirmed))
+    return (*findings(every, station.confirmed), *_without_floor(model))
+
+
+def _without_floor(model: Model) -> Iterator[Finding]:
+    """Of whom nobody looks at what they stand on, where that is below z = 0 and nothing stands there."""
+    place = _Home(model)
+    if _drawn(model, place):
+        return
+    for human in model.workstation.humans:
+        low = place.lowest(_of(model, model.mechanisms[human.name]))
+        if human.name in place.still and low >= -LEVEL:
+            continue  # where they stand is compared with z = 0
+        where = f"{-low:.3g} m below it" if human.name in place.still else "where a source puts them below it"
+        text = f"nothing is drawn that stands at z = 0: nobody looks at what {human.name} stands on {where}"
+        yield Finding(level="assumed", subject=human.name, text=text)
 
 
 def _variables(model: Model) -> Iterator[Quantity]:
@@ -346,16 +362,19 @@ def _of(model: Model, mechanism: Mechanism) -> list[Body]:
 
 def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
     """How far people who stand still are from what they stand or sit on."""
-    parts = [b for b in _seen(model.bodies) if b.role in ("part", "machine")]
-    under = [b.index for b in parts]
-    # Where nothing stands at 0, the origin is somewhere else, such as at the base of the robot.
-    floor = any(abs(place.lowest([b])) <= LEVEL for b in parts)
+    under = [b.index for b in _things(model)]
+    floor = _drawn(model, place)
+    lowest = min((0.0, *(place.lowest([b]) for b in _standing(model))))
     for i, human in enumerate(model.workstation.humans):
         if human.name not in who:
             continue
         bodies = _of(model, model.mechanisms[human.name])
         gap = place.lowest(bodies)
         if gap < 0 and not floor:
+            # The origin is somewhere else, such as at the base of the robot.
+            said = f"the lowest point of {human.name} is so far above the lowest point of all that stands"
+            depth = min(gap - lowest, 0.0)
+            yield Quantity(f"humans[{i}].feet_below", BELOW, "m", (depth,), (human.name,), said, human.name)
             continue
         feet = [b.index for b in bodies if b.name.rpartition("/")[2].endswith(SUPPORTED)]
         said = f"the lowest point of {human.name} is {gap:.3g} m above the floor z = 0"
@@ -364,6 +383,16 @@ def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity
             if on < gap:
                 gap, said = max(on, 0.0), f"from what {human.name} stands or sits on"
         yield Quantity(f"humans[{i}].feet", FEET, "m", (gap,), (human.name,), said, human.name)
+
+
+def _things(model: Model) -> list[Body]:
+    """Parts and machines that are drawn."""
+    return [b for b in _seen(model.bodies) if b.role in ("part", "machine")]
+
+
+def _drawn(model: Model, place: _Home) -> bool:
+    """Whether a part or machine stands at z = 0, so that this is the floor."""
+    return any(abs(place.lowest([b])) <= LEVEL for b in _things(model))
 
 
 def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:

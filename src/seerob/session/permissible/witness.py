@@ -81,9 +81,11 @@ class Witness:
 
 def _heard(state: State, name: str) -> Value | Undecided:
     try:
-        return state.signals.value(name, state.t)
+        value = state.signals.value(name, state.t)
     except Undecided as why:
         return why
+    late = state.signals.untimed.get(name, "")
+    return Undecided(late) if late and value is False else value
 
 
 class Posed(State):

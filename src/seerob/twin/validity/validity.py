@@ -6,7 +6,7 @@ author of a criterion can forget it. Each reason is worked out once per tick.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -259,6 +259,11 @@ class Validity:
             raise Undecided(reason)
         hearing = self._hearings[name]
         return hearing.copied() if self._author else hearing
+
+    def late_reason(self, names: Collection[str]) -> str:
+        """Why nobody knows how late one of some inputs is heard, a variable; empty where somebody does."""
+        untimed = self._signals.untimed
+        return next((why for name, why in untimed.items() if VARIABLE + name in names), "") if untimed else ""
 
     def signal(self, name: str) -> Value:
         """The value of a variable of the dictionary now, in SI.

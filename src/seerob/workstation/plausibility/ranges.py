@@ -50,7 +50,7 @@ FOLLOWS: dict[str, tuple[str, ...]] = {
     "sensors": ("below_floor",),
     "machines": ("extent", "mass", "bulk_density", "com_outside", "gyration", "nobody_within"),
     "sources": ("step", "degrees", "speed"),
-    "humans": ("bmi", "feet", "inside."),
+    "humans": ("bmi", "feet", "feet_below", "inside."),
 }
 """What follows from a table and can be implausible, by table; with a point at the end, of a name."""
 OF_LINKS = ("bulk_density", "com_outside", "gyration")

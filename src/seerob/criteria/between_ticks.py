@@ -442,12 +442,13 @@ class BetweenTicks:
 
     def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
         assert watch.falls is not None
-        span = self._span(watch, path, ends, state)
-        if span is self._whole:
+        a, b = ends
+        if a.t == self._begins and b.t == self._ends:
             if self._falls is None:
-                self._falls = self._simple.of(span)
+                self._falls = self._simple.of(self._span(watch, path, ends, state))
             if (found := self._falls.get(watch.falls)) is not None:
                 return found
+        span = self._span(watch, path, ends, state)
         (m, off), *rest = [end.margin for end in ends if end.margin is not None]
         if not rest:
             return watch.falls(span, m - off)

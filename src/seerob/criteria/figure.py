@@ -15,7 +15,7 @@ from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, structs
 from numpy.typing import NDArray
 
 from seerob.core.markers import Marker, drawn
@@ -133,9 +133,32 @@ Present = Callable[["State", Figure, Verdict | None], Shown]
 
 def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     """Verdict of a figure of one instant, and of its parts, which is written into these."""
-    parts = figure.parts
-    if parts is None:
-        return _own_verdict(figure, at_most=at_most)
+    if figure.parts is not None:
+        return _verdict_of_parts(figure, figure.parts, at_most=at_most)
+    limit, value = figure.limit, figure.value
+    assert not isinstance(limit, np.ndarray)
+    if figure.nothing:
+        return None
+    if limit is not None and (figure.exceeded or figure.undecided):
+        return _UNDECIDED if figure.undecided else _EXCEEDED
+    known = value is not None and not math.isnan(value)
+    if figure.interval is not None:
+        low, high = figure.interval
+        low, high = low if type(low) is int else float(low), high if type(high) is int else float(high)
+        verdict = judge_interval((low, high), limit, at_most=at_most)
+        if not known:  # wherever it lies in there
+            informs = verdict is None and not figure.open
+            return verdict if informs or verdict is _EXCEEDED else _UNDECIDED
+    elif value is None or not known:
+        return _UNDECIDED
+    else:
+        verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
+    # Nothing could exceed a limit without end.
+    endless = limit is not None and math.isinf(limit)
+    return _UNDECIDED if verdict is _WITHIN and (figure.open or endless) else verdict
+
+
+def _verdict_of_parts(figure: Figure, parts: Parts, *, at_most: bool) -> Verdict | None:
     low, high = parts.interval or (parts.value, parts.value)
     codes = np.empty(len(parts.limit), np.uint8)
     parts.governs = k = judged(
@@ -144,7 +167,9 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     if parts.apart:
         parts.governs = k = int(_said_of_each(parts, codes, at_most=at_most))
     parts.verdicts = verdicts = list(map(_VERDICTS.__getitem__, codes.tolist()))
-    return verdicts[k] if parts.whole else worst([verdicts[k], _own_verdict(figure, at_most=at_most)])
+    if parts.whole:
+        return verdicts[k]
+    return worst([verdicts[k], verdict_of(structs.replace(figure, parts=None), at_most=at_most)])
 
 
 def _said_of_each(parts: Parts, codes: Codes, *, at_most: bool) -> NDArray[np.int64]:
@@ -163,29 +188,6 @@ def _said_of_each(parts: Parts, codes: Codes, *, at_most: bool) -> NDArray[np.in
     room = np.where(np.isnan(room), -np.inf, np.minimum(room, sys.float_info.max))
     worst = rank == rank.max(axis=-1, keepdims=True)
     return np.asarray(np.where(worst, room, np.inf).argmin(axis=-1))
-
-
-def _own_verdict(figure: Figure, *, at_most: bool) -> Verdict | None:
-    limit, value = figure.limit, figure.value
-    assert not isinstance(limit, np.ndarray)
-    if figure.nothing:
-        return None
-    if limit is not None and (figure.exceeded or figure.undecided):
-        return _UNDECIDED if figure.undecided else _EXCEEDED
-    known = value is not None and not math.isnan(value)
-    if figure.interval is not None:
-        low, high = (end if type(end) is int else float(end) for end in figure.interval)
-        verdict = judge_interval((low, high), limit, at_most=at_most)
-        if not known:  # wherever it lies in there
-            informs = verdict is None and not figure.open
-            return verdict if informs or verdict is _EXCEEDED else _UNDECIDED
-    elif value is None or not known:
-        return _UNDECIDED
-    else:
-        verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
-    # Nothing could exceed a limit without end.
-    endless = limit is not None and math.isinf(limit)
-    return _UNDECIDED if verdict is _WITHIN and (figure.open or endless) else verdict
 
 
 def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Result) -> Result:

@@ -195,7 +195,7 @@ def contradiction(result: Result, criterion: Criterion) -> str:
             return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
     if result.at_most is not criterion.at_most:
         return "it bounds from the other side than its kind says (at_most)"
-    return _worse_part(result)
+    return _worse_part(result) if result.parts or result.rows else ""
 
 
 def unsaid(result: Result, criterion: Criterion) -> str:
@@ -555,15 +555,16 @@ class Judge:
 
     def _one(self, question: Question, state: State) -> Result:
         kept = question.kept
-        passed_over = question.passed_over(state.t)
-        if pulse := question.pulse(state):
+        passed_over = question.turns is not None and question.passed_over(state.t)
+        if question.criterion.active is not None and (pulse := question.pulse(state)):
             question.kept = None
             return _unknown(question.criterion, pulse)
         if kept is not None and self._lasts(kept, question, state):
             if self._holds:  # also what was found out since it was asked
                 question.why = question.held_for(kept.asked)
             return kept.result
-        result = self._now(question, question.bound.evaluate, state)
+        says = self._says if question.criterion.active is None else self._now
+        result = says(question, question.bound.evaluate, state)
         if passed_over and not result.muted:
             result = undecided(result, passed_over)
         if self._holds:
@@ -592,24 +593,22 @@ class Judge:
 
         Where nobody knows how late what mutes it is, it is asked all the same, and exceeds nothing.
         """
-        late = "" if applies else question.muted_late(state)
-        result = self._says(question, evaluate, state, applies=applies, late=bool(late))
+        if applies or question.criterion.active is None:
+            return self._says(question, evaluate, state)
+        late = question.muted_late(state)
+        result = self._says(question, evaluate, state, mutes=not late)
         if not late or result.verdict is not _EXCEEDED:
             return result
         doubt = _unknown(question.criterion, f"exceeded were it true: {late}")
         return replace(doubt, value=result.value, limit=result.limit, interval=result.interval)
 
-    def _says(
-        self, question: Question, evaluate: Evaluate, state: State, *, applies: bool, late: bool
-    ) -> Result:
-        """What a criterion says of a state; as if it applied where what mutes it may be ``late``."""
+    def _says(self, question: Question, evaluate: Evaluate, state: State, *, mutes: bool = False) -> Result:
+        """What a criterion says of a state; muted by its variable where that ``mutes``."""
         criterion = question.criterion
         try:
             with state.asking():
-                if criterion.active is not None and not applies:
-                    muted = self._muted(criterion, state)
-                    if muted is not None and not late:
-                        return muted
+                if mutes and (muted := self._muted(criterion, state)) is not None:
+                    return muted
                 return self._asked(question, evaluate, state)
         except Unweighed as reason:
             return self._at_least(question, evaluate, state, str(reason))
@@ -656,7 +655,7 @@ class Judge:
             # What it says where it applies is so where it does not. Of those that ship none is greener by it.
             late = state.late_reason(state.asked - {question.muted_by})
             result = undecided(result, late) if late else result
-        if result.verdict is _WITHIN or question.relied_on:
+        if (state.speeds_asked and result.verdict is _WITHIN) or question.relied_on:
             for said in question.undecided_reasons(state):
                 if said:
                     return undecided(result, str(said))

@@ -17,6 +17,7 @@ RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
 NODE := $(VENV)/.node
 PAGE := src/seerob/app/server/page/index.html
+LOOPS := $(VENV)/.loops
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock audit clean
@@ -35,7 +36,7 @@ demo-plc: $(DEV) $(PAGE)
 
 # Either keeps one core busy; the others want both.
 test: setup
-	$(MAKE) --no-print-directory -j2 check package
+	$(MAKE) --no-print-directory -j2 check compiled package
 	$(MAKE) --no-print-directory unit web-test
 
 # -- set-up -------------------------------------------------------------------------------------
@@ -99,8 +100,13 @@ unit: $(DEV) $(PAGE)
 web-test: $(DEV) $(PAGE)
 	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && cd web && ../scripts/npm run check && ../scripts/npm run lint && ../scripts/npm test
 
-package: compiled $(PAGE)
-	scripts/test-wheel $(BIN)/python
+# Inner loops that a wheel brings, for processors of others.
+$(LOOPS)/.made: $(DEV) scripts/compile-loops $(wildcard src/seerob/kernels/*.py)
+	$(BIN)/python scripts/compile-loops $(LOOPS)
+	touch $@
+
+package: $(PAGE) $(LOOPS)/.made
+	scripts/test-wheel $(BIN)/python $(LOOPS)
 
 # -- other work ---------------------------------------------------------------------------------
 
@@ -120,9 +126,11 @@ wire: $(DEV)
 
 web: $(PAGE)
 
-build: $(DEV) $(PAGE)
+# A wheel for every platform, and one for this Python on this platform that brings its loops.
+build: $(DEV) $(PAGE) $(LOOPS)/.made
 	rm -rf dist
 	$(BIN)/python -m build --no-isolation --wheel --sdist
+	SEEROB_LOOPS=$(LOOPS) $(BIN)/python -m build --no-isolation --wheel
 	$(BIN)/python scripts/sbom dist/seerob.cdx.json
 
 # Known flaws of what is locked: asks the advisory database, fails where that does not answer, and needs pip-audit

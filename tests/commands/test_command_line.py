@@ -224,16 +224,25 @@ def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, comm
 
 def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(capsys, tmp_path, monkeypatch):
     from seerob.app.console import progress
-    from seerob.kernels import _beforehand
+    from seerob.kernels import _beforehand, _kept_loops
 
     names = ["paint averaged", "paint darken", "pull along"]
     monkeypatch.setattr(_beforehand, "LOOPS", {name: _beforehand.LOOPS[name] for name in names})
     monkeypatch.setattr("seerob.app.console.progress.EVERY", 0.0)
+    monkeypatch.setattr(_kept_loops, "BROUGHT", tmp_path / "nothing")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     (folder,) = progress.cache_folders()
     folder.mkdir()
     (folder / "paint.averaged-1-0123456789abcdef.py311.nbi").write_bytes(b"")  # of another source
     assert progress.missing_loops() == names
+    for processor in _kept_loops.stood_in_for():
+        key = _kept_loops.key_of("paint", processor)
+        brought = f"paint.darken-1-{key}.py{sys.version_info.major}{sys.version_info.minor}.nbi"
+        (tmp_path / "brought").mkdir(exist_ok=True)
+        (tmp_path / "brought" / brought).write_bytes(b"")
+        with monkeypatch.context() as wheel:
+            wheel.setattr(_kept_loops, "BROUGHT", tmp_path / "brought")
+            assert progress.missing_loops() == ["paint averaged", "pull along"]
     progress.compile_loops()
     assert capsys.readouterr() == ("", "".join(f"{progress.COMPILING}: {k} of 3\n" for k in range(4)))
     assert progress.missing_loops() == []

@@ -1,13 +1,15 @@
-"""No loop of another source is run; who may write nowhere that Numba would choose still has its loops."""
+"""No loop of another source or processor is run; who may write nowhere that Numba would choose has loops."""
 
 from __future__ import annotations
 
 import ast
 import os
 import shutil
+import subprocess
 import sys
 from importlib import import_module
 
+import numpy as np
 import pytest
 from numba import config
 
@@ -112,3 +114,94 @@ def test_what_cannot_be_made_cannot_be_written(tmp_path):
     assert not _kept_loops._writable(tmp_path / "file" / "folder")
     assert _kept_loops._writable(tmp_path / "new" / "folder")
     assert os.listdir(tmp_path / "new" / "folder") == []
+
+
+ASKED = """
+import sys
+from importlib import import_module
+from pathlib import Path
+import seerob.kernels
+from seerob.kernels import _kept_loops
+
+_kept_loops.FOLDER, _kept_loops.BROUGHT = Path(sys.argv[1]), Path(sys.argv[2])
+seerob.kernels.__path__.append(sys.argv[1])
+scaled = import_module("seerob.kernels.outer_of_two").scaled
+print(scaled(21), sum(scaled.stats.cache_hits.values()), len(_kept_loops.stood_in_for()))
+"""
+AVX2 = "x86-64-v3"
+
+
+@pytest.fixture
+def asked(tmp_path):
+    """Writes two modules of loops and asks the outer, in a process of its own that keeps loops in a folder;
+    what it gave, whether it was compiled already, and how many processors this one stands in for."""
+    (tmp_path / "source").mkdir()
+    (tmp_path / "source" / "outer_of_two.py").write_text(OUTER)
+
+    def ask(kept, factor=2, **environment):
+        (tmp_path / "source" / "inner_of_two.py").write_text(INNER.format(factor=factor))
+        done = subprocess.run(
+            [sys.executable, "-P", "-B", "-c", ASKED, str(tmp_path / "source"), str(tmp_path / "brought")],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / kept), **environment},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        return tuple(map(int, done.stdout.split()))
+
+    return ask
+
+
+def test_loops_that_are_brought_are_run_only_of_this_source_and_by_a_processor_that_is_able(tmp_path, asked):
+    made = {"NUMBA_CPU_NAME": AVX2, "NUMBA_CPU_FEATURES": ""}
+    assert asked("made", **made) == (42, 0, 0)
+    assert asked("made", **made) == (42, 1, 0)  # as Numba itself keeps it
+    (kept,) = (tmp_path / "made").iterdir()
+    shutil.copytree(kept, tmp_path / "brought")
+    value, hits, able = asked("own")
+    assert (value, hits) == (42, able > 0)
+    assert bool(list(tmp_path.glob("own/*/*.nbi"))) == (able == 0)  # nothing is compiled and kept then
+    assert asked("edited", factor=3)[:2] == (63, 0)
+    assert asked("unable", NUMBA_ENABLE_AVX="0") == (42, 0, 0)
+    assert asked("told", NUMBA_CPU_NAME="x86-64") == (42, 0, 0)
+    assert sorted(file.name for file in (tmp_path / "brought").iterdir()) == sorted(
+        file.name for file in kept.iterdir()
+    )
+
+
+ROUNDED = """
+import sys
+import numpy as np
+from numba import njit
+from seerob.kernels.lanes import of_rows
+
+fused = of_rows(3, 1, lambda row, given: row[0].plus_product(row[1], row[2]))
+
+@njit
+def rounded(rows, given, out):
+    fused(rows, 0, given, 1e9, out)
+
+out = np.empty(8, np.float32)
+rows = np.frombuffer(bytes.fromhex(sys.argv[1]), np.float32).reshape(1, 24)
+rounded(rows, np.zeros(1, np.float32), out)
+print(out.tobytes().hex())
+"""
+
+
+def test_a_fused_product_is_rounded_alike_by_loops_that_are_compiled_here_and_that_are_brought():
+    """Of 1 + 2⁻¹² and its square: what rounding twice takes is all that is left."""
+    factor = np.float32(1 + 2**-12)
+    rows = np.repeat([-factor * factor, factor, factor], 8).astype(np.float32)
+    exact = np.full(8, 2.0**-24, np.float32)
+    assert factor * factor - factor * factor == 0
+    processors = _kept_loops.stood_in_for()
+    for names in ({}, *({"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} for name in processors)):
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", ROUNDED, rows.tobytes().hex()],
+            env={**os.environ, **names},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        if processors:  # which all fuse
+            assert np.frombuffer(bytes.fromhex(done.stdout.strip()), np.float32).tolist() == exact.tolist()

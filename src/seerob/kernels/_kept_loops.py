@@ -1,6 +1,8 @@
-"""Where Numba keeps what it compiled: under names that change with the source.
+"""Where Numba keeps what it compiled: under names that change with the source; and what a wheel brings.
 
-Also for a user without a home: it refuses to work without a place.
+A wheel brings loops that were compiled for a processor which many others can stand in for; they are read
+where no loop is kept that was compiled here. Also for a user without a home: Numba refuses to work without
+a place.
 """
 
 from __future__ import annotations
@@ -17,13 +19,40 @@ from typing import Any
 
 FOLDER = Path(__file__).parent
 IMPORTED = re.compile(rb"^from seerob\.kernels\.(\w+) import ", re.MULTILINE)
+BROUGHT = FOLDER / "compiled"
+"""What a wheel brings (`scripts/compile-loops`): as trusted as the sources beside it, and never written."""
+_V2 = "cmov cx8 cx16 fxsr mmx popcnt sahf sse sse2 sse3 sse4.1 sse4.2 ssse3"
+_V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe"
+PROCESSORS = {
+    "x86-64-v4": f"{_V3} avx512bw avx512cd avx512dq avx512f avx512vl".split(),
+    "x86-64-v3": _V3.split(),
+}
+"""Processors that loops are brought for, best first, and what one that stands in for them must be able to do;
+by LLVM's names, the levels of the psABI of x86-64. All of them fuse a product with a sum (`fma`): results are
+those of loops that are compiled here, bit for bit."""
 
 
 @cache
-def key_of(module: str) -> str:
+def stood_in_for() -> tuple[str, ...]:
+    """Those of `PROCESSORS` it stands in for, best first; none where Numba is told what it compiles for."""
+    from llvmlite import binding
+    from numba import config
+
+    settings: Any = config
+    if settings.CPU_NAME or settings.CPU_FEATURES is not None or not settings.ENABLE_AVX:
+        return ()
+    try:
+        able = binding.get_host_cpu_features()
+    except RuntimeError:  # not known here
+        return ()
+    return tuple(name for name, needed in PROCESSORS.items() if all(map(able.get, needed)))
+
+
+@cache
+def key_of(module: str, processor: str = "") -> str:
     """Hash of what a module of `seerob.kernels` is compiled from and by, and the processor it is for.
 
-    That is its source and what it imports there, and Numba.
+    That is its source and what it imports there, Numba, and the processor (that Numba compiles for).
     """
     import numba
     from llvmlite.binding import get_host_cpu_name
@@ -35,7 +64,8 @@ def key_of(module: str) -> str:
         if name not in sources:
             sources[name] = (FOLDER / f"{name}.py").read_bytes()
             waiting += [found.decode() for found in IMPORTED.findall(sources[name])]
-    content = hashlib.sha256(f"{numba.__version__} {get_host_cpu_name()}".encode())
+    processor = processor or numba.config.CPU_NAME or get_host_cpu_name()  # type: ignore[attr-defined]
+    content = hashlib.sha256(f"{numba.__version__} {processor}".encode())
     for name in sorted(sources):
         content.update(hashlib.sha256(sources[name]).digest())
     return content.hexdigest()[:16]
@@ -49,13 +79,14 @@ def keep_loops() -> None:
     may write there: what is read back from it is run.
     """
     from numba import config
-    from numba.core import caching
+    from numba.core import caching, dispatcher
     from platformdirs import user_cache_path
 
     known = caching.CompileResultCacheImpl._locator_classes
     if known[0].__module__ != __name__:
         places = caching.UserProvidedCacheLocator, caching.InTreeCacheLocator, caching.UserWideCacheLocator
         known[:0] = [_keyed(place) for place in places]
+        dispatcher.FunctionCache = _reading_what_is_brought(caching)  # type: ignore[attr-defined]
     if config.CACHE_DIR:  # type: ignore[attr-defined]
         return
     own = FOLDER / "__pycache__", user_cache_path("numba", appauthor=False)
@@ -77,9 +108,32 @@ def _keyed(place: Any) -> Any:
             return super().from_function(function, file) if path.parent == FOLDER and path.is_file() else None
 
         def get_disambiguator(self) -> str:
-            return f"{super().get_disambiguator()}-{key_of(Path(self._py_file).stem)}"
+            return f"{super().get_disambiguator()}-{self.key()}"
+
+        def key(self, processor: str = "") -> str:
+            return key_of(Path(self._py_file).stem, processor)
 
     return Keyed
+
+
+def _reading_what_is_brought(caching: Any) -> Any:
+    """What keeps a function for Numba, and looks into `BROUGHT` for those of this package that it lacks."""
+
+    class Reading(caching.FunctionCache):  # type: ignore[misc]
+        def load_overload(self, types: Any, context: Any) -> Any:
+            found = super().load_overload(types, context)
+            place = self._impl.locator
+            if found is not None or not hasattr(place, "key"):
+                return found
+            types, (triple, *_), code = self._index_key(types, context.codegen())
+            for processor in stood_in_for():
+                name = self._impl.filename_base.replace(place.key(), place.key(processor))
+                brought = caching.IndexDataCacheFile(str(BROUGHT), name, place.get_source_stamp())
+                if (data := brought.load((types, (triple, processor, ""), code))) is not None:
+                    return self._impl.rebuild(context, data)
+            return None
+
+    return Reading
 
 
 def _writable(folder: Path) -> bool:

@@ -219,19 +219,26 @@ def compile_loops() -> None:
 
 
 def missing_loops() -> list[str]:
-    """Names in `seerob.kernels._beforehand.LOOPS` of what is not kept as it is now."""
+    """Names in `seerob.kernels._beforehand.LOOPS` of what is neither kept as it is now nor brought."""
     from seerob.kernels._beforehand import LOOPS
-    from seerob.kernels._kept_loops import key_of
+    from seerob.kernels._kept_loops import BROUGHT, key_of, stood_in_for
 
-    kept = {found.name for folder in cache_folders() if folder.is_dir() for found in folder.glob("*.nbi")}
+    kept, brought = (
+        {found.name for folder in folders if folder.is_dir() for found in folder.glob("*.nbi")}
+        for folders in (cache_folders(), [BROUGHT])
+    )
     end = f".py{sys.version_info.major}{sys.version_info.minor}"
 
-    def is_kept(name: str) -> bool:
+    def is_there(name: str) -> bool:
         module, function = name.split()
-        begin, key = f"{module}.{function}-", f"-{key_of(module)}{end}"
-        return any(file.startswith(begin) and key in file for file in kept)
 
-    return [name for name in LOOPS if not is_kept(name)]
+        def among(files: set[str], processor: str = "") -> bool:
+            begin, key = f"{module}.{function}-", f"-{key_of(module, processor)}{end}"
+            return any(file.startswith(begin) and key in file for file in files)
+
+        return among(kept) or any(among(brought, processor) for processor in stood_in_for())
+
+    return [name for name in LOOPS if not is_there(name)]
 
 
 def _compiled(names: Sequence[str]) -> Generator[str]:

@@ -7,6 +7,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from mujoco.introspect.functions import FUNCTIONS
+
+from seerob.twin.mujoco_addresses import POSES
 
 STUB = Path(__file__).parents[1] / "typings/mujoco/__init__.pyi"
 CLASSES = {c.name: c for c in ast.parse(STUB.read_text()).body if isinstance(c, ast.ClassDef)}
@@ -29,6 +32,17 @@ def test_a_field_has_the_type_that_is_said(owner, name, said):
         assert value.dtype == getattr(np, element[1])
     elif said != "Any":
         assert type(value).__name__ == said
+
+
+@pytest.mark.parametrize("name", [*POSES, "mj_passive"])
+def test_what_is_called_by_its_address_takes_a_model_and_its_data(name):
+    assert str(FUNCTIONS[name]) == f"void {name}(const mjModel * m, mjData * d)"
+
+
+def test_torques_of_a_motion_take_what_they_are_given_by_their_address():
+    said = str(FUNCTIONS["mj_rne"])
+    assert said == "void mj_rne(const mjModel * m, mjData * d, int flg_acc, mjtNum * result)"
+    assert mujoco.MJTNUM_BYTES == 8
 
 
 @pytest.mark.parametrize("name", ["MjSpec", "MjsBody", "MjsGeom", "MjsJoint"])

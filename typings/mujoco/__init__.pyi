@@ -20,6 +20,7 @@ class MjStatistic:
     extent: float
 
 class MjModel:
+    _address: int
     actuator_biasprm: NDArray[np.float64]
     actuator_biastype: NDArray[np.int32]
     actuator_ctrllimited: NDArray[np.bool_]
@@ -117,6 +118,7 @@ class MjModel:
 
 class MjData:
     def __init__(self, model: MjModel) -> None: ...
+    _address: int
     M: NDArray[np.float64]
     act: NDArray[np.float64]
     actuator_force: NDArray[np.float64]

@@ -1,16 +1,20 @@
-"""What the engine does at every step of the physics, compiled: where the twin is to be, and the pull there.
+"""What the engine does at every tick and step, compiled: where the twin is to be, and the pull there.
 
 Two samples are joined by the cubic of `seerob.twin.control.reference`; the commands are those of
-`seerob.twin.engine`.
+`seerob.twin.engine`. Everybody's motion and the physics are bound once (`seerob.kernels.bound`).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
+from seerob.kernels.mujoco_calls import newton_euler, updated
 
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
@@ -18,7 +22,135 @@ Indices = NDArray[np.int64]
 SLACK = 1e-9
 """Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
 
-_ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+
+class Knots(NamedTuple):
+    """Samples of one robot, machine or person, k of which are kept, in rooms of R >= k rows."""
+
+    instants: Array
+    """Increasing [s], shape (R,)."""
+    points: Array
+    """Positions there [rad or m], shape (R, n)."""
+    speeds: Array
+    """Velocities there, shape (R, n)."""
+    jumps: Flags
+    """Whether nothing but a jump leads to each of them, shape (R,)."""
+    said: Flags
+    """Whether each says its velocities, shape (R,)."""
+    kept: Indices
+    """Rows from the first to before the last that is kept, shape (2,)."""
+    coast: Array
+    """How long it goes on at its speed after the last one [s], shape (1,)."""
+
+
+class Joints(NamedTuple):
+    """Joints of one robot, machine or person among all: n that are led, and d that follow them."""
+
+    q_places: Indices
+    """Where their positions are among all, shape (d,)."""
+    v_places: Indices
+    """Where their velocities are, shape (d,)."""
+    own: Indices
+    """Where the velocities of those that are led are, shape (n,)."""
+    coupling: Array
+    """How they follow, shape (d, n); of no rows where each is led itself."""
+    offset: Array
+    """Their positions where those that are led are at 0, shape (d,)."""
+    q: Array
+    """Positions of those that are led, at the steps of a tick and at its end [rad or m], shape (s + 1, n)."""
+    v: Array
+    """Velocities, shape (s + 1, n)."""
+    a: Array
+    """Accelerations, shape (s + 1, n)."""
+    off: Array
+    """How far velocities are from those that are said, shape (n,)."""
+    led_q: Array
+    """Where they are pulled to at the end of a tick, shape (d,)."""
+    led_v: Array
+    """Their velocities then, shape (d,)."""
+
+
+class Physics(NamedTuple):
+    """The twin of r robots, machines and people: nq positions, nv velocities, m actuators, s steps a tick."""
+
+    calls: Indices
+    """Addresses: the `mujoco.MjModel`, its data in which the motion itself is worked out, ``mj_rne``, and
+    what is called before."""
+    qpos: Array
+    qvel: Array
+    before: Array
+    """Velocities before the last step, shape (nv,)."""
+    ctrl: Array
+    force: Array
+    """Of each actuator [N·m or N], shape (m,)."""
+    shown_q: Array
+    """Positions at the last tick, shape (nq,)."""
+    shown_v: Array
+    wanted_q: Array
+    """In those data, as the next three."""
+    wanted_v: Array
+    wanted_a: Array
+    passive: Array
+    armature: Array
+    """Rotor inertia, shape (nv,) [kg·m² or kg]."""
+    damping: Array
+    """Of the joints, shape (nv,)."""
+    kp: Array
+    """Proportional gains, shape (nv,)."""
+    kd: Array
+    """Derivative gains, shape (nv,)."""
+    almost: Array
+    """From which torque on a joint's limit is reached, shape (nv,)."""
+    dof: Indices
+    """Joint of each actuator, shape (m,)."""
+    t: Array
+    """When each step begins, and when the tick ends [s], shape (s + 1,)."""
+    q: Array
+    """Where every joint is to be then [rad or m], shape (s + 1, nq)."""
+    v: Array
+    """Its velocity half a step earlier, as `mujoco.mj_step` counts, shape (s + 1, nv)."""
+    a: Array
+    """Its acceleration, shape (s + 1, nv)."""
+    torques: Array
+    """Work: what the motion itself needs, shape (nv,)."""
+    efforts: Array
+    """Work: of the actuators, shape (nv,)."""
+    now: Array
+    """Work: an instant [s], shape (1,)."""
+    steering: Array
+    """What actuators are told at each step, shape (s, m)."""
+    q_way: Array
+    """Where every joint was at each step, shape (s + 1, nq)."""
+    v_way: Array
+    error: Array
+    """Largest error of a joint of each who is pulled [rad or m], shape (r,)."""
+    person: Flags
+    """Whether each is a person, whom something may hold elsewhere, shape (r,)."""
+    saturated: Flags
+    """Whether a torque limit of each is reached, shape (r,)."""
+    unlike: Array
+    """How far velocities of each are from those that are said; not a number where none are, shape (r,)."""
+
+
+_FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
+KNOTS = Layout(
+    Knots, [(_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1), (_WHOLE, 1), (_FLOAT, 1)]
+)
+JOINTS = Layout(
+    Joints, [*[(_WHOLE, 1)] * 3, (_FLOAT, 2), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3]
+)
+PHYSICS = Layout(
+    Physics,
+    [
+        (_WHOLE, 1), *[(_FLOAT, 1)] * 16, (_WHOLE, 1), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3,
+        *[(_FLOAT, 2)] * 3, (_FLOAT, 1), (_FLAG, 1), (_FLAG, 1), (_FLOAT, 1),
+    ],
+)  # fmt: skip
+KNOT_ROWS = len(KNOTS.arrays)
+MOTION_ROWS = KNOT_ROWS + len(JOINTS.arrays)
+"""Of a table of motions, of each who is pulled: first those of `KNOTS`, then those of `JOINTS`."""
+_knots_in, _joints_in, _physics_in = (layout.read for layout in (KNOTS, JOINTS, PHYSICS))
+
+_ROW, _ROWS, _TABLE = "f8[::1]", "f8[:,::1]", "i8[:,::1]"
 
 
 @njit(
@@ -83,125 +215,102 @@ def along(
             a[row, i] = (2 * c2 + 6 * s * c3) / (T * T)
 
 
-@njit(
-    f"void({_ROW}, {_ROWS}, {_ROWS}, b1[::1], f8, {_ROW}, f8, i8[::1], i8[::1], {', '.join([_ROWS] * 6)})",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def aim(
-    instants: Array,
-    points: Array,
-    speeds: Array,
-    jumps: Flags,
-    coast: float,
-    t: Array,
-    dt: float,
-    q_places: Indices,
-    v_places: Indices,
-    q: Array,
-    v: Array,
-    a: Array,
-    q_all: Array,
-    v_all: Array,
-    a_all: Array,
-) -> None:
-    """Motion of one robot or human at the steps of a tick, and among all; writes into the last six.
+@njit(cache=True, nogil=True, error_model="numpy")
+def _along(knots: Knots, t: Array, q: Array, v: Array, a: Array) -> None:
+    first, end = knots.kept[0], knots.kept[1]
+    along(
+        knots.instants[first:end], knots.points[first:end], knots.speeds[first:end], knots.jumps[first:end],
+        knots.coast[0], t, q, v, a,
+    )  # fmt: skip
+
+
+@njit(f"void({_TABLE}, {_TABLE}, f8, f8, f8)", cache=True, nogil=True, error_model="numpy")
+def aim(motions: Indices, physics: Indices, start: float, end: float, dt: float) -> None:
+    """Work out where everybody is to be at the steps of a tick, and at its end.
 
     Args:
-        instants: As of `along`, likewise the next five.
-        points: Shape (k, n).
-        speeds: Shape (k, n).
-        jumps: Shape (k,).
-        coast: [s]
-        t: Shape (m,).
-        dt: Timestep [s]; velocities among all are half of it earlier, as `mujoco.mj_step` counts.
-        q_places: Where its positions are among all, shape (n,).
-        v_places: Where its velocities are, shape (n,).
-        q: Positions, shape (m, n).
-        v: Velocities, shape (m, n).
-        a: Accelerations, shape (m, n).
-        q_all: Of everybody, shape (m, nq).
-        v_all: Shape (m, nv).
-        a_all: Shape (m, nv).
+        motions: Table of everybody, as `MOTION_ROWS` says; their `Joints` are written.
+        physics: Table of `PHYSICS`; ``t``, ``q``, ``v`` and ``a`` are written.
+        start: When the tick begins [s].
+        end: When it ends [s].
+        dt: Timestep [s].
     """
-    along(instants, points, speeds, jumps, coast, t, q, v, a)
-    half = 0.5 * dt
-    for row in range(len(t)):
-        for i in range(len(v_places)):
-            q_all[row, q_places[i]] = q[row, i]
-            v_all[row, v_places[i]] = v[row, i] - half * a[row, i]
-            a_all[row, v_places[i]] = a[row, i]
+    all_ = _physics_in(physics, 0)
+    last, half = len(all_.t) - 1, 0.5 * dt
+    for row in range(last):
+        all_.t[row] = start + row * dt
+    all_.t[last] = end
+    for r in range(0, len(motions), MOTION_ROWS):
+        knots, joints = _knots_in(motions, r), _joints_in(motions, r + KNOT_ROWS)
+        _along(knots, all_.t, joints.q, joints.v, joints.a)
+        led = len(joints.coupling) == 0
+        for row in range(last + 1):
+            q, v, a = joints.q[row], joints.v[row], joints.a[row]
+            for i in range(len(joints.v_places)):
+                at, to = joints.q_places[i], joints.v_places[i]
+                if led:
+                    all_.q[row, at], all_.v[row, to], all_.a[row, to] = q[i], v[i] - half * a[i], a[i]
+                    continue
+                x, speed, change = 0.0, 0.0, 0.0
+                for j in range(len(q)):
+                    share = joints.coupling[i, j]
+                    x += share * q[j]
+                    speed += share * (v[j] - half * a[j])
+                    change += share * a[j]
+                all_.q[row, at], all_.v[row, to], all_.a[row, to] = x + joints.offset[i], speed, change
 
 
-@njit(
-    f"void({_ROW}, {_ROWS}, {_ROWS}, b1[::1], f8, f8, i8[::1], i8[::1], {', '.join([_ROW] * 3)})",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def follow(
-    instants: Array,
-    points: Array,
-    speeds: Array,
-    jumps: Flags,
-    coast: float,
-    t: float,
-    q_places: Indices,
-    v_places: Indices,
-    qpos: Array,
-    qvel: Array,
-    before: Array,
-) -> None:
-    """Put one robot or human on its motion at an instant; writes into the last three.
+@njit(f"void({_TABLE}, {_TABLE}, f8)", cache=True, nogil=True, error_model="numpy")
+def follow(motions: Indices, physics: Indices, t: float) -> None:
+    """Put everybody who was heard on his motion at an instant.
 
     Args:
-        instants: As of `along`, likewise the next four.
-        points: Shape (k, n).
-        speeds: Shape (k, n).
-        jumps: Shape (k,).
-        coast: [s]
+        motions: Table of everybody; ``q``, ``v`` and ``a`` of `Joints` are where it works.
+        physics: Table of `PHYSICS`; ``qpos``, ``qvel`` and ``before`` are written.
         t: When [s].
-        q_places: Where its positions are among all, shape (n,).
-        v_places: Where its velocities are, shape (n,).
-        qpos: Positions of everybody, shape (nq,).
-        qvel: Velocities of everybody, shape (nv,).
-        before: Velocities of everybody a step earlier, shape (nv,).
     """
-    n = points.shape[1]
-    found = np.empty((3, 1, n))
-    along(instants, points, speeds, jumps, coast, np.full(1, t), found[0], found[1], found[2])
-    for i in range(n):
-        # A negative zero is as good, and would be written differently.
-        qpos[q_places[i]] = found[0, 0, i] + 0.0
-        qvel[v_places[i]] = found[1, 0, i] + 0.0
-        before[v_places[i]] = qvel[v_places[i]]
+    all_ = _physics_in(physics, 0)
+    all_.now[0] = t
+    for r in range(0, len(motions), MOTION_ROWS):
+        knots, joints = _knots_in(motions, r), _joints_in(motions, r + KNOT_ROWS)
+        if knots.instants[knots.kept[0]] == np.inf:
+            continue
+        q, v = joints.q[0], joints.v[0]
+        _along(knots, all_.now, joints.q[:1], joints.v[:1], joints.a[:1])
+        for i in range(len(joints.v_places)):
+            x, speed = 0.0, 0.0
+            if len(joints.coupling) == 0:
+                x, speed = q[i], v[i]
+            else:
+                for j in range(len(q)):
+                    x += joints.coupling[i, j] * q[j]
+                    speed += joints.coupling[i, j] * v[j]
+                x += joints.offset[i]
+            # A negative zero is as good, and would be written differently.
+            all_.qpos[joints.q_places[i]] = x + 0.0
+            all_.qvel[joints.v_places[i]] = all_.before[joints.v_places[i]] = speed + 0.0
 
 
-@njit(f"b1({_ROW}, {_ROWS}, {_ROWS}, b1[::1], b1, b1, {_ROW})", cache=True, nogil=True, error_model="numpy")
-def join(
-    instants: Array,
-    points: Array,
-    speeds: Array,
-    jumps: Flags,
-    derives_before: bool,
-    derives_last: bool,
-    largest: Array,
-) -> bool:
+@njit(f"b1({_TABLE}, {_ROW})", cache=True, nogil=True, error_model="numpy")
+def join(table: Indices, largest: Array) -> bool:
     """Join the newest sample to the one before it; whether only a jump does.
 
     Writes the velocities of these two that nobody said, and that it is a jump.
 
     Args:
-        instants: As of `along`, likewise the next three; k >= 2.
-        points: Shape (k, n).
-        speeds: Shape (k, n).
-        jumps: Shape (k,).
-        derives_before: Whether nobody said the velocities of the last but one.
-        derives_last: Whether nobody said those of the newest.
+        table: Of `KNOTS`; two at least are kept.
         largest: Above it a motion is a jump [rad/s or m/s], shape (n,).
     """
-    last, n = len(instants) - 1, points.shape[1]
+    knots = _knots_in(table, 0)
+    first, end = knots.kept[0], knots.kept[1]
+    instants, points, speeds, jumps = (
+        knots.instants[first:end],
+        knots.points[first:end],
+        knots.speeds[first:end],
+        knots.jumps[first:end],
+    )
+    last, n = end - first - 1, points.shape[1]
+    derives_before, derives_last = not knots.said[end - 2], not knots.said[end - 1]
     T = instants[last] - instants[last - 1]
     chord = np.empty(n)
     jump = beyond = False
@@ -228,119 +337,13 @@ def join(
     return False
 
 
-@njit(f"void({_ROW}, {_ROW}, {_ROW}, b1, i8, {_ROWS}, {_ROWS})", cache=True, nogil=True)
-def note(q: Array, v: Array, before: Array, centred: bool, row: int, q_way: Array, v_way: Array) -> None:
-    """Note where a step of the physics led to; writes a row of the last two.
-
-    Args:
-        q: Positions, shape (nq,).
-        v: Velocities, shape (nv,).
-        before: Those before the step, shape (nv,).
-        centred: Whether velocities belong half a step earlier than positions.
-        row: Which.
-        q_way: Positions at all steps, shape (s, nq).
-        v_way: Velocities at all steps, shape (s, nv).
-    """
-    for i in range(len(q)):
-        q_way[row, i] = q[i]
-    for i in range(len(v)):
-        v_way[row, i] = v[i] + 0.5 * (v[i] - before[i]) if centred else v[i]
-
-
-@njit(
-    f"void({', '.join([_ROWS] * 5)}, {', '.join([_ROW] * 4)}, f8, i8[::1], {_ROWS})",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def commands(
-    q: Array,
-    v: Array,
-    a: Array,
-    inertial: Array,
-    passive: Array,
-    armature: Array,
-    damping: Array,
-    kp: Array,
-    kd: Array,
-    dt: float,
-    dof: Indices,
-    ctrl: Array,
-) -> None:
-    """Commands of the actuators at steps of a tick; writes into ``ctrl``.
-
-    Args:
-        q: Where every joint is to be [rad or m], shape (s, n).
-        v: Its velocity half a step earlier, shape (s, n).
-        a: Its acceleration, shape (s, n).
-        inertial: Torques of the recursive Newton–Euler algorithm, shape (s, n) [N·m or N].
-        passive: Passive torques, shape (s, n).
-        armature: Rotor inertia, shape (n,) [kg·m² or kg].
-        damping: Joint damping, shape (n,).
-        kp: Proportional gains, shape (n,).
-        kd: Derivative gains, shape (n,).
-        dt: Timestep [s].
-        dof: Joint of each actuator, shape (m,).
-        ctrl: Shape (s, m).
-    """
-    for s in range(len(ctrl)):
-        for k in range(len(dof)):
-            i = dof[k]
-            # Newton–Euler knows neither rotor inertia nor passive forces. All damping is implicit: it acts
-            # on the velocity at the end of the step.
-            after = v[s, i] + dt * a[s, i]
-            torque = inertial[s, i] + armature[i] * a[s, i] - passive[s, i] + damping[i] * (after - v[s, i])
-            ctrl[s, k] = q[s, i] + (kd[i] * after + torque) / kp[i]
-
-
-@njit(
-    f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], {_ROW}, b1[::1])",
-    cache=True,
-    nogil=True,
-)
-def errors(
-    q: Array,
-    wanted: Array,
-    force: Array,
-    almost: Array,
-    dof: Indices,
-    q_places: Indices,
-    q_start: Indices,
-    v_places: Indices,
-    v_start: Indices,
-    off: Array,
-    saturated: Flags,
-) -> None:
-    """How far robots and humans are from where they are to be, and whose limits hold them back.
-
-    Writes into the last two.
-
-    Args:
-        q: Where every joint is [rad or m], shape (nq,).
-        wanted: Where it is to be, shape (nq,).
-        force: Of each actuator [N·m or N], shape (m,).
-        almost: From which on a joint's limit is reached, shape (nv,).
-        dof: Joint of each actuator, shape (m,).
-        q_places: Where positions of each robot and human in turn are among all.
-        q_start: Where those of each begin in that, shape (r + 1,).
-        v_places: Where their velocities are.
-        v_start: Shape (r + 1,).
-        off: Largest error of a joint of each, shape (r,).
-        saturated: Whether a limit of each is reached, shape (r,).
-    """
-    effort = np.zeros(len(almost))
-    for k in range(len(dof)):
-        effort[dof[k]] = abs(force[k])
-    for r in range(len(off)):
-        most = 0.0
-        for k in range(q_start[r], q_start[r + 1]):
-            here = abs(q[q_places[k]] - wanted[q_places[k]])
-            if not here <= most and not np.isnan(most):  # what is not a number stays
-                most = here
-        off[r], saturated[r] = most, False
-        for k in range(v_start[r], v_start[r + 1]):
-            if effort[v_places[k]] >= almost[v_places[k]]:
-                saturated[r] = True
+@njit(f"b1({_ROW}, f8)", cache=True, nogil=True)
+def tame(v: Array, wild: float) -> bool:
+    """Whether every velocity is below ``wild``; what is not a number is not."""
+    for speed in v:
+        if not abs(speed) < wild:
+            return False
+    return True
 
 
 @njit(f"f8({_ROW})", cache=True, nogil=True)
@@ -353,30 +356,172 @@ def greatest(v: Array) -> float:
     return most
 
 
-@njit(f"f8({_ROW}, {_ROW}, f8, {_ROW}, i8[::1], {_ROW})", cache=True, nogil=True)
-def unlike(before: Array, after: Array, share: float, moves: Array, rows: Indices, off: Array) -> float:
-    """How far speeds are from those on the straight line between two others; writes the last argument.
+@njit(f"void({_TABLE}, i8, i8, f8)", cache=True, nogil=True, error_model="numpy")
+def steer(physics: Indices, first: int, end: int, dt: float) -> None:
+    """Work out what actuators are told from one step of a tick to before another.
 
     Args:
-        before: Of each joint [rad/s or m/s], shape (n,).
-        after: Likewise.
-        share: Of the way from the former to the latter.
-        moves: Speeds of all joints, shape (nv,).
-        rows: Which of them, shape (n,).
-        off: Receives how far each is off, shape (n,).
-
-    Returns:
-        The largest, as `greatest`.
+        physics: Table of `PHYSICS`; ``steering`` is written, and what MuJoCo works out where ``calls`` says.
+        first: The former.
+        end: The latter.
+        dt: Timestep [s].
     """
-    for j in range(len(rows)):
-        off[j] = abs(moves[rows[j]] - (before[j] + share * (after[j] - before[j])))
-    return greatest(off)
+    all_ = _physics_in(physics, 0)
+    model, data, rne = all_.calls[0], all_.calls[1], all_.calls[2]
+    for s in range(first, end):
+        for i in range(len(all_.wanted_q)):
+            all_.wanted_q[i] = all_.q[s, i]
+        for i in range(len(all_.wanted_v)):
+            all_.wanted_v[i], all_.wanted_a[i] = all_.v[s, i], all_.a[s, i]
+        for function in all_.calls[3:]:
+            updated(function, model, data)
+        newton_euler(rne, model, data, all_.torques)
+        for k in range(len(all_.dof)):
+            i = all_.dof[k]
+            # Newton–Euler knows neither rotor inertia nor passive forces. All damping is implicit: it acts
+            # on the velocity at the end of the step.
+            v, a = all_.v[s, i], all_.a[s, i]
+            after = v + dt * a
+            torque = all_.torques[i] + all_.armature[i] * a - all_.passive[i] + all_.damping[i] * (after - v)
+            all_.steering[s, k] = all_.q[s, i] + (all_.kd[i] * after + torque) / all_.kp[i]
 
 
-@njit(f"b1({_ROW}, f8)", cache=True, nogil=True)
-def tame(v: Array, wild: float) -> bool:
-    """Whether every velocity is below ``wild``; what is not a number is not."""
-    for speed in v:
-        if not abs(speed) < wild:
-            return False
+@njit(f"void({_TABLE}, i8)", cache=True, nogil=True)
+def begin(physics: Indices, step: int) -> None:
+    """Begin a step: tell the actuators, and note where it begins from.
+
+    Args:
+        physics: Table of `PHYSICS`; ``ctrl``, ``before`` and, by the first step, its row of ``q_way`` and of
+            ``v_way`` are written.
+        step: Which of the tick.
+    """
+    all_ = _physics_in(physics, 0)
+    for k in range(len(all_.ctrl)):
+        all_.ctrl[k] = all_.steering[step, k]
+    for i in range(len(all_.qvel)):
+        all_.before[i] = all_.qvel[i]
+    if step == 0:
+        for i in range(len(all_.qpos)):
+            all_.q_way[0, i] = all_.shown_q[i]
+        for i in range(len(all_.qvel)):
+            all_.v_way[0, i] = all_.shown_v[i]
+
+
+@njit(cache=True, nogil=True)
+def _shown(v: float, before: float, centred: bool) -> float:
+    return v + 0.5 * (v - before) if centred else v
+
+
+@njit(f"b1({_TABLE}, i8, b1, f8)", cache=True, nogil=True)
+def end(physics: Indices, step: int, centred: bool, wild: float) -> bool:
+    """Note where a step led to; whether every velocity is below ``wild`` [rad/s or m/s].
+
+    Args:
+        physics: Table of `PHYSICS`; the next row of ``q_way`` and ``v_way`` is written.
+        step: Which of the tick.
+        centred: Whether velocities belong half a step earlier than positions.
+        wild: What is not a number is not below it.
+    """
+    all_ = _physics_in(physics, 0)
+    for i in range(len(all_.qpos)):
+        all_.q_way[step + 1, i] = all_.qpos[i]
+    for i in range(len(all_.qvel)):
+        all_.v_way[step + 1, i] = _shown(all_.qvel[i], all_.before[i], centred)
+    return tame(all_.qvel, wild)
+
+
+@njit(f"b1({_TABLE}, b1)", cache=True, nogil=True)
+def show(physics: Indices, centred: bool) -> bool:
+    """Take over where everybody is at the end of a tick; False, and nothing is, where that is not finite.
+
+    Args:
+        physics: Table of `PHYSICS`; ``shown_q``, ``shown_v`` and the last row of the way are written.
+        centred: As of `end`.
+    """
+    all_ = _physics_in(physics, 0)
+    if not (tame(all_.qpos, np.inf) and tame(all_.qvel, np.inf)):
+        return False
+    last = len(all_.q_way) - 1
+    for i in range(len(all_.qpos)):
+        all_.shown_q[i] = all_.q_way[last, i] = all_.qpos[i]
+    for i in range(len(all_.qvel)):
+        all_.shown_v[i] = all_.v_way[last, i] = _shown(all_.qvel[i], all_.before[i], centred)
     return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _unlike(knots: Knots, joints: Joints, now: Array, moves: Array, held: bool) -> float:
+    """How far speeds are from those that samples say; not a number where no sample says any.
+
+    Between two samples those are on the straight line between both: the slope of the cubic through them is
+    another one where their positions are noisy.
+
+    Args:
+        knots: Samples.
+        joints: ``off`` is written: how far each is; ``q``, ``v`` and ``a`` are where it works.
+        now: When [s], shape (1,).
+        moves: Velocities of all joints, shape (nv,).
+        held: Whether it is to be asked of the motion through the samples instead.
+    """
+    t, first, end = now[0], knots.kept[0], knots.kept[1]
+    k = end - 1
+    while k >= first and knots.instants[k] > t + SLACK:
+        k -= 1
+    if k < first or not knots.said[k]:
+        return np.nan
+    after, share = k, 0.0
+    if k < end - 1:
+        after = k + 1
+        if not knots.said[after] or knots.jumps[after]:
+            return np.nan
+        share = (t - knots.instants[k]) / (knots.instants[after] - knots.instants[k])
+    elif not t - knots.instants[k] <= knots.coast[0] + SLACK:
+        return np.nan
+    if held:
+        _along(knots, now, joints.q[:1], joints.v[:1], joints.a[:1])
+    for j in range(len(joints.own)):
+        speed = joints.v[0, j] if held else moves[joints.own[j]]
+        start = knots.speeds[k, j]
+        joints.off[j] = abs(speed - (start + share * (knots.speeds[after, j] - start)))
+    return greatest(joints.off)
+
+
+@njit(f"void({_TABLE}, {_TABLE}, f8, f8, b1, b1)", cache=True, nogil=True, error_model="numpy")
+def compare(motions: Indices, physics: Indices, t: float, dt: float, errors: bool, physical: bool) -> None:
+    """How far everybody is from where they are to be and from speeds that are said, and whom limits hold.
+
+    Args:
+        motions: Table of everybody; ``off``, ``led_q`` and ``led_v`` of `Joints` are written, and ``q``,
+            ``v`` and ``a`` are where it works.
+        physics: Table of `PHYSICS`; ``unlike`` and, where asked for, ``error`` and ``saturated`` are written.
+        t: The tick [s].
+        dt: Timestep [s].
+        errors: Whether errors and limits are asked for.
+        physical: Whether the physics moves the twin.
+    """
+    all_ = _physics_in(physics, 0)
+    all_.now[0] = t
+    for i in range(len(all_.efforts)):
+        all_.efforts[i] = 0.0
+    for k in range(len(all_.dof)):
+        all_.efforts[all_.dof[k]] = abs(all_.force[k])
+    last = len(all_.q) - 1
+    for r in range(len(motions) // MOTION_ROWS):
+        knots = _knots_in(motions, r * MOTION_ROWS)
+        joints = _joints_in(motions, r * MOTION_ROWS + KNOT_ROWS)
+        if errors:
+            most = 0.0
+            for i in range(len(joints.q_places)):
+                place, to = joints.q_places[i], joints.v_places[i]
+                joints.led_q[i] = all_.q[last, place]
+                joints.led_v[i] = all_.v[last, to] + 0.5 * dt * all_.a[last, to]
+                here = abs(all_.qpos[place] - joints.led_q[i])
+                if not here <= most and not np.isnan(most):  # what is not a number stays
+                    most = here
+            all_.error[r], all_.saturated[r] = most, False
+            for place in joints.v_places:
+                if all_.efforts[place] >= all_.almost[place]:
+                    all_.saturated[r] = True
+        # What holds it elsewhere, or a torque limit, is no noise.
+        held = physical and (all_.person[r] or all_.saturated[r])
+        all_.unlike[r] = _unlike(knots, joints, all_.now, all_.shown_v, held)

@@ -7,12 +7,15 @@ a corner; what lies up to r outside the corners' hull adds at most ``|ω| r``.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
+from seerob.kernels.mujoco_calls import updated
 
 Indices = NDArray[np.int64]
 
@@ -20,34 +23,50 @@ Indices = NDArray[np.int64]
 _ROWS = "f8[:,::1]"
 
 
-@njit(f"void({_ROWS}, {_ROWS}, {_ROWS}, i8[::1], f8[:,:,::1], {_ROWS}, {_ROWS})", cache=True, nogil=True)
-def placed(
-    xmat: Array,
-    xpos: Array,
-    xquat: Array,
-    ids: Indices,
-    rotations: Array,
-    positions: Array,
-    quaternions: Array,
-) -> None:
-    """Poses of some of MuJoCo's bodies; writes into the last three arguments.
+class Placed(NamedTuple):
+    """Poses of MuJoCo's m bodies, and of n that each are one of them."""
+
+    calls: Indices
+    """Addresses: the `mujoco.MjModel`, its data, and what is called so that they are up to date."""
+    xmat: Array
+    """World from body, row by row, shape (m, 9)."""
+    xpos: Array
+    """[m], shape (m, 3)."""
+    xquat: Array
+    """Shape (m, 4)."""
+    rotations: Array
+    """Shape (n, 3, 3)."""
+    positions: Array
+    """[m], shape (n, 3)."""
+    quaternions: Array
+    """Shape (n, 4)."""
+
+
+PLACED = Layout(
+    Placed,
+    [(np.int64, 1), *[(np.float64, 2)] * 3, (np.float64, 3), *[(np.float64, 2)] * 2],
+)
+_placed_in = PLACED.read
+
+
+@njit("void(i8[:,::1], i8[::1])", cache=True, nogil=True)
+def place(table: Indices, ids: Indices) -> None:
+    """Work out poses and velocities of MuJoCo's bodies, and take over the poses of some.
 
     Args:
-        xmat: World from body, row by row, shape (m, 9).
-        xpos: [m], shape (m, 3).
-        xquat: Shape (m, 4).
+        table: Of `PLACED`; its last three are written, and what MuJoCo works out where ``calls`` says.
         ids: Which, shape (n,).
-        rotations: Shape (n, 3, 3).
-        positions: [m], shape (n, 3).
-        quaternions: Shape (n, 4).
     """
+    all_ = _placed_in(table, 0)
+    for function in all_.calls[2:]:
+        updated(function, all_.calls[0], all_.calls[1])
     for i in range(len(ids)):
         for c in range(9):
-            rotations[i, c // 3, c % 3] = xmat[ids[i], c]
+            all_.rotations[i, c // 3, c % 3] = all_.xmat[ids[i], c]
         for c in range(3):
-            positions[i, c] = xpos[ids[i], c]
+            all_.positions[i, c] = all_.xpos[ids[i], c]
         for c in range(4):
-            quaternions[i, c] = xquat[ids[i], c]
+            all_.quaternions[i, c] = all_.xquat[ids[i], c]
 
 
 @njit(cache=True, nogil=True)

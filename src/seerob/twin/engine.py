@@ -29,16 +29,18 @@ from seerob.description.capture.following import Following
 from seerob.devices.live.differentiation import PositionNoise
 from seerob.files.trajectories.trajectory import QUIET
 from seerob.kernels import pull as kernel
+from seerob.kernels.bound import COLUMNS
 from seerob.model.model import Mechanism, Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.twin import controller_check
 from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
-from seerob.twin.control.reference import Course, Reference
+from seerob.twin.control.reference import Reference
 from seerob.twin.control.sample_values import beyond_limits, is_possible, largest_speed, torques_of
 from seerob.twin.machines.following import HOLD, Machines, Moved
 from seerob.twin.machines.gripping import Grips, own_masses
 from seerob.twin.moving_base import moved_by_poses
+from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
@@ -142,19 +144,9 @@ class Engine:
         self._data = mujoco.MjData(self._mj)
         self._wanted = mujoco.MjData(self._mj)
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
-        data, wanted = self._data, self._wanted
-        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
-        self._actuator_force = data.actuator_force
-        self._pull_to = wanted.qpos, wanted.qvel, wanted.qacc, wanted.qfrc_passive
-        self._joint_inertia = self._mj.dof_armature, self._mj.dof_damping
+        self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
-        # Without mimics every joint is commanded itself, and a person's 53 by 53 products can be spared.
-        self._coupled = {
-            m.name
-            for m in self._mechanisms
-            if m.offset.any() or not np.array_equal(m.coupling, np.eye(len(m.v_address)))
-        }
         # What a variable says of a machine stands until it says something else.
         coasting = set(live) - {machine.name for machine in model.workstation.machines}
         self.ahead = set(driven) - set(live) - {m.name for m in model.workstation.machines}
@@ -192,22 +184,21 @@ class Engine:
             for human in model.workstation.humans
             if human.follow == "task" and controllers
         ]
-        self._before = np.zeros(self._mj.nv)
-        self._courses: dict[str, tuple[Array, Array, Array]] = {}
+        self._people = [human.name for human in model.workstation.humans]
+        self._almost = 0.999 * self._limits
+        self._before, self._torques = np.zeros((2, self._mj.nv))
+        # Called from Python once, it tells when there is not enough memory for them.
+        mujoco.mj_passive(self._mj, self._wanted)
+        mujoco.mj_rne(self._mj, self._wanted, 1, self._torques)
+        n = len(self._mechanisms)
+        self._found = np.zeros(n), np.zeros(n, bool), np.zeros(n)
+        """Of each who is pulled the largest error of a joint [rad or m], whether a torque limit is reached,
+        and how far speeds are from those that are said [rad/s or m/s]."""
         self._divide(self._steps)
         self._landing: list[Mechanism] = []
         """Who is still to be put elsewhere."""
         self._broken: set[str] = set()
         """Who was put elsewhere during a tick."""
-        q, v = ([m.q_address for m in self._mechanisms], [m.v_address for m in self._mechanisms])
-        self._places = (
-            *(np.concatenate([np.zeros(0, np.int64), *each]).astype(np.int64) for each in (q, v)),
-            *(np.cumsum([0, *map(len, each)]).astype(np.int64) for each in (q, v)),
-        )
-        """Of positions and velocities of everybody in turn, and where each begins in those."""
-        self._errors = np.zeros(len(self._mechanisms)), np.zeros(len(self._mechanisms), bool)
-        self._people = [human.name for human in model.workstation.humans]
-        self._almost = 0.999 * self._limits
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
         self._said: dict[str, controller_check.ControllerCheck] = {}
@@ -229,20 +220,39 @@ class Engine:
     def _divide(self, steps: int) -> None:
         """Make room for each step of a tick."""
         self._steps, rows = steps, steps + 1
-        self._course = Course(
-            np.tile(self._mj.qpos0, (rows, 1)), np.zeros((rows, self._mj.nv)), np.zeros((rows, self._mj.nv))
-        )
-        self._way = np.empty((rows, self._mj.nq)), np.empty((rows, self._mj.nv))
+        mj, data, wanted, shown = self._mj, self._data, self._wanted, self._shown
+        of_q, of_v = (rows, mj.nq), (rows, mj.nv)
+        self._course = np.tile(mj.qpos0, (rows, 1)), np.zeros(of_v), np.zeros(of_v)
+        """Where every joint is to be at each step of a tick and at its end [rad or m], its velocity half a
+        step earlier, as `mujoco.mj_step` counts, and its acceleration."""
+        self._way = np.empty(of_q), np.empty(of_v)
         """Positions and velocities at each step of a tick."""
-        inertial, passive = np.zeros((2, steps, self._mj.nv))
-        self._efforts = inertial, passive
-        """Torques of the motion itself, and passive ones, at each step."""
-        self._steering = np.zeros((steps, self._mj.nu))
-        """What actuators are told at each step."""
-        course, dofs = self._course, [len(m.home) for m in self._mechanisms]
-        self._step_rows = [(*(each[k] for each in course), inertial[k], passive[k]) for k in range(steps)]
-        for mechanism, n in zip(self._mechanisms, dofs, strict=True):
-            self._courses[mechanism.name] = np.zeros((rows, n)), np.zeros((rows, n)), np.zeros((rows, n))
+        self._instants = np.empty(rows)
+        """When each step begins, and when the tick ends [s]."""
+        calls = addresses(mj, wanted, "mj_rne", *POSES, "mj_passive")
+        person = np.array([m.role == "human" for m in self._mechanisms], bool)
+        error, saturated, unlike = self._found
+        physics = kernel.Physics(
+            calls, data.qpos, data.qvel, self._before, data.ctrl, data.actuator_force, shown.qpos, shown.qvel,
+            wanted.qpos, wanted.qvel, wanted.qacc, wanted.qfrc_passive, mj.dof_armature, mj.dof_damping,
+            self._kp, self._kd, self._almost, self._dof, self._instants, *self._course, self._torques,
+            np.zeros(mj.nv), np.zeros(1), np.zeros((steps, mj.nu)), *self._way,
+            error, person, saturated, unlike,
+        )  # fmt: skip
+        joints = {m.name: _joints(m, rows) for m in self._mechanisms}
+        self._courses = {name: (own.q, own.v, own.a) for name, own in joints.items()}
+        self._unlike_by = {name: own.off for name, own in joints.items()}
+        self._led = {name: (own.led_q, own.led_v) for name, own in joints.items()}
+        """Where joints are pulled to at the end of a tick, and their velocities then."""
+        self._bound = physics, joints
+        """Keeps the arrays of both tables."""
+        self._physics = kernel.PHYSICS.rows(physics)
+        self._motions = np.zeros((len(joints) * kernel.MOTION_ROWS, COLUMNS), np.int64)
+        for k, (name, own) in enumerate(joints.items()):
+            first, end = k * kernel.MOTION_ROWS, (k + 1) * kernel.MOTION_ROWS
+            middle = first + kernel.KNOT_ROWS
+            self._references[name].bind(self._motions[first:middle])
+            self._motions[middle:end] = kernel.JOINTS.rows(own)
 
     # -- what comes in ----------------------------------------------------------------------
 
@@ -456,7 +466,6 @@ class Engine:
         """The twin at t = 0, placed on the first samples without being pulled there."""
         self._place(0.0)
         self._note_errors()
-        self._note_unlike()
         self.state.heard()
         return self.state
 
@@ -474,36 +483,16 @@ class Engine:
         for hearing in self._hearings.values():
             hearing.forget(start)
         self.signals.forget(start)
-        self._aim(start, t)
         self._broken.clear()
-        every = self._mechanisms if self.controllers else ()
-        self._landing = [one for one in every if self._references[one.name].landing]
-        qpos, qvel = self._qpos, self._qvel
-        q_way, v_way = self._way
-        q_way[0], v_way[0] = self._shown.qpos, self._shown.qvel
-        if self.controllers and self.physics and not self._task_pulls:
-            for step in range(self._steps):
-                self._want(step)
-            self._steer(0, self._steps)
-        for step in range(self._steps if self.physics else 0):
-            if self.controllers:
-                self._pull(step, start + step * self._dt)
-            self._before[:] = qvel
-            mujoco.mj_step(self._mj, self._data)
-            if self.controllers and not kernel.tame(qvel, WILD):
-                self._put_back(step + 1, start + (step + 1) * self._dt)
-            kernel.note(qpos, qvel, self._before, self._centred, step + 1, q_way, v_way)
-        self._tick += 1
-        self._now = t
         if self.physics:
-            self._land(self._steps, t)
+            self._step(start, t)
         else:
             self._follow(t)
-        self._check_finite()
+        self._tick += 1
+        self._now = t
         self._show(t)
         strayed = self._strays()
         self._note_errors()
-        self._note_unlike()
         self.state.path = self._path(start, t, captured=strayed or self._strays())
         self.state.heard()
         return self.state
@@ -537,10 +526,7 @@ class Engine:
         broken = tuple(sorted(self._broken))
         q, v = self._way
         if self.physics:
-            instants: Array = np.asarray(start + self._dt * np.arange(self._steps + 1), float)
-            instants[-1] = t
-            q[-1], v[-1] = self._shown.qpos, self._shown.qvel
-            return Path(instants, q, v, broken, self._captured() if captured else None)
+            return Path(self._instants, q, v, broken, self._captured() if captured else None)
         inner = start + kernel.SLACK, t - kernel.SLACK
         inside = {
             instant
@@ -562,71 +548,41 @@ class Engine:
 
     def _follow(self, t: float) -> None:
         """Put the twin on what was heard, with the velocities of that motion."""
+        self._way[0][0], self._way[1][0] = self._shown.qpos, self._shown.qvel
         for mechanism in self._mechanisms:
             reference = self._references[mechanism.name]
             if reference.landing and reference.lands(t):
                 self._broken.add(mechanism.name)
-            if reference.waits:
-                continue
-            if mechanism.name in self._coupled:
-                self._put(mechanism, *reference.at(t))
-                continue
-            places = mechanism.q_address, mechanism.v_address
-            reference.put(t, places, self._qpos, self._qvel, self._before)
+        kernel.follow(self._motions, self._physics, t)
+
+    def _step(self, start: float, end: float) -> None:
+        """Step the physics from one instant to another [s]."""
+        self._aim(start, end)
+        every = self._mechanisms if self.controllers else ()
+        self._landing = [one for one in every if self._references[one.name].landing]
+        physics = self._physics
+        for step in range(self._steps):
+            self._pull(step, start + step * self._dt)
+            mujoco.mj_step(self._mj, self._data)
+            if not kernel.end(physics, step, self._centred, WILD) and self.controllers:
+                self._put_back(step + 1, start + (step + 1) * self._dt)
+                kernel.end(physics, step, self._centred, WILD)
+        self._land(self._steps, end)
 
     def _aim(self, start: float, end: float) -> None:
-        """Where every joint is to be at each step of the tick that begins, and at its end [s]."""
-        if not (self.controllers and self.physics):
-            return
-        t = np.array([start + step * self._dt for step in range(self._steps + 1)])
-        t[-1] = end
-        q_all, v_all, a_all = self._course
-        # mj_step moves positions with the velocity at the end of the step, so its velocities
-        # belong half a step earlier than its positions.
-        for mechanism in self._mechanisms:
-            reference = self._references[mechanism.name]
-            if mechanism.name not in self._coupled:
-                places = mechanism.q_address, mechanism.v_address
-                reference.aim(t, self._dt, places, self._courses[mechanism.name], self._course)
-                continue
-            q, v, a = self._courses[mechanism.name] = reference.course(t)
-            before = v - 0.5 * self._dt * a
-            q = q @ mechanism.coupling.T + mechanism.offset
-            before, a = before @ mechanism.coupling.T, a @ mechanism.coupling.T
-            q_all[:, mechanism.q_address] = q
-            v_all[:, mechanism.v_address] = before
-            a_all[:, mechanism.v_address] = a
+        """Work out where every joint is to be at each step of the tick that begins, and at its end [s]."""
+        kernel.aim(self._motions, self._physics, start, end, self._dt)
+        if self.controllers and not self._task_pulls:
+            kernel.steer(self._physics, 0, self._steps, self._dt)
 
     def _pull(self, step: int, t: float) -> None:
-        self._land(step, t)
+        if self._landing:
+            self._land(step, t)
         if self._task_pulls:
-            self._want(step)
-            self._steer(step, step + 1)
-        self._ctrl[:] = self._steering[step]
+            kernel.steer(self._physics, step, step + 1, self._dt)
+        kernel.begin(self._physics, step)
         for pull in self._task_pulls:
             pull.command(self._mj, self._data, self._wanted, self._kp)
-
-    def _want(self, step: int) -> None:
-        """Work out what the motion itself needs at a step."""
-        wanted, mj = self._wanted, self._mj
-        qpos, qvel, qacc, qfrc_passive = self._pull_to
-        q, v, a, inertial, passive = self._step_rows[step]
-        qpos[:], qvel[:], qacc[:] = q, v, a
-        mujoco.mj_kinematics(mj, wanted)
-        mujoco.mj_comPos(mj, wanted)
-        mujoco.mj_comVel(mj, wanted)
-        mujoco.mj_passive(mj, wanted)
-        mujoco.mj_rne(mj, wanted, 1, inertial)
-        passive[:] = qfrc_passive
-
-    def _steer(self, begin: int, end: int) -> None:
-        """Work out what actuators are told from one step to before another."""
-        q, v, a, inertial, passive = (part[begin:end] for part in (*self._course, *self._efforts))
-        armature, damping = self._joint_inertia
-        kernel.commands(
-            q, v, a, inertial, passive, armature, damping,
-            self._kp, self._kd, self._dt, self._dof, self._steering[begin:end],
-        )  # fmt: skip
 
     def _land(self, step: int, t: float) -> None:
         """Put there who jumped there by ``t`` [s], also where that is the instant of the tick itself."""
@@ -661,58 +617,36 @@ class Engine:
                 self._broken.add(mechanism.name)
 
     def _show(self, t: float) -> None:
-        shown, data = self._shown, self._data
-        shown.qpos[:] = self._qpos
-        shown.qvel[:] = self._qvel
-        if self._centred:
-            shown.qvel += 0.5 * (data.qvel - self._before)
+        if not kernel.show(self._physics, self._centred):
+            raise self._diverged()
         self.state.refresh(t)
         if self._grips.follow(self.state):
             self.state.refresh(t)
 
-    def _note_unlike(self) -> None:
-        for mechanism in self._mechanisms if self.controllers else ():
-            self._hearings[mechanism.name].unlike = self._unlike(mechanism)
-
     def _note_errors(self) -> None:
-        for name, following in self._followings.items() if self.controllers else ():
+        if not self.controllers:
+            return
+        for name, following in self._followings.items():
             q = self.state.joint_positions(self.model.mechanisms[name])
             self._hearings[name].bones = following.errors(self.state.t, q)
-        if not (self.controllers and self.physics and self._tick):
-            return
-        if self.model.workstation.contacts and self.model.workstation.humans:
+        pulled = self.physics and self._tick > 0
+        kernel.compare(self._motions, self._physics, self.state.t, self._dt, pulled, self.physics)
+        if pulled and self.model.workstation.contacts and self.model.workstation.humans:
             self.state.touches = self._touches()
-        q_places, v_places, q_start, v_start = self._places
-        kernel.errors(
-            self._qpos, self._course.q[-1], self._actuator_force, self._almost, self._dof,
-            q_places, q_start, v_places, v_start, *self._errors,
-        )  # fmt: skip
-        off, saturated = self._errors
-        for k, mechanism in enumerate(self._mechanisms):
+        found = zip(self._mechanisms, *(each.tolist() for each in self._found), strict=True)
+        for mechanism, error, saturated, unlike in found:
             hearing = self._hearings[mechanism.name]
-            hearing.error, hearing.saturated = float(off[k]), bool(saturated[k])
-            if mechanism.role == "human" and self.controllers:
-                self._note_captured(mechanism, hearing)
+            if pulled:
+                hearing.error, hearing.saturated = error, saturated
+                if mechanism.role == "human":
+                    self._note_captured(mechanism, hearing)
+            hearing.unlike = self._unlike(mechanism.name) if unlike > QUIET else None
 
-    def _unlike(self, mechanism: Mechanism) -> Array | None:
-        """How far speeds of the twin are from those that are said; None where that is `QUIET`, or none are.
-
-        Between two samples it moves along their positions, and those may be noisier than their speeds.
-        """
-        name, t = mechanism.name, self.state.t
-        hearing, reference = self._hearings[name], self._references[name]
-        said = reference.said_speeds(t)
-        if said is None:
-            return None
+    def _unlike(self, name: str) -> Array | None:
+        """How far speeds of the twin are from those that are said, of whom that is more than `QUIET`."""
         # Noise of speeds that a file's positions told is that half way between two of them.
-        if name not in self._unread and any(s.speed_error is not None for s in hearing.around(t)):
-            return None
-        moves, rows = self._shown.qvel, self.state.columns[name].own_v
-        if self.physics and (mechanism.role == "human" or hearing.saturated):
-            # What holds it elsewhere, or a torque limit, is no noise.
-            moves, rows = reference.at(t)[1], np.arange(len(rows))
-        off = np.empty(len(rows))
-        return together(off) if kernel.unlike(*said, moves, rows, off) > QUIET else None
+        around = () if name in self._unread else self._hearings[name].around(self.state.t)
+        return together(self._unlike_by[name]) if all(s.speed_error is None for s in around) else None
 
     def _touches(self) -> list[tuple[int, int, float]]:
         """Every contact now: two of MuJoCo's bodies and the normal force [N]."""
@@ -727,28 +661,44 @@ class Engine:
 
     def _note_captured(self, person: Mechanism, hearing: Hearing) -> None:
         """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere."""
-        hearing.captured = self._course.q[-1][person.q_address].copy()
-        rows = person.v_address
-        hearing.captured_v = self._course.v[-1][rows] + 0.5 * self._dt * self._course.a[-1][rows]
+        hearing.captured, hearing.captured_v = self._led[person.name]
         limit = self.model.workstation.engine.human_tracking_limit
-        own = {self.model.bodies[i].mj for i in (*person.bodies, *person.carried)}
         if (touches := self.state.touches) is not None:
+            own = {self.model.bodies[i].mj for i in (*person.bodies, *person.carried)}
             touched = any((one in own) != (other in own) for one, other, _ in touches)
             hearing.held = touched or hearing.error > LAGS * limit
         if hearing.error > limit:
             following = self._followings.get(person.name)
             hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
 
-    def _check_finite(self) -> None:
-        if kernel.tame(self._qpos, math.inf) and kernel.tame(self._qvel, math.inf):
-            return
+    def _diverged(self) -> SimulationDiverged:
+        """Say what of the twin is not finite."""
         for mechanism in self._mechanisms:
-            bad = ~np.isfinite(self._data.qpos[mechanism.q_address])
+            bad = ~np.isfinite(self._qpos[mechanism.q_address])
             if bad.any():
                 names = [j.name for link in mechanism.description.links for j in link.joints]
                 joint = names[int(bad.argmax())]
-                raise SimulationDiverged(
+                return SimulationDiverged(
                     f"{mechanism.name}/{joint} is not finite after {self._now:.3f} s; "
                     "lower engine.bandwidth or check masses and samples"
                 )
-        raise SimulationDiverged(f"a velocity is not finite after {self._now:.3f} s")
+        return SimulationDiverged(f"a velocity is not finite after {self._now:.3f} s")
+
+
+def _joints(m: Mechanism, rows: int) -> kernel.Joints:
+    """Joints of one who is pulled, with room for so many instants of a tick."""
+    led = not m.offset.any() and np.array_equal(m.coupling, np.eye(len(m.v_address)))
+    q, v, a = np.zeros((3, rows, len(m.home)))
+    return kernel.Joints(
+        m.q_address.astype(np.int64),
+        m.v_address.astype(np.int64),
+        m.v_address[m.own].astype(np.int64),
+        # Without mimics a person's 53 by 53 products can be spared.
+        np.ascontiguousarray(m.coupling[:0] if led else m.coupling, float),
+        np.ascontiguousarray(m.offset, float),
+        q,
+        v,
+        a,
+        np.zeros(len(m.home)),
+        *np.zeros((2, len(m.v_address))),
+    )

@@ -27,10 +27,11 @@ from seerob.distance.least import Closest, Closests, Per, Query, Surveyor
 from seerob.kernels.axes import felt, principal_axes, quaternion
 from seerob.kernels.chain import along, at_point
 from seerob.kernels.spans import greatest
-from seerob.kernels.speed import carried, fastest, in_body, placed, stacked, velocities
+from seerob.kernels.speed import PLACED, Placed, carried, fastest, in_body, place, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.attachments import Columns, moving_dofs
 from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
+from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
 from seerob.twin.speed_noise import SpeedNoise
@@ -119,7 +120,13 @@ class State(Validity):
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
-        self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
+        self._xmat, self._xpos = data.xmat, data.xpos
+        self._placed = Placed(
+            addresses(model.mj, data, *POSES), self._xmat, self._xpos, data.xquat,
+            self._rotations, self._positions, self._quaternions,
+        )  # fmt: skip
+        """Keeps the arrays of its table."""
+        self._table = PLACED.rows(self._placed)
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
         self._cvel, self._qpos = data.cvel, data.qpos
@@ -128,21 +135,9 @@ class State(Validity):
 
     def refresh(self, t: float) -> None:
         """Take the engine's new positions and velocities; called once per tick by the engine."""
-        mj, data = self._model.mj, self._data
         # mj_step leaves what follows from positions one step behind.
-        mujoco.mj_kinematics(mj, data)
-        mujoco.mj_comPos(mj, data)
-        mujoco.mj_comVel(mj, data)
+        place(self._table, self.attachments.ids)
         self.t = t
-        placed(
-            self._xmat,
-            self._xpos,
-            self._xquat,
-            self.attachments.ids,
-            self._rotations,
-            self._positions,
-            self._quaternions,
-        )
         self._cache.clear()
         self.heard()
         self._surveyor.forget()

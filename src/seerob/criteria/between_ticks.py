@@ -26,10 +26,12 @@ from seerob.core.snapshot import Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, Follows, Lowest, Moment
 from seerob.model.model import Model
+from seerob.twin.signals import SLACK
 from seerob.twin.spans import (
     AllFalls,
     Fall,
     Falls,
+    Gap,
     Margin,
     Path,
     Points,
@@ -43,6 +45,9 @@ MOST = 32
 FEW = 8
 """Instants that are looked at between two ticks, of a criterion whose bound is a judgement of its own
 (`Criterion.lowest`)."""
+
+KEPT = 1.0
+"""How long ticks are remembered while robots are heard live [s]: what is missing for longer is silence."""
 
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
@@ -141,6 +146,20 @@ class Followed:
     """Whether nobody knows it on the way from the last tick."""
 
 
+class Past(NamedTuple):
+    """A tick that was judged, as long as samples before it may turn out to be missing."""
+
+    path: Path
+    ids: bytes
+    """Which of MuJoCo's bodies moved each body where it began."""
+    speeds: Array
+    """Of every body there [m/s]."""
+    ends: tuple[End | None, ...]
+    """What was known of every criterion there."""
+    moments: dict[Watch, Moment | None]
+    """What limits followed from there."""
+
+
 class Asking(NamedTuple):
     """What only who asks the criteria can do."""
 
@@ -186,6 +205,8 @@ class BetweenTicks:
         """What these can lose on that way."""
         self._again: dict[int, Evaluate] = {}
         self._followed: dict[Watch, Followed] = {}
+        self._past: list[Past] = []
+        """Ticks that were judged lately, where robots are heard live."""
         self._failed: dict[int, str] = {}
         """Why nothing bounds a criterion any more in this run."""
         self.looks = 0
@@ -209,12 +230,13 @@ class BetweenTicks:
             return tuple(found)
         speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
         if path is None or self._ids is None:
-            path, self._before, self._followed = None, [None] * len(found), {}
+            path, self._before, self._followed, self._past = None, [None] * len(found), {}, []
             self._shadow = None  # it hears what the twin of this run does
         self._way, self._asking, self._whole, self._falls = path, asking, None, None
         if path is not None:
             self._begins, self._ends = float(path.t[0]), float(path.t[-1])
             self._same = self._ids == ids.tobytes()
+            self._remember(path)
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
@@ -227,7 +249,92 @@ class BetweenTicks:
             if i in self._failed:
                 found[i] = asking.take_back(found[i], self._failed[i])
         self._ids, self._speeds = ids.tobytes(), speeds
+        if path is not None and path.gaps:
+            self._look_back(path.gaps, found, state)
         return tuple(found)
+
+    def _remember(self, path: Path) -> None:
+        """Keep what is known where a tick begins, while robots are heard live."""
+        if path.gaps is None:
+            return
+        assert self._ids is not None
+        assert self._speeds is not None
+        moments = {watch: told.last for watch, told in self._followed.items()}
+        self._past.append(Past(path.copied(), self._ids, self._speeds, tuple(self._before), moments))
+        while self._past[0].path.t[-1] < self._ends - KEPT:
+            del self._past[0]
+
+    def _look_back(self, gaps: tuple[Gap, ...], found: list[Result], state: State) -> None:
+        """Take back what is within by less than robots may have done of which samples turn out to be missing.
+
+        They came to where they are now another way than the twin, as far as their accelerations let them.
+        """
+        assert self._ids is not None
+        assert self._speeds is not None
+        begin = min(gap.begin for gap in gaps) + SLACK
+        past = self._past[
+            max((k for k, tick in enumerate(self._past) if tick.path.t[0] <= begin), default=0) :
+        ]
+        first, path = past[0], Path.joined([tick.path for tick in past], gaps)
+        names = ", ".join(sorted({gap.name for gap in gaps}))
+        text = (
+            f"samples of {names} are missing from {begin:.4g} s to {max(gap.end for gap in gaps):.4g} s: not "
+            "known to be within where it can have been meanwhile"
+        )
+        span: Span | None = None
+        for i, watch in enumerate(self._watches):
+            before, now = first.ends[i], self._before[i]
+            result = found[i]
+            if (
+                watch is None
+                or watch.accepted
+                or not (result.verdict is _WITHIN or result.muted or result.nothing)
+            ):
+                continue
+            if before is None or now is None or before.verdict is _EXCEEDED or before.verdict is _UNDECIDED:
+                continue  # which was said there
+            if (
+                before.margin is None
+                and now.margin is None
+                and not (watch.lowest and (before.idle or now.idle))
+            ):
+                continue
+            if span is None:
+                ids = np.frombuffer(first.ids, np.int64)
+                span = watch.points.span(path, float(path.t[0]), self._ends, ids, state.model.mj)
+                span.between_speeds(first.speeds, self._speeds)
+                span.foresee, span.knots = state.foresee, state.knots
+                if state.speed_errors:
+                    bodies = tuple(range(len(self._speeds)))
+                    span.derived(state.speed_noise(bodies), state.joint_noise())
+            low = -np.inf
+            if first.ids == self._ids:
+                with suppress(Undecided):
+                    low = self._lowest(watch, span, (before, now), first.moments.get(watch), state)
+            if not low >= 0:
+                found[i] = replace(self._asking.take_back(result, text), muted=False)
+
+    def _lowest(
+        self, watch: Watch, span: Span, ends: tuple[End, End], moment: Moment | None, state: State
+    ) -> float:
+        """Bound on the margin on a way of several ticks, given what is known where it begins and ends."""
+        if watch.lowest is not None:
+            return float(watch.lowest(state, span))
+        assert watch.falls is not None
+        margins = [end.margin for end in ends]
+        if watch.follows is not None:
+            most = None if moment is None else watch.follows.most(span, moment)
+            for k, end in enumerate(ends):
+                if (margin := end.margin) is not None:
+                    risen = (
+                        np.inf if most is None or end.figure is None else np.maximum(most - end.figure, 0.0)
+                    )
+                    margins[k] = margin[0] - risen, margin[1]
+        one, *rest = [margin for margin in margins if margin is not None]
+        fall = watch.falls(
+            span, one[0] - one[1] if not rest else np.minimum(one[0] - one[1], rest[0][0] - rest[0][1])
+        )
+        return least_margin(one, rest[0] if rest else None, fall)
 
     def _one(self, i: int, watch: Watch, result: Result, state: State, speeds: Array) -> Result:
         """What a criterion says of a tick, with what happened since the last one."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import mujoco
@@ -37,6 +38,7 @@ from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
 from seerob.twin.control.reference import Reference
 from seerob.twin.control.sample_values import beyond_limits, is_possible, largest_speed, torques_of
+from seerob.twin.control.unheard import QUICKEST, Unheard
 from seerob.twin.machines.following import HOLD, Machines, Moved
 from seerob.twin.machines.gripping import Grips, own_masses
 from seerob.twin.moving_base import moved_by_poses
@@ -201,6 +203,16 @@ class Engine:
         """Who was put elsewhere during a tick."""
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
+        self._unheard = {
+            robot.name: Unheard(
+                robot.name,
+                np.array(robot.acceleration_limits or [QUICKEST] * len(model.mechanisms[robot.name].home)),
+                self._hearings[robot.name].timeout,
+            )
+            for robot in model.workstation.robots
+            if robot.name in coasting and controllers
+        }
+        """By robot that is heard live."""
         self._said: dict[str, controller_check.ControllerCheck] = {}
         self._carried = {name: controller_check.carried(model, name) for name in model.mechanisms}
         """By robot, what its live source says of itself."""
@@ -287,6 +299,8 @@ class Engine:
                 if sample.payload is not None:
                     reason = reason or controller_check.heavier(sample.payload, self._carried[mechanism.name])
                 taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
+                if taken and mechanism.name in self._unheard:
+                    self._unheard[mechanism.name].hear(sample.t, sample.seq, speeds=qd is not None)
             else:
                 taken, missed = self._take_pose(mechanism, sample)
                 reason = reason or missed
@@ -494,6 +508,9 @@ class Engine:
         strayed = self._strays()
         self._note_errors()
         self.state.path = self._path(start, t, captured=strayed or self._strays())
+        if self._unheard:
+            gaps = tuple(gap for each in self._unheard.values() for gap in each.ended(t + kernel.SLACK))
+            self.state.path = replace(self.state.path, gaps=gaps)
         self.state.heard()
         return self.state
 

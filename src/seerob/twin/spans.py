@@ -13,8 +13,9 @@ falls at most ``bend`` below the lesser of both ends, is there nowhere below
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, overload
 
 import mujoco
@@ -59,6 +60,20 @@ def coupling_of(model: Model, mechanism: Mechanism) -> Coupling:
     return Coupling(moves, shares)
 
 
+class Gap(NamedTuple):
+    """A time in which samples of a robot are missing that is heard live (`seerob.twin.control.unheard`)."""
+
+    name: str
+    begin: float
+    """When its last sample before was so [s]."""
+    end: float
+    """When its first one after was [s]."""
+    acceleration: Array
+    """Largest of its joints meanwhile [rad/s² or m/s²], shape (n,)."""
+    speeds: bool
+    """Whether both samples say speeds."""
+
+
 ROUNDING = 1e-9
 """Added to every bound on a way or a speed [m, m/s]: the error of rounding is far below."""
 
@@ -78,6 +93,11 @@ class Path:
     captured: tuple[Array, Array] | None = None
     """``qpos`` and ``qvel`` of the same knots with people as they were captured, where the physics holds one
     of them elsewhere at either end (`State.stray`), or touches one (`Hearing.held`)."""
+
+    gaps: tuple[Gap, ...] | None = None
+    """What is missing of robots that are heard live until its end; None where none is heard live."""
+    loose: tuple[Gap, ...] = ()
+    """What is missing on the way: robots may have gone another one."""
 
     def captured_at(self, t: float) -> tuple[Array, Array] | None:
         """``qpos`` and ``qvel`` at an instant [s] of it with people as captured; None where it follows."""
@@ -113,6 +133,26 @@ class Path:
             x = (np.array([max(begin, self.t[k]), min(end, self.t[k + 1])]) - self.t[k]) / T
             found += [(mean - 4 * v - 2 * then + s * (6 * (v + then) - 2 * mean)) / T for s in x.tolist()]
         return np.array(found).reshape(-1, len(dofs))
+
+    def copied(self) -> Path:
+        """The path in arrays of its own: the engine writes the next one into these."""
+        return replace(self, q=self.q.copy(), v=self.v.copy())
+
+    @staticmethod
+    def joined(paths: Sequence[Path], loose: tuple[Gap, ...]) -> Path:
+        """Paths that follow one another as one, of which something is missing."""
+        ends = [0 if k == 0 else 1 for k in range(len(paths))]  # they share them
+        captured = None
+        if any(path.captured is not None for path in paths):
+            both = [(path.q, path.v) if path.captured is None else path.captured for path in paths]
+            q, v = (np.concatenate([each[i][k:] for each, k in zip(both, ends, strict=True)]) for i in (0, 1))
+            captured = q, v
+        t, q, v = (
+            np.concatenate([part[k:] for part, k in zip(every, ends, strict=True)])
+            for every in ([p.t for p in paths], [p.q for p in paths], [p.v for p in paths])
+        )
+        broken = tuple(sorted({name for path in paths for name in path.broken}))
+        return Path(t, q, v, broken, captured, loose=loose)
 
     def middle(self, begin: float, end: float) -> float:
         """Where a span is best cut [s]: at the knot that is nearest to its middle, else there."""
@@ -275,6 +315,8 @@ class Points:
     ) -> None:
         """Bound all joints, and with them all points, on cubics through the knots of a path."""
         joint_bounds(path.t, q, v, begin, end, mj.qpos0, self._speed, self._change, self._varies, self._away)
+        for gap in path.loose:
+            self._loosen(gap, end - begin)
         for name in path.broken:
             rows = self._movers[name]
             self._speed[rows] = self._change[rows] = self._varies[rows] = np.inf
@@ -282,6 +324,23 @@ class Points:
             self._speed, self._change, self._varies, self._away, end - begin,
             self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
         )  # fmt: skip
+
+    def _loosen(self, gap: Gap, T: float) -> None:
+        """Let a robot go any way within a span of length T [s] that its accelerations allow."""
+        mechanism, rows = self.model.mechanisms[gap.name], self._movers[gap.name]
+        coupling = np.abs(mechanism.coupling)
+        limits = [math.inf if v is None else v.value for v in mechanism.velocity_limits]
+        most = coupling @ gap.acceleration
+        lasts, twice = gap.end - gap.begin, 1 if gap.speeds else 2
+        faster = twice * (most + self._change[rows]) * lasts / 4
+        with np.errstate(invalid="ignore"):
+            capped = np.where(coupling > 0, coupling * limits, 0.0).sum(axis=1)
+        allowed = np.maximum(capped - self._speed[rows], 0.0)
+        faster = np.minimum(faster, allowed)
+        self._varies[rows] += 4 * faster / T
+        self._away[rows] += faster * lasts / 4
+        self._speed[rows] += faster
+        self._change[rows] = np.maximum(self._change[rows], most)
 
     def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
         """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""

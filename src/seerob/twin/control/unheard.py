@@ -1,0 +1,72 @@
+r"""What a robot that is heard live may have done while its samples were lost: nobody was told.
+
+From one sample to the next the twin goes along a cubic through both. Of a joint whose acceleration is a at
+most, and whose cubic has b at most, the difference e from it has :math:`|\ddot e| \le a + b`, and vanishes at
+both ends: with its derivative there, where samples say speeds, and else without. So within a time T
+
+.. math:: |\dot e| \le (a + b)\,T/4, \qquad |e| \le (a + b)\,T^2/16,
+
+or twice as much without speeds: it speeds up for T/4, brakes and turns round for T/2, and brakes for T/4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from seerob.core.transforms import Array
+from seerob.twin.spans import Gap
+
+USUAL = 32
+"""Newest intervals between samples: a quarter of them are as short as usual, however many are lost."""
+MISSING = 1.8
+"""Times the usual interval after which a sample is missing: the next but one is due after two."""
+QUICKEST = 30.0
+"""No joint accelerates harder that states nothing [rad/s² or m/s²]: published stopping tables of arms come to
+that."""
+SEEN = 5e-3
+"""How far a joint may go away unseen and come back [rad or m]: what its samples, and the twin, are off by."""
+
+
+class Unheard:
+    """Looks at when samples of one robot were so, as the twin takes them, whether some between are missing.
+
+    Args:
+        name: Of the robot.
+        acceleration: Largest acceleration of its joints [rad/s² or m/s²], shape (n,).
+        timeout: Of its source [s]; a longer silence is undecided as such.
+    """
+
+    def __init__(self, name: str, acceleration: Array, timeout: float) -> None:
+        self._name, self._acceleration, self._timeout = name, acceleration, timeout
+        self._least = 4 * math.sqrt(SEEN / float(acceleration.max(initial=1e-9)))
+        """So long nobody has to know where it was [s]."""
+        self._intervals: deque[float] = deque(maxlen=USUAL)
+        self._t, self._seq, self._said = -math.inf, 0, False
+        self._gaps: list[Gap] = []
+
+    def hear(self, t: float, seq: int, *, speeds: bool) -> None:
+        """Take note of a sample.
+
+        Args:
+            t: When it was so [s].
+            seq: Its number: those between were heard, and a newer one took their place.
+            speeds: Whether it says speeds.
+        """
+        interval, said = t - self._t, speeds and self._said
+        each = interval / max(seq - self._seq, 1)
+        begin, self._t, self._seq, self._said = self._t, t, seq, speeds
+        if not interval <= self._timeout:
+            self._intervals.clear()
+            return
+        self._intervals.append(each)
+        usual = sorted(self._intervals)[len(self._intervals) // 4]
+        if each >= MISSING * usual and interval >= self._least:
+            self._gaps.append(Gap(self._name, begin, t, self._acceleration, said))
+
+    def ended(self, t: float) -> tuple[Gap, ...]:
+        """Times that are over at an instant [s] in which samples are missing; told once."""
+        found = tuple(gap for gap in self._gaps if gap.end <= t)
+        if found:
+            self._gaps = [gap for gap in self._gaps if gap.end > t]
+        return found

@@ -93,6 +93,28 @@ def test_what_was_measured_above_its_limit_is_exceeded(tmp_path: Path, changed: 
     assert part.reason.startswith("measured ")
 
 
+@pytest.mark.parametrize("below", [0.0, 1e-12, 1e-4])
+@pytest.mark.parametrize(
+    ("figure", "limit", "contact"),
+    [
+        ("force_N", 280, {}),
+        ("pressure_N_cm2", 240, {}),
+        ("force_N", 280, {"contact": '"clamped"', "static_force_N": "100", "pressure_N_cm2": "100"}),
+        ("static_force_N", 140, {"contact": '"clamped"', "pressure_N_cm2": "100"}),
+        ("pressure_N_cm2", 120, {"contact": '"clamped"', "static_force_N": "100"}),
+    ],
+)
+def test_what_was_measured_on_its_limit_but_for_rounding_is_not_within(tmp_path, figure, limit, contact, below):
+    """A device of which the peak is the limit to the last bit, free and where it clamps."""
+    station = cell(tmp_path, entry(**{**contact, figure: repr(limit * (1 - below))}))
+    told = {p.name.partition(":")[0]: p for p in chest(station).parts if "measured" in p.name}
+    names = {"force_N": "force, first half second", "static_force_N": "force after it"}
+    name = names.get(figure, "pressure")
+    part = told[f"measured {name}"]
+    assert part.limit == limit * (1e4 if name == "pressure" else 1)
+    assert (part.verdict is Verdict.WITHIN) is (below > 1e-9)
+
+
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [

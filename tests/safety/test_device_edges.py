@@ -84,6 +84,62 @@ def test_units_of_all_kinds():
         assert load("safety", name, Criterion).unit == unit, name
 
 
+FIELDS = SCANNER.format(more="capability = 0.07\nresponse = 0.08", resolution=HALF)
+MAT = (
+    '[[sensors]]\nname = "mat"\nresponse = 0.03\n'
+    "pressure_mat = { corners = [[-1, -3], [4, -3], [4, 3], [-1, 3]] }\n"
+)
+CURTAIN = (
+    '[[sensors]]\nname = "curtain"\ncapability = 0.03\nresponse = 0.02\n'
+    "light_curtain = { ends = [[4, -3, 0], [4, 3, 0]], height = 1.5 }\n"
+)
+BALL = """
+[[machines]]
+name = "ball"
+shape = { sphere = 0.3 }
+at = { position = [4, 0, 0.3] }
+slide = { along = [1, 0, 0], lower = -8, upper = 8 }
+"""
+PRESENT = '[[safety]]\nkind = "{kind}"\nname = "s"\nsensor = "{sensor}"\nof = "ball"\n'
+FAR = (
+    '[[safety]]\nkind = "device_distance"\nname = "s"\nsensor = "{sensor}"\nhazard = "ball"\nstopping = 0.2\n'
+)
+SETTLED = "reach_over = 0\nreach_under = 0\nsupplement = 0.1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "x", "away"),
+    [
+        (FIELDS + PRESENT.format(kind="scanner_field", sensor="scan"), 0.5, 1),
+        (MAT + PRESENT.format(kind="pressure_mat", sensor="mat"), 0.5, 1),
+        (CURTAIN + PRESENT.format(kind="light_curtain", sensor="curtain"), 0.5, 1),
+        (CURTAIN + PRESENT.format(kind="light_curtain", sensor="curtain"), -0.5, -1),
+        (CURTAIN + FAR.format(sensor="curtain") + SETTLED, -3.0, -1),
+        (CURTAIN + FAR.format(sensor="curtain") + SETTLED + 'edition = "2010"\n', -3.0, -1),
+        (FIELDS + FAR.format(sensor="scan") + SETTLED + "edges = [1]\n", -3.0, -1),
+        (FIELDS + FAR.format(sensor="scan") + SETTLED + 'edges = [1]\nedition = "2010"\n', -3.0, -1),
+        (MAT + FAR.format(sensor="mat") + SETTLED + "edges = [1]\n", -3.0, -1),
+    ],
+)
+def test_who_is_exactly_where_a_device_says_is_too_near(tmp_path, text, x, away):
+    """Whoever is on the border, or at S, to the last bits is not beyond it; a tenth of a millimetre is."""
+    station = made(tmp_path, FLOATING + BALL + text)
+
+    def at(x):
+        state = state_at(station, ball=((x,), (0.0,)))
+        return Judge(station.bound)(state)[0]
+
+    far = at(x)
+    assert far.verdict == "within", far.reason
+    for _ in range(60):  # a mat is met aslant
+        now = at(x)
+        x -= away * (now.value - now.limit)
+    assert at(x).value == pytest.approx(far.limit, abs=1e-9)
+    for off in (-1e-12, 0.0, 1e-12):
+        assert at(x + off).verdict == "exceeded"
+    assert at(x + 1e-4 * away).verdict == "within"
+
+
 # -- scanner --------------------------------------------------------------------------------------
 
 

@@ -104,7 +104,7 @@ def test_what_was_measured_above_its_limit_is_exceeded(tmp_path: Path, changed: 
         ("pressure_N_cm2", 120, {"contact": '"clamped"', "static_force_N": "100"}),
     ],
 )
-def test_what_was_measured_on_its_limit_but_for_rounding_is_not_within(tmp_path, figure, limit, contact, below):
+def test_what_was_measured_on_its_limit_is_not_within(tmp_path, figure, limit, contact, below):
     """A device of which the peak is the limit to the last bit, free and where it clamps."""
     station = cell(tmp_path, entry(**{**contact, figure: repr(limit * (1 - below))}))
     told = {p.name.partition(":")[0]: p for p in chest(station).parts if "measured" in p.name}

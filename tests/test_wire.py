@@ -46,6 +46,25 @@ def test_encoded_messages_have_the_keys_of_their_interface():
         assert data["type"] == type(message).__struct_config__.tag
 
 
+def test_the_page_knows_the_order_of_all_that_is_an_array_on_the_wire():
+    arrays = {c for c in STRUCTS if c.__struct_config__.array_like}
+    assert set(wire.ARRAYS) == arrays
+    orders = re.search(r"^export const FIELDS = {\n(.*?)^}", wire.typescript(), re.M | re.S)[1]
+    found = dict(re.findall(r"^  (\w+): (\[.*\]),$", orders, re.M))
+    for cls in arrays:
+        tag = cls.__struct_config__.tag
+        order = msgspec.json.decode(found.pop(tag or cls.__name__.lower()))
+        given = {field.name: None for field in msgspec.structs.fields(cls)} | {"verdict": "within"}
+        sent = msgspec.msgpack.decode(
+            msgspec.msgpack.encode(cls(**{k: given[k] for k in order if k != "type"}))
+        )
+        assert len(sent) == len(order)
+        assert [sent[order.index(k)] for k in ("type", "verdict") if k in order] == [
+            v for k, v in (("type", tag), ("verdict", "within")) if k in order
+        ]
+    assert not found
+
+
 def test_types_map_to_what_a_decoder_gives():
     text = wire.typescript()
     assert "  poses: Uint8Array;" in text
@@ -56,7 +75,7 @@ def test_types_map_to_what_a_decoder_gives():
     assert "  faces: [number, number, number][];" in text
     assert "  joints: Record<string, number[]>;" in text
     assert "  value: number | string | null;" in text
-    assert 'export const PROTOCOL = "seerob.v1.msgpack";' in text
+    assert 'export const PROTOCOL = "seerob.v2.msgpack";' in text
 
 
 def test_every_docstring_of_a_field_goes_along():

@@ -175,7 +175,7 @@ def test_a_websocket_comes_from_the_page_itself(server):
 
 
 @pytest.mark.parametrize(
-    "offered", [["seerob.v2.msgpack"], ["seerob.v1"], ["SEEROB.V1.MSGPACK"], ["wamp.2.json", "x"]]
+    "offered", [["seerob.v1.msgpack"], ["seerob.v2"], ["SEEROB.V2.MSGPACK"], ["wamp.2.json", "x"]]
 )
 def test_another_protocol_is_refused_in_words(server, offered):
     with Visitor(server, subprotocols=offered) as page:

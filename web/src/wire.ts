@@ -3,14 +3,16 @@
  * What goes out: plain frozen data that a recorder, a browser and a report can read.
  *
  * `web/src/wire.ts` is generated from this file by `seerob.app.wire`; docstrings go along.
+ * What there are many of in each snapshot (results, rows, aspects, markers) is an array of its fields in this
+ * order, so that no name travels with each figure; a new field goes to the end, with a default.
  * World frame: right-handed, z up, metres. Quaternions: unit, w first.
  */
 
 /** WebSocket sub-protocol; the server refuses any other. */
-export const PROTOCOL = "seerob.v1.msgpack";
+export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "b62710767b875e70";
+export const SCHEMA = "7fddbb06c4eef7ea";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -207,11 +209,11 @@ export type RowState =
 export interface Aspect {
   name: string;
   /** None when it is not known or not measured. */
-  value?: number | null;
-  unit?: string;
-  limit?: number | null;
+  value: number | null;
+  unit: string;
+  limit: number | null;
   /** Band of the method into which the value falls, with its thresholds: `20° to 45°`. */
-  band?: string;
+  band: string;
 }
 
 /**
@@ -223,27 +225,27 @@ export interface Row {
   /** Without its side: `upper arm`, `Palm`; `score` for the total of a side or of the whole. */
   name: string;
   /** Body region or table of the method that it belongs to. */
-  group?: string;
+  group: string;
   /** `left` or `right`; empty for the middle or where both sides are meant. */
-  side?: string;
-  state?: RowState;
-  value?: number | null;
-  unit?: string;
+  side: string;
+  state: RowState;
+  value: number | null;
+  unit: string;
   /** Greatest admissible value, in `unit`. */
-  limit?: number | null;
+  limit: number | null;
   /** Best and worst score that there can be; None for a quantity. */
-  scale?: [number, number] | null;
-  interval?: [number, number] | null;
-  verdict?: Verdict | null;
+  scale: [number, number] | null;
+  interval: [number, number] | null;
+  verdict: Verdict | null;
   /** What governs, or why there is no verdict. */
-  reason?: string;
+  reason: string;
   /** Numbers of specific body areas, ISO/TS 15066:2016 Table A.2, 1 to 29. */
-  areas?: number[];
+  areas: number[];
   /** Full names of the nodes that it speaks of: `operator/right_hand`. */
-  bones?: string[];
-  aspects?: Aspect[];
+  bones: string[];
+  aspects: Aspect[];
   /** Names of the inputs of the basis that its limit comes from. */
-  inputs?: string[];
+  inputs: string[];
 }
 
 /**
@@ -544,19 +546,24 @@ export interface Command {
 
 export const DEFAULTS = {
   snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {} },
-  result: { value: null, unit: "", limit: null, at_most: true, verdict: null, reason: "", interval: null, parts: [], markers: [], rows: [], t: null, muted: false, nothing: false },
-  arrow: { label: "", verdict: null },
-  segment: { label: "", verdict: null },
-  sphere: { label: "", verdict: null },
-  ellipsoid: { label: "", verdict: null },
-  box: { label: "", verdict: null },
-  hull: { label: "", verdict: null },
-  polyline: { closed: false, label: "", verdict: null },
-  prism: { position: [0.0,0.0,0.0], wxyz: [1.0,0.0,0.0,0.0], label: "", verdict: null },
-  rays: { hits: [], filled: false, label: "", verdict: null },
-  label: { verdict: null },
-  highlight: { verdict: null },
 };
+
+export const FIELDS = {
+  result: ["name", "value", "unit", "limit", "at_most", "verdict", "reason", "interval", "parts", "markers", "rows", "t", "muted", "nothing"],
+  row: ["name", "group", "side", "state", "value", "unit", "limit", "scale", "interval", "verdict", "reason", "areas", "bones", "aspects", "inputs"],
+  aspect: ["name", "value", "unit", "limit", "band"],
+  arrow: ["type", "origin", "vector", "label", "verdict"],
+  segment: ["type", "start", "end", "label", "verdict"],
+  sphere: ["type", "center", "radius", "label", "verdict"],
+  ellipsoid: ["type", "center", "wxyz", "radii", "label", "verdict"],
+  box: ["type", "center", "wxyz", "size", "label", "verdict"],
+  hull: ["type", "vertices", "faces", "label", "verdict"],
+  polyline: ["type", "points", "closed", "label", "verdict"],
+  prism: ["type", "outline", "lower", "upper", "position", "wxyz", "label", "verdict"],
+  rays: ["type", "starts", "ends", "hits", "filled", "label", "verdict"],
+  label: ["type", "position", "text", "verdict"],
+  highlight: ["type", "body", "verdict"],
+} as const;
 
 export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked;
 

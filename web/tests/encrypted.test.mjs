@@ -31,7 +31,7 @@ const ask = (token, commands) =>
   page.evaluate(
     ([query, messages]) =>
       new Promise((resolve) => {
-        const socket = new WebSocket(`wss://${location.host}/ws${query}`, "seerob.v1.msgpack");
+        const socket = new WebSocket(`wss://${location.host}/ws${query}`, "seerob.v2.msgpack");
         let opened = false;
         socket.onopen = () => {
           opened = true;

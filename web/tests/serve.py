@@ -77,6 +77,16 @@ def _publish(live: Live, frozen: threading.Event, over: threading.Event) -> None
         over.wait(max(0.0, begun + k * PERIOD - time.monotonic()))
 
 
+def _named(thing: object) -> object:
+    """What is an array on the wire, with the names of its fields."""
+    if isinstance(thing, tuple):
+        return [_named(one) for one in thing]
+    if not isinstance(thing, msgspec.Struct):
+        return thing
+    fields = {k: _named(v) for k, v in msgspec.structs.asdict(thing).items()}
+    return fields | {"type": thing.__struct_config__.tag}
+
+
 def _told(scene: Scene, t: float) -> dict[str, object]:
     told = snapshot(round(t / PERIOD), round(t / PERIOD) * PERIOD)
     block = np.frombuffer(told.poses, "<f4").reshape(-1, 7).tolist()
@@ -84,7 +94,7 @@ def _told(scene: Scene, t: float) -> dict[str, object]:
     return {
         "t": told.t,
         "poses": dict(zip(names, block, strict=True)),
-        "results": msgspec.to_builtins(told.results),
+        "results": _named(told.results),
     }
 
 

@@ -1,8 +1,9 @@
 """Writes ``web/src/wire.ts``, the page's types, from `seerob.core.snapshot`: one fact, one place.
 
 ``python -m seerob.app.wire`` writes the file, ``python -m seerob.app.wire --check`` fails when it is stale.
-Structs become interfaces (tagged ones carry ``type``; what a default leaves out is optional or in DEFAULTS),
-enums unions of strings, ``bytes`` ``Uint8Array``; docstrings of classes and fields go along as JSDoc.
+Structs become interfaces (tagged ones carry ``type``; what a default leaves out is optional or in DEFAULTS,
+the order of those that are arrays is in FIELDS), enums unions of strings, ``bytes`` ``Uint8Array``;
+docstrings of classes and fields go along as JSDoc.
 """
 
 from __future__ import annotations
@@ -38,8 +39,10 @@ FROM_SERVER = (
 FROM_PAGE = (snapshot.Command, snapshot.Tracking)
 """Messages that a page sends; what has a default may be left out."""
 
-COMPLETED = (snapshot.Snapshot, snapshot.Result, *get_args(snapshot.Marker))
+COMPLETED = (snapshot.Snapshot,)
 """Of these the page puts back what a default leaves out, before anything else looks at them."""
+ARRAYS = (snapshot.Result, snapshot.Row, snapshot.Aspect, *get_args(snapshot.Marker))
+"""These are arrays on the wire; the page puts back the names, before anything else looks at them."""
 
 SOURCES = (verdict, markers, snapshot, page_messages)
 """Modules whose types go over the wire; `seerob.core.snapshot` has the names of all of them."""
@@ -83,6 +86,7 @@ def _declarations(*, docs: bool) -> Iterator[str]:
         elif issubclass(thing, Struct):
             yield _interface(thing, aliases, docs=docs)
     yield _defaults()
+    yield _orders()
     yield f"export type ServerMessage = {' | '.join(c.__name__ for c in FROM_SERVER)};\n"
     yield f"export type PageMessage = {' | '.join(c.__name__ for c in FROM_PAGE)};\n"
 
@@ -127,6 +131,15 @@ def _defaults() -> str:
         values = (f"{field.encode_name}: {default_of(field)}" for field in fields)
         lines.append(f"  {cls.__struct_config__.tag or cls.__name__.lower()}: {{ {', '.join(values)} }},\n")
     return "".join((*lines, "};\n"))
+
+
+def _orders() -> str:
+    lines = ["export const FIELDS = {\n"]
+    for cls in ARRAYS:
+        tag = cls.__struct_config__.tag
+        names = ["type"] * (tag is not None) + [field.encode_name for field in msgspec.structs.fields(cls)]
+        lines.append(f"  {tag or cls.__name__.lower()}: [{', '.join(map(_string, names))}],\n")
+    return "".join((*lines, "} as const;\n"))
 
 
 def default_of(field: msgspec.structs.FieldInfo) -> str:

@@ -1,5 +1,6 @@
 """What a criterion draws into the room: a closed set; a new criterion draws with these.
 
+In a message a marker is an array: its tag, then its fields in this order; a new field goes to the end.
 World frame: right-handed, z up, metres. Quaternions: unit, w first.
 """
 
@@ -17,7 +18,7 @@ Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 
 
-class Arrow(Struct, frozen=True, kw_only=True, tag="arrow", omit_defaults=True):
+class Arrow(Struct, frozen=True, kw_only=True, tag="arrow", array_like=True):
     """A vector at a point."""
 
     origin: Vec3
@@ -27,7 +28,7 @@ class Arrow(Struct, frozen=True, kw_only=True, tag="arrow", omit_defaults=True):
     verdict: Verdict | None = None
 
 
-class Segment(Struct, frozen=True, kw_only=True, tag="segment", omit_defaults=True):
+class Segment(Struct, frozen=True, kw_only=True, tag="segment", array_like=True):
     """A line between two points, such as a shortest distance."""
 
     start: Vec3
@@ -36,7 +37,7 @@ class Segment(Struct, frozen=True, kw_only=True, tag="segment", omit_defaults=Tr
     verdict: Verdict | None = None
 
 
-class Sphere(Struct, frozen=True, kw_only=True, tag="sphere", omit_defaults=True):
+class Sphere(Struct, frozen=True, kw_only=True, tag="sphere", array_like=True):
     """A translucent ball."""
 
     center: Vec3
@@ -45,7 +46,7 @@ class Sphere(Struct, frozen=True, kw_only=True, tag="sphere", omit_defaults=True
     verdict: Verdict | None = None
 
 
-class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid", omit_defaults=True):
+class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid", array_like=True):
     """A translucent ellipsoid."""
 
     center: Vec3
@@ -57,7 +58,7 @@ class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid", omit_default
     verdict: Verdict | None = None
 
 
-class Box(Struct, frozen=True, kw_only=True, tag="box", omit_defaults=True):
+class Box(Struct, frozen=True, kw_only=True, tag="box", array_like=True):
     """A translucent box."""
 
     center: Vec3
@@ -68,7 +69,7 @@ class Box(Struct, frozen=True, kw_only=True, tag="box", omit_defaults=True):
     verdict: Verdict | None = None
 
 
-class Hull(Struct, frozen=True, kw_only=True, tag="hull", omit_defaults=True):
+class Hull(Struct, frozen=True, kw_only=True, tag="hull", array_like=True):
     """A translucent closed surface, convex or not."""
 
     vertices: tuple[Vec3, ...]
@@ -77,7 +78,7 @@ class Hull(Struct, frozen=True, kw_only=True, tag="hull", omit_defaults=True):
     verdict: Verdict | None = None
 
 
-class Label(Struct, frozen=True, kw_only=True, tag="label", omit_defaults=True):
+class Label(Struct, frozen=True, kw_only=True, tag="label", array_like=True):
     """Text at a point."""
 
     position: Vec3
@@ -85,7 +86,7 @@ class Label(Struct, frozen=True, kw_only=True, tag="label", omit_defaults=True):
     verdict: Verdict | None = None
 
 
-class Highlight(Struct, frozen=True, kw_only=True, tag="highlight", omit_defaults=True):
+class Highlight(Struct, frozen=True, kw_only=True, tag="highlight", array_like=True):
     """A whole body shown in the colour of a verdict."""
 
     body: str
@@ -93,7 +94,7 @@ class Highlight(Struct, frozen=True, kw_only=True, tag="highlight", omit_default
     verdict: Verdict | None = None
 
 
-class Polyline(Struct, frozen=True, kw_only=True, tag="polyline", omit_defaults=True):
+class Polyline(Struct, frozen=True, kw_only=True, tag="polyline", array_like=True):
     """A line through points, such as the edge of a field on the floor or a path."""
 
     points: tuple[Vec3, ...]
@@ -108,7 +109,7 @@ class Polyline(Struct, frozen=True, kw_only=True, tag="polyline", omit_defaults=
         return list(pairwise(points))
 
 
-class Prism(Struct, frozen=True, kw_only=True, tag="prism", omit_defaults=True):
+class Prism(Struct, frozen=True, kw_only=True, tag="prism", array_like=True):
     """A translucent extruded polygon, convex or not, such as a floor area with a height."""
 
     outline: tuple[tuple[float, float], ...]
@@ -123,7 +124,7 @@ class Prism(Struct, frozen=True, kw_only=True, tag="prism", omit_defaults=True):
     verdict: Verdict | None = None
 
 
-class Rays(Struct, frozen=True, kw_only=True, tag="rays", omit_defaults=True):
+class Rays(Struct, frozen=True, kw_only=True, tag="rays", array_like=True):
     """What a sensor sees: beams that end where something is in their way, or at their range."""
 
     starts: tuple[Vec3, ...]

@@ -1,6 +1,8 @@
 """What goes out: plain frozen data that a recorder, a browser and a report can read.
 
 ``web/src/wire.ts`` is generated from this file by `seerob.app.wire`; docstrings go along.
+What there are many of in each snapshot (results, rows, aspects, markers) is an array of its fields in this
+order, so that no name travels with each figure; a new field goes to the end, with a default.
 World frame: right-handed, z up, metres. Quaternions: unit, w first.
 """
 
@@ -85,7 +87,7 @@ __all__ = [
     "Verdict",
 ]
 
-PROTOCOL = "seerob.v1.msgpack"
+PROTOCOL = "seerob.v2.msgpack"
 """WebSocket sub-protocol; the server refuses any other."""
 
 
@@ -166,7 +168,7 @@ class RowState(StrEnum):
     """What it needs is not measured or was not entered; never a least score."""
 
 
-class Aspect(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Aspect(Struct, frozen=True, kw_only=True, array_like=True):
     """One figure behind a row: an angle of a component, the speed that one of several limits allows."""
 
     name: str
@@ -178,7 +180,7 @@ class Aspect(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Band of the method into which the value falls, with its thresholds: ``20° to 45°``."""
 
 
-class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Row(Struct, frozen=True, kw_only=True, array_like=True):
     """One line about a place of a person's body: for body map, posture panel and manikin.
 
     A component of a score (with `scale`) or a body area with a limit of its own.
@@ -210,7 +212,7 @@ class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Names of the inputs of the basis that its limit comes from."""
 
 
-class Result(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Result(Struct, frozen=True, kw_only=True, array_like=True):
     """What one criterion says at one instant; its basis does not change in a run (`CriterionInfo.basis`).
 
     A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.

@@ -162,8 +162,10 @@ def _kept(owner: str, name: str, *, inside: bool) -> str:
     return "/".join([OUTSIDE, owner, *(part.replace(":", "_") for part in parts)])
 
 
-VERSION = "1"
+VERSION = "2"
 """Of this layout; a reader refuses one that it does not know."""
+WITH_NAMES = "1"
+"""The layout before: results, rows, aspects and markers are maps, in which a field may be missing."""
 
 METADATA = "seerob"
 """Name of the metadata record at the start: layout, versions, wall-clock time."""

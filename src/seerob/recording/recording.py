@@ -17,7 +17,7 @@ from hashlib import sha256
 from itertools import repeat
 from pathlib import Path, PurePosixPath
 from threading import Lock
-from typing import BinaryIO, NamedTuple, TypeVar
+from typing import BinaryIO, NamedTuple, TypeVar, get_args
 
 import msgspec
 from msgspec.structs import replace
@@ -25,7 +25,7 @@ from msgspec.structs import replace
 from seerob.core.errors import InputError
 from seerob.core.printable import printable_record
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Finding, Scene, Snapshot
+from seerob.core.snapshot import Aspect, Finding, Marker, Result, Row, Scene, Snapshot
 from seerob.recording.format import (
     DIGEST,
     END_METADATA,
@@ -38,6 +38,7 @@ from seerob.recording.format import (
     VERSION,
     VIEW_SCENE,
     VIEWS,
+    WITH_NAMES,
     Tick,
     content_hash,
     nanoseconds,
@@ -285,6 +286,47 @@ _decode_snapshot = msgspec.msgpack.Decoder(Snapshot).decode
 _decode_tick = msgspec.msgpack.Decoder(Tick).decode
 
 
+def snapshot_reader(layout: str) -> Callable[[bytes], Snapshot]:
+    """Decoder of the snapshots of a recording of this layout; raises `msgspec.DecodeError`."""
+    return _with_names if layout == WITH_NAMES else _decode_snapshot
+
+
+_NESTED: dict[str, type[msgspec.Struct] | None] = {
+    "parts": Result,
+    "rows": Row,
+    "aspects": Aspect,
+    "markers": None,
+}
+"""Fields that list what has fields of its own; markers say by their tag what they are."""
+_MARKERS = {cls.__struct_config__.tag: cls for cls in get_args(Marker)}
+
+
+def _with_names(data: bytes) -> Snapshot:
+    given = msgspec.msgpack.decode(data)
+    if isinstance(given, dict) and isinstance(given.get("results"), list):
+        given["results"] = [_in_order(result, Result) for result in given["results"]]
+    return msgspec.convert(given, Snapshot)
+
+
+def _in_order(given: object, cls: type[msgspec.Struct] | None) -> object:
+    """A map of fields as the array that it is by now; the decoder refuses what is no such map."""
+    if not isinstance(given, dict):
+        return given
+    tag = given.get("type")
+    cls = cls or (_MARKERS.get(tag) if isinstance(tag, str) else None)
+    if cls is None:
+        return given
+    found = [] if cls.__struct_config__.tag is None else [tag]
+    for each in msgspec.structs.fields(cls):
+        if each.required and each.name not in given:
+            raise msgspec.ValidationError(f"Object missing required field `{each.name}`")
+        value = given.get(each.name, each.default)
+        if each.name in _NESTED and isinstance(value, list):
+            value = [_in_order(one, _NESTED[each.name]) for one in value]
+        found.append(value)
+    return found
+
+
 def unpack(files: Mapping[str, bytes], folder: Path, recording: Path) -> None:
     """Write files of a recording below a folder.
 
@@ -321,6 +363,7 @@ class Recording:
         """Use `open`."""
         self.path = path
         self._index = index
+        self._decode_snapshot = snapshot_reader(index.metadata.get(METADATA, {}).get("layout", VERSION))
         self._lock = Lock()
         self._cache: OrderedDict[int, list[Message]] = OrderedDict()
         self._topics: dict[int, str] = {}
@@ -343,11 +386,11 @@ class Recording:
         layout = index.metadata.get(METADATA, {}).get("layout")
         if layout is None and index.finished:
             raise InputError.at(path, "", "is an MCAP file, but not one of seerob", _REMEDY)
-        if layout is not None and layout != VERSION:
+        if layout not in (None, WITH_NAMES, VERSION):
             raise InputError.at(
                 path,
                 "layout",
-                f"is {layout!r}, this version reads {VERSION!r}",
+                f"is {layout!r}, this version reads {WITH_NAMES!r} and {VERSION!r}",
                 "use the seerob that wrote it",
             )
         return cls(path, index)
@@ -517,12 +560,12 @@ class Recording:
     def _decode(self, decode: Callable[[bytes], T], message: Message, topic: str) -> T:
         try:
             return decode(message.data)
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             place = f"{topic} at {message.time / 1e9:.3f} s"
             raise InputError.at(self.path, place, f"is not what it should be: {error}", _REMEDY) from error
 
     def _snapshot(self, message: Message) -> Snapshot:
-        snapshot: Snapshot = self._decode(_decode_snapshot, message, SNAPSHOT)
+        snapshot: Snapshot = self._decode(self._decode_snapshot, message, SNAPSHOT)
         if len(snapshot.poses) != _POSE * len(self.scene.nodes):
             what = f"has {len(snapshot.poses)} bytes of poses for {len(self.scene.nodes)} nodes"
             raise InputError.at(self.path, f"{SNAPSHOT} seq {snapshot.seq}", what, _REMEDY)

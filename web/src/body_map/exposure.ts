@@ -52,13 +52,13 @@ export function contactRows(results: readonly Result[], only: string | null): To
 
 /** Whether a row is of a contact, not of a score. */
 export function isContact(row: Row): boolean {
-  return row.scale == null && ((row.areas?.length ?? 0) > 0 || WITHOUT_LIMIT.has(row.state ?? "judged"));
+  return row.scale == null && (row.areas.length > 0 || WITHOUT_LIMIT.has(row.state));
 }
 
 /** Present speed as a share of what a limit allows; null when that is not known, infinite when it allows none. */
 export function shareOf(row: Row, aspect: Aspect): number | null {
   const allowed =
-    aspect === "worst" ? row.limit : row.aspects?.find((a) => a.name === `allowed by ${aspect}`)?.value;
+    aspect === "worst" ? row.limit : row.aspects.find((a) => a.name === `allowed by ${aspect}`)?.value;
   if (allowed == null || row.value == null) return null;
   return allowed > 0 ? row.value / allowed : Number.POSITIVE_INFINITY;
 }
@@ -84,7 +84,7 @@ export function toldOf(
   aspect: Aspect,
 ): Told | undefined {
   return worst(
-    all.filter(({ row }) => row.areas?.includes(spot.area) && onSide(row, spot.side)),
+    all.filter(({ row }) => row.areas.includes(spot.area) && onSide(row, spot.side)),
     aspect,
   );
 }
@@ -118,7 +118,7 @@ export function worst(all: readonly Told[], aspect: Aspect): Told | undefined {
 /** Inputs of the basis that a row's limit is from, in its order. */
 export function inputsOf({ criterion, row }: Told, scene: Scene): Input[] {
   const inputs = scene.criteria.find((c) => c.name === criterion)?.basis?.inputs ?? [];
-  return (row.inputs ?? []).flatMap((name) => inputs.find((input) => input.name === name) ?? []);
+  return row.inputs.flatMap((name) => inputs.find((input) => input.name === name) ?? []);
 }
 
 /** The dominant hand, from rows that say on which side a dominant area is; right where nobody says. */

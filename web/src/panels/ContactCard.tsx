@@ -22,14 +22,14 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
   const look = lookOf(row, aspect);
   const side = row.side || (spot?.side ?? "");
   const share = shareOf(row, aspect);
-  const figures = against(row.value ?? null, row.limit ?? null, row.unit ?? "", true);
+  const figures = against(row.value, row.limit, row.unit, true);
   return (
     <div class={`contact-head card-${look}`}>
       <h3>
         {side !== "" && `${side} `}
         {row.name}
         <span class="unit">
-          {row.areas?.length ? ` area ${row.areas.join(", ")}` : ""}
+          {row.areas.length ? ` area ${row.areas.join(", ")}` : ""}
           {row.group && row.group !== row.name ? ` · ${row.group}` : ""}
         </span>
       </h3>
@@ -37,7 +37,7 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
         {row.verdict && row.state !== "forbidden" ? <StateBadge state={row.verdict} /> : LOOK_WORDS[look]}
         {row.limit != null && (
           <span>
-            {figures.value} of {withUnit(figures.limit, row.unit ?? "")}
+            {figures.value} of {withUnit(figures.limit, row.unit)}
           </span>
         )}
         {share !== null && <span>{percent(share, "up")}</span>}
@@ -57,7 +57,7 @@ export function ContactDetails({ run, told }: { run: Scene; told: Told }) {
         <dd>{known(row.value, row.unit, figure)}</dd>
         <dt>Permissible speed</dt>
         <dd>{row.limit == null ? LOOK_WORDS[lookOf(row, "worst")] : known(row.limit, row.unit, atLeast)}</dd>
-        {(row.aspects ?? []).map((one) => (
+        {row.aspects.map((one) => (
           <AspectRow key={one.name} name={one.name} text={one.band || known(one.value, one.unit, atLeast)} />
         ))}
         <dt>Criterion</dt>
@@ -68,7 +68,7 @@ export function ContactDetails({ run, told }: { run: Scene; told: Told }) {
           <caption>Limits, where from and how sure</caption>
           <tbody>
             {inputs.map((input) => (
-              <LimitRow key={input.name} input={input} group={row.group ?? ""} />
+              <LimitRow key={input.name} input={input} group={row.group} />
             ))}
           </tbody>
         </table>

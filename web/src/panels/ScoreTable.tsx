@@ -42,14 +42,14 @@ function ScoreCell({ row, span = 1 }: { row: Row | null; span?: number }) {
   const [best, worst] = row.scale ?? [null, null];
   const scale = best === null ? "" : `, from ${best} to ${worst}`;
   return (
-    <td colSpan={span} title={`${row.reason ?? ""}${scale}`}>
+    <td colSpan={span} title={`${row.reason}${scale}`}>
       <span class={share === null ? "chip chip-unknown" : "chip"} style={{ background: color }}>
-        {share === null ? "?" : figure(row.value ?? null, "")}
+        {share === null ? "?" : figure(row.value, "")}
         {worst !== null && share !== null && <small>/{worst}</small>}
       </span>
       <span class="angles">
         {share === null && <em>{row.reason || "not assessed"} </em>}
-        {(row.aspects ?? []).map((aspect) => (
+        {row.aspects.map((aspect) => (
           <Angle key={aspect.name} aspect={aspect} />
         ))}
       </span>
@@ -64,7 +64,7 @@ function Angle({ aspect }: { aspect: Aspect }) {
       ? "not measured"
       : angular
         ? `${formatFixed((aspect.value * 180) / Math.PI, 0)}°`
-        : `${figure(aspect.value, aspect.unit ?? "")} ${aspect.unit ?? ""}`;
+        : `${figure(aspect.value, aspect.unit)} ${aspect.unit}`;
   return (
     <span class="angle">
       {aspect.name} <b>{value}</b>

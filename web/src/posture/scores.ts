@@ -89,7 +89,7 @@ export function tints(result: Result | undefined, by: Coloring, palette: Palette
   for (const row of rows) {
     const share = by === "overall" ? total : (shareOfScale(row) ?? -1);
     if (share < 0 || (by === "parts" && row.name === TOTAL)) continue;
-    for (const bone of row.bones ?? []) shares.set(bone, Math.max(shares.get(bone) ?? 0, share));
+    for (const bone of row.bones) shares.set(bone, Math.max(shares.get(bone) ?? 0, share));
   }
   for (const [bone, share] of shares) found.set(bone, scaleColor(share, palette));
   return found;

@@ -136,7 +136,7 @@ class Path:
 
     def copied(self) -> Path:
         """The path in arrays of its own: the engine writes the next one into these."""
-        return replace(self, q=self.q.copy(), v=self.v.copy())
+        return replace(self, t=self.t.copy(), q=self.q.copy(), v=self.v.copy())
 
     @staticmethod
     def joined(paths: Sequence[Path], loose: tuple[Gap, ...]) -> Path:

@@ -161,6 +161,86 @@ def test_a_sink_of_ones_own_writes_each_change_once(tmp_path):
     assert all(a[2] != b[2] for a, b in pairwise(rows) if a[1] == b[1])
 
 
+LIVE = '[[sources]]\nkind = "KIND"\nrobot = "arm"\nport = 9\n'
+FILE = '[[sources]]\nkind = "KIND"\nrobot = "arm"\nfile = "motion.jsonl"\n'
+SINK = '[[sinks]]\nkind = "KIND"\n'
+LOADED = """
+[[humans]]
+name = "op"
+stature = 1.75
+mass = 75
+sex = "male"
+posture = "standing"
+[[phases]]
+load = 20
+[[ergonomics]]
+kind = "KIND"
+human = "op"
+"""
+FORGOTTEN = {
+    "no period": (
+        "cell_controller",
+        "def period",
+        "def every",
+        LIVE,
+        "has no period: define it as LiveSource",
+    ),
+    "no listen": (
+        "cell_controller",
+        "def listen",
+        "def hear",
+        LIVE,
+        "has no listen: define it as LiveSource",
+    ),
+    "no open": (
+        "joint_lines",
+        "def open(",
+        "def read(",
+        FILE,
+        "has no open: define it as Source describes it",
+    ),
+    "no sink": ("verdict_changes", "def open(", "def begin(", SINK, "has no open: define it as Sink"),
+    "no write": (
+        "verdict_changes",
+        "def write(",
+        "def take(",
+        SINK,
+        "gives _Table, which has no write: derive",
+    ),
+    "another load": (
+        "bent_load",
+        "load: float | None = None",
+        "lifted: float = 0.0",
+        LOADED,
+        r"\[\[phases\]\] has no lifted, which Handled would take for 0.0: name it as there",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", FORGOTTEN)
+def test_what_a_plug_in_leaves_out_is_said_before_the_run(tmp_path, monkeypatch, how):
+    example, there, instead, table, words = FORGOTTEN[how]
+    package = tmp_path / "path" / f"own_{how.replace(' ', '_')}"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    text = (ROOT / f"examples/acme/{example}.py").read_text()
+    assert text.count(there) == 1
+    (package / "own.py").write_text(text.replace(there, instead))
+    monkeypatch.syspath_prepend(str(tmp_path / "path"))
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    swing(folder)
+    cell(folder, table.replace("KIND", f"{package.name}.own"))
+    with pytest.raises(sr.SeerobError, match=words):
+        run_with_sinks(folder)
+    assert not (folder / "out/run.mcap").exists()
+
+
+def run_with_sinks(folder):
+    station = sr.load(folder, allow_plugins=True)
+    station.run(folder=folder / "out", sinks=station.workstation.sinks)
+
+
 def test_the_page_shows_each_file_as_it_is():
     page = (ROOT / "docs/extending.md").read_text()
     shown = re.findall(r"write-docs: file/(\S+)", page)

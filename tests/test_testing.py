@@ -73,6 +73,18 @@ SAFETY = {
     "acme.work_height": 'at = "arm"\nlimit = 9\n',
     "acme.tool_clearance": 'at = "arm"\nlimit = -9\n',
 }
+BELOW = {
+    "device_distance",
+    "light_curtain",
+    "manipulability",
+    "minimum_distance",
+    "pressure_mat",
+    "safety_area",
+    "scanner_field",
+    "separation",
+    "separation_area",
+}
+"""Kinds that ship and whose limit bounds from below."""
 PHASE = """
 [[phases]]
 title = "stands"

@@ -13,20 +13,9 @@ from seerob.core.plugin import kinds, load
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import Judge
 from seerob.criteria.safety import device_distance
+from test_testing import BELOW
 
 ZERO = ((0.0, 0.0), (0.0, 0.0))
-BELOW = {
-    "device_distance",
-    "light_curtain",
-    "manipulability",
-    "minimum_distance",
-    "pressure_mat",
-    "safety_area",
-    "scanner_field",
-    "separation",
-    "separation_area",
-}
-"""Kinds whose limit bounds from below."""
 ROD = '[[parts]]\nname = "{name}"\nshape = {{ box = [{x}, {y}, {z}] }}\nat = {{ position = {at} }}\n'
 POLE = '[[parts]]\nname = "{name}"\nshape = {{ cylinder = [{r}, 2] }}\nat = {{ position = {at} }}\n'
 SCANNER = """

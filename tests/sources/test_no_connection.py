@@ -19,7 +19,7 @@ sys.addaudithook(lambda name, _: names.append(name) if name.startswith("socket."
 EVERY = (
     AUDIT
     + """
-import msgspec, pathlib
+import asyncio, contextlib, msgspec, pathlib
 from seerob.core.plugin import kinds, load
 from seerob.devices.live.listening import LiveSource
 from seerob.workstation.source import Source, Target
@@ -27,12 +27,17 @@ GIVEN = dict(host="127.0.0.1", url="opc.tcp://127.0.0.1:9", robot="arm", human="
              password_env="SEEROB_P")
 MORE = {"web": {"url": "ws://127.0.0.1:9/x"}, "siemens_web": {"url": "http://127.0.0.1:9"},
         "kinect": {"at": {"position": (0, 0, 1)}}}
+async def heard(source, target):
+    with contextlib.suppress(Exception):
+        await asyncio.wait_for(anext(source.listen(target)), 1)
 found = {}
 for name in kinds("sources"):
     kind = load("sources", name, Source)
     if not issubclass(kind, LiveSource):
         continue
-    given = {k: v for k, v in {**GIVEN, **MORE.get(name, {})}.items() if k in kind.__struct_fields__}
+    required = {f.name for f in msgspec.structs.fields(kind) if f.required}
+    known = {**GIVEN, **({"port": 9} if "port" in required else {}), **MORE.get(name, {})}
+    given = {k: v for k, v in known.items() if k in kind.__struct_fields__}
     source = msgspec.convert(given, kind)
     joints = 7 if name == "fri" else 6
     target = Target(name=source.target(), joints=tuple(map(str, range(joints))), units=("rad",) * joints)
@@ -40,6 +45,8 @@ for name in kinds("sources"):
     used = list(names)
     names.clear()
     opened.reach()
+    if (kind.ask, kind.inquire) == (LiveSource.ask, LiveSource.inquire):  # asks nothing before it listens
+        asyncio.run(heard(source, target))
     found[name] = str(source.contact()), used, list(names)
     names.clear()
 print(json.dumps(found))

@@ -119,6 +119,11 @@ def load(
     found = getattr(module, point.attr, None) if point is not None and point.attr else _only(module, base)
     if not (isinstance(found, type) and issubclass(found, base)):
         raise PluginError(f"the entry point of kind {kind!r} must be a {base.__name__}, it is {found!r}")
+    left = [name for name in dir(found) if getattr(getattr(found, name), "__isabstractmethod__", False)]
+    if left:
+        described = next(c.__name__ for c in found.__mro__ if left[0] in vars(c))
+        whose = f"{found.__name__} of {found.__module__}"
+        raise PluginError(f"{whose} has no {', no '.join(left)}: define it as {described} describes it")
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
@@ -72,6 +73,7 @@ class RecordsVisitors(Protocol):
 class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of every sink: one file, one class, one ``kind``. The fields are its table in the file."""
 
+    @abstractmethod
     def open(self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path) -> Writer:
         """Open for one run.
 

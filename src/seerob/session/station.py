@@ -16,6 +16,7 @@ from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.plugin import PluginError
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.criteria.contact.measured import curves
@@ -199,6 +200,7 @@ class Station:
 
         Raises:
             InputError: One of them cannot be opened; the others are closed again.
+            PluginError: One gives what cannot be written to.
         """
         opened: list[Writer] = []
         if not sinks:
@@ -212,9 +214,17 @@ class Station:
         try:
             for sink in sinks:
                 opened.append(sink.open(scene, self.model.meshes, self.files, folder))
+                if lacks := [
+                    name for name in ("write", "close", "__exit__") if not hasattr(opened[-1], name)
+                ]:
+                    raise PluginError(
+                        f"open of {type(sink).__module__} gives {type(opened[-1]).__name__}, which has no "
+                        f"{', no '.join(lacks)}: derive it from seerob.api.Closing, with a write"
+                    )
         except BaseException:
             for writer in opened:
-                writer.close()
+                if hasattr(writer, "close"):
+                    writer.close()
             if new and not any(folder.iterdir()):
                 folder.rmdir()
             raise

@@ -8,6 +8,7 @@ are interpolated between two samples and nothing lags.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,6 +114,7 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """
         return ""
 
+    @abstractmethod
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Read, and check against the target's limits; connects to nothing.
 

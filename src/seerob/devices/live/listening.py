@@ -17,6 +17,7 @@ import logging
 import math
 import os
 import time
+from abc import abstractmethod
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar
@@ -241,6 +242,7 @@ class LiveSource(Source, frozen=True, kw_only=True):
                 "give a longer timeout"
             )
 
+    @abstractmethod
     def period(self) -> float:
         """Expected interval between its samples [s]."""
         raise NotImplementedError
@@ -301,6 +303,7 @@ class LiveSource(Source, frozen=True, kw_only=True):
         """How long a run waits for the answer at start [s]."""
         return ASK_WITHIN
 
+    @abstractmethod
     def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Connect, and yield what is heard until the connection ends; then it is called again.
 

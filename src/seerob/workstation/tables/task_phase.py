@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeVar
 
 from msgspec import Meta, Struct
+from msgspec.structs import fields
 
 Kilograms = Annotated[float, Meta(ge=0, extra={"unit": "kg"}, extra_json_schema={"x-unit": "kg"})]
 Seconds = Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
@@ -59,9 +60,20 @@ class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def from_task(cls, task: TaskPhase) -> Self:
-        """What a rule takes from a phase that all rules share: every field that has the same name."""
+        """What a rule takes from a phase that all rules share: every field that has the same name.
+
+        Raises:
+            TypeError: A field says something by default that no shared phase has and ``read`` does not give.
+        """
         same = {name: getattr(task, name) for name in cls.__struct_fields__ if hasattr(task, name)}
-        return cls(**{**same, **cls.read(task)})
+        given = {**same, **cls.read(task)}
+        for field in fields(cls):
+            if field.name not in given and field.default is not None:
+                raise TypeError(
+                    f"[[phases]] has no {field.name}, which {cls.__name__} would take for {field.default!r}: "
+                    "name it as there, give it in read, or let its default be None"
+                )
+        return cls(**given)
 
     @classmethod
     def read(cls, task: TaskPhase) -> Mapping[str, object]:

@@ -7,10 +7,16 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, basis_in, made, results_at, two_r
 from seerob.core.errors import InputError, UnknownName
-from seerob.criteria.safety.effective_mass import inverse_effective_mass, principal_masses, projected_mass
+from seerob.criteria.safety.effective_mass import (
+    felt_toward,
+    inverse_effective_mass,
+    principal_masses,
+    projected_mass,
+)
 from seerob.criteria.safety.kinetic_energy import kinetic_energy
 from seerob.criteria.safety.manipulability import singular_values
 from seerob.criteria.safety.velocity import point_velocity
+from seerob.kernels.axes import mass_along
 
 J = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 0.0]])
 M = np.array([[3.0, 1.0], [1.0, 1.0]])
@@ -41,10 +47,15 @@ def test_functions_take_batches():
     inverse = inverse_effective_mass(Js[:, :3], Ms)
     for i in range(7):
         assert kinetic_energy(Ms, qds)[i] == pytest.approx(0.5 * qds[i] @ Ms[i] @ qds[i])
+        assert kinetic_energy(Ms, qds)[i] == kinetic_energy(Ms[i], qds[i])  # bit by bit
         np.testing.assert_allclose(point_velocity(Js, qds)[i], Js[i] @ qds[i], atol=1e-14)
         np.testing.assert_allclose(inverse[i], Js[i, :3] @ np.linalg.inv(Ms[i]) @ Js[i, :3].T, atol=1e-12)
         values, axes = singular_values(Js[i, :3])
         np.testing.assert_allclose(axes @ np.diag(values**2) @ axes.T, Js[i, :3] @ Js[i, :3].T, atol=1e-12)
+        *u, mass = mass_along(inverse[i], qds[i, :3], 1e-9)
+        assert mass == felt_toward(inverse, qds[:, :3], 1e-9)[i]
+        assert mass == pytest.approx(projected_mass(inverse[i], np.array(u)))
+        assert np.linalg.norm(u) == pytest.approx(1)
 
 
 def test_push_of_the_effective_mass_is_newtons_law():

@@ -120,12 +120,12 @@ class Closests(Struct, frozen=True, eq=False):
     def at(self, *index: int) -> Closest:
         """One of them."""
         return Closest(
-            float(self.distance[index]),
+            self.distance.item(*index),
             self.point_a[index],
             self.point_b[index],
-            int(self.body_a[index]),
-            int(self.body_b[index]),
-            _KINDS[int(self.kind[index])],
+            self.body_a.item(*index),
+            self.body_b.item(*index),
+            _KINDS[self.kind.item(*index)],
         )
 
 

@@ -126,31 +126,44 @@ def reciprocals(values: Array) -> Array:
     return found
 
 
-@njit("void(f8[:,:,::1], f8[:,::1], f8, f8[:,::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
-def masses_along(inverse: Array, along: Array, least: float, u: Array, masses: Array) -> None:
-    """Masses felt along directions; writes into the last two arguments.
+@njit("UniTuple(f8, 4)(f8[:,::1], f8[:], f8)", cache=True, nogil=True, error_model="numpy")
+def mass_along(inverse: Array, along: Array, least: float) -> tuple[float, float, float, float]:
+    """Mass felt along a direction.
+
+    Args:
+        inverse: Inverse of the effective mass matrix [1/kg], shape (3, 3).
+        along: Direction of any length, shape (3,).
+        least: Up to this length there is no direction.
+
+    Returns:
+        The direction, of unit length, and the mass [kg]: NaN without a direction, infinite of what cannot be
+        pushed that way.
+    """
+    x, y, z = along[0], along[1], along[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    if not length > least:
+        return x, y, z, np.nan
+    x, y, z = x / length, y / length, z / length
+    square = (
+        x * (inverse[0, 0] * x + inverse[0, 1] * y + inverse[0, 2] * z)
+        + y * (inverse[1, 0] * x + inverse[1, 1] * y + inverse[1, 2] * z)
+        + z * (inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2] * z)
+    )
+    return x, y, z, np.inf if square <= 0.0 else 1.0 / square
+
+
+@njit("void(f8[:,:,::1], f8[:,::1], f8, f8[::1])", cache=True, nogil=True, error_model="numpy")
+def masses_along(inverse: Array, along: Array, least: float, masses: Array) -> None:
+    """Masses felt along directions; writes into the last argument.
 
     Args:
         inverse: Inverse of the effective mass matrix [1/kg], shape (N, 3, 3).
         along: Directions of any length, shape (N, 3).
         least: Up to this length there is no direction.
-        u: Of unit length, shape (N, 3).
         masses: [kg], shape (N,); NaN without a direction, infinite of what cannot be pushed that way.
     """
     for k in range(len(along)):
-        x, y, z = along[k, 0], along[k, 1], along[k, 2]
-        length = math.sqrt(x * x + y * y + z * z)
-        known = length > least
-        if known:
-            x, y, z = x / length, y / length, z / length
-        u[k, 0], u[k, 1], u[k, 2] = x, y, z
-        A = inverse[k]
-        square = (
-            x * (A[0, 0] * x + A[0, 1] * y + A[0, 2] * z)
-            + y * (A[1, 0] * x + A[1, 1] * y + A[1, 2] * z)
-            + z * (A[2, 0] * x + A[2, 1] * y + A[2, 2] * z)
-        )
-        masses[k] = (np.inf if square <= 0.0 else 1.0 / square) if known else np.nan
+        masses[k] = mass_along(inverse[k], along[k], least)[3]
 
 
 @njit("void(f8[:,::1], f8[::1])", cache=True, nogil=True, error_model="numpy")

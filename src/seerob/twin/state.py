@@ -364,7 +364,7 @@ class State(Validity):
         Raises:
             Undecided: The body may be elsewhere.
         """
-        self.require_bodies(self._alone[index], allow_estimated=allow_estimated, strayed=strayed)
+        self._relied_on_bodies(self._alone[index], allow_estimated, strayed)
         found: tuple[float, float, float] = in_body(self._rotations, self._positions, index, point)
         return found
 
@@ -439,17 +439,18 @@ class State(Validity):
     @property
     def speed_errors(self) -> Mapping[str, Array]:
         """By name of whose speeds were derived from noisy positions: `speed_error`, where there is any."""
-        if "speed errors" not in self._cache:
+        found: dict[str, Array] | None = self._cache.get("speed errors")
+        if found is None:
             every = self._every_speed_error().items()
-            self._cache["speed errors"] = {name: error for name, error in every if error.any()}
-        found: dict[str, Array] = self._cache["speed errors"]
+            found = self._cache["speed errors"] = {name: error for name, error in every if error.any()}
         return found
 
     def _every_speed_error(self) -> dict[str, Array]:
-        if "every speed error" not in self._cache:
+        found: dict[str, Array] | None = self._cache.get("every speed error")
+        if found is None:
             every = ((name, hearing.speed_error(self.t)) for name, hearing in self._hearings.items())
-            self._cache["every speed error"] = {name: error for name, error in every if error is not None}
-        found: dict[str, Array] = self._cache["every speed error"]
+            found = {name: error for name, error in every if error is not None}
+            self._cache["every speed error"] = found
         return found
 
     def speed_noise(self, bodies: tuple[int, ...]) -> Array:
@@ -496,9 +497,6 @@ class State(Validity):
             mujoco.mj_comVel(self._model.mj, data)
             # What was written into buffers meanwhile is of other speeds.
             self._cache = {key: kept for key, kept in cache.items() if key[0] not in WRITTEN}
-
-    def _ask_speeds(self, bodies: tuple[int, ...]) -> None:
-        self.speeds_asked |= self._owners(bodies).everyone
 
     @property
     def foresee(self) -> Foresee:
@@ -716,9 +714,10 @@ class State(Validity):
         Raises:
             Undecided: As `mass_matrix`.
         """
-        M, J = self.mass_matrix(mechanism), self.jacobian(frame, mechanism, offset)
+        M = self.mass_matrix(mechanism)
         key = ("Λ", id(frame), mechanism.name, None if offset is None else offset.tobytes())
         if key not in self._cache:
+            J = self._point(frame, mechanism, offset).jacobian
             inverse, axes, figures = np.empty((3, 3)), np.empty((3, 3)), np.empty(7)
             if not felt(J, M, inverse, axes, figures):
                 raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
@@ -799,7 +798,7 @@ class State(Validity):
             Valid until the next tick.
         """
         self.placed(bodies, allow_estimated=allow_estimated)
-        self._ask_speeds(bodies)
+        self.speeds_asked |= self._owners(bodies).everyone
         key = ("velocities of", bodies)
         if key not in self._cache:
             self._cache[key] = True
@@ -828,8 +827,7 @@ class State(Validity):
         Returns:
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
-        self.require_bodies(self._alone[index])
-        self._ask_speeds(self._alone[index])
+        self.speeds_asked |= self._relied_on_bodies(self._alone[index]).everyone
         speed, point, velocity = self._fastest()
         return float(speed[index]), point[index], velocity[index]
 
@@ -842,22 +840,22 @@ class State(Validity):
             bodies: By index.
             allow_estimated: As in `require_bodies`.
         """
-        self.require_bodies(bodies, allow_estimated=allow_estimated)
-        self._ask_speeds(bodies)
-        rows = self._rows_of(bodies)
+        owners = self._relied_on_bodies(bodies, allow_estimated)
+        self.speeds_asked |= owners.everyone
         speed, point, velocity = self._fastest()
-        return speed[rows], point[rows], velocity[rows]
+        # A third of what an index of rows takes.
+        rows = owners.rows
+        return speed[rows], point.take(rows, 0), velocity.take(rows, 0)
 
     def fastest_speeds(self, bodies: tuple[int, ...], *, allow_estimated: bool = False) -> Array:
         """Bounds on the speed of any point of bodies [m/s], shape (b,); arguments as of `fastest_points`."""
-        self.require_bodies(bodies, allow_estimated=allow_estimated)
-        self._ask_speeds(bodies)
-        return np.asarray(self._fastest()[0][self._rows_of(bodies)])
+        owners = self._relied_on_bodies(bodies, allow_estimated)
+        self.speeds_asked |= owners.everyone
+        return np.asarray(self._fastest()[0][owners.rows])
 
     def fastest_speed(self, bodies: tuple[int, ...], *, allow_estimated: bool = False) -> float:
         """Bound on the speed of the fastest point of bodies [m/s], 0 of none; arguments likewise."""
-        self.require_bodies(bodies, allow_estimated=allow_estimated)
-        owners = self._owners(bodies)
+        owners = self._relied_on_bodies(bodies, allow_estimated)
         self.speeds_asked |= owners.everyone
         return float(greatest(self._fastest()[0], owners.rows))
 
@@ -917,14 +915,14 @@ class State(Validity):
 
     def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closest:
         """Where two sets are nearest; ``allow_estimated`` and ``strayed`` as in `require_bodies`."""
-        self.require_bodies(gap.bodies, allow_estimated=allow_estimated, strayed=strayed)
+        self._relied_on_bodies(gap.bodies, allow_estimated, strayed)
         if self._author:
             return self._distances(gap.query, Per.SETS).at(0)
         return self._surveyor.closest(gap.query, self._rotations, self._positions)
 
     def closest_per_body(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
-        self.require_bodies(gap.bodies, allow_estimated=allow_estimated, strayed=strayed)
+        self._relied_on_bodies(gap.bodies, allow_estimated, strayed)
         return self._distances(gap.query, Per.BODY)
 
     def distances(self, query: Query, per: Per, *, allow_estimated: bool = False) -> Closests:

@@ -21,7 +21,7 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.criterion import Criterion, Lowest
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
-from seerob.kernels.axes import masses_along, mobility, principal_axes, reciprocals
+from seerob.kernels.axes import mass_along, masses_along, mobility, principal_axes, reciprocals
 from seerob.model import provenance
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
@@ -34,8 +34,6 @@ DRAWN = 0.02
 LARGEST_DRAWN = 0.6
 TOUCHING = 1e-9
 """Length below which a line to a person has no direction [m]."""
-NAMES = "m1", "m2", "m3"
-"""Of the principal masses."""
 STANDSTILL = 1e-3
 """Speed below which a motion has no direction [m/s]."""
 
@@ -76,19 +74,17 @@ def projected_mass(inverse: Array, u: Array) -> Array:
     return reciprocals(along.reshape(-1)).reshape(along.shape)
 
 
-def felt_toward(inverse: Array, along: Array, least: float) -> tuple[Array, Array]:
-    """Unit directions, shape (..., 3), and the mass felt along them [kg], shape (...).
+def felt_toward(inverse: Array, along: Array, least: float) -> Array:
+    """Mass felt along directions [kg], shape (...).
 
     Args:
         inverse: Λ⁻¹, shape (..., 3, 3) [1/kg].
         along: Directions of any length, shape (..., 3).
         least: Up to this length there is no direction, and the mass is NaN.
     """
-    u, masses = np.empty_like(along).reshape(-1, 3), np.empty(along.shape[:-1])
-    masses_along(
-        inverse.reshape(-1, 3, 3), np.ascontiguousarray(along).reshape(-1, 3), least, u, masses.reshape(-1)
-    )
-    return u.reshape(along.shape), masses
+    masses, rows = np.empty(along.shape[:-1]), np.ascontiguousarray(along).reshape(-1, 3)
+    masses_along(inverse.reshape(-1, 3, 3), rows, least, masses.reshape(-1))
+    return masses
 
 
 def principal_masses(inverse: Array) -> tuple[Array, Array]:
@@ -103,6 +99,11 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     principal_axes(used_up, values, axes)
     values[~np.isfinite(values).all(axis=-1)] = np.nan
     return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
+
+
+def _of(name: str, mass: float) -> Result:
+    """A principal mass, by name."""
+    return Result(name=name, value=mass if math.isfinite(mass) else None, unit="kg")
 
 
 def _turned(before: Array, after: Array, off: float) -> tuple[Array, float]:
@@ -172,17 +173,20 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         silent = self.toward is None or self.limit is None
 
         def compute(twin: Twin) -> Figure:
-            inverse = twin.inverse_effective_mass(frame, robot, offset)
-            u, found = felt_toward(inverse, direction(twin, inverse), least)
             if twin.many:
+                inverse = twin.inverse_effective_mass(frame, robot, offset)
+                found = felt_toward(inverse, direction(twin, inverse), least)
                 return Figure(found, self.limit, None, np.isnan(found) & silent)
-            mass, interval = float(found), None
-            known = not math.isnan(mass)
+            ellipsoid = cast("State", twin).mass_ellipsoid(frame, robot, offset)
+            *u, mass = mass_along(ellipsoid.inverse, direction(twin, ellipsoid.inverse), least)
+            known, interval = not math.isnan(mass), None
             if len(tolerances) and math.isfinite(mass):
-                ends = self._ends(tolerances, cast("State", twin), frame, offset, u)
+                ends = self._ends(tolerances, cast("State", twin), frame, offset, np.array(u))
                 interval = ends.low, ends.high
             nothing = silent and not known
-            return Figure(mass if known else None, self.limit, interval, nothing, beside=(u, known))
+            return Figure(
+                mass if known else None, self.limit, interval, nothing, beside=(u, known, ellipsoid)
+            )
 
         return compute
 
@@ -209,8 +213,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         simplified = self._simplified(model, robot, tolerances)
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
-            _, _, masses, wxyz = state.mass_ellipsoid(frame, robot, offset)
-            u, known = figure.beside
+            u, known, (_, _, masses, wxyz) = figure.beside
             mass, reason = None if figure.value is None else float(figure.value), ""
             if not known:
                 touching = "touching: the line to the person has no direction"
@@ -218,7 +221,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             elif mass is not None and math.isinf(mass):
                 reason = "cannot be pushed that way: infinite"
             elif figure.interval is not None and verdict is Verdict.UNDECIDED:
-                ends = self._ends(tolerances, state, frame, offset, u)
+                ends = self._ends(tolerances, state, frame, offset, np.array(u))
                 reason = deciding(tolerances.tolerances, ends.widths)
             place = state.drawn_point(frame, offset)
 
@@ -232,15 +235,12 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 )
                 if mass is None:
                     return (ellipsoid,)
-                vector = tuple((min(DRAWN * mass, LARGEST_DRAWN) * u).tolist())
+                vector = tuple(min(DRAWN * mass, LARGEST_DRAWN) * each for each in u)
                 label = figures.worded(mass, self.limit, self.unit, at_most=True)
                 return ellipsoid, Arrow(origin=center, vector=vector, label=label, verdict=verdict)
 
-            principal = (
-                Result(name=name, value=m if math.isfinite(m) else None, unit="kg")
-                for name, m in zip(NAMES, masses.tolist(), strict=True)
-            )
-            return Shown(reason, draw, (*principal, simplified))
+            one, two, three = masses.tolist()
+            return Shown(reason, draw, (_of("m1", one), _of("m2", two), _of("m3", three), simplified))
 
         return present
 

@@ -3,7 +3,7 @@ r"""Manipulability of a point of a robot, [Weistroffer2022]_ section 2.2.2.2."""
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 from msgspec import Meta
@@ -14,7 +14,7 @@ from seerob.core.snapshot import Basis, Ellipsoid, Result
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.figure import Compute, Figure, Present, Shown
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
 from seerob.model.model import Model
@@ -102,7 +102,14 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         """Look up every name in the model once and return the function that computes the figure."""
         frame, offset = model.frame(self.at), np.array(self.offset)
         mechanism = model.carrier(frame)
-        return lambda twin: Figure(twin.singular_values(frame, mechanism, offset)[2], self.limit)
+
+        def compute(twin: Twin) -> Figure:
+            if twin.many:
+                return Figure(twin.singular_values(frame, mechanism, offset)[2], self.limit)
+            ellipsoid = cast("State", twin).velocity_ellipsoid(frame, mechanism, offset)
+            return Figure(ellipsoid[0][2], self.limit, beside=ellipsoid)
+
+        return compute
 
     def one_by_one(self, model: Model) -> str:
         """Many instants are computed together."""
@@ -115,7 +122,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         names = [joint.name for joint in mechanism.joints]
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
-            sigma, wxyz = state.velocity_ellipsoid(frame, mechanism, offset)
+            sigma, wxyz = figure.beside
             smallest, reason = sigma[2], ""
             if verdict is Verdict.EXCEEDED and len(names) >= 3:
                 after = least_value_after(state.jacobian(frame, mechanism, offset)).max(axis=1)

@@ -88,14 +88,13 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
     def _distances(self, model: Model, watched: Sequence[_Watched], depths: Depths) -> Compute:
         several = len(_names(self.area)) > 1
         offs = [TrackingError(model, each.gap.bodies) for each in watched]
-        surfaces = [np.full(len(each.gap.b), each.gap.deviation) for each in watched]
         places = [[_where(model, each, i, several) for i in range(len(each.gap.b))] for each in watched]
         concerned = tuple(dict.fromkeys(i for each in watched for i in each.gap.bodies))
 
         def of_many(states: States, asked: list[Closests]) -> Figure:
-            value = np.min([found.distance.min(axis=-1) for found in asked], axis=0)
-            room = [(found.distance - may).min(axis=-1) for found, may in zip(asked, surfaces, strict=True)]
-            least = np.min(room, axis=0)
+            nearest = [found.distance.min(axis=-1) for found in asked]
+            rooms = [value - each.gap.deviation for value, each in zip(nearest, watched, strict=True)]
+            value, least = np.min(nearest, axis=0), np.min(rooms, axis=0)
             # How deep somebody is inside is asked of each instant.
             states.alone = states.alone | ~(value > ROUNDING)
             return Figure(value, 0.0, (np.minimum(least, value), value))
@@ -107,21 +106,20 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
             state: State = twin  # type: ignore[assignment]
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
             entered: list[tuple[int, int]] = []
-            for k, (each, names, found, off, still) in enumerate(
-                zip(watched, places, asked, offs, surfaces, strict=True)
-            ):
-                may = still
+            for k, (each, names, found, off) in enumerate(zip(watched, places, asked, offs, strict=True)):
+                i, may = int(found.distance.argmin()), each.gap.deviation
+                value = room = found.distance.item(i)
+                nearest = min(nearest, (value, names[i]))
+                if value <= ROUNDING:
+                    entered += [(k, j) for j in np.flatnonzero(found.distance <= ROUNDING).tolist()]
                 if not off.none(state):
                     errors, on = off.at(state), len(each.gap.a)
                     # An area that a person carries may be elsewhere, too.
-                    may = errors[:on].max() + errors[on:] + each.gap.deviation
-                i = int(found.distance.argmin())
-                nearest = min(nearest, (float(found.distance[i]), names[i]))
-                # Another may be nearer than it, shapes and devices being what they are.
-                room = found.distance - may
-                i = int(room.argmin())
-                perhaps = min(perhaps, (float(room[i]), names[i], float(may[i])))
-                entered += [(k, i) for i in np.flatnonzero(found.distance <= ROUNDING).tolist()]
+                    elsewhere = errors[:on].max() + errors[on:]
+                    # Another may be nearer than it, devices being what they are.
+                    i = int((found.distance - (elsewhere + may)).argmin())
+                    room, may = found.distance.item(i), elsewhere.item(i) + may
+                perhaps = min(perhaps, (room - may, names[i], may))
             if not entered:
                 # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not out.
                 (value, who), (least, _, _) = nearest, perhaps

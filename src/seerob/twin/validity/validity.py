@@ -157,15 +157,7 @@ class Validity:
     def require(self, *names: str) -> None:
         """Raise `Undecided` unless each robot or human is where the twin shows it."""
         self.asked.update(names)
-        sound = self._sound
-        if sound is None:
-            sound = self._find_sound()
-        for name in names:
-            if name not in sound:
-                break
-        else:
-            return
-        if names in self._relied_on:
+        if (self._sound or self._find_sound()).issuperset(names) or names in self._relied_on:
             return
         for name in names:
             if reason := self.invalid_reason(name):
@@ -356,13 +348,19 @@ class Validity:
             strayed: Whether people will do of whom the twin is elsewhere than they were captured, as a table
                 or a robot stops it (`stray`): likewise.
         """
+        self._relied_on_bodies(bodies, allow_estimated, strayed)
+
+    def _relied_on_bodies(
+        self, bodies: tuple[int, ...], allow_estimated: bool = False, strayed: bool = False
+    ) -> _Owners:
+        """Whom these bodies belong to, when `require_bodies` lets them pass."""
         owners = self._owners(bodies)
         self.asked |= owners.everyone
         if owners.everyone <= (self._sound or self._find_sound()) and not self.attachments.unknown:
-            return
+            return owners
         key = owners.key, allow_estimated, strayed
         if key in self._relied_on:
-            return
+            return owners
         self.require(*owners.others)
         if lost := self.attachments.unknown.keys() & owners.bodies:
             raise Undecided(self.attachments.unknown[min(lost)])
@@ -378,12 +376,13 @@ class Validity:
             ):
                 raise Undecided(self.invalid_reason(name))
         self._relied_on.add(key)
+        return owners
 
     def invalid_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Bodies that are bones in doubt, of people whose other bones may be relied on."""
         owners = self._owners(bodies)
         if owners.everyone <= (self._sound or self._find_sound()):
-            self.asked |= owners.people.keys()
+            self.asked.update(owners.people)
             return ()
         if owners.key not in self._lost:
             known = frozenset(name for name in owners.people if not self.invalid_place_reason(name))
@@ -404,7 +403,7 @@ class Validity:
         return self._sound
 
     def _is_sound(self, name: str) -> bool:
-        if self.invalid_place_reason(name):
+        if self._invalid_place(name):
             return False
         # Of whom nothing is heard bone by bone there is no other reason.
         if not self._hearings[name].bones_heard:
@@ -441,18 +440,18 @@ class Validity:
             key: A tuple that begins with what it is, and names all that it depends on but the state.
             make: How to.
         """
-        if key not in self._cache:
+        kept = self._cache.get(key)
+        if kept is None:
             before, self.asked, self.speeds_asked = (self.asked, self.speeds_asked), set(), set()
             try:
-                made = make()
+                kept = self._cache[key] = make(), self.asked, self.speeds_asked
             finally:
-                asked = self.asked, self.speeds_asked
+                names, speeds = self.asked, self.speeds_asked
                 self.asked, self.speeds_asked = before
-                self.asked |= asked[0]
-                self.speeds_asked |= asked[1]
-            self._cache[key] = made, *asked
-        found: T
-        found, names, speeds = self._cache[key]
-        self.asked |= names
-        self.speeds_asked |= speeds
+                self.asked |= names
+                self.speeds_asked |= speeds
+        else:
+            self.asked |= kept[1]
+            self.speeds_asked |= kept[2]
+        found: T = kept[0]
         return found

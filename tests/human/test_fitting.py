@@ -77,12 +77,9 @@ def test_the_fit_is_a_minimum():
     q, _ = FITTER.fit(seen, None)
 
     def cost(q):
-        R, p = FITTER.bones(q)
         beside = (FITTER._w_rest * (q - FITTER.rest) ** 2).sum()
         error = np.zeros((len(seen.bone), 6))
-        return beside + kernel.residuals(
-            R, p, seen.bone, seen.at, seen.position, seen.wp, seen.rotation, seen.wo, error
-        )
+        return beside + kernel.residuals(FITTER.poses(q), seen.of_links(), error)
 
     best = cost(q)
     for size in (1e-4, 1e-3, 1e-2):

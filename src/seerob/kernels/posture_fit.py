@@ -14,6 +14,7 @@ is taken back and damped more (Levenberg 1944).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -29,27 +30,76 @@ HUBER = 5.0
 """In units of a pull's own error: beyond it a pull grows only linearly."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def forward(
-    q: Array, parent: Indices, first: Indices, prismatic: NDArray[np.bool_], axis: Array, anchor: Array,
-    offset: Array, mount: Array, R: Array, p: Array, line: Array, through: Array,
-) -> None:  # fmt: skip
-    """Where every bone is; writes into the last four arguments.
+class Links(NamedTuple):
+    """Links of a person, b with n joints, the root first."""
 
-    Args:
-        q: Joint values [rad or m], shape (n,).
-        parent: Of each link, -1 for the first, shape (b,).
-        first: Joint at which each link's own begin, and their number at the end, shape (b + 1,).
-        prismatic: Shape (n,).
-        axis: In the link's frame, shape (n, 3).
-        anchor: Point of the axis in the link's frame [m], shape (n, 3).
-        offset: Of the link in its parent [m], shape (b, 3).
-        mount: Rotation of the link in its parent, shape (b, 3, 3).
-        R: Root from link, shape (b, 3, 3).
-        p: [m], shape (b, 3).
-        line: Joint axes in the root's frame, shape (n, 3).
-        through: Points of them [m], shape (n, 3).
-    """
+    parent: Indices
+    """Of each link, -1 for the first, shape (b,)."""
+    first: Indices
+    """Joint at which each link's own begin, and their number at the end, shape (b + 1,)."""
+    prismatic: NDArray[np.bool_]
+    """Shape (n,)."""
+    axis: Array
+    """In the link's frame, shape (n, 3)."""
+    anchor: Array
+    """Point of the axis in the link's frame [m], shape (n, 3)."""
+    offset: Array
+    """Of the link in its parent [m], shape (b, 3)."""
+    mount: Array
+    """Rotation of the link in its parent, shape (b, 3, 3)."""
+    chain: Indices
+    """Joints that move each link, from the root on, shape (b, most)."""
+    length: Indices
+    """How many, shape (b,)."""
+
+
+class Poses(NamedTuple):
+    """Where links and their joints are, in the root's frame."""
+
+    R: Array
+    """Root from link, shape (b, 3, 3)."""
+    p: Array
+    """[m], shape (b, 3)."""
+    line: Array
+    """Joint axes, shape (n, 3)."""
+    through: Array
+    """Points of them [m], shape (n, 3)."""
+
+
+class Seen(NamedTuple):
+    """What is seen of m points and orientations, in the root's frame."""
+
+    bone: Indices
+    """Link of each, shape (m,)."""
+    at: Array
+    """In the link's frame [m], shape (m, 3)."""
+    position: Array
+    """Of the point [m], shape (m, 3)."""
+    wp: Array
+    """One over the error of a position [1/m], 0 for none, shape (m,)."""
+    rotation: Array
+    """Root from link as it is seen, shape (m, 3, 3)."""
+    wo: Array
+    """One over the error of an orientation [1/rad], 0 for none, shape (m,)."""
+
+
+class Beside(NamedTuple):
+    """Postures beside what is seen, each with its weights [1/rad² or 1/m²], shape (n,)."""
+
+    rest: Array
+    """For what nobody measures [rad or m]."""
+    w_rest: Array
+    before: Array
+    """The posture before [rad or m]."""
+    w_before: Array
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def forward(q: Array, links: Links, poses: Poses) -> None:
+    """Where every bone is at joint values ``q`` [rad or m], shape (n,); writes into ``poses``."""
+    parent, first, prismatic = links.parent, links.first, links.prismatic
+    axis, anchor, offset, mount = links.axis, links.anchor, links.offset, links.mount
+    R, p, line, through = poses.R, poses.p, poses.line, poses.through
     own, new = np.empty((3, 3)), np.empty((3, 3))
     for b in range(len(parent)):
         up = parent[b]
@@ -126,23 +176,11 @@ def logarithm(R: Array, S: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def residuals(
-    R: Array, p: Array, bone: Indices, at: Array, position: Array, wp: Array, rotation: Array, wo: Array,
-    error: Array,
-) -> float:  # fmt: skip
-    """What is missing of every pull; writes ``error`` (m, 6), position [m] first, and returns the cost.
-
-    Args:
-        R: Root from link, shape (b, 3, 3).
-        p: [m], shape (b, 3).
-        bone: Link of each pull, shape (m,).
-        at: In the link's frame [m], shape (m, 3).
-        position: Of the point in the root's frame [m], shape (m, 3).
-        wp: One over the error of a position [1/m], 0 for none, shape (m,).
-        rotation: Root from link as it is seen, shape (m, 3, 3).
-        wo: One over the error of an orientation [1/rad], 0 for none, shape (m,).
-        error: Receives what is missing, shape (m, 6).
-    """
+def residuals(poses: Poses, seen: Seen, error: Array) -> float:
+    """What is missing of every pull; writes ``error`` (m, 6), position [m] first, and returns the cost."""
+    R, p, bone, at, position, wp, rotation, wo = (
+        poses.R, poses.p, seen.bone, seen.at, seen.position, seen.wp, seen.rotation, seen.wo,
+    )  # fmt: skip
     cost = 0.0
     for k in range(len(bone)):
         b = bone[k]
@@ -165,7 +203,8 @@ def _huber(r: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _beside(q: Array, rest: Array, w_rest: Array, before: Array, w_before: Array) -> float:
+def _beside(q: Array, beside: Beside) -> float:
+    rest, w_rest, before, w_before = beside
     total = 0.0
     for d in range(len(q)):
         total += w_rest[d] * (q[d] - rest[d]) ** 2 + w_before[d] * (q[d] - before[d]) ** 2
@@ -173,11 +212,11 @@ def _beside(q: Array, rest: Array, w_rest: Array, before: Array, w_before: Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _normal(
-    chain: Indices, length: Indices, prismatic: NDArray[np.bool_], line: Array, through: Array, R: Array,
-    p: Array, bone: Indices, at: Array, wp: Array, wo: Array, error: Array, A: Array, g: Array,
-) -> None:  # fmt: skip
+def _normal(links: Links, poses: Poses, seen: Seen, error: Array, A: Array, g: Array) -> None:
     """Adds ``J^T W J`` to the lower half of A and ``J^T W e`` to g."""
+    chain, length, prismatic = links.chain, links.length, links.prismatic
+    R, p, line, through = poses.R, poses.p, poses.line, poses.through
+    bone, at, wp, wo = seen.bone, seen.at, seen.wp, seen.wo
     n = len(g)
     J = np.empty((6, n))
     for k in range(len(bone)):
@@ -243,10 +282,8 @@ def _solve(A: Array, g: Array, damping: float, fixed: NDArray[np.bool_], L: Arra
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def fit(
-    q: Array, lower: Array, upper: Array, rest: Array, w_rest: Array, before: Array, w_before: Array,
-    parent: Indices, first: Indices, prismatic: NDArray[np.bool_], axis: Array, anchor: Array, offset: Array,
-    mount: Array, chain: Indices, length: Indices, bone: Indices, at: Array, position: Array, wp: Array,
-    rotation: Array, wo: Array, iterations: int, enough: float, error: Array,
+    q: Array, lower: Array, upper: Array, beside: Beside, links: Links, seen: Seen, iterations: int,
+    enough: float, error: Array,
 ) -> int:  # fmt: skip
     """Improve ``q`` in place; returns the number of iterations, and in ``error`` what is missing.
 
@@ -254,46 +291,30 @@ def fit(
         q: Where to start [rad or m], shape (n,); brought into the box first.
         lower: Of the box, shape (n,).
         upper: Of the box, shape (n,).
-        rest: Posture for what nobody measures, shape (n,).
-        w_rest: Its weights [1/rad² or 1/m²], shape (n,).
-        before: Posture before, shape (n,).
-        w_before: Its weights, shape (n,).
-        parent: As all that follows up to ``mount`` see `forward`.
-        first: Shape (b + 1,).
-        prismatic: Shape (n,).
-        axis: Shape (n, 3).
-        anchor: Shape (n, 3).
-        offset: Shape (b, 3).
-        mount: Shape (b, 3, 3).
-        chain: Joints that move each link, from the root on, shape (b, most).
-        length: How many, shape (b,).
-        bone: As all that follows up to ``wo`` see `residuals`.
-        at: Shape (m, 3).
-        position: Shape (m, 3).
-        wp: Shape (m,).
-        rotation: Shape (m, 3, 3).
-        wo: Shape (m,).
+        beside: What holds it where nothing is seen.
+        links: Of the person.
+        seen: What is seen.
         iterations: At most.
         enough: A step of which no joint is larger is the last [rad or m].
         error: Shape (m, 6).
     """
-    n, b = len(q), len(parent)
-    R, p = np.empty((b, 3, 3)), np.empty((b, 3))
-    line, through = np.empty((n, 3)), np.empty((n, 3))
+    rest, w_rest, before, w_before = beside
+    n, b = len(q), len(links.parent)
+    poses = Poses(np.empty((b, 3, 3)), np.empty((b, 3)), np.empty((n, 3)), np.empty((n, 3)))
     A, L = np.empty((n, n)), np.zeros((n, n))
     g, x, new = np.empty(n), np.empty(n), np.empty(n)
     fixed = np.zeros(n, np.bool_)
     for d in range(n):
         q[d] = min(max(q[d], lower[d]), upper[d])
-    forward(q, parent, first, prismatic, axis, anchor, offset, mount, R, p, line, through)
-    cost = residuals(R, p, bone, at, position, wp, rotation, wo, error)
-    cost += _beside(q, rest, w_rest, before, w_before)
+    forward(q, links, poses)
+    cost = residuals(poses, seen, error)
+    cost += _beside(q, beside)
     damping = 1e-6
     done = 0
     for _ in range(iterations):
         done += 1
         A[:], g[:] = 0.0, 0.0
-        _normal(chain, length, prismatic, line, through, R, p, bone, at, wp, wo, error, A, g)
+        _normal(links, poses, seen, error, A, g)
         for d in range(n):
             A[d, d] += w_rest[d] + w_before[d] + 1e-9
             g[d] += w_rest[d] * (rest[d] - q[d]) + w_before[d] * (before[d] - q[d])
@@ -308,9 +329,9 @@ def fit(
             scale = min(1.0, LARGEST_STEP / max(largest, 1e-300))
             for d in range(n):
                 new[d] = min(max(q[d] + scale * x[d], lower[d]), upper[d])
-            forward(new, parent, first, prismatic, axis, anchor, offset, mount, R, p, line, through)
-            reached = residuals(R, p, bone, at, position, wp, rotation, wo, error)
-            reached += _beside(new, rest, w_rest, before, w_before)
+            forward(new, links, poses)
+            reached = residuals(poses, seen, error)
+            reached += _beside(new, beside)
             if reached <= cost:
                 better = True
                 break
@@ -323,6 +344,6 @@ def fit(
         damping = max(0.1 * damping, 1e-9)
         if largest < enough:
             break
-    forward(q, parent, first, prismatic, axis, anchor, offset, mount, R, p, line, through)
-    residuals(R, p, bone, at, position, wp, rotation, wo, error)
+    forward(q, links, poses)
+    residuals(poses, seen, error)
     return done

@@ -51,6 +51,10 @@ class Pulls:
     wo: Array
     """One over the error of the orientation [1/rad], 0 where it is not seen, shape (m,)."""
 
+    def of_links(self) -> kernel.Seen:
+        """What is seen by links, of which the root is the first, as the compiled loop takes it."""
+        return kernel.Seen(self.bone + 1, self.at, self.position, self.wp, self.rotation, self.wo)
+
     def same(self, other: Pulls) -> bool:
         """Whether the same is seen of the same bones."""
         return (
@@ -97,21 +101,25 @@ class Fitter:
         names = [link.name for link in links]
         joints = description.joints()
         counts = [len(link.joints) for link in links]
-        self._parent = np.array([-1 if link.parent is None else names.index(link.parent) for link in links])
-        self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        self._prismatic = np.array([j.kind is JointKind.PRISMATIC for j in joints], bool)
-        self._axis = np.array([j.axis for j in joints], float)
-        self._anchor = np.array([j.anchor for j in joints], float)
-        self._offset = np.array([link.parent_from_link[:3, 3] for link in links])
-        self._mount = np.array([link.parent_from_link[:3, :3] for link in links])
+        parent = np.array([-1 if link.parent is None else names.index(link.parent) for link in links])
+        first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         chains: list[list[int]] = []
-        for i, up in enumerate(self._parent):
-            own = list(range(self._first[i], self._first[i + 1]))
-            chains.append((chains[up] if up >= 0 else []) + own)
-        self._length = np.array([len(chain) for chain in chains], np.int64)
-        self._chain = np.zeros((len(links), max(map(len, chains))), np.int64)
-        for i, chain in enumerate(chains):
-            self._chain[i, : len(chain)] = chain
+        for i, up in enumerate(parent):
+            chains.append((chains[up] if up >= 0 else []) + list(range(first[i], first[i + 1])))
+        chain = np.zeros((len(links), max(map(len, chains))), np.int64)
+        for i, through in enumerate(chains):
+            chain[i, : len(through)] = through
+        self._links = kernel.Links(
+            parent=parent,
+            first=first,
+            prismatic=np.array([j.kind is JointKind.PRISMATIC for j in joints], bool),
+            axis=np.array([j.axis for j in joints], float),
+            anchor=np.array([j.anchor for j in joints], float),
+            offset=np.array([link.parent_from_link[:3, 3] for link in links]),
+            mount=np.array([link.parent_from_link[:3, :3] for link in links]),
+            chain=chain,
+            length=np.array([len(through) for through in chains], np.int64),
+        )
         self.lower = np.array([-np.inf if j.lower is None else j.lower for j in joints])
         """Of the joints [rad or m], shape (n,)."""
         self.upper = np.array([np.inf if j.upper is None else j.upper for j in joints])
@@ -181,33 +189,30 @@ class Fitter:
         lower, upper = np.maximum(self.lower, near - reach), np.minimum(self.upper, near + reach)
         rest, iterations = self.rest, FIRST_ITERATIONS if before is None else NEXT_ITERATIONS
         for _ in range(1 + AGAIN):
-            kernel.fit(
-                q, lower, upper, rest, self._w_rest, near.copy(), keep,
-                self._parent, self._first, self._prismatic, self._axis, self._anchor, self._offset,
-                self._mount, self._chain, self._length, seen.bone + 1, seen.at, seen.position, seen.wp,
-                seen.rotation, seen.wo, iterations, ENOUGH, error,
-            )  # fmt: skip
+            beside = kernel.Beside(rest, self._w_rest, near.copy(), keep)
+            kernel.fit(q, lower, upper, beside, self._links, seen.of_links(), iterations, ENOUGH, error)
             rest, iterations = q.copy(), AGAIN_ITERATIONS
         return q, error
 
     def bones(self, q: Array) -> tuple[Array, Array]:
         """Root from bone (21, 3, 3) and positions [m] (21, 3), as `skeleton.bone_poses`."""
-        b, n = len(self._parent), len(q)
-        R, p = np.empty((b, 3, 3)), np.empty((b, 3))
-        kernel.forward(
-            q, self._parent, self._first, self._prismatic, self._axis, self._anchor, self._offset,
-            self._mount, R, p, np.empty((n, 3)), np.empty((n, 3)),
-        )  # fmt: skip
-        return R[1:], p[1:]
+        poses = self.poses(q)
+        return poses.R[1:], poses.p[1:]
+
+    def poses(self, q: Array) -> kernel.Poses:
+        """Root from link and joint axes, of the root too."""
+        b, n = len(self._links.parent), len(q)
+        found = kernel.Poses(np.empty((b, 3, 3)), np.empty((b, 3)), np.empty((n, 3)), np.empty((n, 3)))
+        kernel.forward(q, self._links, found)
+        return found
 
     def errors(self, seen: Pulls, q: Array) -> dict[str, tuple[float | None, float | None]]:
         """How far a posture is from what is seen: bone → position [m] and angle [rad].
 
         Of several things seen of a bone the largest; None where no position or no orientation was.
         """
-        R, p = self.bones(q)
         error = np.zeros((len(seen.bone), 6))
-        kernel.residuals(R, p, seen.bone, seen.at, seen.position, seen.wp, seen.rotation, seen.wo, error)
+        kernel.residuals(self.poses(q), seen.of_links(), error)
         largest = np.full((2, len(BONES)), -1.0)
         for side, weight in enumerate((seen.wp, seen.wo)):
             use = weight > 0

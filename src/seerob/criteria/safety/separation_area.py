@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Annotated, Any, ClassVar, NamedTuple, cast
+from typing import Annotated, ClassVar, NamedTuple, Protocol, cast
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -33,6 +33,34 @@ from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.spans import Fall, Falls, Points, Span, rows_of
 from seerob.twin.state import State
 from seerob.twin.states import States
+
+
+class _Separating(Protocol):
+    """What is asked of the criterion of kind separation that is named."""
+
+    @property
+    def between(self) -> tuple[str, str]:
+        """A robot or machine, and a human."""
+
+    def moving(self, model: Model) -> tuple[int, ...]: ...
+    def depends(self, model: Model) -> tuple[str, ...]: ...
+    def one_by_one(self, model: Model) -> str: ...
+    def remembers(self, model: Model) -> bool: ...
+    def bounded_once(self, model: Model) -> bool: ...
+    def basis(self, model: Model) -> Basis: ...
+    def unknown(self, model: Model) -> str: ...
+    def at_worst(self, model: Model) -> _Separating: ...
+    def required(self, model: Model) -> Callable[[State], _OfOne]: ...
+    def required_of_many(self, model: Model) -> Callable[[States], Array]: ...
+    def rises(self, model: Model) -> Callable[[Span], Array] | None: ...
+    def lasts(self, model: Model) -> bool: ...
+    def limit_follows(
+        self, model: Model, points: Points, *, keeps: bool, again: Callable[[], Evaluate]
+    ) -> Follows | None: ...
+
+
+_OfOne = tuple[Array, Array, str]
+"""S_p of each moving part, the most that it may be [m], (n,) each, and why it may be larger."""
 
 
 class SeparationArea(Criterion, frozen=True, kw_only=True):
@@ -62,8 +90,10 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """Names of what must stay outside, and of the robot that the separation is of."""
         return (*self.subjects(), *self._criterion(model).depends(model))
 
-    def _criterion(self, model: Model) -> Any:
-        known = {c.name: c for c in model.workstation.safety if hasattr(c, "required")}
+    def _criterion(self, model: Model) -> _Separating:
+        known: dict[str, _Separating] = {
+            c.name: c for c in model.workstation.safety if hasattr(c, "required")
+        }
         if self.separation not in known:
             raise UnknownName("criterion of kind separation", self.separation, known)
         return known[self.separation]
@@ -81,7 +111,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """Return the function that judges one instant: of who is partly seen, what is seen first."""
         return self._bind(model, self._criterion(model))
 
-    def _bind(self, model: Model, criterion: Any) -> Evaluate:
+    def _bind(self, model: Model, criterion: _Separating) -> Evaluate:
         moving, outside = self._sides(model)
         required = _Required.of(model, criterion)
 
@@ -105,7 +135,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     def one_by_one(self, model: Model) -> str:
         """Say why S_p is; many instants are computed together where S_p is."""
-        return str(self._criterion(model).one_by_one(model))
+        return self._criterion(model).one_by_one(model)
 
     def _shown(self, model: Model, gap: Gap) -> Present:
         drawn: tuple[float, Verdict | None, Callable[[], tuple[Hull, ...]]] | None = None
@@ -148,7 +178,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
-        return bool(self._criterion(model).remembers(model))
+        return self._criterion(model).remembers(model)
 
     def falls(self, model: Model, points: Points) -> Falls | None:
         """Bound the loss of distance between instants; None unless S_p is bounded, too."""
@@ -162,6 +192,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         def falls(span: Span, _: Array | float) -> Fall:
             if apart:
                 return Fall(span.way(outside) + span.way(moving))
+            assert rises is not None
             nearer = span.fast[moving] * span.T + rises(span)
             lost = span.way(outside) + float(nearer.max(initial=0.0))
             return Fall(np.inf, lost) if lasts else Fall(lost)
@@ -170,7 +201,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     def bounded_once(self, model: Model) -> bool:
         """Whether S_p of the separation is."""
-        return bool(self._criterion(model).bounded_once(model))
+        return self._criterion(model).bounded_once(model)
 
     def follows(self, model: Model, points: Points) -> Follows | None:
         """S_p is bounded apart where the largest counts, or where speeds alone do not tell how it changes."""
@@ -178,15 +209,12 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         keeps = criterion.remembers(model)
         if not keeps and criterion.rises(model) is not None:
             return None
-        present = replace(criterion, mode="dynamic")
-        found: Follows | None = criterion.limit_follows(
-            model, points, keeps=keeps, again=lambda: self._bind(model, present)
-        )
-        return found
+        present = cast("_Separating", replace(cast("Criterion", criterion), mode="dynamic"))
+        return criterion.limit_follows(model, points, keeps=keeps, again=lambda: self._bind(model, present))
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
-        found: Basis = self._criterion(model).basis(model)
+        found = self._criterion(model).basis(model)
         gap = model.gap(*self._sides(model))
         return Basis(
             formula="least of distance less S_p over the moving parts of the robot; 0 or less is inside, at "
@@ -204,8 +232,8 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 class _Required(NamedTuple):
     """S_p of each moving part of a robot, by the criterion that is named."""
 
-    now: Callable[[State], Any]
-    largest: Callable[[State], Any] | None
+    now: Callable[[State], _OfOne]
+    largest: Callable[[State], _OfOne] | None
     """With its tolerances at their worst; None where it has none."""
     of_many: Callable[[], Callable[[States], Array]]
     """Binds what says it of N instants."""
@@ -213,7 +241,7 @@ class _Required(NamedTuple):
     """Why S_p may always be larger than what is computed; empty when it may not."""
 
     @classmethod
-    def of(cls, model: Model, criterion: Any) -> _Required:
+    def of(cls, model: Model, criterion: _Separating) -> _Required:
         worst = criterion.at_worst(model)
         largest = None if worst is criterion else worst.required(model)
         of_many = cache(partial(criterion.required_of_many, model))
@@ -256,7 +284,7 @@ def _rooms(model: Model, gap: Gap, required: _Required) -> Compute:
         found = state.distances(gap.query, Per.PAIR)
         S_p, most, more = required.now(state)
         if required.largest is not None:
-            most = np.maximum(most, required.largest(state).most)
+            most = np.maximum(most, required.largest(state)[1])
         unknown = "; ".join(filter(None, (required.unknown_ever, more)))
         room = found.distance.reshape(len(gap.a), len(gap.b)) - S_p[:, None]
         nearest = room.argmin(axis=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import product
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -504,7 +504,7 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     )
 
 
-def _each(ends: Callable[..., Any], courses: Sequence[Course]) -> Course:
+def _each(ends: Callable[..., Array], courses: Sequence[Course]) -> Course:
     """The least or the largest of every term of courses that begin alike, each by itself."""
     terms = ([getattr(course, name) for course in courses] for name in ("S_r", "S_s"))
     S_r, S_s = (np.asarray(ends(term, axis=0)) for term in terms)

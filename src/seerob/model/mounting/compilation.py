@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -132,24 +131,24 @@ class _Compiler:
 
     def run(self) -> Model:
         self.mounting.option(timestep=self.station.engine.timestep, gravity=self.station.engine.gravity)
-        self._try("", self._variables, None)
+        self._try("", self._variables)
         for i, robot in enumerate(self.station.robots):
             if robot.on is None:
-                self._try(f"robots[{i}]", self._robot, robot)
+                self._try(f"robots[{i}]", partial(self._robot, robot))
         for i, human in enumerate(self.station.humans):
-            self._try(f"humans[{i}]", self._human, human)
+            self._try(f"humans[{i}]", partial(self._human, human))
         for i, part in enumerate(self.station.parts):
-            self._try(f"parts[{i}]", self._part, part)
+            self._try(f"parts[{i}]", partial(self._part, part))
         for i, machine in enumerate(self.station.machines):
             if machine.on is None:
-                self._try(f"machines[{i}]", self._machine, machine)
+                self._try(f"machines[{i}]", partial(self._machine, machine))
         if not self.problems:
             self._mount_all()
         if not self.problems:
             for i, area in enumerate(self.station.areas):
-                self._try(f"areas[{i}]", self._area, area)
+                self._try(f"areas[{i}]", partial(self._area, area))
             for i, sensor in enumerate(self.station.sensors):
-                self._try(f"sensors[{i}]", partial(mount_sensor, self.mounting, self.carriers), sensor)
+                self._try(f"sensors[{i}]", partial(mount_sensor, self.mounting, self.carriers, sensor))
         if self.problems:
             raise InputError(self.problems)
         bodies = listed(self.mounting)
@@ -179,9 +178,9 @@ class _Compiler:
         remedy = f"give it a mass greater than 0 and {INERTIA}, or look at what is mounted there"
         return InputError.at(file, key, f"MuJoCo refuses the model: {said}", remedy)
 
-    def _try(self, key: str, build: Callable[[Any], None], table: Any) -> None:
+    def _try(self, key: str, build: Callable[[], None]) -> None:
         try:
-            build(table)
+            build()
         except InputError as error:
             self.problems += [
                 p._replace(
@@ -192,7 +191,7 @@ class _Compiler:
         except UnknownName as error:
             self.problems.append(Problem(self.file, key, str(error)))
 
-    def _variables(self, _: None) -> None:
+    def _variables(self) -> None:
         self.bound = bound(self.station)
         self.mounting.findings += self.bound.findings
         self.mounting.files |= self.bound.files
@@ -309,30 +308,38 @@ class _Compiler:
 
     def _mount_all(self) -> None:
         """Mount what is on something else; what that is may come later in the file."""
-        mounted: tuple[tuple[str, Callable[[Any], None], Any], ...] = (
-            *((f"robots[{i}]", self._robot, robot) for i, robot in enumerate(self.station.robots)),
-            *((f"machines[{i}]", self._machine, machine) for i, machine in enumerate(self.station.machines)),
-        )
-        waiting: list[tuple[str, Callable[[Any], None], Any]] = [
-            *(entry for entry in mounted if entry[2].on is not None),
-            *((f"tools[{i}]", partial(self._mount, "tool"), t) for i, t in enumerate(self.station.tools)),
+        waiting = [
             *(
-                (f"workpieces[{i}]", partial(self._mount, "workpiece"), w)
+                (f"robots[{i}]", robot.on, partial(self._robot, robot))
+                for i, robot in enumerate(self.station.robots)
+                if robot.on is not None
+            ),
+            *(
+                (f"machines[{i}]", machine.on, partial(self._machine, machine))
+                for i, machine in enumerate(self.station.machines)
+                if machine.on is not None
+            ),
+            *(
+                (f"tools[{i}]", t.on, partial(self._mount, "tool", t))
+                for i, t in enumerate(self.station.tools)
+            ),
+            *(
+                (f"workpieces[{i}]", w.on, partial(self._mount, "workpiece", w))
                 for i, w in enumerate(self.station.workpieces)
             ),
         ]
         while waiting:
-            ready = [entry for entry in waiting if self.mounting.has(self._body(entry[2].on))]
+            ready = [entry for entry in waiting if self.mounting.has(self._body(entry[1]))]
             if not ready:
                 known = list(self.carriers)
                 self.problems += [
-                    Problem(self.file, f"{key}.on", str(UnknownName("link or tool", thing.on, known)))
-                    for key, _, thing in waiting
+                    Problem(self.file, f"{key}.on", str(UnknownName("link or tool", on, known)))
+                    for key, on, _ in waiting
                 ]
                 return
             for entry in ready:
                 waiting.remove(entry)
-                self._try(*entry)
+                self._try(entry[0], entry[2])
 
     def _body(self, on: str) -> str:
         """Full name of the body that ``on`` means: a machine's name means what moves of it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import msgspec
@@ -15,8 +16,10 @@ import trimesh
 import seerob as sr
 from kept_run import Kept
 from made_cell import FLOATING, TWO_R, heard, made, two_r
+from seerob.app.console.progress import Announced
 from seerob.core.errors import InputError
 from seerob.core.markers import plain
+from seerob.outputs.sink import Closing
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 from seerob.session.run import Clock, Judge, bind, pump, ticks
@@ -50,6 +53,22 @@ def up_to(ticks):
         return left[0] <= 0
 
     return stop
+
+
+class Noted(Closing):
+    """A writer that notes what it is told in a list of several."""
+
+    def __init__(self, name, told):
+        self.name, self.told = name, told
+
+    def write(self, snapshot, samples):
+        self.told.append((self.name, snapshot.seq))
+
+    def begin(self):
+        self.told.append((self.name, "begin"))
+
+    def close(self):
+        self.told.append((self.name, "close"))
 
 
 def encoded(snapshots):
@@ -353,3 +372,19 @@ def test_a_clock_that_falls_behind_slips_by_what_was_lost():
     before = clock.slipped
     clock.wait(0.011)
     assert clock.slipped == before
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_what_takes_long_begins_when_no_tick_comes_any_more_and_before_any_writer_is_closed(tmp_path, fails):
+    told = []
+
+    def progress(t):
+        if fails:
+            raise ZeroDivisionError
+
+    station = made(tmp_path, FLOATING + TWO_R + MOVED, {"arm.urdf": two_r(), "motion.csv": CSV})
+    writers = [Noted("a", told), Announced(Noted("b", told), "b", lambda text: told.append(text))]
+    with pytest.raises(ZeroDivisionError) if fails else nullcontext():
+        station.run(writers=writers, stop=up_to(1), progress=progress)
+    begins = [] if fails else [("a", "begin"), ("b", "begin")]
+    assert told == [("a", 0), ("b", 0), *begins, "writing b", ("b", "close"), ("a", "close")]

@@ -165,6 +165,29 @@ def test_progress_is_told(tmp_path):
     assert told == [(1, 3), (2, 3), (3, 3)]
 
 
+def test_pictures_that_were_begun_before_the_end_are_those_that_it_draws(tmp_path, source):
+    with Dossier().open(made_run.scene(), made_run.MESHES, made_run.FILES, tmp_path) as writer:
+        for k in range(120):
+            writer.write(made_run.snapshot(k), made_run.samples(k))
+        writer.begin()
+        begun = dict(writer._being_drawn)
+        writer.begin()
+        assert writer._being_drawn == begun
+    pictures = [a["src"] for t, a in Page((tmp_path / "report.html").read_text()).tags if t == "img"]
+    assert pictures == [a["src"] for t, a in Page(source).tags if t == "img"]
+    assert len(pictures) == len(begun) == 2
+    assert all(picture.done() for picture in begun.values())
+
+
+def test_whoever_does_not_want_to_wait_waits_for_no_picture_that_is_not_begun(tmp_path):
+    writer = Dossier().open(made_run.scene(), made_run.MESHES, {}, tmp_path)
+    writer.write(made_run.snapshot(50), ())
+    writer.begin()
+    writer.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
+    assert not list(tmp_path.iterdir())
+    assert all(picture.done() for picture in writer._being_drawn.values())
+
+
 def test_a_mesh_that_cannot_be_read_is_a_finding_not_a_failure(tmp_path):
     meshes = made_run.MESHES | {"b" * 64: b"not a mesh"}
     with Dossier().open(made_run.scene(), meshes, {}, tmp_path) as writer:

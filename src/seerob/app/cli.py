@@ -42,8 +42,8 @@ COMMANDS = (
 """One module each in `seerob.app.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+def parser(asked: str = "") -> argparse.ArgumentParser:
+    """The parser of the whole command line, or of the command that is asked alone where there is one."""
     top = Parser(
         prog="seerob",
         description="Evaluate the safety and ergonomics of a cobotic workstation with a physics-based twin.",
@@ -52,10 +52,12 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"seerob {version('seerob')}")
     commands = top.add_subparsers(dest="command", required=True, metavar="command")
-    for name in COMMANDS:
+    named = {name.replace("_", "-"): name for name in COMMANDS}
+    for command in [asked] if asked in named else named:
+        name = named[command]
         module = import_module(f"seerob.app.commands.{name}")
         sub = commands.add_parser(
-            name.replace("_", "-"),
+            command,
             help=module.HELP,
             description=module.HELP,
             epilog=f"example: {module.EXAMPLE}",
@@ -73,7 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         logging.lastResort.setFormatter(PrintableLines())
     try:
         with interrupts:
-            options = parser().parse_args(arguments)
+            words = sys.argv[1:] if arguments is None else arguments
+            options = parser(*words[:1]).parse_args(words)
             code = int(options.run(options))
             sys.stdout.flush()
         return code

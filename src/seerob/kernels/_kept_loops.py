@@ -21,6 +21,8 @@ FOLDER = Path(__file__).parent
 IMPORTED = re.compile(rb"^from seerob\.kernels\.(\w+) import ", re.MULTILINE)
 BROUGHT = FOLDER / "compiled"
 """What a wheel brings (`scripts/compile-loops`): as trusted as the sources beside it, and never written."""
+_TRIED: set[str] = set()
+"""Folders into which a file was written already, for trial: once, not for each loop."""
 _V2 = "cmov cx8 cx16 fxsr mmx popcnt sahf sse sse2 sse3 sse4.1 sse4.2 ssse3"
 _V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe"
 PROCESSORS = {
@@ -106,6 +108,12 @@ def _keyed(place: Any) -> Any:
         def from_function(cls, function: Any, file: str) -> Any:
             path = Path(file)
             return super().from_function(function, file) if path.parent == FOLDER and path.is_file() else None
+
+        def ensure_cache_path(self) -> None:
+            path = self.get_cache_path()
+            if path not in _TRIED or not os.access(path, os.W_OK):
+                super().ensure_cache_path()
+                _TRIED.add(path)
 
         def get_disambiguator(self) -> str:
             return f"{super().get_disambiguator()}-{self.key()}"

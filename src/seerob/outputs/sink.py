@@ -55,6 +55,14 @@ class KeepsResults(Protocol):
         """Use the log of the run; adding a snapshot that is in it changes nothing."""
 
 
+@runtime_checkable
+class BeginsAtEnd(Protocol):
+    """A writer that has much to do at the end, some of it beside others that are closed before."""
+
+    def begin(self) -> None:
+        """No tick comes any more; `close` does."""
+
+
 class Visited(Protocol):
     """Where it is known who looks on."""
 

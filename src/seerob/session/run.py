@@ -25,7 +25,7 @@ from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model
 from seerob.outputs.notebook import results_html
-from seerob.outputs.sink import KeepsResults, Writer
+from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
 from seerob.session.opening import coarse, signal_timeouts, untimed
 from seerob.session.scene import Looks, invalid_reasons
@@ -360,6 +360,9 @@ def run(
                 break
             if clock is not None:
                 clock.wait(t + model.workstation.engine.tick)
+        for writer in writers:
+            if isinstance(writer, BeginsAtEnd):
+                writer.begin()
     return Summary(
         results=log,
         scene=scene,

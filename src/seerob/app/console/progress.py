@@ -23,7 +23,7 @@ from seerob.core.errors import SeerobError
 from seerob.core.printable import printable
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Snapshot
-from seerob.outputs.sink import AtEnd, KeepsResults, Writer
+from seerob.outputs.sink import AtEnd, BeginsAtEnd, KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
 
 
@@ -130,6 +130,11 @@ class Announced:
         """Use the log of the run; adding a snapshot that is in it changes nothing."""
         if isinstance(self._writer, KeepsResults):
             self._writer.share(log)
+
+    def begin(self) -> None:
+        """No tick comes any more."""
+        if isinstance(self._writer, BeginsAtEnd):
+            self._writer.begin()
 
     def close(self) -> None:
         """Finish files; nothing half-written stays behind."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +13,7 @@ from msgspec import Meta
 from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_file
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Basis, Finding, Result, Scene, Snapshot
+from seerob.core.snapshot import Basis, Finding, Scene, Snapshot
 from seerob.outputs.report.report import ReportSection
 from seerob.outputs.sink import AtEndWithResults, Sink
 from seerob.recording.result_log import result_named
@@ -67,6 +67,8 @@ class DossierWriter(AtEndWithResults):
         """What a command adds to the report, after the criteria."""
         self._scene, self._meshes, self._files, self._pictures = scene, meshes, files, pictures
         self._worst: dict[str, Snapshot] = {}
+        self._pool: ThreadPoolExecutor | None = None
+        self._being_drawn: dict[str, Future[bytes]] = {}
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick."""
@@ -100,7 +102,10 @@ class DossierWriter(AtEndWithResults):
         write_whole(self.path, page(report).encode())
         self._tell(len(pictures) + 1, len(pictures) + 1)
 
-    def _drawn(self) -> dict[str, bytes]:
+    def begin(self) -> None:
+        """Begin to draw; `close` waits for it."""
+        if self._pool is not None:
+            return
         from seerob.outputs.picture.picture import Stage
 
         # A figure without a verdict is worth a picture only when it draws something.
@@ -111,24 +116,32 @@ class DossierWriter(AtEndWithResults):
             if snapshot is None or result is None or not result.markers:
                 continue
             chosen.append((snapshot, result))
-        chosen = chosen[: self._pictures]
-        if not chosen:
-            return {}
-        subjects = {info.name: info.subjects for info in self._scene.criteria}
-        stage = Stage(self._scene, self._meshes)
-        self.findings.extend(stage.findings)
+        self._pool = ThreadPoolExecutor(_AT_ONCE)  # most of a picture is drawn without the interpreter's lock
+        if chosen := chosen[: self._pictures]:
+            subjects = {info.name: info.subjects for info in self._scene.criteria}
+            stage = Stage(self._scene, self._meshes)
+            self.findings.extend(stage.findings)
+            self._being_drawn = {
+                result.name: self._pool.submit(
+                    stage.picture, snapshot, result, subjects=subjects.get(result.name, ())
+                )
+                for snapshot, result in chosen
+            }
 
-        def draw(at: tuple[Snapshot, Result]) -> bytes:
-            return stage.picture(*at, subjects=subjects.get(at[1].name, ()))
+    def abandon(self) -> None:
+        """Draw no picture more."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
 
+    def _drawn(self) -> dict[str, bytes]:
+        self.begin()
         drawn = {}
-        pool = ThreadPoolExecutor(_AT_ONCE)  # most of a picture is drawn without the interpreter's lock
         try:
-            for (_, result), picture in zip(chosen, pool.map(draw, chosen), strict=True):
-                drawn[result.name] = picture
-                self._tell(len(drawn), len(chosen) + 1)
+            for name, picture in self._being_drawn.items():
+                drawn[name] = picture.result()
+                self._tell(len(drawn), len(self._being_drawn) + 1)
         finally:
-            pool.shutdown(cancel_futures=True)
+            self.abandon()
         return drawn
 
     def _bases(self) -> dict[str, Basis]:

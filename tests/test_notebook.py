@@ -9,6 +9,7 @@ from multiprocessing import get_context
 import pytest
 
 import seerob as sr
+from seerob.outputs.sink import Closing
 
 CELL = """
 title = "A <b>cell</b>"
@@ -38,14 +39,22 @@ def verdict_of(station):
     return station.run().verdict, station.run().results["elsewhere"].max()
 
 
+class Seen(Closing):
+    def write(self, snapshot, samples):
+        self.last = snapshot
+
+
 def test_it_is_said_in_a_line(station):
     run = station.run()
     assert repr(station) == "<Station 'A <b>cell</b>': one robot, two criteria>"
     arm = station.model.robot("arm")  # what an author of a criterion looks at first
     of_model = (arm, arm.description, arm.description.links[3], station.model.bodies[0])
     shapes = (station.model.bodies[0].solids[0], *(solid.mesh for solid in station.model.bodies[0].solids))
-    said = (run, run.results, run.results["elsewhere"], station.batch(), station.scene())
-    for what in (station.model, *of_model, *shapes, *said):
+    seen = Seen()
+    station.run(writers=[seen])
+    of_tick = (seen.last, *seen.last.results)
+    said = (run, run.results, run.results["elsewhere"], station.batch(), station.scene(), station.workstation)
+    for what in (station.model, *of_model, *shapes, *of_tick, *said):
         assert len(repr(what)) < 120
         assert "\n" not in repr(what)
     assert "undecided" in repr(run)

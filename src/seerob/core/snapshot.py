@@ -41,7 +41,7 @@ from seerob.core.page_messages import (
     Transport,
 )
 from seerob.core.printable import printable
-from seerob.core.verdict import Verdict
+from seerob.core.verdict import Verdict, worst
 
 __all__ = [
     "PROTOCOL",
@@ -244,6 +244,11 @@ class Result(Struct, frozen=True, kw_only=True, array_like=True):
     nothing: bool = False
     """Whether there is nothing to judge now, and ``reason`` says why: nobody is near."""
 
+    def __repr__(self) -> str:
+        value = "no figure" if self.value is None else f"{self.value:.6g} {self.unit}".rstrip()
+        verdict = "no verdict" if self.verdict is None else self.verdict.value
+        return f"<Result {self.name!r}: {value}, {verdict}>"
+
 
 class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot", omit_defaults=True):
     """The twin and its results at one tick."""
@@ -269,6 +274,11 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot", omit_defaults=
     doubts: dict[str, str] = {}
     """Robots, humans, machines (with all that they move, `Node.mover`) and single nodes that may not be where
     `poses` has them, with the reason."""
+
+    def __repr__(self) -> str:
+        verdict = worst([result.verdict for result in self.results])
+        said = "no verdict" if verdict is None else verdict.value
+        return f"<Snapshot {self.seq} at {self.t:.4f} s: {len(self.results)} results, {said}>"
 
 
 # -- what does not change during a run ----------------------------------------------------------

@@ -76,6 +76,9 @@ class Opened(Struct, frozen=True, kw_only=True):
     """Connects, for what a live source says of itself; only a run and `seerob probe` call it. None where
     there is nothing to ask, or it was asked."""
 
+    def __repr__(self) -> str:
+        return f"<Opened: {self.duration:g} s, {len(self.findings)} findings>"
+
 
 class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of every source: one file, one class, one ``kind``. The fields are its table in the file."""

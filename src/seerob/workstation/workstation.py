@@ -411,6 +411,10 @@ class Workstation(_Table, frozen=True, kw_only=True):
     files: dict[str, bytes] = {}
     """The file itself, and after `compile` every file it names; not written in it."""
 
+    def __repr__(self) -> str:
+        tables = [f"{name} {len(there)}" for name in (*TABLES, *PLUGINS) if (there := getattr(self, name))]
+        return f"<Workstation {self.title!r}: {', '.join(tables) or 'empty'}>"
+
 
 TABLES: dict[str, type[Struct]] = {
     "robots": Robot,

@@ -18,6 +18,7 @@ DEV := $(VENV)/.dev
 NODE := $(VENV)/.node
 PAGE := src/seerob/app/server/page/index.html
 LOOPS := $(VENV)/.loops
+BROUGHT := src/seerob/kernels/compiled
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock audit clean
@@ -85,7 +86,8 @@ imports: $(DEV)
 
 # What the workers of `unit` would all compile at the same time: modules and inner loops.
 compiled: export PYTHONDONTWRITEBYTECODE :=
-compiled: $(DEV)
+compiled: $(DEV) $(LOOPS)/.made
+	mkdir -p $(BROUGHT) && find $(LOOPS) -name '*.nb?' -exec cp -p {} $(BROUGHT) \;
 	said=$$($(BIN)/pytest --collect-only -qq) || { echo "$$said"; exit 1; }
 	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && $(BIN)/seerob new "$$folder/cell" >/dev/null && \
 	{ $(BIN)/seerob assess "$$folder/cell" -o "$$folder/out" >/dev/null || [ $$? -le 2 ]; }
@@ -151,4 +153,4 @@ lock: $(DEV)
 	scripts/lock $(BIN)/python
 
 clean:
-	rm -rf $(VENV) web/node_modules dist src/seerob/app/server/page .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) web/node_modules dist src/seerob/app/server/page $(BROUGHT) .mypy_cache .ruff_cache .pytest_cache

@@ -14,7 +14,7 @@ from seerob.criteria.contact.clamped_regions import Clamping
 from seerob.criteria.contact.clamping import (
     MISSED,
     STILL,
-    OwnJoints,
+    RelativeJoints,
     clamps,
     distances_from,
     getting_in,
@@ -279,7 +279,7 @@ def test_own_parts_open_as_wide_as_any_place_gets_from_the_other_part(tmp_path: 
     assert {*found} == around | {("l1", "arm/base"), ("l2", "arm/base"), ("l0", "arm/l2")}
     assert all(np.isinf(found[gap]) for gap in around)
     index, rng = {body.name: body.index for body in model.bodies}, np.random.default_rng(5)
-    joints = OwnJoints(model)
+    joints = RelativeJoints(model)
     R, x = joints.poses({("arm", k): rng.uniform(*ends, 40) for k, ends in enumerate(FOLDED)})
     for one, other in (("arm/l1", "arm/base"), ("arm/l0", "arm/l2")):
         i, j = index[one], index[other]
@@ -330,7 +330,7 @@ def test_joints_between_bodies_are_those_of_one_way_only_and_poses_are_where_the
     mimic = '<mimic joint="j1" multiplier="2" offset="0.3"/>'
     text = FLOATING + '[[robots]]\nname = "zarm"\nmodel = "arm.urdf"\n' + HAND_OF.format("ahand", "")
     model = made(tmp_path, text.replace("arm/l2", "zarm/l2"), {"arm.urdf": two_r(mimic=mimic)}).model
-    joints, index = OwnJoints(model), {body.name: body.index for body in model.bodies}
+    joints, index = RelativeJoints(model), {body.name: body.index for body in model.bodies}
     turn, grip = ("zarm", 0), ("ahand", 0)
     expected = {
         ("zarm/l1", "zarm/l2"): {turn},
@@ -365,7 +365,7 @@ def test_ends_of_joints_are_those_of_the_file_and_one_side_without_any_goes_some
         "1.1", "1.3"
     )
     model = folded(tmp_path, text)
-    joints = OwnJoints(model)
+    joints = RelativeJoints(model)
     assert [joints.range(("arm", k)) for k in range(3)] == [*FOLDED]
     assert not any(joints.endless(("arm", k)) for k in range(3))
     assert joints.range(("hand", 0)) == (0.0, 0.025)  # of each finger

@@ -14,7 +14,7 @@ from seerob.core.shapes import Mesh, Solid, capsule
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact import joint_gaps
 from seerob.criteria.contact.clamped_regions import Clamping
-from seerob.criteria.contact.clamping import STILL, OwnJoints
+from seerob.criteria.contact.clamping import STILL, RelativeJoints
 from seerob.criteria.contact.joint_gaps import Looks, _Joint, closing, places
 from seerob.session.station import Station, load
 
@@ -110,7 +110,7 @@ def test_an_elbow_that_follows_by_half_a_turn_clamps_wherever_it_folds(
 
 def test_a_turn_with_one_end_goes_round_once_from_there(tmp_path: Path) -> None:
     text = '[[machines]]\nname = "door"\nmass = 5\nturn = { lower = -0.2 }\nshape = { box = [1, 0.1, 1] }\n'
-    joints = OwnJoints(made(tmp_path, FLOATING + text).model)
+    joints = RelativeJoints(made(tmp_path, FLOATING + text).model)
     assert joints.range(("door", 0)) == (-0.2, -0.2 + 2 * math.pi)
     assert not joints.endless(("door", 0))
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from made_postures import made_angles
 
 from seerob.criteria.ergonomics.rula import Profile
-from seerob.criteria.scoring.held_work import Hold, Moves, Watch, WorkDetection, activity, muscle_use
+from seerob.criteria.scoring.held_work import Hold, Moves, WorkDetection, WorkMonitor, activity, muscle_use
 
 RATE = 20.0
 SEEN = 4
@@ -114,18 +114,18 @@ def test_rula_four_per_minute_of_one_joint_is_muscle_use_of_that_side():
             "elbow_flexion": lambda t, n=cycles: [80 + 20 * np.sin(2 * np.pi * n * t / 60), 80 + moving(t)],
             "neck_flexion": moving,
         }
-        rows = watched(Watch(REST, hold=60, count=4), swing, 90)
+        rows = watched(WorkMonitor(REST, hold=60, count=4), swing, 90)
         assert known(rows[-1][1]) == expected
         assert known(rows[-1][2]) == 0
 
 
 def test_rula_needs_every_part_of_the_group_held_and_reba_one():
-    rows = watched(Watch(REST, hold=60, count=4), {"wrist_flexion": moving, "neck_flexion": moving}, 61)
+    rows = watched(WorkMonitor(REST, hold=60, count=4), {"wrist_flexion": moving, "neck_flexion": moving}, 61)
     _, arms, body, static, _ = rows[-1]
     assert known(arms) == [0, 0]
     assert known(body) == 0
     assert known(static) == 1
-    rows = watched(Watch(REST, hold=60, count=4), {}, 61)
+    rows = watched(WorkMonitor(REST, hold=60, count=4), {}, 61)
     assert [known(rows[-1][i]) for i in (1, 2, 3)] == [[1, 1], 1, 1]
     assert [known(rows[59 * SEEN][i]) for i in (1, 2, 3)] == [[0, 0], 0, 0]
 
@@ -133,23 +133,23 @@ def test_rula_needs_every_part_of_the_group_held_and_reba_one():
 def test_the_profiles_differ_in_how_long_is_static():
     assert (Profile.ORIGINAL_1993.static, Profile.WORKSHEET.static) == (60, 600)
     for profile, expected in ((Profile.ORIGINAL_1993, 1), (Profile.WORKSHEET, 0)):
-        rows = watched(Watch(REST, hold=profile.static, count=4), {}, 70)
+        rows = watched(WorkMonitor(REST, hold=profile.static, count=4), {}, 70)
         assert known(rows[-1][2]) == expected
 
 
 def test_what_was_before_the_run_is_not_known():
-    watch = Watch(WorkDetection(), hold=60, count=4)
+    watch = WorkMonitor(WorkDetection(), hold=60, count=4)
     rows = watched(watch, {}, 61)
     assert (int(rows[20][2].low), int(rows[20][2].high)) == (0, 1)
     assert known(rows[-1][2]) == 1
     # Who has moved since was not held before; how often, only a whole minute tells.
-    rows = watched(Watch(WorkDetection(), hold=60, count=4), {"neck_flexion": moving}, 61)
+    rows = watched(WorkMonitor(WorkDetection(), hold=60, count=4), {"neck_flexion": moving}, 61)
     assert int(rows[20][2].high) == 1
     assert known(rows[-1][2]) == 0
 
 
 def test_a_joint_that_is_not_measured_may_be_anything():
-    watch = Watch(REST, hold=60, count=4)
+    watch = WorkMonitor(REST, hold=60, count=4)
     for k in range(70 * SEEN):
         watch.add(k / SEEN, made_angles(neck_flexion=np.nan))
     assert muscle_use(watch)[1] == (0, 1)
@@ -157,13 +157,13 @@ def test_a_joint_that_is_not_measured_may_be_anything():
 
 
 def test_a_silence_forgets_and_an_earlier_instant_begins_anew():
-    watch = Watch(REST, hold=60, count=4)
+    watch = WorkMonitor(REST, hold=60, count=4)
     watched(watch, {}, 61)
     assert known(muscle_use(watch)[1]) == 1
     watch.add(64.0, made_angles())
     assert muscle_use(watch)[1] == (0, 1)
     again = watched(watch, {}, 61)
-    fresh = watched(Watch(REST, hold=60, count=4), {}, 61)
+    fresh = watched(WorkMonitor(REST, hold=60, count=4), {}, 61)
     for one, other in zip(again, fresh, strict=True):
         assert [str(x) for x in one] == [str(x) for x in other]
 
@@ -171,15 +171,19 @@ def test_a_silence_forgets_and_an_earlier_instant_begins_anew():
 def test_nothing_depends_on_what_comes_later():
     rng = np.random.default_rng(1)
     noise = np.cumsum(rng.normal(0, 2, 400))
-    whole = watched(Watch(REST, hold=10, count=4), {"trunk_flexion": lambda t: noise[round(t * SEEN)]}, 80)
-    part = watched(Watch(REST, hold=10, count=4), {"trunk_flexion": lambda t: noise[round(t * SEEN)]}, 40)
+    whole = watched(
+        WorkMonitor(REST, hold=10, count=4), {"trunk_flexion": lambda t: noise[round(t * SEEN)]}, 80
+    )
+    part = watched(
+        WorkMonitor(REST, hold=10, count=4), {"trunk_flexion": lambda t: noise[round(t * SEEN)]}, 40
+    )
     assert [str(row) for row in whole[: len(part)]] == [str(row) for row in part]
 
 
 @pytest.mark.parametrize("unseen", [(0.0, 50.0), (20.0, 50.0)])
 def test_of_a_joint_that_nobody_saw_for_a_while_nothing_is_known_until_it_was_seen_for_a_minute(unseen):
     """Hidden from one instant to another it may have moved as often as it likes, or been held all along."""
-    watch = Watch(REST, hold=60, count=4)
+    watch = WorkMonitor(REST, hold=60, count=4)
     found = {}
     for k in range(120 * SEEN):
         t = k / SEEN
@@ -199,7 +203,7 @@ def test_of_a_joint_that_nobody_saw_for_a_while_nothing_is_known_until_it_was_se
 )
 def test_who_looks_seldom_does_not_know_that_nothing_is_repeated(rate, known_to_be):
     """A wrist that goes to and fro once a second is always at one place to whoever looks once a second."""
-    watch = Watch(REST, hold=60, count=4)
+    watch = WorkMonitor(REST, hold=60, count=4)
     for k in range(round(90 * rate) + 1):
         watch.add(k / rate, made_angles(wrist_flexion=0.0))
     assert watch.part("wrist", 0).repeated == known_to_be
@@ -207,7 +211,7 @@ def test_who_looks_seldom_does_not_know_that_nothing_is_repeated(rate, known_to_
 
 
 def test_one_short_gap_hides_no_more_than_it_can():
-    watch = Watch(REST, hold=60, count=4)
+    watch = WorkMonitor(REST, hold=60, count=4)
     for k in range(90 * SEEN):
         if not 200 < k < 204:
             watch.add(k / SEEN, made_angles())

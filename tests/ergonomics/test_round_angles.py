@@ -11,7 +11,7 @@ from made_postures import PERSON, UNSUPPORTED, posed, random_q
 from seerob.criteria.ergonomics import eaws_posture, owas, reba, rula
 from seerob.criteria.scoring.measured import ArmPolicy
 from seerob.criteria.scoring.spans import ROUNDING, Thresholds, exactly, fallen, published, reached
-from seerob.criteria.scoring.zones import ZoneRow, ZoneWatch, zones_of
+from seerob.criteria.scoring.zones import ZoneMonitor, ZoneRow, zones_of
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 
@@ -85,7 +85,7 @@ def test_no_line_and_no_zone_changes_with_the_way_a_person_faces():
                 own, legs="posture", supported=False, thresholds=eaws_posture.EawsThresholds()
             )
             zones = [
-                tuple(ZoneWatch(rows, from_rest=True).add(0.0, own, 0.0, {}).items())
+                tuple(ZoneMonitor(rows, from_rest=True).add(0.0, own, 0.0, {}).items())
                 for rows in ZONES.values()
             ]
             said.add((lines, *zones))
@@ -129,7 +129,7 @@ def test_where_two_zones_meet_the_higher_score_counts():
     )
     for degrees, score in ((-1, 2), (-1e-8, 0), (0, 0), (19.9, 0), (20 - 1e-8, 1), (20, 1), (21, 1)):
         own = replace(posed(), trunk_flexion=np.radians(degrees))
-        found = ZoneWatch(rows, from_rest=True).add(0.0, own, 0.0, {})
+        found = ZoneMonitor(rows, from_rest=True).add(0.0, own, 0.0, {})
         assert found == {("trunk_flexion", 0): (score, score)}, degrees
 
 

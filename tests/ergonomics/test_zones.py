@@ -8,7 +8,7 @@ from made_postures import PERSON, made_angles, random_q
 
 from seerob.core.errors import InputError
 from seerob.criteria.scoring.spans import published
-from seerob.criteria.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of, zones_of
+from seerob.criteria.scoring.zones import MEASURES, ZoneMonitor, ZoneRow, mistakes, value_of, zones_of
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 
@@ -21,7 +21,7 @@ def row(low=None, high=None, score=1.0, angle="trunk_flexion", **more):
 def scores(rows, signal, duration, *, rate=10, accuracy=0.0, support=None, from_rest=True, angle=None):
     """(least, greatest) of the first angle at each instant; the signal is in degrees."""
     name = angle or rows[0].angle
-    watch = ZoneWatch(rows, from_rest=from_rest)
+    watch = ZoneMonitor(rows, from_rest=from_rest)
     found = []
     for k in range(round(duration * rate) + 1):
         posture = made_angles(**{name: signal(k / rate)})
@@ -57,7 +57,7 @@ def test_either_way_is_of_the_size():
 
 
 def test_a_side_of_its_own():
-    watch = ZoneWatch([row(30, None, 4, "shoulder_elevation", side="left")], from_rest=True)
+    watch = ZoneMonitor([row(30, None, 4, "shoulder_elevation", side="left")], from_rest=True)
     found = watch.add(0.0, made_angles(shoulder_elevation=[50, 50]), 0.0, {})
     assert found == {("shoulder_elevation", 0): (0, 0), ("shoulder_elevation", 1): (4, 4)}
 
@@ -122,7 +122,7 @@ def test_what_lasts_since_the_first_instant_may_have_begun_before():
 
 
 def test_a_silence_forgets():
-    watch = ZoneWatch([row(20, None, 1), row(20, None, 2, hold=4)], from_rest=True)
+    watch = ZoneMonitor([row(20, None, 1), row(20, None, 2, hold=4)], from_rest=True)
     bent = made_angles(trunk_flexion=30)
     for t in (0, 1, 2, 3, 4):
         last = watch.add(t, bent, 0.0, {})
@@ -231,7 +231,7 @@ def test_zones_change_sides_in_a_mirror_and_not_with_heading_and_place(name):
 
     def said(q):
         support = dict.fromkeys(((n, s) for n in MEASURES for s in range(2)), False)
-        watch = ZoneWatch(rows, from_rest=True)
+        watch = ZoneMonitor(rows, from_rest=True)
         posture = angles(*bone_poses(PERSON, q))
         for t in range(6):
             found = watch.add(float(t), posture, 0.0, support)

@@ -21,8 +21,8 @@ from seerob.devices.live.device_clock import (
     SETTLED,
     SLEW,
     STEP,
+    ClockState,
     DeviceClock,
-    Known,
 )
 from seerob.devices.live.listening import Arrivals
 
@@ -582,7 +582,7 @@ def test_clocks_count_to_a_trillion_seconds(device):
 
 def test_what_another_listener_knew_of_a_clock_goes_on():
     """Two seconds late are two seconds late; the time since is that in which clocks drift."""
-    clock = DeviceClock(Known(offset=5.0, device=100.0, host=105.0))
+    clock = DeviceClock(ClockState(offset=5.0, device=100.0, host=105.0))
     assert clock.offset == 5.0
     late = clock.hear(110.0, 117.0)
     assert clock.latency == pytest.approx(2.0 - 12 * 2e-4, abs=1e-9)
@@ -590,7 +590,7 @@ def test_what_another_listener_knew_of_a_clock_goes_on():
     assert DeviceClock().offset is None
     assert DeviceClock().latency == 0.0
     # Whose clock lies far before that has started again; else it comes late.
-    back = [DeviceClock(Known(5.0, 100.0, 105.0)).hear(t, 106.0) for t in (99.7, 90.0)]
+    back = [DeviceClock(ClockState(5.0, 100.0, 105.0)).hear(t, 106.0) for t in (99.7, 90.0)]
     assert [found.t for found in back] == [None, 106.0]
     assert ["seems to have started again" in found.invalid_reason for found in back] == [False, True]
 

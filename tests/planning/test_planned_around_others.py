@@ -13,7 +13,7 @@ from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Snapshot
 from seerob.files.waypoints.reading import read_program
 from seerob.session.planning.clearance import Clearance
-from seerob.session.planning.others import Witness, movers
+from seerob.session.planning.others import PoseRecorder, movers
 from seerob.session.planning.plan import plan
 
 CELL = """
@@ -131,7 +131,7 @@ def test_at_an_instant_others_stand_where_their_source_has_them(cell, model, cap
     assert len(q) > 2
     assert "at the instant that was given" in said
     assert dense(around(model, places={"other": np.array([1.5, 0.2])}), q) >= MARGIN - 1e-6
-    late = Witness(100.0)
+    late = PoseRecorder(100.0)
     late.write(Snapshot(seq=0, t=1.25, poses=b"", joints={"other": (0.0, 0.0)}), ())
     with pytest.raises(InputError, match=r"the motion of the others ends at 1\.25 s, before 100 s"):
         late.require()

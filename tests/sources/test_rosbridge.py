@@ -44,7 +44,7 @@ def sorted_motion(t):
 def _patient(monkeypatch):
     """A busy machine may take its time to answer at start."""
     monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.devices.ros.ASKED", 20.0)
+    monkeypatch.setattr("seerob.devices.ros.LISTEN_AT_START", 20.0)
 
 
 def cell(folder, server, more="", timeout=0.2):

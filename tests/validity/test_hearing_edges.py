@@ -15,7 +15,7 @@ from seerob.twin.validity.hearing import (
     Heard,
     Hearing,
     Places,
-    nobody_says,
+    no_position_reason,
     unobserved_reason,
 )
 
@@ -217,7 +217,7 @@ def test_where_bones_are_left_open_is_the_most_of_both_samples() -> None:
         + [Places(none, none, {"head": 0.5})] * 2
     )
     assert [hearing.unplaced(t) for t in (0.5, 1.5, 2.5)] == [("head", "left_hand"), ("left_hand",), ()]
-    assert hearing.displaced(0.5) == hearing.displaced(1.5) == nobody_says(("left_hand",))
+    assert hearing.displaced(0.5) == hearing.displaced(1.5) == no_position_reason(("left_hand",))
     assert hearing.displaced(2.5) == ""
     assert hearing.slack(0.5) == {"head": 0.2, "left_hand": 0.3}
     assert hearing.slack(1.5) == {"head": 0.5, "left_hand": 0.3}
@@ -225,10 +225,10 @@ def test_where_bones_are_left_open_is_the_most_of_both_samples() -> None:
 
 def test_as_many_bones_are_named_as_one_reads() -> None:
     six, seven = BONES[:6], BONES[:7]
-    assert (unobserved_reason("op", ()), nobody_says(())) == ("", "")
+    assert (unobserved_reason("op", ()), no_position_reason(())) == ("", "")
     assert unobserved_reason("op", six) == "op: no device sees " + ", ".join(six)
     assert unobserved_reason("op", BONES[:8]).endswith(", ".join(six) + " and 2 more")
-    assert nobody_says(six[:1]) == f"no device says where {six[0]} is, only how bones are turned"
-    assert nobody_says(six) == f"no device says where {', '.join(six)} are, only how bones are turned"
-    assert f"{six[-1]} and 1 more are" in nobody_says(seven)
-    assert nobody_says(BONES).startswith("no device says where the person is, only")
+    assert no_position_reason(six[:1]) == f"no device says where {six[0]} is, only how bones are turned"
+    assert no_position_reason(six) == f"no device says where {', '.join(six)} are, only how bones are turned"
+    assert f"{six[-1]} and 1 more are" in no_position_reason(seven)
+    assert no_position_reason(BONES).startswith("no device says where the person is, only")

@@ -23,8 +23,8 @@ from seerob.devices.live.listening import LiveSource
 from seerob.devices.motion_files import PoseFrame, fixed_links
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
-from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Said, Transform
-from seerob.protocols.ros.rosbridge import SILENCE, Heard
+from seerob.protocols.ros.ros_messages import Content, Joints, Plan, RosMessage, Transform
+from seerob.protocols.ros.rosbridge import SILENCE, ReceivedMessage
 from seerob.workstation.source import Opened, Target
 
 STATIC = "/tf_static"
@@ -284,7 +284,7 @@ class PlayedPlan:
         )
 
 
-ASKED = 1.2
+LISTEN_AT_START = 1.2
 """How long the first message is waited for at start [s]."""
 
 
@@ -332,7 +332,7 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
         """Longest pause of the watched topic [s]; commands come when they come."""
         return None if self.content is Content.TRAJECTORY else SILENCE
 
-    def heard(self) -> AsyncGenerator[Heard, None]:
+    def heard(self) -> AsyncGenerator[ReceivedMessage, None]:
         """Connect, and yield the messages of the topics.
 
         Raises:
@@ -366,16 +366,18 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
     async def ask(self) -> tuple[Finding, ...]:
         """Whose motion it is, and what the first message says and leaves out."""
         origin = MotionOrigin.PLANNED if self.content is Content.TRAJECTORY else self.origin
-        first: Said | None = None
+        first: RosMessage | None = None
         try:
-            async with asyncio.timeout(ASKED), aclosing(self.heard()) as messages:
+            async with asyncio.timeout(LISTEN_AT_START), aclosing(self.heard()) as messages:
                 async for heard in messages:
                     if heard.topic == self.topics()[0]:
                         first = heard.said
                         break
         except TimeoutError:
             if self.content is not Content.TRAJECTORY:
-                raise TimeoutError(f"nothing came on {self.topics()[0]} within {ASKED:g} s") from None
+                raise TimeoutError(
+                    f"nothing came on {self.topics()[0]} within {LISTEN_AT_START:g} s"
+                ) from None
         if origin is MotionOrigin.CONTROLLER:
             text = f"motion heard from the robot, as it happens ({self.where()})"
             said = [Finding(level="note", subject=self.robot, text=text)]
@@ -419,7 +421,7 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
         return self.joints or (() if target is None else target.joints)
 
     async def _joint_samples(
-        self, messages: AsyncGenerator[Heard, None], target: Target | None
+        self, messages: AsyncGenerator[ReceivedMessage, None], target: Target | None
     ) -> AsyncGenerator[Sample, None]:
         gather = JointGather(self.robot, self._names(target), self.period())
         last = time.monotonic()
@@ -432,7 +434,7 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
                 raise ProtocolError(f"{heard.topic}: {gather.lacking()}")
 
     async def _poses(
-        self, messages: AsyncGenerator[Heard, None], target: Target | None
+        self, messages: AsyncGenerator[ReceivedMessage, None], target: Target | None
     ) -> AsyncGenerator[Sample, None]:
         tree = FrameTree(self.parent, self.child)
         world_from_parent = np.eye(4) if target is None else self._world_from_parent(target)
@@ -450,12 +452,12 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
                 raise ProtocolError(f"{heard.topic}: {tree.lacking()}")
 
     async def _played(
-        self, messages: AsyncGenerator[Heard, None], target: Target | None
+        self, messages: AsyncGenerator[ReceivedMessage, None], target: Target | None
     ) -> AsyncGenerator[Sample, None]:
         names = self._names(target)
         plan: PlayedPlan | None = None
         begun = 0.0
-        waiting: asyncio.Task[Heard] | None = None
+        waiting: asyncio.Task[ReceivedMessage] | None = None
         try:
             while True:
                 waiting = waiting or asyncio.ensure_future(anext(messages))

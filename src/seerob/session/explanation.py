@@ -42,9 +42,9 @@ NORMAL_95 = 1.959964
 """Quantile of the normal distribution: 95 % lie between ± it."""
 STUDENT_1 = 12.7062
 """That of Student's distribution with one degree of freedom."""
-TOLD = 1e5
+LARGEST_CONDITION = 1e5
 """Condition number above which a direction of the parameters is not told by the motion [scaled columns]."""
-ASKED = 0.05
+UNEXPLAINED_SHARE = 0.05
 """A joint is explained when what is left is at most this share of its torque limit, or of the largest torque
 where nobody knows a limit: about what friction changes by with temperature."""
 PAYLOAD = 0.02, 0.1
@@ -145,7 +145,7 @@ def fit(columns: Array, measured: Array, used: NDArray[np.bool_]) -> Fitted:
     x = np.zeros(p)
     for _ in range(3):
         W = (scaled * weights[:, None]) @ keep
-        # TOLD bounds the condition, so that its square is far from what a float holds.
+        # LARGEST_CONDITION bounds the condition, so that its square is far from what a float holds.
         x = keep @ np.linalg.solve(W.T @ W, W.T @ (weights * b))
         r = b - scaled @ x
         sigma = np.array(
@@ -181,7 +181,7 @@ def _basis(scaled: Array) -> tuple[Array, Array]:
     """Directions of the parameters that the rows tell, shape (p, k); which parameters lie in them wholly."""
     _, s, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r"), full_matrices=True)
     s = np.concatenate([s, np.zeros(vt.shape[0] - len(s))])
-    good = s * TOLD > s[0]
+    good = s * LARGEST_CONDITION > s[0]
     hidden = (vt[~good] ** 2).sum(axis=0)
     return vt[good].T, hidden < 1e-6
 
@@ -420,7 +420,7 @@ def explain(model: Model, name: str, said: ControllerLog) -> Explanation:
     joints, added = [], payload @ found.values[: len(POINTS)]
     for j, joint in enumerate(robot.joints):
         limit = robot.effort_limits[j]
-        asked = ASKED * (float(np.abs(tau[:, j]).max()) if limit is None else limit.value)
+        asked = UNEXPLAINED_SHARE * (float(np.abs(tau[:, j]).max()) if limit is None else limit.value)
         moves = bool(used[:, j].any())
         r = found.residuals[used[:, j], j] if moves else gap[:, j] - added[:, j]
         joints.append(

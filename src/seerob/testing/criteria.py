@@ -39,7 +39,7 @@ SETTLED = 2
 """Tick at which somebody in a posture of their own is asked."""
 MUTE = "seerob.testing/asked"
 
-Said = Callable[[JointSample, int], JointSample | None]
+SampleChange = Callable[[JointSample, int], JointSample | None]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Spoiling:
     """One way in which what is said can be wrong."""
 
     what: str
-    said: Said
+    said: SampleChange
     """What is said instead at a tick; None for nothing."""
     ticks: range
     """In which nothing that depends on it may be within."""
@@ -308,7 +308,7 @@ class _Harness:
     def _run(
         self,
         *,
-        spoil: Mapping[str, Said] | None = None,
+        spoil: Mapping[str, SampleChange] | None = None,
         elsewhere: str = "",
         findings: Sequence[Finding] = (),
         hidden: str = "",

@@ -19,7 +19,7 @@ MAX_KEPT = 4096
 """Pictures kept per source at most."""
 
 
-class Known(NamedTuple):
+class KnownValue(NamedTuple):
     """What is known of a variable at an instant."""
 
     value: Value | None
@@ -71,18 +71,18 @@ class Signals:
             while len(heard) > 1 and heard[1].t <= t:
                 del heard[0]
 
-    def at(self, name: str, t: float) -> Known:
+    def at(self, name: str, t: float) -> KnownValue:
         """What is known of a variable of the dictionary at an instant [s]."""
         source = self.dictionary[name].source
         picture = next((s for s in reversed(self._heard.get(source, ())) if s.t <= t + SLACK), None)
         if picture is None:
-            return Known(None, f"{name}: nothing heard yet")
+            return KnownValue(None, f"{name}: nothing heard yet")
         value = picture.values.get(name)
         age = t - picture.t + picture.ages.get(name, 0.0)
         timeout = self._timeouts[name]
         if age > timeout + SLACK:
-            return Known(value, f"{name}: {source} not heard for {age:.2f} s (time-out {timeout:g} s)")
-        return Known(value, invalid_value_reason(picture, name))
+            return KnownValue(value, f"{name}: {source} not heard for {age:.2f} s (time-out {timeout:g} s)")
+        return KnownValue(value, invalid_value_reason(picture, name))
 
     def value(self, name: str, t: float) -> Value:
         """The value of a variable of the dictionary at an instant [s].

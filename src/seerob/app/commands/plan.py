@@ -81,7 +81,7 @@ def around(
         InputError: Live sources, an instant after the end, or a motion that is not known throughout.
         Stopped: ``stopped`` said so.
     """
-    from seerob.session.planning.others import Witness, alone, made_for, movers, with_sweeps
+    from seerob.session.planning.others import PoseRecorder, alone, made_for, movers, with_sweeps
     from seerob.session.planning.plan import Stopped
     from seerob.session.station import Station
 
@@ -99,7 +99,7 @@ def around(
         what = f"{robot} stands on {carrier}, which moves: where it plans from would move too"
         raise InputError.at("plan", "--others", what, "give an instant [s]")
     bare = Station(alone(station.workstation, robot, who, keep_out), cache=cache_folder(), progress=tell)
-    witness = Witness(instant)
+    witness = PoseRecorder(instant)
     tell("following the others")
     bare.run(writers=[witness], stop=lambda: stopped() or witness.done)
     tell("following the others")

@@ -9,14 +9,14 @@ from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Rate, Ready, RobotOptions, option, port
 from seerob.core.extras import need
-from seerob.protocols.ros.ros_messages import Content, Edition, Joints, Said
+from seerob.protocols.ros.ros_messages import Content, Edition, Joints, RosMessage
 
 JOINT_STATES = "/joint_states"
 EPOCH = 1_700_000_000.0
 """What the robot's clock begins at [s]."""
 LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
-Says = Callable[[float], Said]
+Says = Callable[[float], RosMessage]
 """What is published at a time since the start [s]."""
 
 

@@ -20,7 +20,7 @@ from seerob.app.emulation.options import Ready, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.core.extras import need
 from seerob.protocols.links.tcp_server import stop_accepting
-from seerob.protocols.ros.ros_messages import Edition, Joints, Plan, Said, Transform, encode, ros1_name
+from seerob.protocols.ros.ros_messages import Edition, Joints, Plan, RosMessage, Transform, encode, ros1_name
 from seerob.protocols.ros.rosbridge import MAX_MESSAGE, Compression
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ class RosbridgeServer(RosRobot):
         return cbor2.dumps({"op": "publish", "topic": topic, "msg": message})
 
 
-def document(said: Said, edition: Edition) -> dict[str, object]:
+def document(said: RosMessage, edition: Edition) -> dict[str, object]:
     """A message as rosbridge writes it in JSON: what is not finite is null."""
 
     def span(t: float | None) -> dict[str, int]:

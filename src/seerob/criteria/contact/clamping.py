@@ -193,7 +193,7 @@ def pinch_pairs(
     )  # fmt: skip
 
 
-class OwnJoints:
+class RelativeJoints:
     """Which commanded joints move two bodies of a robot against each other, and poses by where they stand.
 
     Args:
@@ -305,7 +305,7 @@ def robot_pinch_pairs(
     around = [b for b in model.bodies if b.role not in ("human", "area") and b.index not in own]
     surfaces = [b.index for b in around if not b.mover]
     others = [b.index for b in around if b.mover]
-    joints = OwnJoints(model)
+    joints = RelativeJoints(model)
     between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
     # Without ends anything may get between, and what is picked up lies in the hand as it was taken: who is
     # near clamps.
@@ -335,8 +335,8 @@ def robot_pinch_pairs(
     return pairs, opens, placed
 
 
-def _some_poses(joints: OwnJoints, coordinates: Iterable[Coordinate]) -> list[tuple[Array, Array]]:
-    """Poses of all bodies while some joints stand anywhere, a few at a time; see `OwnJoints.poses`."""
+def _some_poses(joints: RelativeJoints, coordinates: Iterable[Coordinate]) -> list[tuple[Array, Array]]:
+    """Poses of all bodies while some joints stand anywhere, a few at a time; see `RelativeJoints.poses`."""
     every = joints.in_order(coordinates)
     low, high = np.array([joints.range(coordinate) for coordinate in every]).T
     at = low + np.random.default_rng(0).random((SAMPLED, len(every))) * (high - low)
@@ -371,7 +371,7 @@ class _Way:
         """No point of a hull is farther from all of its corners than their ball is wide (Jung)."""
 
     def at(self, rotations: Array, positions: Array) -> float:
-        """In some poses of all bodies, as of `OwnJoints.poses`."""
+        """In some poses of all bodies, as of `RelativeJoints.poses`."""
         points = np.einsum("nij,kj->nki", rotations[:, self._one], self._corners)
         points += positions[:, self._one, None] - positions[:, self._other, None]
         points = np.einsum("nki,nij->nkj", points, rotations[:, self._other]).reshape(-1, 3)

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Solid
 from seerob.core.transforms import Array
-from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints, distances_from
+from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, RelativeJoints, distances_from
 from seerob.kernels._kept_loops import key_of
 from seerob.model.model import Mechanism, Model
 from seerob.twin.spans import Span
@@ -230,7 +230,7 @@ class _Joint:
     """Whether it goes round without end."""
 
     @classmethod
-    def of(cls, model: Model, joints: OwnJoints, coordinate: Coordinate) -> _Joint:
+    def of(cls, model: Model, joints: RelativeJoints, coordinate: Coordinate) -> _Joint:
         low, high = joints.range(coordinate)
         mechanism = model.mechanisms[coordinate[0]]
         whole = mechanism.coupling[:, coordinate[1]]
@@ -304,7 +304,7 @@ class JointGaps:
             least: See `closing`.
         """
         row = {body: k for k, body in enumerate(robot.moving)}
-        joints = OwnJoints(model)
+        joints = RelativeJoints(model)
         self._tables: list[_Table] = []
         for a, b, coordinate in pairs:
             rows = tuple(row[i] for i in (a, b) if i in row)

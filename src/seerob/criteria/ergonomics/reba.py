@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from seerob.core.domains import number, whole
 from seerob.core.snapshot import Basis
 from seerob.core.transforms import Array
-from seerob.criteria.scoring.held_work import Watch, activity
+from seerob.criteria.scoring.held_work import WorkMonitor, activity
 from seerob.criteria.scoring.judgement import Method
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, Measured, arm_score, one_foot_up
 from seerob.criteria.scoring.phases import Kilograms, Phase, Sides, Stance, TaskPhase, on_sides
@@ -331,7 +331,7 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
         return 60.0
 
     def components(
-        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
+        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: WorkMonitor | None = None
     ) -> dict[str, Span]:
         """Score the components of postures in a phase: shapes (..., 2) of sided, (...) of central ones."""
         assert isinstance(phase, RebaPhase)

@@ -238,14 +238,14 @@ class Hidden:
         return sum(many for _, many in self._gaps)
 
 
-class Found(NamedTuple):
+class FoundWork(NamedTuple):
     """What is known of one part of the body: 0 or 1, or both when it cannot be known yet."""
 
     static: Span
     repeated: Span
 
 
-class Watch:
+class WorkMonitor:
     """Every part of a body over time.
 
     Args:
@@ -305,12 +305,12 @@ class Watch:
             self._since[key] = t if unseen else self._start
             self._known_before[key] = self._known_before[key] and not unseen
 
-    def part(self, part: str, side: int) -> Found:
+    def part(self, part: str, side: int) -> FoundWork:
         """What is known of a part of the body on a side, 0 right and 1 left."""
         keys = [(name, side if name in SIDED else 0) for name in PARTS[part]]
-        return Found(_every(map(self._static, keys)), _any(map(self._repeated, keys)))
+        return FoundWork(_every(map(self._static, keys)), _any(map(self._repeated, keys)))
 
-    def parts(self, part: str) -> tuple[Found, ...]:
+    def parts(self, part: str) -> tuple[FoundWork, ...]:
         """Of one side after the other; of the body's middle once."""
         sided = PARTS[part][0] in SIDED
         return tuple(self.part(part, side) for side in range(2 if sided else 1))
@@ -336,21 +336,21 @@ class Watch:
         return between(0, 1) if short and not self._known_before[key] else between(0, 0)
 
 
-def muscle_use(watch: Watch) -> tuple[Span, Span]:
+def muscle_use(watch: WorkMonitor) -> tuple[Span, Span]:
     """RULA: of the arms, shape (2,), and of the body. Static when every part is held, or any is repeated."""
     arms = [_mainly([watch.part(part, side) for part in ARMS]) for side in range(2)]
     body = _mainly([found for part in BODY for found in watch.parts(part)])
     return between([a.low for a in arms], [a.high for a in arms]), body
 
 
-def activity(watch: Watch, *, walking: bool) -> tuple[Span, Span]:
+def activity(watch: WorkMonitor, *, walking: bool) -> tuple[Span, Span]:
     """REBA: any part held, and any part repeated, walking apart."""
     found = [each for part in PARTS for each in watch.parts(part)]
     moving = [each for part in PARTS if not (walking and part == "legs") for each in watch.parts(part)]
     return _any(f.static for f in found), _any(f.repeated for f in moving)
 
 
-def _mainly(found: list[Found]) -> Span:
+def _mainly(found: list[FoundWork]) -> Span:
     return _any([_every(f.static for f in found), *(f.repeated for f in found)])
 
 

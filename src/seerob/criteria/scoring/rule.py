@@ -25,7 +25,7 @@ from seerob.criteria.scoring.basis import (
     posture_quality,
     watched,
 )
-from seerob.criteria.scoring.held_work import GAP, Watch, WorkDetection
+from seerob.criteria.scoring.held_work import GAP, WorkDetection, WorkMonitor
 from seerob.criteria.scoring.judgement import Method, score, shown, together
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, JointAccuracy, accuracy_of
 from seerob.criteria.scoring.phases import P, Phase, check_order, phase_at, phases_of, shared_phases
@@ -165,7 +165,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         raise NotImplementedError
 
     def components(
-        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
+        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: WorkMonitor | None = None
     ) -> dict[str, Span]:
         """Component scores of postures in a phase, in the order of the method.
 
@@ -189,7 +189,9 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         """Look up every name in the model once and return the function that computes scores."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), self.PHASE(), self.error()
-        watch = None if self.detect is None else Watch(self.detect, hold=self.static, count=self.REPEATED)
+        watch = (
+            None if self.detect is None else WorkMonitor(self.detect, hold=self.static, count=self.REPEATED)
+        )
         if watch is not None and self.every is not None and self.every > GAP:
             raise InputError.at(
                 self.name,

@@ -15,7 +15,7 @@ from seerob.criteria.scoring.basis import ACCURACY_NOTE, entered, posture_qualit
 from seerob.criteria.scoring.phases import Phase, Sides, on_sides, phase_at, shared_phases
 from seerob.criteria.scoring.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.score_rows import total_row
-from seerob.criteria.scoring.zones import DERIVED, ZoneRow, ZoneTable, ZoneWatch, sided, value_of
+from seerob.criteria.scoring.zones import DERIVED, ZoneMonitor, ZoneRow, ZoneTable, sided, value_of
 from seerob.description.humans.angles import NEEDS, Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.model import provenance
@@ -77,7 +77,7 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         phases = shared_phases(model, self.human, self.phases, SupportPhase.from_task)
         rows, error = self.zones(model).rows, self.error()
         self._refuse_idle(rows)
-        watch = ZoneWatch(rows, from_rest=self.from_rest)
+        watch = ZoneMonitor(rows, from_rest=self.from_rest)
 
         def compute(twin: Twin) -> Figure:
             assert isinstance(twin, State)

@@ -218,7 +218,7 @@ STEP = math.radians(2.5)
 """Errors of an angle that are tried are no further apart [rad], a choice: entries by less are trembling."""
 
 
-class ZoneWatch:
+class ZoneMonitor:
     """The rows of one table over time, for one person.
 
     Args:

@@ -48,7 +48,7 @@ Stopping = Callable[[Onset, float, Sequence[KinematicChain]], Course]
 Bound = tuple[Braking, Callable[[Onset], Course] | None, tuple[Input, ...], InSpan | None]
 
 
-def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
+def other_robot_reason(table: StoppingTable, model: Model, robot: Mechanism) -> str:
     """Why it is not known that a table is of a robot; empty when it is."""
     entry = next(r for r in model.workstation.robots if r.name == robot.name)
     if table.robot == robot.name or entry.model in table.models:

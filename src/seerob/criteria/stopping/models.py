@@ -23,7 +23,7 @@ from seerob.criteria.stopping.by_table import (
     bind_in_span,
     bind_table,
     impossible,
-    not_its_own,
+    other_robot_reason,
 )
 from seerob.criteria.stopping.onset import At as OnsetAt
 from seerob.criteria.stopping.onset import Onset, by_speed
@@ -380,7 +380,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     if stop.rated_payload is not None and table.rated_payload is not None:
         what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
         raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
-    unbounded_reason = not_its_own(table, model, robot) if stop.table_for is None else ""
+    unbounded_reason = other_robot_reason(table, model, robot) if stop.table_for is None else ""
     undecided_reasons = (unbounded_reason, *impossible(table, robot))
 
     def bind(after: Stopping) -> InSpan | None:

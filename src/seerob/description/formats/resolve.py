@@ -27,7 +27,7 @@ def installed_packages() -> tuple[Path, ...]:
 
 
 @dataclass(frozen=True)
-class Found:
+class ResolvedFile:
     """A file that exists."""
 
     path: Path
@@ -56,7 +56,7 @@ class Resolver:
     notes: list[str] = field(default_factory=list)
     """What was done to read it that whoever opens the file wants to know."""
 
-    def find(self, uri: str) -> Found | Problem:
+    def find(self, uri: str) -> ResolvedFile | Problem:
         """The file behind ``package://``, ``model://``, ``file://`` or a path; a problem when there is none.
 
         A name that differs from the reference in upper and lower case only is accepted with a remark.
@@ -86,7 +86,7 @@ class Resolver:
                 remark = (
                     "" if found == candidate else f"{uri}: upper and lower case differ, used {found.name}"
                 )
-                return Found(found, remark)
+                return ResolvedFile(found, remark)
         package = rest.partition("/")[0]
         remedies = ["searched " + ", ".join(map(str, searched))] if searched else []
         if scheme in {"package", "model"}:

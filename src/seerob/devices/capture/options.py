@@ -111,7 +111,7 @@ def lateness(options: Options) -> float:
     return options.latency + group_delay(options.smoothing or 0.0)
 
 
-Known = Mapping[str, names.Convention]
+Conventions = Mapping[str, names.Convention]
 
 
 def person(target: Target | None, human: str, file: str) -> Description:
@@ -130,7 +130,7 @@ def person(target: Target | None, human: str, file: str) -> Description:
 
 
 def observer(
-    options: Options, layout: Layout, description: Description, *, known: Known | None = None, file: str
+    options: Options, layout: Layout, description: Description, *, known: Conventions | None = None, file: str
 ) -> tuple[Observer, tuple[Finding, ...]]:
     """Bind a device's names to the person's bones as the options say.
 

@@ -76,7 +76,7 @@ class Instant(NamedTuple):
     """Why the device's time may not be relied on now; empty when it may."""
 
 
-class Known(NamedTuple):
+class ClockState(NamedTuple):
     """What is known of a device's clock, for whoever listens to it next."""
 
     offset: float
@@ -97,7 +97,7 @@ class DeviceClock:
         latency: How much later than the fastest one of late the newest sample arrived [s].
     """
 
-    def __init__(self, known: Known | None = None) -> None:
+    def __init__(self, known: ClockState | None = None) -> None:
         self._newest = -math.inf
         """Stamp of the newest sample."""
         self._host = 0.0
@@ -114,7 +114,7 @@ class DeviceClock:
         """Nothing was heard since it has connected."""
         self._restarted = -math.inf
         """When it last started again."""
-        self._before: Known | None = None
+        self._before: ClockState | None = None
         """Its clock before that, while it may be the same one."""
         self._otherwise, self._last_otherwise = 0, -math.inf
         """How often it said something else at an instant that was heard, since there was news; when last."""
@@ -265,7 +265,7 @@ class DeviceClock:
         if late < BUFFERED:
             self._before = None
         elif self._before is None or host - self._restarted > RESTART_HOLD:
-            self._before = Known(self._offset, self._newest, self._host)
+            self._before = ClockState(self._offset, self._newest, self._host)
         self._restarted = host
         self._offset = self._applied = math.inf
         self._ahead = None

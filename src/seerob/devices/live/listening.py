@@ -39,7 +39,7 @@ from seerob.core.samples import BodySample, JointSample, Quality, Sample, Signal
 from seerob.core.snapshot import Finding
 from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
-from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
+from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock, Instant
 from seerob.devices.live.held_back import HeldBack
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
@@ -362,7 +362,7 @@ class Listener:
         post: Callable[[Sample], None],
         *,
         again: bool = False,
-        known: Known | None = None,
+        known: ClockState | None = None,
         waits: Callable[[tuple[str, ...]], bool] = lambda _: False,
     ) -> None:
         self._waits = waits

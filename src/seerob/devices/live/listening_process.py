@@ -21,7 +21,7 @@ from typing import BinaryIO
 import msgspec
 
 from seerob.devices.live.listening import Listener, LiveSource, stop
-from seerob.devices.live.source_process import Order, Said, SharedMailbox
+from seerob.devices.live.source_process import Order, ProcessMessage, SharedMailbox
 from seerob.workstation.source import Target
 
 SLICE = 100_000
@@ -72,7 +72,7 @@ class _LogForwarder(logging.Handler):
         self._to, self._lines = to, Lock()
         self._encoder = msgspec.json.Encoder()
 
-    def say(self, said: Said) -> None:
+    def say(self, said: ProcessMessage) -> None:
         """One line.
 
         Raises:
@@ -85,7 +85,11 @@ class _LogForwarder(logging.Handler):
         """Called by the log."""
         try:
             trace = logging.Formatter().formatException(record.exc_info) if record.exc_info else None
-            self.say(Said(logger=record.name, level=record.levelno, text=record.getMessage(), trace=trace))
+            self.say(
+                ProcessMessage(
+                    logger=record.name, level=record.levelno, text=record.getMessage(), trace=trace
+                )
+            )
         except Exception:  # as every handler does: a log is no reason to end
             self.handleError(record)
 
@@ -132,7 +136,7 @@ def main() -> int:
         wake_promptly()
         listener.start()
         with contextlib.suppress(OSError):
-            forwarder.say(Said(ready=True))
+            forwarder.say(ProcessMessage(ready=True))
             sys.stdin.buffer.read(1)
         stop((listener,))
     return 0

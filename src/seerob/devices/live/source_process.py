@@ -34,7 +34,7 @@ import numpy as np
 
 from seerob.core.errors import SeerobError
 from seerob.core.samples import Quality, Sample, SignalSample, key
-from seerob.devices.live.device_clock import Known
+from seerob.devices.live.device_clock import ClockState
 from seerob.devices.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
 
@@ -193,11 +193,11 @@ class Order(NamedTuple):
     """Whether another one listened before."""
     pair: bytes
     """From `pickled_source`."""
-    known: Known | None = None
+    known: ClockState | None = None
     """What the one before knew of the device's clock."""
 
 
-class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class ProcessMessage(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A line from the other process: a record of the log, or that it listens now."""
 
     ready: bool = False
@@ -231,7 +231,7 @@ class SourceProcess:
         self.name = name
         self._pair = pair
         self._box: SharedMailbox | None = None
-        self._known: Known | None = None
+        self._known: ClockState | None = None
         self._begun, self._stopping = Event(), Event()
         self._lock = Lock()
         self._process: subprocess.Popen[bytes] | None = None
@@ -255,7 +255,7 @@ class SourceProcess:
             # What is late has the right instant all the same; after a step nobody knows.
             sure = sample.quality in (Quality.GOOD, Quality.LATE)
             if sure and sample.t_device is not None and not isinstance(sample, SignalSample):
-                self._known = Known(sample.t - sample.t_device, sample.t_device, sample.t)
+                self._known = ClockState(sample.t - sample.t_device, sample.t_device, sample.t)
         return samples
 
     def ask_to_stop(self) -> None:
@@ -335,7 +335,7 @@ class SourceProcess:
                 process.stdin.flush()
 
     def _hear(self, said: IO[bytes]) -> None:
-        decoder = msgspec.json.Decoder(Said)
+        decoder = msgspec.json.Decoder(ProcessMessage)
         while line := said.readline(LONGEST_LINE):
             try:
                 found = decoder.decode(line)
@@ -362,7 +362,7 @@ def _started(file: int) -> subprocess.Popen[bytes]:
     )
 
 
-def _log_again(said: Said) -> None:
+def _log_again(said: ProcessMessage) -> None:
     logger = logging.getLogger(said.logger)
     if logger.isEnabledFor(said.level):
         record = logger.makeRecord(said.logger, said.level, "", 0, "%s", (said.text,), None)

@@ -17,7 +17,7 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.links.websocket_link import Link, linked
 from seerob.protocols.ros import foxglove
 from seerob.protocols.ros.foxglove import Operation, ServerChannel
-from seerob.protocols.ros.rosbridge import NONSENSE, Heard
+from seerob.protocols.ros.rosbridge import NONSENSE, ReceivedMessage
 
 _log = logging.getLogger(__name__)
 
@@ -38,7 +38,7 @@ class Foxglove(RosSource, frozen=True, kw_only=True):
         """The server."""
         return f"foxglove {self.host}:{self.port}"
 
-    async def heard(self) -> AsyncGenerator[Heard, None]:
+    async def heard(self) -> AsyncGenerator[ReceivedMessage, None]:
         """Subscribe to what is offered, and yield what comes."""
         async with linked(
             self.host,
@@ -79,7 +79,7 @@ class Foxglove(RosSource, frozen=True, kw_only=True):
                 nonsense = 0
                 if channel.topic == self.topics()[0]:
                     heard = arrived
-                yield Heard(arrived, channel.topic, said)
+                yield ReceivedMessage(arrived, channel.topic, said)
 
     async def _receive(
         self, link: Link, said: Operation, taken: dict[int, ServerChannel], offered: dict[str, str]

@@ -91,8 +91,10 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
         if len(target.joints) != found.joints:
             what = f"{target.name} has {len(target.joints)} joints, the map {self.map} has {found.joints}"
             raise InputError.at(f"modbus_robot {self.host}", "robot", what, "name another robot or map")
-        at_home = self if not self.map.endswith(SUFFIX) else replace(self, map=str(folder / self.map))
-        opened = LiveSource.open(at_home, folder, target)
+        with_absolute_paths = (
+            self if not self.map.endswith(SUFFIX) else replace(self, map=str(folder / self.map))
+        )
+        opened = LiveSource.open(with_absolute_paths, folder, target)
         about = (Finding(level=level, subject=self.robot, text=text) for level, text in remarks(found))
         return replace(opened, findings=(*opened.findings, *about))
 

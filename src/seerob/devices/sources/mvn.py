@@ -241,7 +241,7 @@ SILENCE = 1.0
 """Without a datagram the connection counts as lost [s]."""
 CONNECT_WITHIN = 5.0
 """How long a TCP connection is waited for before the port is opened anew [s]."""
-ASKED = 0.6
+LISTEN_AT_START = 0.6
 """How long it is listened to at start, after the first datagram [s]."""
 WAITING = 512
 """Datagrams of a TCP connection that wait; after that the sender waits."""
@@ -309,12 +309,12 @@ class Mvn(CaptureStream, frozen=True, kw_only=True):
         said = Frames(unit=self.unit, up=self.up, who=self.name or "mvn")
         first: float | None = None
         samples = 0
-        end = time.monotonic() + ASKED + SILENCE
+        end = time.monotonic() + LISTEN_AT_START + SILENCE
         async with aclosing(self._datagrams()) as heard:
             async for arrived, data in heard:
                 first = arrived if first is None else first
                 samples += said.feed(data, arrived) is not None
-                if arrived - first >= ASKED or arrived >= end:
+                if arrived - first >= LISTEN_AT_START or arrived >= end:
                     break
         return self._remarks(said, samples)
 

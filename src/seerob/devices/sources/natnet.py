@@ -18,9 +18,9 @@ from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.listening import Contact, contact_of
 from seerob.files.motion_capture.upright import Up, world_from_file
 from seerob.protocols.tracking import natnet
-from seerob.protocols.tracking.natnet import Body, BoneModel, Heard, Models, SkeletonModel, frames
+from seerob.protocols.tracking.natnet import Body, BoneModel, Models, ReceivedFrame, SkeletonModel, frames
 
-ASKED = 0.4
+LISTEN_AT_START = 0.4
 """How long frames are listened to at start [s]."""
 
 
@@ -99,7 +99,7 @@ class Natnet(CaptureStream, frozen=True, kw_only=True):
                     yield layout, frame
 
     def _people(
-        self, heard: Heard, layouts: dict[int, tuple[Layout, SkeletonModel]], rigid: Layout
+        self, heard: ReceivedFrame, layouts: dict[int, tuple[Layout, SkeletonModel]], rigid: Layout
     ) -> list[tuple[Layout, CaptureFrame]]:
         world = world_from_file(self.up or Up.Y)
         if self.tracked is Tracked.RIGID_BODIES:
@@ -126,11 +126,11 @@ class Natnet(CaptureStream, frozen=True, kw_only=True):
 
     async def ask(self) -> tuple[Finding, ...]:
         """Which version, which people and bodies."""
-        newest: Heard | None = None
+        newest: ReceivedFrame | None = None
         until = None
         async with aclosing(self._heard()) as stream:
             async for newest in stream:
-                until = newest.arrived + ASKED if until is None else until
+                until = newest.arrived + LISTEN_AT_START if until is None else until
                 if time.monotonic() >= until:
                     break
         if newest is None:
@@ -140,7 +140,7 @@ class Natnet(CaptureStream, frozen=True, kw_only=True):
             for level, text in self._remarks(newest)
         )
 
-    def _remarks(self, heard: Heard) -> list[tuple[str, str]]:
+    def _remarks(self, heard: ReceivedFrame) -> list[tuple[str, str]]:
         server, models = heard.server, heard.models
         version = ".".join(map(str, server.natnet[:2]))
         said = [
@@ -164,7 +164,7 @@ class Natnet(CaptureStream, frozen=True, kw_only=True):
             said.append(("warning", text))
         return said
 
-    def _heard(self) -> AsyncGenerator[Heard, None]:
+    def _heard(self) -> AsyncGenerator[ReceivedFrame, None]:
         return frames(
             self.host,
             bind=self.bind,

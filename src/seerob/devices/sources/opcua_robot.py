@@ -18,11 +18,11 @@ from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.listening import LiveSource
-from seerob.devices.variables.access import at_home, missing
+from seerob.devices.variables.access import missing, with_absolute_paths
 from seerob.devices.variables.live_source import PULSES
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
-from seerob.protocols.plc.opcua_client import Changes, Said, Security, Way, connect
+from seerob.protocols.plc.opcua_client import Changes, NodeValue, Security, Way, connect
 from seerob.protocols.plc.opcua_robotics import MODES, Robot, robots
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables import unit
@@ -99,7 +99,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             raise InputError.at(where, "axes", what, "name one per joint")
         if self.position_unit is not None and unit(self.position_unit) is None:
             raise InputError.at(where, "position_unit", f"unknown unit {self.position_unit!r}", 'write "deg"')
-        return LiveSource.open(at_home(self, folder), folder, target)
+        return LiveSource.open(with_absolute_paths(self, folder), folder, target)
 
     async def ask(self) -> tuple[Finding, ...]:
         """What the server says of the robot; whether its axes can be bound."""
@@ -147,7 +147,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             changes = Changes()
             if refused := await changes.watch(client, nodes, self.interval):
                 raise ProtocolError(f"the server refuses to watch {', '.join(refused)}")
-            newest: dict[str, Said] = {}
+            newest: dict[str, NodeValue] = {}
             signals: dict[str, float | bool | str] = {}
             due = 0.0
             within, last = min(self.timeout / PULSES, SIGNAL_PERIOD), -math.inf
@@ -228,7 +228,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
 
 
 def joint_sample(
-    newest: dict[str, Said],
+    newest: dict[str, NodeValue],
     positions: tuple[float, ...],
     speeds: tuple[float, ...] | None,
     *,
@@ -268,7 +268,7 @@ def joint_sample(
     )
 
 
-def _states(newest: dict[str, Said]) -> dict[str, float | bool | str]:
+def _states(newest: dict[str, NodeValue]) -> dict[str, float | bool | str]:
     found: dict[str, float | bool | str] = {}
     for key in ("emergency_stop", "protective_stop"):
         if key in newest and isinstance(newest[key].value, bool):
@@ -281,7 +281,7 @@ def _states(newest: dict[str, Said]) -> dict[str, float | bool | str]:
     return found
 
 
-def _mass(robot: Robot, newest: dict[str, Said]) -> float | None:
+def _mass(robot: Robot, newest: dict[str, NodeValue]) -> float | None:
     """What the controller has at the flange [kg]; None where it does not say, or doubts it."""
     said = newest.get(LOAD)
     if robot.mass is None or said is None or said.invalid_reason or not isinstance(said.value, int | float):
@@ -289,7 +289,7 @@ def _mass(robot: Robot, newest: dict[str, Said]) -> float | None:
     return robot.mass[1] * float(said.value)
 
 
-def _load(robot: Robot, newest: dict[str, Said]) -> dict[str, float | bool | str]:
+def _load(robot: Robot, newest: dict[str, NodeValue]) -> dict[str, float | bool | str]:
     mass = _mass(robot, newest)
     load = {key: value for key, value in robot.load.items() if key != "mass"}
     return {

@@ -24,7 +24,7 @@ from seerob.protocols.tracking.rokoko import LAYOUT, PORT, Scene, decode
 
 SILENCE = 1.0
 """Without a datagram the connection counts as lost [s]."""
-ASKED = 0.6
+LISTEN_AT_START = 0.6
 """How long it is listened to at start [s]."""
 
 
@@ -70,9 +70,9 @@ class Rokoko(CaptureStream, frozen=True, kw_only=True):
     async def ask(self) -> tuple[Finding, ...]:
         """Which version, and who is in the stream."""
         heard: list[Scene] = []
-        end = time.monotonic() + ASKED
+        end = time.monotonic() + LISTEN_AT_START
         try:
-            async with asyncio.timeout(ASKED + SILENCE), aclosing(self._scenes()) as scenes:
+            async with asyncio.timeout(LISTEN_AT_START + SILENCE), aclosing(self._scenes()) as scenes:
                 async for _, scene in scenes:
                     heard.append(scene)
                     if time.monotonic() > end:

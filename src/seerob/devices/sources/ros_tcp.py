@@ -26,7 +26,7 @@ from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import Edition, decode, ros1_name, same_type, store
 from seerob.protocols.ros.ros_tcp import Frame, Splitter
-from seerob.protocols.ros.rosbridge import NONSENSE, Heard
+from seerob.protocols.ros.rosbridge import NONSENSE, ReceivedMessage
 from seerob.workstation.source import Opened, Target
 
 _log = logging.getLogger(__name__)
@@ -86,7 +86,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
             remedy = "a client needs the endpoint's address, an endpoint has bind instead"
             raise InputError.at("ros_tcp", "host", what, remedy)
 
-    async def heard(self) -> AsyncGenerator[Heard, None]:
+    async def heard(self) -> AsyncGenerator[ReceivedMessage, None]:
         """Connect or wait for Unity, and yield what comes."""
         self._check()
         if self.side is Side.ENDPOINT:
@@ -133,7 +133,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
 
     async def _decoded(
         self, frames: AsyncGenerator[tuple[float, Frame], None], edition: Edition
-    ) -> AsyncGenerator[Heard, None]:
+    ) -> AsyncGenerator[ReceivedMessage, None]:
         last, nonsense = time.monotonic(), 0
         silence = self.silence()
         async for arrived, frame in frames:
@@ -150,7 +150,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
                 nonsense = 0
                 if frame.destination == self.topics()[0]:
                     last = arrived
-                yield Heard(arrived, frame.destination, said)
+                yield ReceivedMessage(arrived, frame.destination, said)
             if silence is not None and arrived - last > silence:
                 raise TimeoutError(f"connected, but nothing on {self.topics()[0]} for {silence:g} s")
 

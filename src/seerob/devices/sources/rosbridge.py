@@ -15,7 +15,7 @@ from seerob.devices.ros import RosSource
 from seerob.protocols.links.websocket_link import linked
 from seerob.protocols.ros import rosbridge
 from seerob.protocols.ros.ros_messages import Edition, ros1_name
-from seerob.protocols.ros.rosbridge import Compression, Heard, hear
+from seerob.protocols.ros.rosbridge import Compression, ReceivedMessage, hear
 
 
 class Rosbridge(RosSource, frozen=True, kw_only=True):
@@ -38,7 +38,7 @@ class Rosbridge(RosSource, frozen=True, kw_only=True):
         """The server."""
         return f"rosbridge {self.host}:{self.port}"
 
-    async def heard(self) -> AsyncGenerator[Heard, None]:
+    async def heard(self) -> AsyncGenerator[ReceivedMessage, None]:
         """Subscribe, and yield what is published."""
         name = self.content.message_type
         largest = 2 * rosbridge.MAX_MESSAGE

@@ -34,7 +34,7 @@ would make a calibration void."""
 CONNECT_WITHIN = 2.0
 SILENCE = 1.0
 """Without a pose the connection counts as lost [s]."""
-ASKED = 0.5
+LISTEN_AT_START = 0.5
 """How long it is listened to at start [s]."""
 
 Key = tuple[str, int]
@@ -122,9 +122,9 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
     async def ask(self) -> tuple[Finding, ...]:
         """Which trackers and sensors there are."""
         found: set[Key] = set()
-        end = time.monotonic() + ASKED
+        end = time.monotonic() + LISTEN_AT_START
         try:
-            async with asyncio.timeout(ASKED + CONNECT_WITHIN), aclosing(self._poses()) as poses:
+            async with asyncio.timeout(LISTEN_AT_START + CONNECT_WITHIN), aclosing(self._poses()) as poses:
                 async for arrived, pose in poses:
                     found.add((pose.tracker, pose.sensor))
                     if arrived > end:

@@ -61,7 +61,7 @@ def missing(where: str, source: Any, folder: Path) -> list[Problem]:
     return [*problems, *missing_access(source, folder, where=where, server=server(source), files=FILES)]
 
 
-def at_home(source: Any, folder: Path) -> Any:
+def with_absolute_paths(source: Any, folder: Path) -> Any:
     """The source with paths that do not depend on where the process stands."""
     named = {key: getattr(source, key) for key in FILES}
     return replace(source, **{key: str(folder / name) for key, name in named.items() if name is not None})

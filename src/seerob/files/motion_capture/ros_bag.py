@@ -31,7 +31,7 @@ from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture.frame_arrays import check_size
 from seerob.files.motion_capture.kinect_recording import ROWS, Reading, recording
 from seerob.protocols import ProtocolError
-from seerob.protocols.ros.ros_messages import MAX_BYTES, Content, Edition, Said, decode, same_type
+from seerob.protocols.ros.ros_messages import MAX_BYTES, Content, Edition, RosMessage, decode, same_type
 from seerob.protocols.tracking.kinect import JOINTS, MAX_BODIES, Body, Picture, camera_body
 
 MOST_MESSAGES = 5_000_000
@@ -52,7 +52,7 @@ class Recorded(NamedTuple):
     topic: str
     received: float
     """When it was recorded [s]."""
-    said: Said
+    said: RosMessage
 
 
 def topics_of(path: Path, file: str) -> dict[str, str]:

@@ -283,7 +283,7 @@ def server(way: Way) -> Server:
     return server_of(way.url, encrypted=way.security is not Security.NONE)
 
 
-class Said(NamedTuple):
+class NodeValue(NamedTuple):
     """What a server says of one node."""
 
     value: Any
@@ -477,7 +477,7 @@ class Changes:
     """Changes of nodes as they come: of each node only the newest waits."""
 
     def __init__(self) -> None:
-        self._waiting: dict[str, Said] = {}
+        self._waiting: dict[str, NodeValue] = {}
         self._names: dict[Any, list[str]] = {}
         self._arrived = asyncio.Event()
         self.revised: float | None = None
@@ -520,7 +520,7 @@ class Changes:
 
     async def heard(
         self, client: Client, pulse: float = BEAT
-    ) -> AsyncGenerator[tuple[dict[str, Said], float], None]:
+    ) -> AsyncGenerator[tuple[dict[str, NodeValue], float], None]:
         """What has changed, if anything, and until when the server has said everything that it had to say.
 
         The server is asked again and again whether it is there. Its answer comes after what it said before
@@ -576,13 +576,13 @@ class Changes:
             self._arrived.set()
 
 
-def said(value: Any) -> Said:
+def said(value: Any) -> NodeValue:
     """What a data value says."""
     status = value.StatusCode
     invalid_reason = "" if status is None or status.is_good() else f"the server says {status.name}"
     stamp = _seconds(value.SourceTimestamp)
     # Of two clocks that differ nothing is known; what lies ahead is as new as can be.
-    return Said(
+    return NodeValue(
         value.Value.Value, invalid_reason, 0.0 if stamp is None else max(0.0, time.time() - stamp), stamp
     )
 

@@ -23,7 +23,7 @@ from seerob.protocols.ros.ros_messages import (
     Content,
     Edition,
     Joints,
-    Said,
+    RosMessage,
     Transform,
     read,
     same_type,
@@ -178,7 +178,7 @@ def message(data: bytes) -> Message | None:
     return Message(subscription, nanoseconds * 1e-9, data[_HEAD.size :])
 
 
-def decode(content: Content, channel: ServerChannel, payload: bytes) -> Said:
+def decode(content: Content, channel: ServerChannel, payload: bytes) -> RosMessage:
     """What a message says.
 
     Raises:
@@ -200,7 +200,7 @@ def decode(content: Content, channel: ServerChannel, payload: bytes) -> Said:
 # -- Foxglove's own schemas ---------------------------------------------------------------------
 
 
-def _own_json(content: Content, said: object) -> Said:
+def _own_json(content: Content, said: object) -> RosMessage:
     """By putting it as ROS would."""
     if not isinstance(said, dict):
         raise ProtocolError("a message that is no table")

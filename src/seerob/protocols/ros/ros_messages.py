@@ -108,7 +108,7 @@ class Plan:
     points: tuple[Point, ...]
 
 
-Said = Joints | tuple[Transform, ...] | Plan
+RosMessage = Joints | tuple[Transform, ...] | Plan
 
 
 def ros1_name(message_type: str) -> str:
@@ -121,7 +121,7 @@ def same_type(one: str, other: str) -> bool:
     return ros1_name(one) == ros1_name(other)
 
 
-def read(content: Content, message: Any) -> Said:
+def read(content: Content, message: Any) -> RosMessage:
     """What a message says.
 
     Args:
@@ -279,7 +279,7 @@ def store(edition: Edition) -> Any:
     return found
 
 
-def decode(content: Content, raw: bytes, edition: Edition) -> Said:
+def decode(content: Content, raw: bytes, edition: Edition) -> RosMessage:
     """What a serialised message says.
 
     Args:
@@ -302,7 +302,7 @@ def decode(content: Content, raw: bytes, edition: Edition) -> Said:
     return read(content, message)
 
 
-def encode(content: Content, message: Said, edition: Edition) -> bytes:
+def encode(content: Content, message: RosMessage, edition: Edition) -> bytes:
     """A serialised message, as a robot would send it.
 
     Args:
@@ -315,7 +315,7 @@ def encode(content: Content, message: Said, edition: Edition) -> bytes:
     return bytes(pack(_made(content, message, edition), content.message_type))
 
 
-def _made(content: Content, said: Said, edition: Edition) -> Any:
+def _made(content: Content, said: RosMessage, edition: Edition) -> Any:
     import numpy as np
 
     def made(name: str, /, **fields: Any) -> Any:

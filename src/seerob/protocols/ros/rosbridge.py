@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from seerob.core.extras import need
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.websocket_link import Link
-from seerob.protocols.ros.ros_messages import Content, Edition, Said, read, store
+from seerob.protocols.ros.ros_messages import Content, Edition, RosMessage, read, store
 from seerob.protocols.ros.ros_messages import decode as deserialise
 
 PORT = 9090
@@ -188,7 +188,7 @@ def _operation(frame: dict[object, object]) -> Operation | None:
     return None
 
 
-def message(content: Content, published: Published, edition: Edition) -> Said:
+def message(content: Content, published: Published, edition: Edition) -> RosMessage:
     """What a published message says.
 
     Args:
@@ -245,13 +245,13 @@ NONSENSE = 50
 """Messages in a row that cannot be read before the connection is given up."""
 
 
-class Heard(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """One message."""
 
     arrived: float
     """Host's monotonic time [s]."""
     topic: str
-    said: Said
+    said: RosMessage
 
 
 async def hear(
@@ -264,7 +264,7 @@ async def hear(
     edition: Edition,
     type_name: str = "",
     silence: float | None = SILENCE,
-) -> AsyncGenerator[Heard, None]:
+) -> AsyncGenerator[ReceivedMessage, None]:
     """What is published on topics of one type.
 
     A compression that brings nothing is given up once for JSON: servers of ROS 1 fail at CBOR without a word.
@@ -331,7 +331,7 @@ async def hear(
         nonsense = 0
         if frame.topic == topics[0]:
             heard = arrived
-        yield Heard(arrived, frame.topic, said)
+        yield ReceivedMessage(arrived, frame.topic, said)
 
 
 class _Refused(ProtocolError):

@@ -452,7 +452,7 @@ KEEP_ALIVE = 0.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Heard:
+class ReceivedFrame:
     """A frame, and what its numbers mean."""
 
     arrived: float
@@ -492,7 +492,7 @@ class Session:
             self._kept = now
             self._port.send(message(Message.KEEP_ALIVE), self._server)
 
-    def take(self, datagram: Datagram) -> Heard | None:
+    def take(self, datagram: Datagram) -> ReceivedFrame | None:
         """What a datagram says; None when it is no frame, or not understood yet.
 
         Raises:
@@ -508,7 +508,7 @@ class Session:
         self._nonsense = 0
         return found
 
-    def _take(self, datagram: Datagram) -> Heard | None:
+    def _take(self, datagram: Datagram) -> ReceivedFrame | None:
         kind, payload = split(datagram.data)
         if kind == Message.SERVER_INFO:
             self.info = server_info(payload)
@@ -528,7 +528,7 @@ class Session:
             self._stale = self._stale or heard.models_changed
             self._stale |= not all(s.id in known[0] for s in heard.skeletons)
             self._stale |= not all(b.id in known[1] for b in heard.bodies)
-            return Heard(datagram.arrived, heard, self.models, self.info)
+            return ReceivedFrame(datagram.arrived, heard, self.models, self.info)
         return None
 
 
@@ -539,7 +539,7 @@ async def frames(
     command_port: int = COMMAND_PORT,
     data_port: int = DATA_PORT,
     group: str | None = GROUP,
-) -> AsyncGenerator[Heard, None]:
+) -> AsyncGenerator[ReceivedFrame, None]:
     """Frames of a server.
 
     Args:

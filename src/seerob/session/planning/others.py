@@ -70,7 +70,7 @@ def made_for(who: Collection[str]) -> list[str]:
     return [f"{SWEEPS}{name}" for name in who]
 
 
-class Witness(Closing):
+class PoseRecorder(Closing):
     """A writer that keeps where everybody is at the first tick from an instant on, and who was not known.
 
     Args:

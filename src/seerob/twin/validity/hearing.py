@@ -284,7 +284,7 @@ class Hearing:
     def displaced(self, t: float) -> str:
         """Why nobody may rely any more on where bones are that were placed before; empty when all may."""
         found = {bone for said in self._said_of_bones(t) for bone in said.places.displaced}
-        return nobody_says(tuple(bone for bone in BONES if bone in found)) if found else ""
+        return no_position_reason(tuple(bone for bone in BONES if bone in found)) if found else ""
 
     def slack(self, t: float) -> dict[str, float]:
         """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m]."""
@@ -314,7 +314,7 @@ class Hearing:
         return self.bones_heard[max(k - 1, 0) : k + 1]
 
 
-def nobody_says(bones: Sequence[str]) -> str:
+def no_position_reason(bones: Sequence[str]) -> str:
     """Why nothing rests on where bones are of which only the directions are known; empty for none."""
     shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
     which = "the person is" if len(bones) == len(BONES) else f"{shown} {'is' if len(bones) == 1 else 'are'}"

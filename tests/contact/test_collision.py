@@ -120,6 +120,14 @@ def test_least_speed_governs_and_an_equal_energy_is_called_force() -> None:
 def test_an_energy_that_is_the_forces_own_is_called_force_within_rounding() -> None:
     assert c.permissible_speed(1.0, 2.0, 1.0 - 1e-14)[1] == c.Governing.FORCE
     assert c.permissible_speed(1.0, 2.0, 1.0 - 1e-9)[1] == c.Governing.ENERGY
+    # At the last one that is rounding the force's own figure is said.
+    least, which = c.permissible_speed(1.0, 2.0, 1.0 - 1e-12)
+    assert (float(least), which) == (1.0, c.Governing.FORCE)
+
+
+def test_a_force_that_cannot_be_is_refused_in_newtons() -> None:
+    with pytest.raises(ValueError, match="F is -1 N"):
+        c.spring_energy(-1.0, 75e3)
 
 
 def test_heavier_robots_and_stiffer_bodies_are_never_permitted_more() -> None:

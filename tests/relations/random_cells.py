@@ -90,6 +90,16 @@ class Machine:
 
 
 @dataclass(frozen=True)
+class Gripper:
+    """Two fingers at the end of the arm that open and close, as a file of their opening says."""
+
+    mass: float
+    """Of a finger [kg]."""
+    frequency: float
+    phase: float
+
+
+@dataclass(frozen=True)
 class Cell:
     links: tuple[Link, ...]
     """Of a random arm; empty for one of the library."""
@@ -138,6 +148,11 @@ class Cell:
     live: bool = False
     """Whether the arm is heard from a live source instead of a log."""
     machine: Machine | None = None
+    gripper: Gripper | None = None
+    brakes: tuple[float, ...] = ()
+    """How hard joints brake by a table of the maker [rad/s²]; empty for a stopping time."""
+    tilt: float = 0.0
+    """Angle about x by which everything is turned, gravity too [rad]."""
     more: str = ""
     """More tables."""
     every: float | None = None
@@ -220,6 +235,10 @@ def more_of(rng: np.random.Generator, cell: Cell) -> dict[str, object]:
         found["frequency"] = cell.frequency * 10 ** rng.uniform(-2, 0)
     if rng.random() < 0.1:
         found["frequency"] = cell.frequency * 10 ** rng.uniform(-5, -3)  # below 1 mm/s
+    if rng.random() < 0.3:
+        found["gripper"] = Gripper(*(float(x) for x in rng.uniform([0.05, 1.0, -np.pi], [0.5, 8.0, np.pi])))
+    if rng.random() < 0.3 and all(link.kind == "revolute" for link in cell.links):
+        found["brakes"] = tuple(rng.uniform(4, 40, len(cell.amplitude)).tolist())
     return found
 
 
@@ -259,11 +278,29 @@ def _xyz(values) -> str:
 def _place(cell: Cell, x: float, y: float, z: float, yaw: float) -> str:
     wx, wy, turn = cell.world
     c, s = np.cos(turn), np.sin(turn)
-    position, yaw = [wx + c * x - s * y, wy + s * x + c * y, z], yaw + turn
+    position, rpy = np.array([wx + c * x - s * y, wy + s * x + c * y, z]), np.array([0.0, 0.0, yaw + turn])
+    if cell.tilt:
+        tilted = _about_x(cell.tilt)
+        position, rpy = tilted @ position, _rpy(tilted @ _about_z(yaw + turn))
     if cell.units:
-        mm = [1000 * v for v in position]
-        return f"{{ position_mm = {[float(v) for v in mm]}, rpy_deg = [0, 0, {float(np.degrees(yaw))!r}] }}"
-    return f"{{ position = {[float(v) for v in position]}, rpy = [0, 0, {float(yaw)!r}] }}"
+        return f"{{ position_mm = {(1000 * position).tolist()}, rpy_deg = {np.degrees(rpy).tolist()} }}"
+    return f"{{ position = {position.tolist()}, rpy = {rpy.tolist()} }}"
+
+
+def _about_x(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def _about_z(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def _rpy(R: np.ndarray) -> np.ndarray:
+    return np.array(
+        [np.arctan2(R[2, 1], R[2, 2]), np.arcsin(np.clip(-R[2, 0], -1, 1)), np.arctan2(R[1, 0], R[0, 0])]
+    )
 
 
 def _length(cell: Cell, key: str, value: float) -> str:
@@ -391,6 +428,37 @@ def machine_files(cell: Cell, machine: Machine) -> dict[str, str]:
     return found
 
 
+def gripper_file(cell: Cell, gripper: Gripper) -> str:
+    """The log of how far each finger is from the middle, as far as the arm's goes."""
+    rows = ["t [s],j0 [m]"]
+    for k in range(round(cell.duration * cell.rate) + 1):
+        t = k / cell.rate
+        if not (cell.gap and cell.gap[0] < t < cell.gap[1]):
+            side = 0.025 + 0.02 * np.sin(gripper.frequency * t + gripper.phase)
+            rows.append(f"{t + cell.start!r},{float(side)!r}")
+    return "\n".join(rows) + "\n"
+
+
+def stop_of(cell: Cell) -> str:
+    """How the arm stops: within a time, or joint by joint as a table says."""
+    if not cell.brakes:
+        carried = cell.machine is not None and cell.machine.carries
+        return f"reaction = 0.1, stopping = 0.2{', acceleration = 2.0' * carried}"
+    full, shares = 12.0, np.arange(0.1, 1.01, 0.1)
+
+    def grid(values: np.ndarray) -> str:
+        return str([[[float(x)]] for x in values])
+
+    joints = ", ".join(
+        f"{{ joint = {j}, full_speed = {full}, speed = {shares.round(3).tolist()}, "
+        f"way = {grid((shares * full) ** 2 / 2 / a)}, time = {grid(shares * full / a)} }}"
+        for j, a in enumerate(cell.brakes)
+    )
+    head = f'robot = "{cell.names[0]}", category = 1, source = "s", confidence = "1S", rated_payload = 90.0'
+    said = f'table_for = "{cell.names[0]}", acceleration = 0'
+    return f'reaction = 0.1, {said}, model = "table", table = {{ {head}, joints = [{joints}] }}'
+
+
 def machine_criteria(cell: Cell) -> dict[str, str]:
     """What is asked of the machine: speed, energy, distance, separation, contact."""
     cart, op, limits = cell.cart, cell.names[1], cell.limits
@@ -434,6 +502,14 @@ def files(cell: Cell) -> dict[str, str]:
             f'[[tools]]\nname = "tool"\non = "{arm}/{end}"\nshape = {{ box = [0.06, 0.06, 0.06] }}\n'
             f"mass = {cell.tool!r}\ntcp = {{ position = [0, 0, 0.05] }}\n"
         )
+    if cell.gripper is not None:
+        on = "tool" if cell.tool is not None else f"{arm}/{end}"
+        tables.append(
+            f'[[machines]]\nname = "hand"\non = "{on}"\nat = {{ position = [0, 0, 0.07] }}\n'
+            f"shape = {{ box = [0.02, 0.02, 0.06] }}\nmass = {cell.gripper.mass!r}\n"
+            "grip = { lower = 0, upper = 0.1 }\n"
+        )
+        tables.append('[[sources]]\nkind = "csv"\nrobot = "hand"\nfile = "hand.csv"\n')
     if cell.post is not None:
         tables.append(
             '[[parts]]\nname = "post"\nshape = { box = [0.1, 0.1, 2.0] }\n'
@@ -446,6 +522,8 @@ def files(cell: Cell) -> dict[str, str]:
     elif cell.heard:
         tables.append(f'[[sources]]\nkind = "csv"\nrobot = "{arm}"\nfile = "motion.csv"\n')
     found = {"motion.csv": motion(cell)}
+    if cell.gripper is not None:
+        found["hand.csv"] = gripper_file(cell, cell.gripper)
     if machine is not None:
         tables += machine_tables(cell, machine)
         found |= machine_files(cell, machine)
@@ -467,7 +545,7 @@ def files(cell: Cell) -> dict[str, str]:
         + _length(cell, "limit", limits["distance"])
         + _length(cell, "uncertainty", cell.uncertainty),
         "separation": f'kind = "separation"\nbetween = ["{arm}", "{op}"]\n'
-        + f"stop = {{ reaction = 0.1, stopping = 0.2{', acceleration = 2.0' * carried} }}\n"
+        + f"stop = {{ {stop_of(cell)} }}\n"
         + _length(cell, "intrusion", 0.1)
         + _length(cell, "human_uncertainty", 0.02 + cell.uncertainty)
         + _length(cell, "robot_uncertainty", 0.01),
@@ -483,6 +561,13 @@ def files(cell: Cell) -> dict[str, str]:
         + f"contact_area = {{ {arm} = 1e-4{', tool = 1e-4' if cell.tool is not None else ''} }}\n"
         "largest_area = 1e-4\n" + "drive_force = 20\n" * carried,
     } | ({} if machine is None else machine_criteria(cell))
+    if cell.gripper is not None:
+        criteria |= {
+            "hand speed": f'kind = "velocity"\nof = "hand"\nlimit = {limits["speed"]!r}\n',
+            "hand distance": f'kind = "minimum_distance"\nbetween = ["hand", "{op}"]\n'
+            + _length(cell, "limit", limits["distance"])
+            + _length(cell, "uncertainty", cell.uncertainty),
+        }
     if cell.walks:
         criteria["posture"] = f'kind = "owas"\nhuman = "{op}"\n'
     asked = [(name, text) for name, text in criteria.items() if name not in cell.left_out]
@@ -497,12 +582,24 @@ def files(cell: Cell) -> dict[str, str]:
     head = (
         'variables = "variables.toml"\n' * spoken
         + f"[engine]\ntimestep = 0.001\ntick = {cell.tick!r}\nphysics = {str(cell.physics).lower()}\n"
+        + _gravity(cell)
     )
     found["workstation.toml"] = "\n".join([head, *tables, phase, cell.more])
     return found
 
 
 # -- what they say ------------------------------------------------------------------------------
+
+
+def _gravity(cell: Cell) -> str:
+    """Along the tilted vertical, which is meant."""
+    if not cell.tilt:
+        return ""
+    down = (_about_x(cell.tilt) @ np.array([0.0, 0.0, -9.81])).tolist()
+    return (
+        f'gravity = {down}\n[[confirmed]]\nkey = "engine.gravity.turned"\nvalue = {abs(cell.tilt)!r}\n'
+        'why = "the hall leans"\n'
+    )
 
 
 def station(cell: Cell, folder: Path) -> Station:
@@ -515,7 +612,8 @@ def station(cell: Cell, folder: Path) -> Station:
 
 ALL = (
     "speed", "fastest", "energy", "distance", "separation", "area", "felt", "contact", "posture",
-    "cart speed", "cart energy", "cart distance", "cart separation", "cart contact",
+    "cart speed", "cart energy", "cart distance", "cart separation", "cart contact", "hand speed",
+    "hand distance",
 )  # fmt: skip
 """Names of all criteria."""
 _kept: dict[tuple[str, ...], ResultLog] = {}
@@ -555,7 +653,9 @@ def heavier(cell: Cell) -> Cell:
         for k in cell.links
     )
     machine = cell.machine and replace(cell.machine, mass=1.5 * cell.machine.mass)
-    return replace(cell, links=links, machine=machine, tool=None if cell.tool is None else 1.5 * cell.tool)
+    hand = cell.gripper and replace(cell.gripper, mass=1.5 * cell.gripper.mass)
+    tool = None if cell.tool is None else 1.5 * cell.tool
+    return replace(cell, links=links, machine=machine, tool=tool, gripper=hand)
 
 
 def mirrored(cell: Cell) -> Cell:
@@ -591,6 +691,7 @@ def faster(cell: Cell) -> Cell:
         duration=cell.duration / 2,
         tick=cell.tick / 2,
         machine=machine,
+        gripper=cell.gripper and replace(cell.gripper, frequency=2 * cell.gripper.frequency),
     )
 
 

@@ -25,6 +25,7 @@ from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, Follows, Lowest, Moment
+from seerob.kernels.spans import greatest
 from seerob.model.model import Model
 from seerob.twin.signals import SLACK
 from seerob.twin.spans import (
@@ -36,6 +37,7 @@ from seerob.twin.spans import (
     Path,
     Points,
     Span,
+    Speeding,
 )
 from seerob.twin.state import State
 
@@ -308,9 +310,13 @@ class BetweenTicks:
                     bodies = tuple(range(len(self._speeds)))
                     span.derived(state.speed_noise(bodies), state.joint_noise())
             low = -np.inf
-            if first.ids == self._ids:
+            if first.ids == self._ids and first.path.t[0] <= begin:
                 with suppress(Undecided):
                     low = self._lowest(watch, span, (before, now), first.moments.get(watch), state)
+                if isinstance(watch.falls, Speeding) and result.limit is not None and not path.broken:
+                    # Over several ticks how fast a point gets says more than how quickly it can get faster.
+                    off = max(end.margin[1] for end in (before, now) if end.margin is not None)
+                    low = max(low, result.limit - greatest(span.fast, watch.falls.rows) - float(np.max(off)))
             if not low >= 0:
                 found[i] = replace(self._asking.take_back(result, text), muted=False)
 

@@ -34,11 +34,13 @@ class Unheard:
     Args:
         name: Of the robot.
         acceleration: Largest acceleration of its joints [rad/s² or m/s²], shape (n,).
-        timeout: Of its source [s]; a longer silence is undecided as such.
+        timeout: After which the twin does not rely on it [s].
     """
 
     def __init__(self, name: str, acceleration: Array, timeout: float) -> None:
-        self._name, self._acceleration, self._timeout = name, acceleration, timeout
+        self._name, self._acceleration = name, acceleration
+        # A sample comes a delay before the twin shows its instant; the time-out is more than that delay.
+        self._longest = 2 * timeout
         self._least = 4 * math.sqrt(SEEN / float(acceleration.max(initial=1e-9)))
         """So long nobody has to know where it was [s]."""
         self._intervals: deque[float] = deque(maxlen=USUAL)
@@ -56,7 +58,7 @@ class Unheard:
         interval, said = t - self._t, speeds and self._said
         each = interval / max(seq - self._seq, 1)
         begin, self._t, self._seq, self._said = self._t, t, seq, speeds
-        if not interval <= self._timeout:
+        if not interval <= self._longest:
             self._intervals.clear()
             return
         self._intervals.append(each)

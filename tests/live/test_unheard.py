@@ -52,6 +52,23 @@ def test_a_slow_source_misses_nothing_that_comes_when_it_usually_does():
     assert missing(*[0.02 * k for k in range(40) if k % 4 == 0 or k < 10])[-1]
 
 
+def test_what_is_usual_is_a_quarter_of_the_intervals():
+    """Of five short ones of 21 none is it; of six it is."""
+    for short, found in ((5, False), (6, True)):
+        times = np.cumsum([0.0, *[0.02] * short, *[0.06] * (20 - short), 0.1])
+        assert missing(*times.tolist())[-1] is found
+
+
+@pytest.mark.parametrize(("before", "after"), [(True, False), (False, True), (True, True), (False, False)])
+def test_speeds_are_said_where_both_samples_say_them(before, after):
+    unheard = Unheard("arm", np.array([QUICKEST]), TIMEOUT)
+    for t in REGULAR:
+        unheard.hear(t, 0, speeds=before)
+    unheard.hear(REGULAR[-1] + 0.1, 0, speeds=after)
+    (gap,) = unheard.ended(1.0)
+    assert gap.speeds is (before and after)
+
+
 def test_after_a_silence_all_begins_anew():
     assert not any(missing(0.0, 0.09, 0.18, 0.6, 0.76))
     assert missing(0.0, 0.09, 0.18, 0.57)[-1]  # which may have come before the time-out was over

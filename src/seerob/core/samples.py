@@ -110,7 +110,7 @@ class BodyPoint(Struct, frozen=True, kw_only=True):
     """One thing that a device sees on a person, as a pull on one bone."""
 
     name: str
-    """As the device calls it."""
+    """What the device calls it."""
     bone: str
     """Bone of the person, such as ``right_hand``."""
     at: Vec3 = (0.0, 0.0, 0.0)

@@ -20,7 +20,7 @@ class Tolerance(NamedTuple):
     """How far an input may be off, either way."""
 
     name: str
-    """As the workstation file calls it: ``stop.reaction``."""
+    """Key of the workstation file: ``stop.reaction``."""
     half: float
     """Half the width, in ``unit``."""
     unit: str

@@ -225,7 +225,7 @@ class ControllerTool:
 class _Ways(NamedTuple):
     t: float
     speeds: Array
-    """As said, and of each tip [m/s], shape (1 + tips,)."""
+    """Speeds that were said, and of each tip [m/s], shape (1 + tips,)."""
     ways: Array
     """Their integrals [m], likewise."""
 

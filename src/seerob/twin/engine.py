@@ -528,7 +528,7 @@ class Engine:
         )
 
     def _captured(self) -> tuple[Array, Array]:
-        """As `_way`, with people where they were captured."""
+        """What `_way` gives, with people where they were captured."""
         q, v = (each.copy() for each in self._way)
         q_all, v_all, a_all = self._course
         for person in self._mechanisms:

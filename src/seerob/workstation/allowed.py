@@ -30,7 +30,7 @@ class Named(NamedTuple):
     key: str
     """Where the workstation file names it: ``sources[0].file``."""
     name: str
-    """As it has it."""
+    """Name that it has."""
     real: Path
     """Where that leads."""
 

@@ -77,7 +77,7 @@ UNITS: dict[str, Unit] = {
     "kW": Unit("W", 1e3),
     "J": Unit("J", 1.0),
 }
-"""As they are written in a variable dictionary."""
+"""Units by the names that a variable dictionary writes."""
 
 _SPELLINGS = {
     "°": "deg",
@@ -104,7 +104,7 @@ VARIABLE = "variable "
 """Before the name of a variable among the names that answers depend on: robots have no blank in theirs."""
 MOST_VARIABLES = 10_000
 WHOLE = re.compile(r"0|-?[1-9][0-9]{0,18}")
-"""As a number is written: another spelling would never be heard."""
+"""Spelling of a whole number: another one would never be heard."""
 LONGEST_TEXT = 1000
 """Longest text that a value may be."""
 

@@ -37,14 +37,14 @@ class Draft:
     """What of a workstation file can be looked at, whatever else is wrong in it."""
 
     file: str
-    """As the user named it."""
+    """Path that the user gave."""
     head: Workstation
     entries: Entries
     names: tuple[Named, ...]
 
     @property
     def station(self) -> Workstation:
-        """As a workstation, whose entries are numbered without what is left out."""
+        """Return a workstation whose entries are numbered without what is left out."""
         from seerob.session.reading import with_entries
 
         return with_entries(self.head, self.entries)

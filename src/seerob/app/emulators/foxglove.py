@@ -25,7 +25,7 @@ class FoxgloveBridge(RosRobot):
     """The bridge, in a thread of its own; its messages are CDR, or those of ROS 1."""
 
     def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
-        """As `RosRobot`."""
+        """Take the arguments of `RosRobot`."""
         super().__init__(motion, names, **more)
         encoding = "cdr" if self.edition is Edition.ROS2 else "ros1"
         self._channels = [

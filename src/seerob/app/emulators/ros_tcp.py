@@ -57,7 +57,7 @@ class RosTcpEndpoint(_Playing):
     received: deque[Frame]
 
     def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
-        """As `_Playing`."""
+        """Take the arguments of `_Playing`."""
         super().__init__(motion, names, **more)
         self.received = deque(maxlen=KEPT)
 

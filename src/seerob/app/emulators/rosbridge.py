@@ -35,7 +35,7 @@ class RosbridgeServer(RosRobot):
     """The server, in a thread of its own; that of ROS 1 fails at ``cbor`` without a word."""
 
     def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
-        """As `RosRobot`."""
+        """Take the arguments of `RosRobot`."""
         super().__init__(motion, names, **more)
         self.received: deque[dict[str, Any]] = deque(maxlen=1000)
         """What clients advertised and published, oldest first."""

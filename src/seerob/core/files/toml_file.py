@@ -38,7 +38,7 @@ def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
 
 
 def loads(text: str) -> dict[str, Any]:
-    """As `tomllib.loads`, of what strangers wrote.
+    """Read TOML that strangers wrote, by `tomllib.loads`.
 
     Raises:
         tomllib.TOMLDecodeError: It is not TOML, a key has more parts than any table has levels, or a whole

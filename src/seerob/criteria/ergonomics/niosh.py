@@ -269,7 +269,7 @@ class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return tuple(name for name in ("load", "coupling") if getattr(self, name) is None)
 
     def task(self) -> Task:
-        """As the equation takes it, of a lift of which nothing is missing."""
+        """Return the task of the equation, of a lift of which nothing is missing."""
         assert self.load is not None
         assert self.coupling is not None
         ends = [End(H=e.horizontal, V=e.vertical, A=e.asymmetry) for e in (self.origin, self.destination)]

@@ -96,7 +96,7 @@ class _Found(Struct, frozen=True, eq=False):
     """Speed of the person as it is known, and as it may be [m/s]."""
     stray: str
     S_p: Array
-    """As shown [m], shape (n,)."""
+    """Protective separation distance as shown [m], shape (n,)."""
     most: Array
     """A bound on it from above, likewise."""
     unbounded_reason: str

@@ -473,7 +473,7 @@ def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tupl
 def _farthest(
     t: Array, stretch: tuple[float, float], most: Array, now: Array, T_r: float, lead: float
 ) -> tuple[Array, Array]:
-    """As `farthest`, of instants of which the stretch says since when they count, and for how long [s]."""
+    """Way and top speed by `farthest`, of instants that count since, and as long as, the stretch says [s]."""
     way, top = np.empty((2, len(now)))
     kernel.farthest(t, *stretch, most, now, T_r, lead, SLACK, way, top)
     return way, top

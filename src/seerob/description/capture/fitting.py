@@ -37,7 +37,7 @@ class Pulls:
     """What is seen at one instant, in the root's frame of the person."""
 
     names: tuple[str, ...]
-    """As the devices call them."""
+    """What the devices call them."""
     bone: NDArray[np.int64]
     """Of each, in the order of `BONES`, shape (m,)."""
     at: Array

@@ -57,7 +57,7 @@ class Travel(StrEnum):
     """How the pelvis gets over the floor."""
 
     KEYS = "keys"
-    """As the keys' positions say; feet may slide."""
+    """Places are those of the keys' positions; feet may slide."""
     FEET = "feet"
     """On top of the keys' positions, so that the point of the foot that carries stays where it is."""
 

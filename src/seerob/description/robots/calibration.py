@@ -50,7 +50,7 @@ class Calibration(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     alpha: _SixNumbers
     """[rad]"""
     checksum: tuple[int, ...] = ()
-    """As the controller has it."""
+    """The controller's own figure."""
 
     def frames(self, q: Array) -> tuple[Array, ...]:
         """Pose of the base, of each joint's frame after it has turned, and so of the flange at last.

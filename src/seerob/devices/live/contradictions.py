@@ -410,7 +410,7 @@ class Contradictions:
         return ""
 
     def _speeds_up(self, q: tuple[float, ...], t: float, jitter: float) -> str:
-        """As `_hurries`, of mean speeds in two neighbouring spans of equal numbers of instants.
+        """Say what `_hurries` does, of mean speeds in two neighbouring spans of equal numbers of instants.
 
         Args:
             q: Positions now [rad or m].

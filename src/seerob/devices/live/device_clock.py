@@ -122,7 +122,7 @@ class DeviceClock:
         """What was said last."""
         self._said: dict[float, int] = {}
         self._marks: dict[float, int] = {}
-        """As `_said`, of a few."""
+        """What `_said` has, of a few."""
         self._next_mark = -math.inf
         self._reason, self._until = "", -math.inf
         self.latency = 0.0

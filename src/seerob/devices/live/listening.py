@@ -140,7 +140,7 @@ class Contact(NamedTuple):
     where: str
     """``connects to 192.168.0.7:30004``, ``listens on 0.0.0.0:9763``."""
     user: str = ""
-    """As whom; empty for nobody."""
+    """User name; empty for none."""
     secret: str = ""
     """Name of the secret that is sent; empty for none."""
     encrypted: bool = False

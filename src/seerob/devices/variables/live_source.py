@@ -50,7 +50,7 @@ class Change(NamedTuple):
     name: str
     """In the dictionary."""
     raw: object
-    """As it was sent."""
+    """Value that was sent."""
     invalid_reason: str = ""
     """Why the device itself does not stand by it."""
     age: float = 0.0
@@ -70,11 +70,11 @@ class Node(NamedTuple):
     """One variable that a device has, found by browsing."""
 
     address: str
-    """As the dictionary has it."""
+    """Address in the dictionary."""
     type: str
-    """As the device calls it."""
+    """What the device calls it."""
     unit: str
-    """As the device states it; empty when it does not."""
+    """Unit that the device states; empty when it does not."""
     value: str
     """What it was, for whoever reads the skeleton."""
 

@@ -18,7 +18,7 @@ MAX_VALUES = 1 << 26
 FAR = 100.0
 """No point of a person is further from the origin of a capture [m]."""
 VAST = 1e100
-"""As far as infinity, and still a number [m]."""
+"""Counts as infinitely far, and is still a number [m]."""
 LATEST = 1e12
 """No time stamp is as late [s]."""
 SHORTEST = 1e-5

@@ -36,7 +36,7 @@ class Reading:
     """How a file of a depth camera is to be read."""
 
     file: str
-    """As messages name it."""
+    """What messages call it."""
     subject: str = ""
     """The tracker's numbers of the person, ``1, 5``; empty when there is only one."""
     level: bool = False

@@ -26,7 +26,7 @@ class MarkerReading:
     """What the user says of a file of markers; what is left open the file or the person tells."""
 
     file: str
-    """As messages name it."""
+    """What messages call it."""
     subject: str = ""
     """The part of the names before the colon."""
     up: Up | None = None

@@ -109,11 +109,11 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     joint_unit: PositionUnit | tuple[PositionUnit, ...] | None = None
     """One unit for all joints, or one per joint."""
     velocities: str | tuple[Column, ...] | None = None
-    """As ``joints``; ``[]`` leaves them out, and velocities are derived from the positions."""
+    """Columns, like ``joints``; ``[]`` leaves them out, and velocities are derived from the positions."""
     velocity_unit: RateUnit | tuple[RateUnit, ...] | None = None
     """One unit for all joints, or one per joint."""
     torques: str | tuple[Column, ...] | None = None
-    """As ``joints`` [N·m or N]; ``[]`` leaves them out."""
+    """Columns [N·m or N], like ``joints``; ``[]`` leaves them out."""
     tcp_position: tuple[Column, ...] | None = None
     """Columns x, y, z of the tool; ``[]`` leaves them out."""
     tcp_position_unit: LengthUnit | None = None

@@ -33,7 +33,7 @@ MAX_LINE = 4 << 20
 """Longest line that is taken, in characters."""
 
 BLANKS = " "
-"""As a delimiter: any run of blanks and tabs."""
+"""Delimiter that means any run of blanks and tabs."""
 
 BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 

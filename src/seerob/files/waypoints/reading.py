@@ -222,7 +222,7 @@ class Point(Table, frozen=True, kw_only=True):
             raise ValueError("a tool pose needs its orientation: rpy (or rpy_deg) or wxyz")
 
     def waypoint(self, place: str) -> Waypoint:
-        """As the readers of programs give it."""
+        """Return the waypoint that the readers of programs give."""
         pose = None if self.at is None else ToolPose(self.at.position, _wxyz(self.at))
         return Waypoint(
             place=place,

@@ -19,7 +19,7 @@ class Move(StrEnum):
     LINEAR = "linear"
     """The tool point on a straight line (``movel``)."""
     PROCESS = "process"
-    """As `LINEAR`; the speed of the tool point is kept through blends (``movep``)."""
+    """A straight line, like `LINEAR`; the speed of the tool point is kept through blends (``movep``)."""
     CIRCULAR = "circular"
     """The tool point on the arc through ``via`` (``movec``)."""
 

@@ -178,7 +178,7 @@ class Sweep:
         period: float | None = None,
         noise: Array | None = None,
     ) -> None:
-        """As `advance`, but nothing is marked before `flush`."""
+        """Advance like `advance`, but mark nothing before `flush`."""
         assert self._last is not None
         before, speed = self._last
         delta = (qpos - before)[self._joints.q_address]

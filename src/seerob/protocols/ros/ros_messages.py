@@ -43,7 +43,7 @@ class Content(StrEnum):
 
     @property
     def message_type(self) -> str:
-        """As ROS 2 calls it."""
+        """Name in ROS 2."""
         return {
             Content.JOINT_STATE: "sensor_msgs/msg/JointState",
             Content.TF: "tf2_msgs/msg/TFMessage",

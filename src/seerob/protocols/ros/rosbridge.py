@@ -41,11 +41,11 @@ class Compression(StrEnum):
     """How messages are to come."""
 
     NONE = "none"
-    """As JSON."""
+    """JSON."""
     CBOR = "cbor"
-    """As CBOR. ROS 1 servers fail at it for messages with lists of texts, which joints have."""
+    """CBOR. ROS 1 servers fail at it for messages with lists of texts, which joints have."""
     CBOR_RAW = "cbor-raw"
-    """As ROS serialises them, in CBOR."""
+    """Bytes that ROS serialises, in CBOR."""
 
 
 @dataclass(frozen=True, slots=True)

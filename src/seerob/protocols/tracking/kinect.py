@@ -120,7 +120,7 @@ class LiveObject(FrameObject, kw_only=True):
 
 
 VAST = 1e100
-"""As far as infinity, and still a number [m]."""
+"""Counts as infinitely far, and is still a number [m]."""
 VERSION = "kinect/1"
 
 

@@ -100,7 +100,7 @@ class Items:
     ids: NDArray[np.int32]
     """Identifiers, shape (n,); of joints (parent, child), shape (n, 2); of the centre of mass 0."""
     values: NDArray[np.floating]
-    """As on the wire, shape (n, k); `numbers` makes them floats to reckon with."""
+    """Numbers of the wire, shape (n, k); `numbers` makes them floats to reckon with."""
 
     def numbers(self) -> Array:
         """The values, shape (n, k)."""

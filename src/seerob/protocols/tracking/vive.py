@@ -64,7 +64,7 @@ class DeviceObject(Struct, kw_only=True, omit_defaults=True):
 
     serial: Annotated[str, Meta(min_length=1, max_length=128)]
     role: _Text = ""
-    """As the runtime has it: ``vive_tracker_waist``, ``/user/vive_tracker_htcx/role/waist``, ``waist``."""
+    """Role in the runtime: ``vive_tracker_waist``, ``/user/vive_tracker_htcx/role/waist``, ``waist``."""
     tracking: bool = True
     """``bPoseIsValid`` of OpenVR; the location is valid and tracked in OpenXR."""
     result: int = RUNNING_OK

@@ -84,7 +84,7 @@ class Bound:
         }
 
     def sentence(self) -> str:
-        """As the report has it."""
+        """Sentence of the report."""
         if not math.isfinite(self.value):
             return f"{self.what}: no bound, {self.note} (met at {self.at:.3f} s)"
         sign = "≤" if self.at_most else "≥"

@@ -188,5 +188,5 @@ class TrackingError:
 
 
 def tracking(error: float) -> Tolerance:
-    """As the input that may decide a verdict. Error [m]."""
+    """Tolerance, the input that may decide a verdict, of a tracking error [m]."""
     return Tolerance("tracking of the person", error, "m")

@@ -139,7 +139,7 @@ class Hearing:
     """Something touches that person, or keeps the twin from being where it is pulled to: how fast the person
     is, what was captured tells, too."""
     residual: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    """As `bones`, of those joint positions instead of the twin's, where the twin does not follow."""
+    """Errors like `bones`, of those joint positions instead of the twin's, where the twin does not follow."""
     reset_at: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False

@@ -61,7 +61,7 @@ class Zone(Table, frozen=True, kw_only=True):
                 raise ValueError(f"{axis} from {a:g} to {b:g} m is no interval: the lower end comes first")
 
     def shape(self) -> dict[str, object]:
-        """As the table of a simple shape."""
+        """Table of a simple shape."""
         if self.low is not None and self.high is not None:
             (x0, y0, z0), (x1, y1, z1) = self.low, self.high
             return {"polygon": [[x0, y0], [x1, y0], [x1, y1], [x0, y1]], "height": [z0, z1]}

@@ -82,7 +82,6 @@ BONES: tuple[str, ...] = tuple(PARENTS)
 
 
 @cache
-@cache
 def without_side(bone: str) -> str:
     """``upper_arm`` of ``left_upper_arm``."""
     return bone.removeprefix("right_").removeprefix("left_")

@@ -83,7 +83,9 @@ def against(value: float | None, limit: float | None, unit: str = "", *, at_most
 
 def worded(value: float, limit: float | None, unit: str = "", *, at_most: bool) -> str:
     """A value with its unit, on its side of the limit where there is one: what a label in a picture says."""
-    if limit is not None and math.isfinite(value) and math.isfinite(limit):
+    if limit is None:
+        return with_unit(_alone(value, unit), unit)
+    if math.isfinite(value) and math.isfinite(limit):
         places = _places(unit, value, limit)
         if abs(value - limit) * _SCALES[places] > _APART and abs(value) * _SCALES[places] < _PLAIN:
             return with_unit(_text(value, places, ROUND_CEILING if at_most else ROUND_FLOOR), unit)

@@ -27,7 +27,7 @@ from seerob.distance.least import Closest, Closests, Per, Query, Surveyor
 from seerob.kernels.axes import felt, principal_axes, quaternion
 from seerob.kernels.chain import along, at_point
 from seerob.kernels.spans import greatest
-from seerob.kernels.speed import PLACED, Placed, carried, fastest, in_body, place, stacked, velocities
+from seerob.kernels.speed import PLACED, Placed, by_coordinate, carried, fastest, in_body, place, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.attachments import Columns, moving_dofs
 from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
@@ -130,7 +130,7 @@ class State(Validity):
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
         self._cvel, self._qpos = data.cvel, data.qpos
-        self._corners = stacked([body.corners for body in model.bodies])
+        self._corners = by_coordinate([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
     def refresh(self, t: float) -> None:

@@ -26,7 +26,7 @@ from seerob.core.transforms import Array
 from seerob.distance.least import Closests, Per, Query, Survey
 from seerob.kernels.axes import mobility, principal_axes
 from seerob.kernels.chain import along, held_many, jacobians
-from seerob.kernels.speed import fastest_many, stacked, velocities_many
+from seerob.kernels.speed import by_coordinate, fastest_many, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
 from seerob.twin.attachments import Columns, moving_dofs, unknown_place
@@ -140,7 +140,7 @@ class Bench:
         self.data = mujoco.MjData(mj)
         self.ids = np.array([body.mj for body in model.bodies], np.int64)
         self.roots = mj.body_rootid[self.ids].astype(np.int64)
-        self.corners = stacked([body.corners for body in model.bodies])
+        self.corners = by_coordinate([body.corners for body in model.bodies])
         self.reach = np.array([body.radius + body.deviation for body in model.bodies])
         self.columns = {m.name: Columns.of(m, mj) for m in model.mechanisms.values()}
         self._trees: dict[int, Tree | None] = {}

@@ -35,7 +35,7 @@ from seerob.core.domains import agree, number
 from seerob.core.transforms import Array
 from seerob.kernels import ahead as kernel
 from seerob.kernels.ahead import joint_speeds, kept, part_speeds
-from seerob.kernels.speed import fastest_of, stacked
+from seerob.kernels.speed import by_coordinate, fastest_of
 from seerob.model.model import Body, Gap, Mechanism, Model
 from seerob.twin.spans import ROUNDING, Chains, Knots, Points, rows_of
 from seerob.twin.speed_noise import levers as levers_of
@@ -170,7 +170,7 @@ class Foreseen:
         # To ask the data for them takes longer than to use them.
         self._views = data.qpos, data.qvel, data.xmat, data.xpos, data.cvel, data.subtree_com
         bodies = [model.bodies[i] for i in gap.b]
-        self._corners = stacked([body.corners for body in bodies])
+        self._corners = by_coordinate([body.corners for body in bodies])
         self._reach = np.array([body.radius + body.deviation for body in bodies])
         self._points, self._parts, self._joints = Points(model), rows_of(gap.b), _Joints()
         self._run: Callable[[], State | None] = lambda: None

@@ -220,16 +220,13 @@ class Hearing:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         # Who falls behind has more than one sample ahead: the last takes all of them back.
-        until = len(self.heard) - 1
-        while until > k and not self._repeats(until):
+        heard, until = self.heard, len(self.heard) - 1
+        while until > k and not heard[until].t - heard[until - 1].t < REPEATED:
             until -= 1
-        for said in self.heard[k - 1 : until + 1]:
+        for said in heard[k - 1 : until + 1]:
             if said.reason:
                 return said.reason
         return ""
-
-    def _repeats(self, j: int) -> bool:
-        return self.heard[j].t - self.heard[j - 1].t < REPEATED
 
     def around(self, t: float) -> list[Heard]:
         """Return the last sample at or before ``t`` [s] and the next one, where there are such."""

@@ -1,10 +1,12 @@
 """What the import contract is for is caught by it: one wrong arrow of each kind, in a copy of the sources."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -67,3 +69,29 @@ def test_a_wrong_arrow_breaks_its_contract(said, contract):
 def test_every_contract_is_tried(said):
     assert said.count(" BROKEN") == len(WRONG)
     assert " KEPT" not in said
+
+
+# -- the page -------------------------------------------------------------------------------------
+
+
+def imported(page: Path) -> dict[Path, set[Path]]:
+    """Modules of a page and what each imports of it, lazily and for types too."""
+    found = {}
+    for file in sorted(page.rglob("*.ts")):
+        names = re.findall(r"""(?:\bfrom|\bimport)\s*\(?\s*["'](\.[^"']+)["']""", file.read_text("utf-8"))
+        found[file] = {(file.parent / f"{name.removesuffix('.ts')}.ts").resolve() for name in names}
+    return found
+
+
+def test_no_module_of_the_page_is_imported_in_a_circle():
+    modules = imported((ROOT / "web/src").resolve())
+    assert len(modules) > 50
+    assert sum(map(len, modules.values())) > 150
+    TopologicalSorter(modules).prepare()
+
+
+def test_a_circle_of_the_page_is_found(tmp_path):
+    (tmp_path / "caption.ts").write_text('import { draw } from "./drawn"\n')
+    (tmp_path / "drawn.ts").write_text('export const draw = async () => await import("./caption")\n')
+    with pytest.raises(CycleError):
+        TopologicalSorter(imported(tmp_path.resolve())).prepare()

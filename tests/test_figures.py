@@ -1,7 +1,7 @@
 """Text of numbers keeps the side of the limit that the numbers are on, and is never kinder."""
 
 import math
-from decimal import Context, Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 
 import numpy as np
 import pytest
@@ -87,6 +87,39 @@ def test_a_label_is_the_text_of_the_pair_and_a_figure_that_of_decimal_arithmetic
             if unit and 1e-3 < abs(value) < 1e6:
                 exact = Decimal(f"{value:.11e}").quantize(Decimal(1).scaleb(-DECIMALS[unit]), context=ten)
                 assert back(figure(value, unit)) == float(exact)
+
+
+@pytest.mark.parametrize("unit", DECIMALS)
+def test_texts_beside_and_without_a_limit_are_those_of_decimal_arithmetic(unit):
+    rng, places = np.random.default_rng(7), DECIMALS[unit]
+    one = Decimal(1).scaleb(-places)
+
+    def text(value, rounding):
+        exact = Decimal(f"{value:.11e}")
+        exact = Decimal(0) if abs(exact) < one / 1000 else exact.quantize(one, rounding, Context(prec=60))
+        shown = f"{exact:f}".rstrip("0").rstrip(".") if places else f"{exact:f}"
+        return ("0" if shown in ("-0", "") else shown).replace("-", "−")
+
+    values = rng.normal(0, 10.0 ** rng.uniform(-places - 6, 3, 400))
+    round_ones = np.round(values, places)
+    for value in (*values, *round_ones, *(round_ones * (1 + 1e-14)), *(round_ones + 0.3 * 10.0**-places)):
+        limit = float(round(value, places)) + 5 * 10.0**-places
+        up, down = text(value, ROUND_CEILING), text(value, ROUND_FLOOR)
+        assert against(value, limit, unit, at_most=True) == (up, text(limit, ROUND_FLOOR))
+        assert worded(value, limit, unit, at_most=True) == f"{up} {unit}"
+        assert worded(value, limit, unit, at_most=False) == f"{down} {unit}"
+        assert against(value, limit, unit, at_most=False) == (down, text(limit, ROUND_CEILING))
+        assert worded(value, None, unit, at_most=True) == f"{text(value, ROUND_HALF_EVEN)} {unit}"
+    for value, limit in (
+        (np.inf, 1.0),
+        (np.inf, np.inf),
+        (-np.inf, None),
+        (1.0, np.inf),
+        (np.nan, 1.0),
+        (np.nan, None),
+    ):
+        shown = with_unit(against(value, limit, unit, at_most=True).value, unit)
+        assert worded(value, limit, unit, at_most=True) == shown
 
 
 @pytest.mark.parametrize("unit", [*DECIMALS, "", "kN"])

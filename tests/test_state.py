@@ -341,6 +341,20 @@ def test_a_shape_that_may_be_off_is_faster_by_that_much(cell):
     assert other.fastest_point(body.index)[0] == pytest.approx(plain + 0.01 * omega)
 
 
+def test_what_is_drawn_later_is_where_it_was_and_is_worked_out_once(cell):
+    state, offset = moved(cell, 0.0), np.array([0.01, -0.02, 0.3])
+    frame = cell.model.frame("grip")
+    rotation, position = (each.copy() for each in state.pose(frame))
+    origin, point = state.drawn_point(frame, np.zeros(3)), state.drawn_point(frame, offset)
+    state.data.xpos[:] += 1.0
+    state.data.xmat[:] = np.eye(3).ravel()
+    assert origin().tolist() == position.tolist()
+    close(point(), position + rotation @ offset)
+    assert state.drawn_point(frame, offset.copy())() is point()
+    with pytest.raises(ValueError, match="read-only"):
+        point()[0] = 0.0
+
+
 def test_poses_are_seven_float32_per_body(cell):
     state = moved(cell, 0.0)
     table = np.frombuffer(state.poses(), "<f4").reshape(-1, 7)

@@ -43,7 +43,9 @@ _SCALES = [10.0**places for places in range(_SMALLEST + _MOST + 1)]
 _PLAIN = 1e8
 """Units of the last place below which 12 digits leave more than `_CLEAR` of one."""
 _CLEAR = 1e-3
-"""Share of a unit, beside which way to round is beyond doubt without decimal arithmetic."""
+"""Share of a unit, beside which way to round is beyond doubt without decimal arithmetic; as it is of none."""
+_AS_WRITTEN = 4
+"""Places after the point up to which Python writes a float without an exponent, and no zeros behind it."""
 _APART = 3
 """Units of the last place beyond which rounding carries no value past its limit."""
 
@@ -74,6 +76,8 @@ def against(value: float | None, limit: float | None, unit: str = "", *, at_most
         return Pair(_alone(value, unit), _alone(limit, unit))
     worse, better = (ROUND_CEILING, ROUND_FLOOR) if at_most else (ROUND_FLOOR, ROUND_CEILING)
     places = _places(unit, value, limit)
+    if abs(value - limit) * _SCALES[places] > _APART and abs(value) * _SCALES[places] < _PLAIN:
+        return Pair(_text(value, places, worse), _text(limit, places, better))
     for more in range(_MOST):
         shown = Pair(_text(value, places + more, worse), _text(limit, places + more, better))
         if _beyond(_back(shown.value), _back(shown.limit), at_most) == _beyond(value, limit, at_most):
@@ -83,13 +87,14 @@ def against(value: float | None, limit: float | None, unit: str = "", *, at_most
 
 def worded(value: float, limit: float | None, unit: str = "", *, at_most: bool) -> str:
     """A value with its unit, on its side of the limit where there is one: what a label in a picture says."""
-    if limit is None:
-        return with_unit(_alone(value, unit), unit)
-    if math.isfinite(value) and math.isfinite(limit):
-        places = _places(unit, value, limit)
-        if abs(value - limit) * _SCALES[places] > _APART and abs(value) * _SCALES[places] < _PLAIN:
-            return with_unit(_text(value, places, ROUND_CEILING if at_most else ROUND_FLOOR), unit)
-    return with_unit(against(value, limit, unit, at_most=at_most).value, unit)
+    places = DECIMALS.get(unit)
+    if places is None or math.isnan(value):
+        return with_unit(against(value, limit, unit, at_most=at_most).value, unit)
+    if limit is None or math.isinf(limit):
+        return f"{_text(value, places, ROUND_HALF_EVEN)} {unit}"
+    if abs(value - limit) * _SCALES[places] > _APART and abs(value) * _SCALES[places] < _PLAIN:
+        return f"{_text(value, places, ROUND_CEILING if at_most else ROUND_FLOOR)} {unit}"
+    return f"{against(value, limit, unit, at_most=at_most).value} {unit}"
 
 
 def margin(value: float, limit: float, unit: str = "", *, at_most: bool) -> str:
@@ -137,9 +142,16 @@ def _text(value: float, places: int, rounding: str) -> str:
     if -_PLAIN < units < _PLAIN:
         whole = math.floor(units)
         rest = units - whole
-        if _CLEAR < rest < 1 - _CLEAR and abs(rest - 0.5) > _CLEAR:
-            up = rest > 0.5 if rounding == ROUND_HALF_EVEN else rounding == ROUND_CEILING
-            return _short(f"{(whole + up) / _SCALES[places]:.{places}f}")
+        if rounding == ROUND_HALF_EVEN:
+            clear, up = abs(rest - 0.5) > _CLEAR, rest > 0.5
+        else:
+            clear, up = _CLEAR < rest < 1 - _CLEAR or rest == 0, rest > 0 and rounding == ROUND_CEILING
+        if clear:
+            shown = (whole + 1 if up else whole) / _SCALES[places]
+            if places > _AS_WRITTEN:
+                return _short(f"{shown:.{places}f}")
+            text = repr(shown).removesuffix(".0")
+            return text if shown >= 0 else f"−{text[1:]}"
     if not math.isfinite(value):
         return "∞" if value > 0 else "−∞"
     if abs(value) >= _HUGE:

@@ -149,21 +149,22 @@ Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Polyline | Prism | 
 class _Drawn(Sequence[Marker]):
     """Markers that are made when somebody looks."""
 
-    __slots__ = "_made", "_make"
+    __slots__ = "_kept", "_make"
 
     def __init__(self, make: Callable[[], Sequence[Marker]]) -> None:
         self._make: Callable[[], Sequence[Marker]] | None = make
-        self._made: tuple[Marker, ...] = ()
+        self._kept: tuple[Marker, ...] = ()
 
-    def _all(self) -> tuple[Marker, ...]:
+    def made(self) -> tuple[Marker, ...]:
+        """All of them."""
         make = self._make
         if make is not None:  # twice, should two threads look at once, to one result
-            self._made = tuple(make())
+            self._kept = tuple(make())
             self._make = None
-        return self._made
+        return self._kept
 
     def __len__(self) -> int:
-        return len(self._all())
+        return len(self.made())
 
     @overload
     def __getitem__(self, index: int) -> Marker: ...
@@ -172,22 +173,22 @@ class _Drawn(Sequence[Marker]):
     def __getitem__(self, index: slice) -> tuple[Marker, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Marker | tuple[Marker, ...]:
-        return self._all()[index]
+        return self.made()[index]
 
     def __iter__(self) -> Iterator[Marker]:
-        return iter(self._all())
+        return iter(self.made())
 
     def __eq__(self, other: object) -> bool:
-        return self._all() == (other._all() if isinstance(other, _Drawn) else other)
+        return self.made() == (other.made() if isinstance(other, _Drawn) else other)
 
     def __hash__(self) -> int:
-        return hash(self._all())
+        return hash(self.made())
 
     def __repr__(self) -> str:
-        return repr(self._all())
+        return repr(self.made())
 
     def __reduce__(self) -> tuple[type[tuple[Marker, ...]], tuple[tuple[Marker, ...]]]:
-        return tuple, (self._all(),)
+        return tuple, (self.made(),)
 
 
 def drawn(make: Callable[[], Sequence[Marker]]) -> tuple[Marker, ...]:
@@ -216,7 +217,7 @@ def plain(value: object) -> object:
         TypeError: It is neither.
     """
     if isinstance(value, _Drawn):
-        return value[:]
+        return value.made()
     item: Callable[[], object] | None = getattr(value, "item", None)
     if item is None or getattr(value, "ndim", 1) != 0:
         raise TypeError(f"{type(value).__name__} cannot be recorded")

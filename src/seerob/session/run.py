@@ -158,14 +158,14 @@ def snapshot(
     late: dict[str, tuple[float, float]] | None = None,
 ) -> Snapshot:
     """What goes out of a state."""
-    mechanisms = state.model.mechanisms.values()
+    mechanisms, hearings = state.model.mechanisms.values(), state.hearings
     return Snapshot(
         seq=seq,
         t=state.t,
         poses=state.poses(),
         joints={m.name: tuple(state.joint_positions(m).tolist()) for m in mechanisms},
-        tracking={m.name: state.hearings[m.name].error for m in mechanisms},
-        bones={m.name: bones for m in mechanisms if (bones := state.hearings[m.name].bones)},
+        tracking={m.name: hearings[m.name].error for m in mechanisms},
+        bones={m.name: bones for m in mechanisms if (bones := hearings[m.name].bones)},
         late=late or {},
         results=results,
         looks={} if looks is None else looks.at(state),

@@ -186,7 +186,7 @@ def invalid_reasons(state: State) -> dict[str, str]:
     some bones are in doubt those are named, and what the person holds.
     """
     found: dict[str, str] = {}
-    for name in state.model.mechanisms:
+    for name in state.in_doubt():
         if reason := state.invalid_place_reason(name):
             found[name] = reason
         elif reason := state.invalid_reason(name):
@@ -199,4 +199,7 @@ def invalid_reasons(state: State) -> dict[str, str]:
             }
             held = (body.name for body in state.model.bodies if body.mover == name and body.owner != name)
             found |= dict.fromkeys(held, reason)
-    return found | {state.model.bodies[i].name: why for i, why in state.attachments.unknown.items()}
+    if state.attachments.unknown:
+        bodies = state.model.bodies
+        found |= {bodies[i].name: why for i, why in state.attachments.unknown.items()}
+    return found

@@ -74,9 +74,33 @@ class _Point(NamedTuple):
     wxyz: list[float]
 
 
-def _point_of(xmat: Array, xpos: Array, frame: Frame, offset: Array) -> Array:
-    rotation, position = carried(xmat, xpos, frame.mj, frame.body_from_frame)
-    return np.asarray(position + rotation @ offset)
+class _DrawnPoints:
+    """Where MuJoCo's bodies were at one tick, for what is drawn later.
+
+    Args:
+        xmat: World from body, row by row, shape (m, 9).
+        xpos: [m], shape (m, 3).
+    """
+
+    def __init__(self, xmat: Array, xpos: Array) -> None:
+        # MuJoCo writes through its own at the next tick.
+        self._xmat, self._xpos = xmat.copy(), xpos.copy()
+        self._points: dict[tuple[int, bytes], tuple[Frame, Array]] = {}
+
+    def point(self, frame: Frame, offset: Array) -> Array:
+        """Where a point of a frame was [m], shape (3,): worked out once for all that draw there."""
+        key = id(frame), offset.tobytes()
+        kept = self._points.get(key)
+        if kept is None:
+            ox, oy, oz = offset.tolist()
+            x, y, z = (a * ox + b * oy + c * oz + d for a, b, c, d in frame.body_from_frame[:3].tolist())
+            turned, at = self._xmat[frame.mj].tolist(), self._xpos[frame.mj].tolist()
+            rows = zip(at, turned[0::3], turned[1::3], turned[2::3], strict=True)
+            found = np.array([p + (a * x + b * y + c * z) for p, a, b, c in rows])
+            found.setflags(write=False)
+            # With the frame itself: another one may get the id of one that is forgotten.
+            kept = self._points[key] = frame, found
+        return kept[1]
 
 
 class State(Validity):
@@ -102,6 +126,7 @@ class State(Validity):
         n = len(model.bodies)
         self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
         self._quaternions = np.zeros((n, 4))
+        self._shown = np.zeros((n, 7), "<f4")
         self._alone = [(i,) for i in range(n)]
         """Each body by itself, as it is asked for."""
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
@@ -186,7 +211,8 @@ class State(Validity):
     def poses(self) -> bytes:
         """Little-endian float32, seven per body: position [m], quaternion w first."""
         self._open("poses", "placed(bodies)")
-        return np.hstack([self._positions, self._quaternions])[self.attachments.drawn].astype("<f4").tobytes()
+        self._shown[:, :3], self._shown[:, 3:] = self._positions, self._quaternions
+        return self._shown.take(self.attachments.drawn, axis=0).tobytes()
 
     # -- people as they were captured -------------------------------------------------------
 
@@ -651,11 +677,10 @@ class State(Validity):
             Undecided: As `pose`.
         """
         self._require_frame(frame)
-        if "placed once" not in self._cache:
-            # MuJoCo writes through its own at the next tick.
-            self._cache["placed once"] = self._xmat.copy(), self._xpos.copy()
-        xmat, xpos = self._cache["placed once"]
-        return partial(_point_of, xmat, xpos, frame, offset)
+        placed = self._cache.get("placed once")
+        if placed is None:
+            placed = self._cache["placed once"] = _DrawnPoints(self._xmat, self._xpos)
+        return partial(placed.point, frame, offset)
 
     def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
         """Whom the place of a body of MuJoCo depends on: the innermost robot or machine, or a bone."""

@@ -402,6 +402,13 @@ class Validity:
             self.asked = asked
         return self._sound
 
+    def in_doubt(self) -> tuple[str, ...]:
+        """Robots, people and machines of whom anything is in doubt at this tick."""
+        sound = self._find_sound()
+        if len(sound) == len(self._hearings):
+            return ()
+        return tuple(name for name in self._hearings if name not in sound)
+
     def _is_sound(self, name: str) -> bool:
         if self._invalid_place(name):
             return False

@@ -19,6 +19,7 @@ NODE := $(VENV)/.node
 PAGE := src/seerob/app/server/page/index.html
 LOOPS := $(VENV)/.loops
 BROUGHT := src/seerob/kernels/compiled
+KEPT := $(VENV)/.compiled
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock audit clean
@@ -29,7 +30,9 @@ help:
 
 # -- the two commands ---------------------------------------------------------------------------
 
-demo: $(RUN) $(PAGE)
+# Inner loops are compiled while packages of the page are fetched.
+demo: $(RUN)
+	$(MAKE) --no-print-directory -j2 $(KEPT) $(PAGE)
 	$(BIN)/seerob run workstations/ur10_assembly || [ $$? -le 2 ]  # 1 and 2 are verdicts, not failures
 
 demo-plc: $(DEV) $(PAGE)
@@ -49,6 +52,10 @@ $(RUN): $(VENV)/bin/python requirements/run.txt pyproject.toml
 	$(BIN)/python -m pip install -q --require-hashes -r requirements/run.txt
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation --require-hashes -r requirements/build.txt
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	touch $@
+
+$(KEPT): $(RUN) $(wildcard src/seerob/kernels/*.py)
+	$(BIN)/python -c "from seerob.app.console.progress import compile_loops; compile_loops()"
 	touch $@
 
 $(DEV): $(RUN) requirements/dev.txt

@@ -126,12 +126,18 @@ def _keyed(place: Any) -> Any:
 
 def _reading_what_is_brought(caching: Any) -> Any:
     """What keeps a function for Numba, and looks into `BROUGHT` for those of this package that it lacks."""
+    from numba.core.runtime.nrt import rtsys
 
     class Reading(caching.FunctionCache):  # type: ignore[misc]
         def load_overload(self, types: Any, context: Any) -> Any:
-            found = super().load_overload(types, context)
             place = self._impl.locator
-            if found is not None or not hasattr(place, "key"):
+            if not hasattr(place, "key"):
+                return super().load_overload(types, context)
+            # Numba would first get ready to compile, which takes longer than to load all that a start needs.
+            rtsys.initialize(context)
+            with self._guard_against_spurious_io_errors():
+                found = self._load_overload(types, context)
+            if found is not None:
                 return found
             types, (triple, *_), code = self._index_key(types, context.codegen())
             for processor in stood_in_for():

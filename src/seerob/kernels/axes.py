@@ -226,7 +226,7 @@ def felt(J: Array, M: Array, inverse: Array, axes: Array, figures: Array) -> boo
     for i in range(3):
         for j in range(3):
             axes[i, j] = turned[0, i, j]
-    lost = np.isnan(values).any()
+    lost = math.isnan(values[0, 0]) or math.isnan(values[0, 1]) or math.isnan(values[0, 2])
     for i in range(3):
         figures[i] = np.nan if lost else np.inf if values[0, i] <= 0.0 else 1.0 / values[0, i]
     quaternion(axes, figures[3:])

@@ -420,7 +420,7 @@ def at_point(
     for r in range(3):
         for c in range(3):
             axes[r, c] = directions[0, r, c]
-    lost = np.isnan(values).any()
+    lost = math.isnan(values[0, 0]) or math.isnan(values[0, 1]) or math.isnan(values[0, 2])
     for r in range(3):
         figures[r] = np.nan if lost else values[0, r]
     quaternion(axes, figures[3:])

@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 import pytest
+from llvmlite.binding import get_host_cpu_name
 from made_cells import HUMAN, SEPARATION, make_cell, seerob
 from mcap.writer import Writer
 
@@ -222,14 +223,22 @@ def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, comm
     assert (tmp_path / name).read_text() == "mine"
 
 
-def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(capsys, tmp_path, monkeypatch):
+@pytest.fixture
+def nothing_brought(monkeypatch, tmp_path):
+    """No loops are there that were compiled elsewhere, for this process and for those that it starts."""
+    monkeypatch.setattr("seerob.kernels._kept_loops.BROUGHT", tmp_path / "nothing")
+    monkeypatch.setenv("NUMBA_CPU_NAME", get_host_cpu_name())  # who is told a processor takes no other's
+
+
+def test_loops_that_are_not_kept_are_compiled_beforehand_and_counted(
+    capsys, tmp_path, monkeypatch, nothing_brought
+):
     from seerob.app.console import progress
     from seerob.kernels import _beforehand, _kept_loops
 
     names = ["paint averaged", "paint darken", "pull along"]
     monkeypatch.setattr(_beforehand, "LOOPS", {name: _beforehand.LOOPS[name] for name in names})
     monkeypatch.setattr("seerob.app.console.progress.EVERY", 0.0)
-    monkeypatch.setattr(_kept_loops, "BROUGHT", tmp_path / "nothing")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     (folder,) = progress.cache_folders()
     folder.mkdir()
@@ -264,7 +273,7 @@ def test_long_work_says_where_it_is_also_without_a_terminal(capsys, tmp_path, re
     assert "writing report.html: 2 of 2\n" in said or "writing report.html: 1 of 1\n" in said
 
 
-def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, tmp_path):
+def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, tmp_path, nothing_brought):
     from seerob.app.console import progress
 
     started = []
@@ -278,7 +287,9 @@ def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, t
     assert all(worker.returncode is not None for worker in started)
 
 
-def test_where_no_process_can_be_started_loops_are_compiled_when_they_are_called(monkeypatch, tmp_path):
+def test_where_no_process_can_be_started_loops_are_compiled_when_they_are_called(
+    monkeypatch, tmp_path, nothing_brought
+):
     from seerob.app.console import progress
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
@@ -288,7 +299,7 @@ def test_where_no_process_can_be_started_loops_are_compiled_when_they_are_called
 
 
 @pytest.mark.parametrize("command", ["check-file", "assess", "report", "swept"])
-def test_the_wait_begins_with_the_announcement(tmp_path, recorded, command):
+def test_the_wait_begins_with_the_announcement(tmp_path, recorded, nothing_brought, command):
     what = recorded[1] / "run.mcap" if command == "report" else recorded[0]
     output = [] if command == "check-file" else ["-o", str(tmp_path / "out.stl")]
     with subprocess.Popen(

@@ -54,7 +54,7 @@ def test_it_is_said_in_a_line(station):
     station.run(writers=[seen])
     of_tick = (seen.last, *seen.last.results)
     said = (run, run.results, run.results["elsewhere"], station.batch(), station.scene(), station.workstation)
-    for what in (station.model, *of_model, *shapes, *of_tick, *said):
+    for what in (station.model, *station.bound, *of_model, *shapes, *of_tick, *said):
         assert len(repr(what)) < 120
         assert "\n" not in repr(what)
     assert "undecided" in repr(run)

@@ -49,6 +49,9 @@ class Bound:
     watch: Watch | None = None
     """How it is judged between two ticks; None where nothing bounds it."""
 
+    def __repr__(self) -> str:
+        return f"<Bound {self.criterion.name!r}: {type(self.criterion).__name__} of {self.group}>"
+
     @cached_property
     def own(self) -> bool:
         """Whether it is one of the user's, which does not ship."""

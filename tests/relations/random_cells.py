@@ -238,7 +238,7 @@ def more_of(rng: np.random.Generator, cell: Cell) -> dict[str, object]:
     if rng.random() < 0.3:
         found["gripper"] = Gripper(*(float(x) for x in rng.uniform([0.05, 1.0, -np.pi], [0.5, 8.0, np.pi])))
     if rng.random() < 0.3 and all(link.kind == "revolute" for link in cell.links):
-        found["brakes"] = tuple(rng.uniform(4, 40, len(cell.amplitude)).tolist())
+        found["brakes"] = tuple(rng.uniform(6, 40, len(cell.amplitude)).tolist())
     return found
 
 
@@ -444,7 +444,7 @@ def stop_of(cell: Cell) -> str:
     if not cell.brakes:
         carried = cell.machine is not None and cell.machine.carries
         return f"reaction = 0.1, stopping = 0.2{', acceleration = 2.0' * carried}"
-    full, shares = 12.0, np.arange(0.1, 1.01, 0.1)
+    full, shares = 6.0, np.arange(0.1, 1.01, 0.1)
 
     def grid(values: np.ndarray) -> str:
         return str([[[float(x)]] for x in values])
@@ -455,7 +455,7 @@ def stop_of(cell: Cell) -> str:
         for j, a in enumerate(cell.brakes)
     )
     head = f'robot = "{cell.names[0]}", category = 1, source = "s", confidence = "1S", rated_payload = 90.0'
-    said = f'table_for = "{cell.names[0]}", acceleration = 0'
+    said = f'table_for = "{cell.names[0]}"'
     return f'reaction = 0.1, {said}, model = "table", table = {{ {head}, joints = [{joints}] }}'
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from seerob.criteria.stopping.onset import accelerated, by_speed, farthest
-from seerob.kernels.ahead import instants, joint_speeds, kept
+from seerob.kernels.ahead import WINDOW, instants, joint_speeds, moved_on, window
 
 
 def motion(seed, m=9, j=3):
@@ -70,36 +70,54 @@ def test_what_follows_from_speeds_alone_is_what_accelerates(a):
     assert (found.ways is None) == (wanted.ways is None)
 
 
-def window(seed, rows):
-    _, q, qd = motion(seed, rows[-1] + 1)
-    rng, m, n, j = np.random.default_rng(seed), len(q) - 1, 2, q.shape[1]
-    return (
-        np.array(rows), q, qd, rng.random((m, 2, n)), rng.random((m, 2, j)), rng.random((len(rows) - 1, n))
-    )  # fmt: skip
+def asked(first, rows, q, qd, *, kept, again=True):
+    """Which ticks of a window are known when it is asked for, and of how many nothing is.
+
+    Args:
+        first: Number of the first tick.
+        rows: Which instants are ticks.
+        q: Positions at the instants.
+        qd: Velocities.
+        kept: Of another window, of which all is known: the same, number of its first tick in front.
+        again: As `moved_on` takes it.
+    """
+    now = window(6, 3, 1, q.shape[1])
+    table = WINDOW.rows(now)
+    moved_on(table, False, *kept)
+    for tick in range(kept[0], kept[0] + len(kept[1]) - 1):
+        now.number[tick % 6], now.parts[tick % 6 * 3 :][:3], now.last[tick % 6] = tick, tick, tick
+    missing = moved_on(table, again, first, rows, q, qd)
+    known = [now.number[tick % 6] == tick for tick in range(first, first + len(rows) - 1)]
+    for tick in np.arange(first, first + len(rows) - 1)[known]:
+        assert (now.parts[tick % 6 * 3 :][:3] == tick).all()
+        assert (now.last[tick % 6] == tick).all()
+    return known, missing
 
 
 def test_a_window_that_moves_on_keeps_what_is_the_same_by_its_bits():
-    before = window(1, [0, 1, 3, 4, 6])
-    _, q, qd, parts, joints, last = before
-    new_q, new_qd = np.vstack([q[1:], q[:1]]), np.vstack([qd[1:], qd[:1]])
-    now = (
-        np.array([0, 2, 3, 5, 6]), new_q, new_qd, np.zeros((6, 2, 2)), np.zeros((6, 2, 3)), np.zeros((4, 2))
-    )  # fmt: skip
-    known = np.empty(4, bool)
-    assert kept(1, *before, *now, known) == 1
-    assert known.tolist() == [True, True, True, False]
-    np.testing.assert_array_equal(now[3][:5], parts[1:])
-    np.testing.assert_array_equal(now[4][:5], joints[1:])
-    np.testing.assert_array_equal(now[5][:3], last[1:])
+    rows, now = np.array([0, 1, 3, 4, 6]), np.array([0, 2, 3, 5, 6])
+    _, q, qd = motion(1, 7)
+    before, new_q, new_qd = (4, rows, q, qd), np.vstack([q[1:], q[:1]]), np.vstack([qd[1:], qd[:1]])
+    assert asked(5, now, new_q, new_qd, kept=before) == ([True, True, True, False], 1)
     # A last bit, of a position or a velocity at a tick or a knot, is another motion on both sides of it.
     for row, ticks in ((0, [0]), (1, [0]), (2, [0, 1]), (4, [2]), (5, [2])):
-        for which in (1, 2):
-            other = [each.copy() for each in now]
+        for which in (0, 1):
+            other = [new_q.copy(), new_qd.copy()]
             other[which][row, 2] = np.nextafter(other[which][row, 2], 9)
-            kept(1, *before, *other, known)
+            known, missing = asked(5, now, *other, kept=before)
             assert [i for i in range(3) if not known[i]] == ticks
+            assert missing == len(ticks) + 1
     # Another number of knots is another motion.
-    assert kept(1, *before, np.array([0, 1, 3, 5, 6]), *now[1:], known) == 3
-    assert known.tolist() == [False, False, True, False]
-    assert kept(9, *before, *now, known) == 4
-    assert kept(-1, *before, *now, known) == 4
+    knots = np.array([0, 1, 3, 5, 6])
+    assert asked(5, knots, new_q, new_qd, kept=before) == ([False, False, True, False], 3)
+    assert asked(13, now, new_q, new_qd, kept=before) == ([False] * 4, 4)
+    assert asked(5, now, new_q, new_qd, kept=before, again=False) == ([False] * 4, 4)
+    assert asked(4, rows, q, qd, kept=before) == ([True] * 4, 0)
+
+
+def test_a_window_without_room_says_so():
+    _, q, qd = motion(1, 8)
+    before = 0, np.array([0, 1]), q[:2], qd[:2]
+    assert asked(1, np.arange(7), q[:7], qd[:7], kept=before)[1] == -1
+    assert asked(1, np.array([0, 3]), q[:4], qd[:4], kept=before)[1] == -1
+    assert asked(1, np.array([0, 2]), q[:3], qd[:3], kept=before)[1] == 1

@@ -2,18 +2,129 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
+from seerob.kernels.mujoco_calls import updated
 from seerob.kernels.spans import joint_bounds, point_bounds
+from seerob.kernels.speed import fastest_of
 
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-
 _ROW, _ROWS, _PAIR = "f8[::1]", "f8[:,::1]", "f8[:,:,::1]"
-_WINDOW = f"i8[::1], {_ROWS}, {_ROWS}, {_PAIR}, {_PAIR}, {_ROWS}"
+
+
+class Window(NamedTuple):
+    """What is known of a motion, tick by tick: room for s ticks, r instants of each, n parts and j joints.
+
+    A tick lies where its number modulo s says, with its first and its last instant.
+    """
+
+    number: Indices
+    """Which tick is known there, -1 where none is, shape (s,)."""
+    instants: Indices
+    """How many instants it has, shape (s,)."""
+    q: Array
+    """Positions of the joints at them [rad or m], shape (s r, j)."""
+    qd: Array
+    """Velocities there [rad/s or m/s], shape (s r, j)."""
+    parts: Array
+    """Largest speed of each part from instant to instant, and the larger of both instants [m/s], shape
+    (s r, 2, n)."""
+    joints: Array
+    """Those of each joint, likewise [rad/s or m/s], shape (s r, 2, j)."""
+    last: Array
+    """Speed of each part at its end [m/s], shape (s, n)."""
+    speeds: Array
+    """Work: speeds of the parts at the instants of a tick [m/s], shape (r, n)."""
+
+
+class Parts(NamedTuple):
+    """Parts of a robot: where MuJoCo has them, and the d joints that move them; r joints of the robot."""
+
+    calls: Indices
+    """Addresses of the `mujoco.MjModel`, of its data, and of what makes the next four follow from positions
+    and velocities of joints (`seerob.twin.mujoco_addresses.POSES`), shape (5,)."""
+    xmat: Array
+    """World from body, row by row, shape (m, 9)."""
+    xpos: Array
+    """[m], shape (m, 3)."""
+    cvel: Array
+    """Twists: rotation first, at the centre of mass of the whole tree, shape (m, 6)."""
+    subtree_com: Array
+    """Centre of mass of the tree below each body [m], shape (m, 3)."""
+    ids: Indices
+    """MuJoCo's body of each part, shape (n,)."""
+    roots: Indices
+    """The first body of its tree, shape (n,)."""
+    corners: Array
+    """Points of all parts in their own frames, by coordinate [m], shape (3, k)."""
+    start: Indices
+    """Where each part's corners start, shape (n + 1,)."""
+    reach: Array
+    """How far a part may lie outside its corners' hull [m], shape (n,)."""
+    home: Array
+    """Positions of the joints in the model as compiled [rad or m], shape (d,)."""
+    chain: Indices
+    """Where the joints of each part begin, shape (n + 1,)."""
+    joints: Indices
+    """All chains one after the other, each from base to tip, shape (c,)."""
+    turns: Flags
+    """Whether each turns; otherwise it slides, shape (c,)."""
+    lengths: Array
+    """Of the segment behind each [m], shape (c,)."""
+    dofs: Indices
+    """Of these joints, where they are among all, shape (d,)."""
+    own: Indices
+    """Which of the robot's each is, -1 for those of others, shape (d,)."""
+    goes: Flags
+    """Whether each of others goes on as it does, shape (d,)."""
+    qpos: Array
+    """MuJoCo's: positions of all joints [rad or m], of which the robot's are written, shape (nq,)."""
+    qvel: Array
+    """Velocities of all, likewise, shape (nv,)."""
+    q_address: Indices
+    """Where the robot's joints are among the former, shape (r,)."""
+    v_address: Indices
+    """Where they are among the latter, likewise."""
+    coupling: Array
+    """They from those that are commanded, shape (r, j)."""
+    offset: Array
+    """Added to their positions [rad or m], shape (r,)."""
+
+
+_FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
+WINDOW = Layout(
+    Window,
+    [
+        (_WHOLE, 1), (_WHOLE, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 3), (_FLOAT, 2),
+        (_FLOAT, 2),
+    ],
+)  # fmt: skip
+PARTS = Layout(
+    Parts,
+    [
+        (_WHOLE, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 2), (_WHOLE, 1), (_WHOLE, 1),
+        (_FLOAT, 2), (_WHOLE, 1), (_FLOAT, 1), (_FLOAT, 1), (_WHOLE, 1), (_WHOLE, 1), (_FLAG, 1), (_FLOAT, 1),
+        (_WHOLE, 1), (_WHOLE, 1), (_FLAG, 1), (_FLOAT, 1), (_FLOAT, 1), (_WHOLE, 1), (_WHOLE, 1), (_FLOAT, 2),
+        (_FLOAT, 1),
+    ],
+)  # fmt: skip
+_window_in, _parts_in = WINDOW.read, PARTS.read
+
+
+def window(ticks: int, instants: int, parts: int, joints: int) -> Window:
+    """Room for so many ticks, and instants of each; nothing is known."""
+    s, m, n, j = ticks, ticks * instants, parts, joints
+    return Window(
+        np.full(s, -1), np.zeros(s, np.int64), np.empty((m, j)), np.empty((m, j)),
+        np.empty((m, 2, n)), np.empty((m, 2, j)), np.empty((s, n)), np.empty((instants, n)),
+    )  # fmt: skip
 
 
 @njit(f"i8(f8, i8, f8, f8[:], f8, {_ROW}, i8[::1])", cache=True, nogil=True)
@@ -47,73 +158,6 @@ def instants(
         found[count], rows[i] = tick, count
         count, i, tick = count + 1, i + 1, period * (first + i + 1)
     return count
-
-
-@njit(f"i8(i8, {_WINDOW}, {_WINDOW}, b1[::1])", cache=True, nogil=True)
-def kept(
-    shift: int,
-    rows_before: Indices,
-    q_before: Array,
-    qd_before: Array,
-    parts_before: Array,
-    joints_before: Array,
-    last_before: Array,
-    rows: Indices,
-    q: Array,
-    qd: Array,
-    parts: Array,
-    joints: Array,
-    last: Array,
-    known: Flags,
-) -> int:
-    """Take over what is known of ticks at which the motion is still the same, by its bits.
-
-    Writes into the last four arguments; a window of s ticks has m instants, n parts and j joints.
-
-    Args:
-        shift: By how many ticks the window has moved on.
-        rows_before: Of the window before: which instants are ticks, shape (s' + 1,).
-        q_before: Positions of the joints [rad or m], shape (m', j).
-        qd_before: Velocities [rad/s or m/s], shape (m', j).
-        parts_before: Bounds on the speeds of parts [m/s], shape (m' - 1, 2, n).
-        joints_before: Bounds on those of joints, shape (m' - 1, 2, j).
-        last_before: Speeds of the parts at the end of each tick [m/s], shape (s', n).
-        rows: Of the window now, as the others.
-        q: Likewise.
-        qd: Likewise.
-        parts: Likewise.
-        joints: Likewise.
-        last: Likewise.
-        known: Of which ticks that was known, shape (s,).
-
-    Returns:
-        How many ticks are not known.
-    """
-    own_q, own_qd = q.view(np.int64), qd.view(np.int64)
-    other_q, other_qd = q_before.view(np.int64), qd_before.view(np.int64)
-    missing = 0
-    for i in range(len(known)):
-        k = i + shift
-        same = 0 <= k < len(rows_before) - 1 and rows[i + 1] - rows[i] == rows_before[k + 1] - rows_before[k]
-        if same:
-            a, b = rows[i], rows_before[k]
-            for r in range(rows[i + 1] - a + 1):
-                for j in range(q.shape[1]):
-                    if own_q[a + r, j] != other_q[b + r, j] or own_qd[a + r, j] != other_qd[b + r, j]:
-                        same = False
-        known[i] = same
-        if not same:
-            missing += 1
-            continue
-        for r in range(rows[i + 1] - a):
-            for side in range(2):
-                for c in range(parts.shape[2]):
-                    parts[a + r, side, c] = parts_before[b + r, side, c]
-                for c in range(joints.shape[2]):
-                    joints[a + r, side, c] = joints_before[b + r, side, c]
-        for c in range(last.shape[1]):
-            last[i, c] = last_before[k, c]
-    return missing
 
 
 @njit(
@@ -273,3 +317,189 @@ def reactions(
         farthest(
             t[a : b + 1], t[a], T_r + lead, bounds[a:b, 0], now[k], T_r, lead, slack, ways[k], tops[k]
         )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _same(a: Array, b: Array) -> bool:
+    """Whether two rows are the same by their bits."""
+    one, other = a.view(np.int64), b.view(np.int64)
+    for j in range(len(one)):
+        if one[j] != other[j]:
+            return False
+    return True
+
+
+@njit(
+    f"i8(i8[:,::1], b1, i8, i8[::1], {_ROWS}, {_ROWS})",
+    cache=True,
+    nogil=True,
+)
+def moved_on(window: Indices, again: bool, first: int, rows: Indices, q: Array, qd: Array) -> int:
+    """Keep what is known of ticks at which the motion is still the same, by its bits, and forget the others.
+
+    Args:
+        window: Table of a `Window`, written.
+        again: Whether anything of it is to be kept.
+        first: Number of the first tick.
+        rows: Which instants are ticks, shape (s + 1,).
+        q: Positions of the joints at the instants [rad or m], shape (m, j).
+        qd: Velocities there [rad/s or m/s], shape (m, j).
+
+    Returns:
+        Of how many ticks that is not known; -1 where there is no room for so many ticks or instants.
+    """
+    now = _window_in(window, 0)
+    s, missing = len(now.number), 0
+    r = len(now.q) // max(s, 1)
+    if len(rows) > s:
+        return -1
+    if not again:
+        now.number[:] = -1
+    for i in range(len(rows) - 1):
+        slot = (first + i) % s
+        begin, count = slot * r, rows[i + 1] - rows[i] + 1
+        if count > r:
+            return -1
+        same = now.number[slot] == first + i and now.instants[slot] == count
+        for row in range(count):
+            k, at = rows[i] + row, begin + row
+            same = same and _same(q[k], now.q[at]) and _same(qd[k], now.qd[at])
+        if same:
+            continue
+        missing += 1
+        now.number[slot], now.instants[slot] = -1, count
+        for row in range(count):
+            for j in range(q.shape[1]):
+                now.q[begin + row, j], now.qd[begin + row, j] = q[rows[i] + row, j], qd[rows[i] + row, j]
+    return missing
+
+
+@njit(cache=True, nogil=True)
+def _coupled(of: Parts, k: int, q: Array) -> float:
+    """What a joint of the robot, of all of them, has of positions or velocities that are commanded."""
+    found = 0.0
+    for j in range(len(q)):
+        found += of.coupling[k, j] * q[j]
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _bound_tick(of: Parts, now: Window, tick: int, t: Array, rounding: float, of_joints: bool) -> None:
+    """Bound how fast parts and joints are in a tick, with all others as they are or go on.
+
+    Args:
+        of: The robot.
+        now: What is known of its motion, written.
+        tick: Number of the tick.
+        t: Its instants [s], shape (k,).
+        rounding: As `part_speeds` takes it [m/s].
+        of_joints: Whether joints are asked for, too.
+    """
+    s, d = len(now.number), len(of.dofs)
+    slot, before, r = tick % s, (tick - 1) % s, len(now.q) // s
+    q, qd = now.q[slot * r : slot * r + len(t)], now.qd[slot * r : slot * r + len(t)]
+    every_q, every_v = np.empty((len(t), d)), np.empty((len(t), d))
+    for row in range(len(t)):
+        for c in range(d):
+            dof, k = of.dofs[c], of.own[c]
+            if k >= 0:
+                every_q[row, c] = _coupled(of, k, q[row]) + of.offset[k]
+                every_v[row, c] = _coupled(of, k, qd[row])
+                continue
+            # Who goes on as they do is where that brings them: all of their joints turn or slide.
+            every_q[row, c], every_v[row, c] = of.qpos[dof], of.qvel[dof]
+            if of.goes[c]:
+                every_q[row, c] += (t[row] - t[0]) * of.qvel[dof]
+    # How fast parts are at its begin is mostly known, by the tick before it.
+    last = before * r + now.instants[before] - 1
+    known = now.number[before] == tick - 1 and _same(now.q[last], q[0]) and _same(now.qd[last], qd[0])
+    for row in range(len(t)):
+        if known and row == 0:
+            for c in range(now.last.shape[1]):
+                now.speeds[0, c] = now.last[before, c]
+            continue
+        for k in range(len(of.offset)):
+            of.qpos[of.q_address[k]] = _coupled(of, k, q[row]) + of.offset[k]
+            of.qvel[of.v_address[k]] = _coupled(of, k, qd[row])
+        for function in of.calls[2:]:
+            updated(function, of.calls[0], of.calls[1])
+        fastest_of(
+            of.xmat, of.xpos, of.cvel, of.subtree_com, of.ids, of.roots, of.corners, of.start, of.reach,
+            now.speeds[row],
+        )  # fmt: skip
+    begin, end = slot * r, slot * r + len(t) - 1
+    part_speeds(
+        t, every_q, every_v, now.speeds[: len(t)], of.home,
+        of.chain, of.joints, of.turns, of.lengths, rounding, now.parts[begin:end],
+    )  # fmt: skip
+    if of_joints:
+        joint_speeds(t, q, qd, now.joints[begin:end])
+    for c in range(now.last.shape[1]):
+        now.last[slot, c] = now.speeds[len(t) - 1, c]
+    now.number[slot] = tick
+
+
+@njit(cache=True, nogil=True)
+def _until_braking(
+    now: Window, bounds: Array, first: int, count: int, side: int, t: Array, begin: float, end: float,
+    T_r: float, lead: float, slack: float, found: Array,
+) -> None:  # fmt: skip
+    s, k = len(now.number), 0
+    r = len(now.q) // s
+    most = np.empty((len(t) - 1, found.shape[1]))
+    for i in range(count):
+        slot = (first + i) % s
+        for row in range(slot * r, slot * r + now.instants[slot] - 1):
+            for c in range(most.shape[1]):
+                most[k, c] = bounds[row, side, c]
+            k += 1
+    farthest(t, begin, end, most, found[0], T_r, lead, slack, found[1], found[2])
+
+
+@njit(
+    f"void(i8[:,::1], i8[:,::1], i8, i8[::1], {_ROW}, i8, f8, f8, f8, f8, f8, f8, {_ROWS}, {_ROWS})",
+    cache=True,
+    nogil=True,
+)
+def until_braking(
+    parts: Indices,
+    window: Indices,
+    first: int,
+    rows: Indices,
+    t: Array,
+    side: int,
+    begin: float,
+    end: float,
+    T_r: float,
+    lead: float,
+    slack: float,
+    rounding: float,
+    points: Array,
+    joints: Array,
+) -> None:
+    """Bound how far and fast parts and joints get until they brake; writes into the last two arguments.
+
+    Args:
+        parts: Table of `Parts`.
+        window: Table of a `Window`, in which bounds of ticks are found that are not known.
+        first: As of `moved_on`, with the next.
+        rows: Likewise.
+        t: Ticks, and the knots between them [s], shape (m,).
+        side: 0 for the largest speeds from instant to instant, 1 for the larger one of both instants.
+        begin: As `farthest` takes it, with the next [s].
+        end: Likewise.
+        T_r: As `farthest` takes it, with the next two [s].
+        lead: Likewise.
+        slack: Likewise.
+        rounding: As `part_speeds` takes it [m/s].
+        points: Speeds of the parts now [m/s], which are given, ways [m] and largest speeds, shape (3, n).
+        joints: Those of joints [rad/s or m/s, rad or m], shape (3, j); of none where they are not asked for.
+    """
+    now, of = _window_in(window, 0), _parts_in(parts, 0)
+    count, of_joints = len(rows) - 1, joints.shape[1] > 0
+    for i in range(count):
+        if now.number[(first + i) % len(now.number)] != first + i:
+            _bound_tick(of, now, first + i, t[rows[i] : rows[i + 1] + 1], rounding, of_joints)
+    _until_braking(now, now.parts, first, count, side, t, begin, end, T_r, lead, slack, points)
+    if of_joints:
+        _until_braking(now, now.joints, first, count, side, t, begin, end, T_r, lead, slack, joints)

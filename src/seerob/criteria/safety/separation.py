@@ -40,8 +40,7 @@ from seerob.criteria.stopping.required import (
 )
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
-from seerob.description.norms import iso_13855
-from seerob.description.norms.iso_13855 import REACHING, WALKING
+from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
 from seerob.distance.least import Closests
 from seerob.kernels.separation import approach_speeds, separation, separations
 from seerob.kernels.spans import greatest
@@ -56,6 +55,7 @@ from seerob.twin.states import States
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 
 
+_WITHIN, _UNDECIDED = Verdict.WITHIN, Verdict.UNDECIDED
 CLOSE = 1e-4
 """A rise of S_p between ticks that is not looked into [m]; our choice, a tenth of the tolerance to which
 `seerob.session.permissible.between_samples` bounds distances."""
@@ -297,20 +297,23 @@ class Separation(Criterion, frozen=True, kw_only=True):
             seen: [m/s].
         """
         found = np.empty(len(course.S_r))
-        time = self.stop.reaction + float(at_least("T_s", course.T_s, unit="s"))
         separation(
-            course.S_r, course.S_s, time, K, self._approach, seen, REACHING, WALKING, iso_13855.ARM_REACH,
-            found,
+            course.S_r, course.S_s, self._time(course), K, self._approach, seen,
+            REACHING, WALKING, ARM_REACH, found,
         )  # fmt: skip
         return found
+
+    def _time(self, course: Course) -> float:
+        """T_r + T_s [s]."""
+        T_s = course.T_s
+        return self.stop.reaction + (T_s if T_s >= 0.0 else float(at_least("T_s", T_s, unit="s")))
 
     def _distances(self, course: Course, K: float, seen: Array) -> Array:
         """S_p at N instants [m], shape (N, n); ``seen`` of each (N,)."""
         found = np.empty(course.S_r.shape)
-        time = self.stop.reaction + float(at_least("T_s", course.T_s, unit="s"))
         separations(
-            np.ascontiguousarray(course.S_r), np.ascontiguousarray(course.S_s), time, K, self._approach,
-            seen, REACHING, WALKING, iso_13855.ARM_REACH, found,
+            np.ascontiguousarray(course.S_r), np.ascontiguousarray(course.S_s), self._time(course), K,
+            self._approach, seen, REACHING, WALKING, ARM_REACH, found,
         )  # fmt: skip
         return found
 
@@ -452,6 +455,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         K, rest = sum(self._terms()[0]) + gap.deviation, sum(terms.values())
         given = tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
         places, human = BodyPlaces(model), self._sides(model)[1]
+        to_whom: dict[bytes, list[str]] = {}
+        """By the bodies to which parts were nearest at the last instant, their names."""
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             at: _Found = figure.beside
@@ -462,7 +467,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             where = f"{parts.names[k]} ↔ {nearest}"
             if at.seen[0] > (self.human_speed or WALKING):
                 where += f", and {human} is seen at {at.seen[0]:.2f} m/s, faster than v_h"
-            if verdict is Verdict.UNDECIDED:
+            if verdict is _UNDECIDED:
                 where = f"{where}: {self._undecided_reason(model, state, at, k, shared)}"
             value, limit = float(found.distance[k]), float(S_p[k])
 
@@ -477,11 +482,15 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 *given,
                 *self._more(S_p, at.most, at.unbounded_reason),
             )
-            if not (state.between and verdict is Verdict.WITHIN):  # which nobody is shown, and it takes long
+            if not (state.between and verdict is _WITHIN):  # which nobody is shown, and it takes long
                 beside += self._permissible(
                     at.stop, state, at.course, at.now, found.distance, K, at.seen, at.stray
                 )
-            return Shown(where, draw, beside, list(map(names.__getitem__, found.body_a.tolist())))
+            key = found.body_a.tobytes()
+            if key not in to_whom:
+                to_whom.clear()
+                to_whom[key] = list(map(names.__getitem__, found.body_a.tolist()))
+            return Shown(where, draw, beside, to_whom[key])
 
         return present
 
@@ -711,13 +720,12 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return np.array([*room, *near]), np.array([*off, *[0.0] * len(off)])
 
     def _required(self, now: Course, K: float, seen: float, seen_most: float) -> Required:
-        S_p = most = self._distance(now, K, seen)
-        if now.most is not None or seen_most > seen:
-            most = np.maximum(self._distance(now.most or now, K, seen_most), S_p)
-        unbounded = (now.unbounded_reason, "" if now.most is None else now.most.unbounded_reason)
-        return Required(
-            S_p, most, "; ".join(dict.fromkeys(filter(None, unbounded))) if any(unbounded) else ""
-        )
+        S_p, top = self._distance(now, K, seen), now.most
+        if top is None and not seen_most > seen:
+            return Required(S_p, S_p, now.unbounded_reason)
+        most = np.maximum(self._distance(top or now, K, seen_most), S_p)
+        unbounded = now.unbounded_reason, "" if top is None else top.unbounded_reason
+        return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, unbounded))))
 
     def required(self, model: Model) -> Callable[[State], Required]:
         """S_p of each of `moving`, in that order; to be asked at every tick."""
@@ -804,7 +812,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None and present.linear:
             v_h = np.empty(len(distance))
-            approach_speeds(distance, self._approach, seen[1], REACHING, WALKING, iso_13855.ARM_REACH, v_h)
+            approach_speeds(distance, self._approach, seen[1], REACHING, WALKING, ARM_REACH, v_h)
             speed, factor = stop.inverse(onset(0.0), present, distance, v_h, K)
         elif now.v_r.max() > MOVING:
             factor = factor_by_search(S_p, distance, stop.costly)

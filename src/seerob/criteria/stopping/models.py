@@ -235,6 +235,15 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         found: tuple[OnsetAt, OnsetAt | None] = state.once(("onset", asked), lambda: asked(state))
         return found
 
+    def with_most(state: State, course: Course, top: Course | None) -> Course:
+        """Add what it is at most, where that is more: after another onset, or by how it brakes."""
+        if top is None and course.most is None:
+            return course
+        why = [] if top is None else [NOISY if _noisy(state, model, robot) else FASTEST]
+        top = course if top is None else top
+        why += [found.more] * (top.most is not None)
+        return replace(course, most=top.most or top, more="; ".join(why))
+
     def courses(state: State) -> At:
         least, most = reactions(state)
         brake: Callable[[Onset, float], Course] | None = None
@@ -255,23 +264,25 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             least = np.zeros_like(onset.S_r)
             return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, unbounded)))
 
-        ways, restless, who = (np.zeros(0), "", "") if by_themselves is None else by_themselves(state)
+        if by_themselves is None:
+            return lambda scale: with_most(
+                state, after(least(scale), scale), most and after(most(scale), scale)
+            )
+        ways, restless, who = by_themselves(state)
         # Who stops within a stroke takes no longer than with the given deceleration over all of it.
         longer = (
             0.0 if stop.deceleration is None else math.sqrt(2 * ways.max(initial=0.0) / stop.deceleration)
         )
 
         def at(scale: float) -> Course:
-            course = after(least(scale), scale)
-            top = course if most is None else after(most(scale), scale)
-            noisy = _noisy(state, model, robot)
-            why = [NOISY if noisy else FASTEST] * (most is not None) + [found.more] * (top.most is not None)
-            top = top.most or top
-            if restless or ways.any():
-                unbounded = "; ".join(filter(None, (top.unbounded_reason, restless)))
-                top = replace(top, S_r=top.S_r + ways, T_s=top.T_s + longer, unbounded_reason=unbounded)
-                why += [f"if {who} goes all of its stroke: {GIVE}"] * bool(ways.any())
-            return course if top is course else replace(course, most=top, more="; ".join(why))
+            course = with_most(state, after(least(scale), scale), most and after(most(scale), scale))
+            if not (restless or ways.any()):
+                return course
+            top = course.most or course
+            unbounded = "; ".join(filter(None, (top.unbounded_reason, restless)))
+            top = replace(top, S_r=top.S_r + ways, T_s=top.T_s + longer, unbounded_reason=unbounded)
+            stroke = f"if {who} goes all of its stroke: {GIVE}" if ways.any() else ""
+            return replace(course, most=top, more="; ".join(filter(None, (course.more, stroke))))
 
         return at
 

@@ -22,7 +22,6 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -34,10 +33,11 @@ from numpy.typing import NDArray
 from seerob.core.domains import agree, number
 from seerob.core.transforms import Array
 from seerob.kernels import ahead as kernel
-from seerob.kernels.ahead import joint_speeds, kept, part_speeds
-from seerob.kernels.speed import by_coordinate, fastest_of
+from seerob.kernels.ahead import PARTS, WINDOW, joint_speeds, moved_on, until_braking
+from seerob.kernels.speed import by_coordinate
 from seerob.model.model import Body, Gap, Mechanism, Model
-from seerob.twin.spans import ROUNDING, Chains, Knots, Points, rows_of
+from seerob.twin.mujoco_addresses import POSES, addresses
+from seerob.twin.spans import ROUNDING, Knots, Points, rows_of
 from seerob.twin.speed_noise import levers as levers_of
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
@@ -164,21 +164,23 @@ class Foreseen:
         """
         number("T_r", T_r, 0.0, unit="s")
         self._robot, self._gap, self._T_r, self._joints_asked = robot, gap, T_r, joints
+        self._ahead = min(T_r, LARGEST_WINDOW)
         self._period = model.workstation.engine.tick
         self._with = (robot.name, *robot.riders, *model.carriers_of(robot.name))
-        self._data = data = mujoco.MjData(model.mj)
-        # To ask the data for them takes longer than to use them.
-        self._views = data.qpos, data.qvel, data.xmat, data.xpos, data.cvel, data.subtree_com
         bodies = [model.bodies[i] for i in gap.b]
-        self._corners = by_coordinate([body.corners for body in bodies])
-        self._reach = np.array([body.radius + body.deviation for body in bodies])
-        self._points, self._parts, self._joints = Points(model), rows_of(gap.b), _Joints()
+        reach = np.array([body.radius + body.deviation for body in bodies])
+        self._parts = _Parts(
+            model, robot, rows_of(gap.b), (*by_coordinate([b.corners for b in bodies]), reach)
+        )
         self._run: Callable[[], State | None] = lambda: None
-        self._window: _Window | None = None
+        self._first = 0
+        """Number of the first tick that was asked for last."""
+        self._window = _Window(0, 0, len(bodies), len(robot.joints))
+        self._no_joints = np.empty((3, 0))
 
     def at(self, state: State) -> At | None:
         """None where nobody knows what it will do."""
-        period, T_r, name, t = self._period, min(self._T_r, LARGEST_WINDOW), self._robot.name, state.t
+        period, T_r, name, t = self._period, self._ahead, self._robot.name, state.t
         k = math.floor(t / period + 1e-6)
         # The same instants whenever they are asked for.
         last = math.ceil((t + T_r + period) / period - 1e-6)
@@ -187,235 +189,140 @@ class Foreseen:
         if foreseen is None:
             return None
         q, qd, unbounded_reason = foreseen
-        if self._T_r > LARGEST_WINDOW:
+        if self._T_r > T_r:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
-        known = self._known(state, k, rows, instants, q, qd)
+        q, qd = np.ascontiguousarray(q), np.ascontiguousarray(qd)
+        missing = self._missing(state, k, rows, q, qd)
+        self._parts.follow(state)
+        if missing:
+            self._parts.put_others(state.data_of(*self._with))
+        # A twin that does not stand exactly where the motion has it may be faster now.
         v_now = state.fastest_speeds(self._gap.b)
+        points, joints, later = np.empty((3, len(v_now))), self._no_joints, rows[:0]
+        points[0] = v_now
+        if self._joints_asked:
+            qd_now = state.qd(self._robot)
+            joints = np.empty((3, len(qd_now)))
+            joints[0] = np.abs(qd_now)
+            # A simulated stop goes by the ticks.
+            later = rows[1 : 1 + math.ceil(T_r / period - 1e-6)]
         # Of a motion that may be another one, or jumps, nothing is known between instants.
         side = ENDS if unbounded_reason else MOST
-        # A twin that does not stand exactly where the motion has it may be faster now.
-        stretch = t, T_r + period
-        S_r, v_s = _farthest(instants, stretch, known.parts[:, side], v_now, self._T_r, period)
-        if not self._joints_asked:
-            points = Onset(v_now, S_r, v_s, None, None, unbounded_reason=unbounded_reason)
-            return lambda scale: (
-                points
-                if scale == 1.0
-                else replace(points, v_r=scale * v_now, S_r=scale * S_r, v_s=scale * v_s)
-            )
-        qd_now = np.abs(state.qd(self._robot))
-        ways, speeds = _farthest(instants, stretch, known.joints[:, side], qd_now, self._T_r, period)
-        # A simulated stop goes by the ticks.
-        later = rows[1 : 1 + math.ceil(T_r / period - 1e-6)]
-        now = Onset(v_now, S_r, v_s, ways, speeds, q[later], qd[later], unbounded_reason)
+        until_braking(
+            self._parts.table, self._window.table, k, rows, instants, side, t, T_r + period,
+            self._T_r, period, SLACK, ROUNDING, points, joints,
+        )  # fmt: skip
 
-        def at(scale: float) -> Onset:
-            if scale == 1.0:
-                return now
+        def onset(scale: float) -> Onset:
+            own = points if scale == 1.0 else scale * points
+            if joints is self._no_joints:
+                return Onset(own[0], own[1], own[2], None, None, unbounded_reason=unbounded_reason)
+            each, known = joints, scale == 1.0
+            if not known:
+                each = scale * joints
             return Onset(
-                scale * v_now, scale * S_r, scale * v_s, scale * ways, scale * speeds,
-                unbounded_reason=unbounded_reason,
+                own[0], own[1], own[2], each[1], each[2],
+                q[later] if known else None, qd[later] if known else None, unbounded_reason,
             )  # fmt: skip
 
-        return at
+        now = onset(1.0)
+        return lambda scale: now if scale == 1.0 else onset(scale)
 
-    def _known(self, state: State, k: int, rows: Indices, t: Array, q: Array, qd: Array) -> _Window:
-        """Bounds of all ticks from tick k on, as they were found where the motion is still the same.
+    def _missing(self, state: State, k: int, rows: Indices, q: Array, qd: Array) -> int:
+        """Of how many ticks from tick k on nothing is known yet: where the motion is another one.
 
         Args:
             state: The twin.
             k: Number of the first tick.
             rows: Which instants are ticks, shape (s + 1,).
-            t: Ticks, and the knots between them [s], shape (m,).
-            q: Positions of the robot's joints there [rad or m], shape (m, j).
+            q: Positions of the robot's joints at instants [rad or m], shape (m, j).
             qd: Velocities there, shape (m, j).
         """
-        now = _Window.of(k, rows, np.ascontiguousarray(q), np.ascontiguousarray(qd), len(self._parts))
-        before = self._window
-        if before is None or self._run() is not state or k < before.first:
-            missing = list(range(len(now.last)))
-        else:
-            shift = k - before.first
-            now.behind = before.end(shift - 1) if shift else before.behind
-            same = np.empty(len(now.last), bool)
-            found = kept(shift, *before.arrays, *now.arrays, same) == 0
-            missing = [] if found else [i for i, known in enumerate(same.tolist()) if not known]
-        if missing:
-            data = state.data_of(*self._with)
-            self._joints.follow(self._points, self._parts, self._robot, state)
-            for i in missing:
-                self._find(state, data, now, i, t)
-        if self._run() is not state:
+        again = self._run() is state
+        missing = moved_on(self._window.table, again and k >= self._first, k, rows, q, qd)
+        if missing < 0:
+            instants = int(np.diff(rows).max(initial=1)) + 1
+            self._window = _Window(len(rows), instants, len(self._gap.b), q.shape[1])
+            missing = moved_on(self._window.table, False, k, rows, q, qd)
+        if not again:
             self._run = weakref.ref(state)
-        self._window = now
-        return now
-
-    def _find(self, state: State, now: mujoco.MjData, window: _Window, i: int, t: Array) -> None:
-        """Bound the speeds from a tick to the next, with all others as they are or go on.
-
-        Args:
-            state: The twin.
-            now: Where all are.
-            window: All that comes before is known.
-            i: Which tick.
-            t: All instants of the window [s], shape (m,).
-        """
-        a, b = int(window.rows[i]), int(window.rows[i + 1])
-        t, q, qd = t[a : b + 1], window.q[a : b + 1], window.qd[a : b + 1]
-        joints, chains = self._joints, self._joints.chains
-        speeds = np.empty((len(t), len(self._parts)))
-        before, first = window.end(i - 1) if i else window.behind, 0
-        if before is not None and _bits(before.q, before.qd) == _bits(q[0], qd[0]):
-            speeds[0], first = before.speeds, 1
-        for row in range(first, len(t)):
-            self._speeds(state, now, q[row], qd[row], speeds[row])
-        all_q, all_v = joints.motion(self._robot, now, t, q, qd)
-        part_speeds(
-            t, all_q, all_v, speeds, joints.home,
-            chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, window.parts[a:b],
-        )  # fmt: skip
-        if self._joints_asked:
-            joint_speeds(t, q, qd, window.joints[a:b])
-        window.last[i] = speeds[-1]
-
-    def _speeds(self, state: State, now: mujoco.MjData, q: Array, qd: Array, speeds: Array) -> None:
-        """Of the parts [m/s], into the last argument (n,), with the robot elsewhere and all others as now."""
-        mj, data, robot, joints = state.model.mj, self._data, self._robot, self._joints
-        qpos, qvel, xmat, xpos, cvel, com = self._views
-        if not joints.alone:
-            qpos[:], qvel[:] = now.qpos, now.qvel
-        if joints.direct:
-            qpos[robot.q_address], qvel[robot.v_address] = q, qd
-        else:
-            qpos[robot.q_address] = robot.coupling @ q + robot.offset
-            qvel[robot.v_address] = robot.coupling @ qd
-        mujoco.mj_kinematics(mj, data)
-        mujoco.mj_comPos(mj, data)
-        mujoco.mj_comVel(mj, data)
-        fastest_of(xmat, xpos, cvel, com, joints.ids, joints.roots, *self._corners, self._reach, speeds)
+        self._first = k
+        return int(missing)
 
 
-class _End(NamedTuple):
-    """Where a tick of a window ends."""
-
-    q: Array
-    qd: Array
-    speeds: Array
-    """Of the parts [m/s], shape (n,)."""
-
-
-@dataclass(eq=False)
 class _Window:
-    """What is known of a motion from a tick on; s ticks, m instants, n parts, j joints."""
+    """A `seerob.kernels.ahead.Window`, bound."""
 
-    first: int
-    """Number of the first tick."""
-    rows: Indices
-    """Which instants are ticks, shape (s + 1,)."""
-    q: Array
-    """Positions of the joints [rad or m], shape (m, j)."""
-    qd: Array
-    """Their velocities [rad/s or m/s], likewise."""
-    parts: Array
-    """Largest speed of each part from instant to instant, and the larger of both instants [m/s], shape
-    (m - 1, 2, n)."""
-    joints: Array
-    """Those of each joint, likewise [rad/s or m/s], shape (m - 1, 2, j)."""
-    last: Array
-    """Speed of each part at the end of each tick [m/s], shape (s, n)."""
-    behind: _End | None = None
-    """Of the tick before the first, when that is known."""
-
-    @classmethod
-    def of(cls, first: int, rows: Indices, q: Array, qd: Array, n: int) -> _Window:
-        """With nothing known yet."""
-        m, j = q.shape
-        bounds = np.empty((m - 1, 2, n)), np.empty((m - 1, 2, j))
-        return cls(first, rows, q, qd, *bounds, np.empty((len(rows) - 1, n)))
-
-    @property
-    def arrays(self) -> tuple[Indices, Array, Array, Array, Array, Array]:
-        """All of them, as `seerob.kernels.ahead.kept` takes them."""
-        return self.rows, self.q, self.qd, self.parts, self.joints, self.last
-
-    def end(self, i: int) -> _End | None:
-        """Of a tick; None where there is none."""
-        if not 0 <= i < len(self.last):
-            return None
-        row = self.rows[i + 1]
-        return _End(self.q[row], self.qd[row], self.last[i])
+    def __init__(self, ticks: int, instants: int, parts: int, joints: int) -> None:
+        self._arrays = kernel.window(ticks, instants, parts, joints)
+        self.table = WINDOW.rows(self._arrays)
 
 
-class _Joints:
-    """All joints that move some parts of a robot, its own and those of whom it rides on.
+class _Parts:
+    """Parts of a robot, and all joints that move them, its own and those of whom it rides on.
 
     Attributes:
-        chains: Of the parts.
-        home: Positions of the joints in the model as compiled, shape (d,).
-        ids: MuJoCo's body of each part, shape (n,).
-        roots: The first body of its tree, likewise.
-        direct: Whether each joint of the robot is commanded itself.
-        alone: Whether nothing but such joints of the robot moves the parts.
+        table: Of `seerob.kernels.ahead.Parts`.
     """
 
-    chains: Chains
-    home: Array
-    ids: Indices
-    roots: Indices
-    direct: bool
-    alone: bool
+    table: Indices
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        model: Model,
+        robot: Mechanism,
+        parts: Indices,
+        shapes: tuple[Array, Indices, Array],
+    ) -> None:
+        """Bind.
+
+        Args:
+            model: The workstation.
+            robot: Who moves.
+            parts: Of all bodies.
+            shapes: Corners of the parts, where those of each start, and how far it lies outside, as
+                `seerob.kernels.speed.fastest_of` takes them.
+        """
+        self._robot, self._points, self._rows, self._shapes = robot, Points(model), parts, shapes
+        self._mj, self._data = model.mj, (data := mujoco.MjData(model.mj))
+        self._moved = data.qpos, data.qvel
+        for name in POSES:
+            getattr(mujoco, name)(model.mj, data)
+        self._own_rows = robot.q_address, robot.v_address
+        self._coupled = np.ascontiguousarray(robot.coupling, float), np.ascontiguousarray(robot.offset, float)
+        self._others = tuple(
+            np.setdiff1d(np.arange(len(every)), own)
+            for every, own in zip(self._moved, self._own_rows, strict=True)
+        )
         self._attached = b""
 
-    def follow(self, points: Points, parts: Indices, robot: Mechanism, state: State) -> None:
+    def follow(self, state: State) -> None:
         """Resolve who moves whom now, where that is not as it was."""
-        ids = state.attachments.ids
+        ids, mj, data, robot = state.attachments.ids, self._mj, self._data, self._robot
         attached = ids.tobytes()
         if self._attached == attached:
             return
         self._attached = attached
-        self.ids, self.roots = ids[parts], state.attachments.roots[parts]
-        self.chains = points.chains(parts, ids, state.model.mj)
-        self.home = state.model.mj.qpos0[self.chains.dofs]
-        dofs = self.chains.dofs.tolist()
-        own = {dof: column for column, dof in enumerate(robot.v_address.tolist())}
-        others = (m for m in state.model.mechanisms.values() if m is not robot)
-        going = {dof for other in others for dof in other.v_address.tolist()}
-        self.direct = (
-            np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not np.any(robot.offset)
+        chains = self._points.chains(self._rows, ids, mj)
+        own = {dof: row for row, dof in enumerate(robot.v_address.tolist())}
+        rows = np.array([own.get(dof, -1) for dof in chains.dofs.tolist()], np.int64)
+        others = [m.v_address for m in state.model.mechanisms.values() if m is not robot]
+        self._bound = kernel.Parts(
+            addresses(mj, data, *POSES), data.xmat, data.xpos, data.cvel, data.subtree_com,
+            ids[self._rows], state.attachments.roots[self._rows], *self._shapes,
+            mj.qpos0[chains.dofs], chains.start, chains.joints, chains.turns, chains.lengths,
+            chains.dofs, rows, np.isin(chains.dofs, np.concatenate([chains.dofs[:0], *others])) & (rows < 0),
+            *self._moved, *self._own_rows, *self._coupled,
         )  # fmt: skip
-        self.alone = self.direct and dofs == robot.v_address.tolist()
-        self._own = np.array([i for i, dof in enumerate(dofs) if dof in own], np.int64)
-        self._columns = np.array([own[dof] for dof in dofs if dof in own], np.int64)
-        self._going = np.array([i for i, dof in enumerate(dofs) if dof in going - own.keys()], np.int64)
+        self.table = PARTS.rows(self._bound)
+        direct = np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not np.any(robot.offset)
+        self._alone = direct and chains.dofs.tolist() == robot.v_address.tolist()
 
-    def motion(
-        self, robot: Mechanism, now: mujoco.MjData, t: Array, q: Array, qd: Array
-    ) -> tuple[Array, Array]:
-        """Positions and velocities of all at instants, shape (m, d) each.
-
-        Args:
-            robot: Whose own are known.
-            now: Where all are at the first instant, but for the robot's.
-            t: Instants [s], shape (m,).
-            q: Positions of the robot's there [rad or m], shape (m, j).
-            qd: Velocities there, shape (m, j).
-        """
-        if self.alone:
-            return q, qd
-        dofs = self.chains.dofs
-        every_q, every_v = (np.tile(each[dofs], (len(t), 1)) for each in (now.qpos, now.qvel))
-        if len(self._going):
-            # Who goes on as they do is where that brings them: all of their joints turn or slide.
-            every_q[:, self._going] += (t - t[0])[:, None] * every_v[0, self._going]
-        every_q[:, self._own] = (q @ robot.coupling.T + robot.offset)[:, self._columns]
-        every_v[:, self._own] = (qd @ robot.coupling.T)[:, self._columns]
-        return every_q, every_v
-
-
-def _bits(q: Array, qd: Array) -> bytes:
-    return bytes(q.tobytes() + qd.tobytes())
+    def put_others(self, now: mujoco.MjData) -> None:
+        """Put all but the robot where they are now, unless joints of its own alone move its parts."""
+        if not self._alone:
+            for put, every, others in zip(self._moved, (now.qpos, now.qvel), self._others, strict=True):
+                put[others] = every[others]
 
 
 def with_knots(
@@ -467,15 +374,8 @@ def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tupl
     number("T_r", T_r, 0.0, unit="s")
     number("lead", lead, 0.0, unit="s")
     agree(k=(len(t), len(most) + 1), n=(most.shape[1], len(now)))
-    return _farthest(np.asarray(t, float), (0.0, np.inf), most, now, T_r, lead)
-
-
-def _farthest(
-    t: Array, stretch: tuple[float, float], most: Array, now: Array, T_r: float, lead: float
-) -> tuple[Array, Array]:
-    """Way and top speed by `farthest`, of instants that count since, and as long as, the stretch says [s]."""
     way, top = np.empty((2, len(now)))
-    kernel.farthest(t, *stretch, most, now, T_r, lead, SLACK, way, top)
+    kernel.farthest(np.asarray(t, float), 0.0, np.inf, most, now, T_r, lead, SLACK, way, top)
     return way, top
 
 

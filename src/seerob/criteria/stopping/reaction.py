@@ -57,7 +57,10 @@ def bind_reaction(
 
     def noise(state: State) -> tuple[Array, Array] | None:
         """How far speeds of parts and joints may be off [m/s, rad/s or m/s]; None where they are not."""
-        if state.speed_errors.keys().isdisjoint((robot.name, *robot.riders, *model.carriers_of(robot.name))):
+        errors = state.speed_errors
+        if not errors or errors.keys().isdisjoint(
+            (robot.name, *robot.riders, *model.carriers_of(robot.name))
+        ):
             return None
         off = state.speed_error(robot)
         return state.speed_noise(gap.b), np.zeros(len(robot.joints)) if off is None else off
@@ -86,7 +89,9 @@ def bind_reaction(
 
     def reactions(state: State) -> tuple[At, At | None]:
         known = foreseen.at(state)
-        if known is not None and all(stands_until(state, each, T_r + lead) for each in carriers):
+        if known is not None and (
+            not carriers or all(stands_until(state, each, T_r + lead) for each in carriers)
+        ):
             return with_noise(state, (known, None))
         v, qd = state.fastest_speeds(gap.b), state.qd(robot)
         if robot.role != "robot":

@@ -70,7 +70,8 @@ def way_of_person(v_h: Array | float, T_r: float, T_s: Array | float) -> Array:
 
 def braking(onset: Onset, T_s: float, share: float = BOUND) -> Course:
     """Course of parts that do something known before a stop that takes a known time; as `course`."""
-    return Course(onset.v_r, onset.S_r, share * onset.v_s * T_s, T_s, onset.unbounded_reason)
+    v_s = onset.v_s if share == BOUND else share * onset.v_s
+    return Course(onset.v_r, onset.S_r, v_s * T_s, T_s, onset.unbounded_reason)
 
 
 def course(v_r: Array, T_r: float, T_s: float, share: float = BOUND) -> Course:

@@ -241,6 +241,33 @@ def test_what_mujoco_works_out_for_compiled_loops_is_what_it_works_out_for_pytho
     assert state.positions.tobytes() == asked.xpos[[body.mj for body in ur10.model.bodies]].tobytes()
 
 
+@pytest.mark.parametrize("speed", [1e4, np.nan])
+def test_what_the_physics_loses_is_put_back_and_moves_nobody_else(tmp_path, speed):
+    station = made(tmp_path, FLOATING + TWO_R + PERSON, {"arm.urdf": two_r()})
+    arm, person = station.model.mechanism("arm"), station.model.mechanism("op")
+    ways = []
+    for at in (None, 7):
+        engine = Engine(station.model, driven={"arm": 0.2, "op": 0.2})
+        engine.take([heard("arm", 0.0, [0.1, 0.2]), heard("op", 0.0, person.home + 0.01)])
+        engine.take([heard("arm", 0.15, [0.2, 0.1]), heard("op", 0.15, person.home)])
+        engine.start()
+        for k in range(12):
+            if k == at:
+                engine._data.qvel[arm.v_address] = speed
+            state = engine.tick()
+            assert state.path.broken == (("arm",) if k == at else ())
+            if k == (at or 7):
+                assert state.hearings["arm"].reset_at == (-np.inf if at is None else 0.002 + k * 0.01)
+                ways.append(state.path.copied())
+        ways.append(state.data.qpos[person.q_address].tobytes())
+        assert state.hearings["arm"].error < 1e-3
+    before, _, after, _ = ways
+    assert ways[1] == ways[3]
+    rows, places = person.v_address, person.q_address
+    assert before.v[:, rows].tobytes() == after.v[:, rows].tobytes()
+    assert before.q[:, places].tobytes() == after.q[:, places].tobytes()
+
+
 def test_what_is_asked_of_a_state_does_not_change_the_motion(ur10):
     """Mass matrices, Jacobians and distances are views: with and without them, the same bits."""
     opened, robot = recorded("arm", wave, 100, 0.3), ur10.model.robot("arm")

@@ -40,6 +40,8 @@ class Knots(NamedTuple):
     """Rows from the first to before the last that is kept, shape (2,)."""
     coast: Array
     """How long it goes on at its speed after the last one [s], shape (1,)."""
+    largest: Array
+    """Above it a motion is a jump [rad/s or m/s], shape (n,)."""
 
 
 class Joints(NamedTuple):
@@ -133,7 +135,8 @@ class Physics(NamedTuple):
 
 _FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
 KNOTS = Layout(
-    Knots, [(_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1), (_WHOLE, 1), (_FLOAT, 1)]
+    Knots,
+    [(_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1), (_WHOLE, 1), (_FLOAT, 1), (_FLOAT, 1)],
 )
 JOINTS = Layout(
     Joints, [*[(_WHOLE, 1)] * 3, (_FLOAT, 2), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3]
@@ -291,49 +294,54 @@ def follow(motions: Indices, physics: Indices, t: float) -> None:
             all_.qvel[joints.v_places[i]] = all_.before[joints.v_places[i]] = speed + 0.0
 
 
-@njit(f"b1({_TABLE}, {_ROW})", cache=True, nogil=True, error_model="numpy")
-def join(table: Indices, largest: Array) -> bool:
-    """Join the newest sample to the one before it; whether only a jump does.
+@njit(f"b1({_TABLE}, i8, i8, f8, {_ROW}, {_ROW}, b1)", cache=True, nogil=True, error_model="numpy")
+def take(table: Indices, first: int, row: int, t: float, q: Array, qd: Array, said: bool) -> bool:
+    """Make a sample the newest one, and join it to the one before; whether only a jump does.
 
-    Writes the velocities of these two that nobody said, and that it is a jump.
+    Velocities of these two that nobody said are those of the parabola through them and the one before.
 
     Args:
-        table: Of `KNOTS`; two at least are kept.
-        largest: Above it a motion is a jump [rad/s or m/s], shape (n,).
+        table: Of `KNOTS`.
+        first: Row of the oldest sample that is kept.
+        row: That of this one.
+        t: Its instant [s].
+        q: Position [rad or m], shape (n,).
+        qd: Velocity, or 0 where nobody says it, shape (n,).
+        said: Whether somebody does.
     """
     knots = _knots_in(table, 0)
-    first, end = knots.kept[0], knots.kept[1]
-    instants, points, speeds, jumps = (
-        knots.instants[first:end],
-        knots.points[first:end],
-        knots.speeds[first:end],
-        knots.jumps[first:end],
-    )
-    last, n = end - first - 1, points.shape[1]
-    derives_before, derives_last = not knots.said[end - 2], not knots.said[end - 1]
-    T = instants[last] - instants[last - 1]
-    chord = np.empty(n)
+    instants, points, speeds, jumps, largest = (
+        knots.instants, knots.points, knots.speeds, knots.jumps, knots.largest
+    )  # fmt: skip
+    n, last = len(q), row - 1
+    knots.kept[0], knots.kept[1] = first, row + 1
+    instants[row], jumps[row], knots.said[row] = t, False, said
+    for i in range(n):
+        points[row, i], speeds[row, i] = q[i], qd[i]
+    if row == first:
+        return False
+    T = t - instants[last]
     jump = beyond = False
     for i in range(n):
-        chord[i] = (points[last, i] - points[last - 1, i]) / T
-        beyond = beyond or abs(speeds[last, i]) > largest[i]
-        jump = jump or abs(chord[i]) > largest[i] or abs(speeds[last - 1, i]) > largest[i]
+        beyond = beyond or abs(qd[i]) > largest[i]
+        chord = (q[i] - points[last, i]) / T
+        jump = jump or abs(chord) > largest[i] or abs(speeds[last, i]) > largest[i]
     if jump or beyond:
-        jumps[last] = True
-        if derives_last or beyond:
-            speeds[last] = 0.0
+        jumps[row] = True
+        if beyond:
+            speeds[row] = 0.0
         return True
-    bends = last > 1 and not jumps[last - 1]
+    bends = last > first and not jumps[last]
     for i in range(n):
-        before = after = chord[i]
+        before = after = chord = (q[i] - points[last, i]) / T
         if bends:
-            T0 = instants[last - 1] - instants[last - 2]
-            bend = (chord[i] - (points[last - 1, i] - points[last - 2, i]) / T0) / (T + T0)
-            before, after = chord[i] - T * bend, chord[i] + T * bend
-        if derives_before:
-            speeds[last - 1, i] = before
-        if derives_last:
-            speeds[last, i] = after
+            T0 = instants[last] - instants[last - 1]
+            bend = (chord - (points[last, i] - points[last - 1, i]) / T0) / (T + T0)
+            before, after = chord - T * bend, chord + T * bend
+        if not knots.said[last]:
+            speeds[last, i] = before
+        if not said:
+            speeds[row, i] = after
     return False
 
 
@@ -414,7 +422,7 @@ def _shown(v: float, before: float, centred: bool) -> float:
 
 @njit(f"b1({_TABLE}, i8, b1, f8)", cache=True, nogil=True)
 def end(physics: Indices, step: int, centred: bool, wild: float) -> bool:
-    """Note where a step led to; whether every velocity is below ``wild`` [rad/s or m/s].
+    """Note where a step led to; whether every velocity is below ``wild`` [rad/s or m/s], and the next begins.
 
     Args:
         physics: Table of `PHYSICS`; the next row of ``q_way`` and ``v_way`` is written.
@@ -427,7 +435,11 @@ def end(physics: Indices, step: int, centred: bool, wild: float) -> bool:
         all_.q_way[step + 1, i] = all_.qpos[i]
     for i in range(len(all_.qvel)):
         all_.v_way[step + 1, i] = _shown(all_.qvel[i], all_.before[i], centred)
-    return tame(all_.qvel, wild)
+    if not tame(all_.qvel, wild):
+        return False
+    if step + 1 < len(all_.steering):
+        begin(physics, step + 1)
+    return True
 
 
 @njit(f"b1({_TABLE}, b1)", cache=True, nogil=True)

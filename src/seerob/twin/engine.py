@@ -149,6 +149,7 @@ class Engine:
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
+        self._people = {m.name: m for m in self._mechanisms if m.role == "human"}
         # What a variable says of a machine stands until it says something else.
         coasting = set(live) - {machine.name for machine in model.workstation.machines}
         self.ahead = set(driven) - set(live) - {m.name for m in model.workstation.machines}
@@ -186,7 +187,8 @@ class Engine:
             for human in model.workstation.humans
             if human.follow == "task" and controllers
         ]
-        self._people = [human.name for human in model.workstation.humans]
+        self._strayed = False
+        """Whether the physics holds a person elsewhere than captured."""
         self._almost = 0.999 * self._limits
         self._before, self._torques = np.zeros((2, self._mj.nv))
         # Called from Python once, it tells when there is not enough memory for them.
@@ -292,13 +294,13 @@ class Engine:
                     "its source sends values that are not finite, or beyond 10⁶",
                 )
             elif isinstance(sample, JointSample):
-                qd = None if sample.qd is None else np.array(sample.qd)
+                qd = None if sample.qd is None else np.array(sample.qd, float)
                 if mechanism.name in self._unread:
                     contradicted = self._contradicted(sample)
                     reason = reason or beyond_limits(sample, mechanism) or contradicted
                 if sample.payload is not None:
                     reason = reason or controller_check.heavier(sample.payload, self._carried[mechanism.name])
-                taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
+                taken = self._take_one(mechanism.name, sample.t, np.array(sample.q, float), qd)
                 if taken and mechanism.name in self._unheard:
                     self._unheard[mechanism.name].hear(sample.t, sample.seq, speeds=qd is not None)
             else:
@@ -505,9 +507,9 @@ class Engine:
         self._tick += 1
         self._now = t
         self._show(t)
-        strayed = self._strays()
+        strayed = self._strayed
         self._note_errors()
-        self.state.path = self._path(start, t, captured=strayed or self._strays())
+        self.state.path = self._path(start, t, captured=strayed or self._strayed)
         if self._unheard:
             gaps = tuple(gap for each in self._unheard.values() for gap in each.ended(t + kernel.SLACK))
             self.state.path = replace(self.state.path, gaps=gaps)
@@ -519,23 +521,14 @@ class Engine:
         """Whether the velocities of mj_step belong half a step earlier than its positions (see _pull)."""
         return self.controllers and self.physics and not self._data.ncon
 
-    def _strays(self) -> bool:
-        """Whether the physics holds a person elsewhere than captured."""
-        limit = self.model.workstation.engine.human_tracking_limit
-        hearings = (self._hearings[name] for name in self._people)
-        return any(
-            hearing.held or (hearing.captured is not None and hearing.error > limit) for hearing in hearings
-        )
-
     def _captured(self) -> tuple[Array, Array]:
         """What `_way` gives, with people where they were captured."""
         q, v = (each.copy() for each in self._way)
         q_all, v_all, a_all = self._course
-        for person in self._mechanisms:
-            if person.role == "human":
-                q[:, person.q_address] = q_all[:, person.q_address]
-                rows = person.v_address
-                v[:, rows] = v_all[:, rows] + 0.5 * self._dt * a_all[:, rows]
+        for person in self._people.values():
+            q[:, person.q_address] = q_all[:, person.q_address]
+            rows = person.v_address
+            v[:, rows] = v_all[:, rows] + 0.5 * self._dt * a_all[:, rows]
         return q, v
 
     def _path(self, start: float, t: float, *, captured: bool) -> Path:
@@ -577,13 +570,15 @@ class Engine:
         self._aim(start, end)
         every = self._mechanisms if self.controllers else ()
         self._landing = [one for one in every if self._references[one.name].landing]
-        physics = self._physics
+        physics, begun = self._physics, False
         for step in range(self._steps):
-            self._pull(step, start + step * self._dt)
+            if not begun or self._landing or self._task_pulls:
+                self._pull(step, start + step * self._dt)
             mujoco.mj_step(self._mj, self._data)
-            if not kernel.end(physics, step, self._centred, WILD) and self.controllers:
+            begun = kernel.end(physics, step, self._centred, WILD)
+            if not begun and self.controllers:
                 self._put_back(step + 1, start + (step + 1) * self._dt)
-                kernel.end(physics, step, self._centred, WILD)
+                begun = kernel.end(physics, step, self._centred, WILD)
         self._land(self._steps, end)
 
     def _aim(self, start: float, end: float) -> None:
@@ -646,18 +641,18 @@ class Engine:
         for name, following in self._followings.items():
             q = self.state.joint_positions(self.model.mechanisms[name])
             self._hearings[name].bones = following.errors(self.state.t, q)
-        pulled = self.physics and self._tick > 0
+        pulled, strayed = self.physics and self._tick > 0, False
         kernel.compare(self._motions, self._physics, self.state.t, self._dt, pulled, self.physics)
         if pulled and self.model.workstation.contacts and self.model.workstation.humans:
             self.state.touches = self._touches()
-        found = zip(self._mechanisms, *(each.tolist() for each in self._found), strict=True)
-        for mechanism, error, saturated, unlike in found:
-            hearing = self._hearings[mechanism.name]
+        found = zip(self._hearings.items(), *(each.tolist() for each in self._found), strict=True)
+        for (name, hearing), error, saturated, unlike in found:
             if pulled:
                 hearing.error, hearing.saturated = error, saturated
-                if mechanism.role == "human":
-                    self._note_captured(mechanism, hearing)
-            hearing.unlike = self._unlike(mechanism.name) if unlike > QUIET else None
+                if name in self._people:
+                    strayed = self._note_captured(self._people[name], hearing) or strayed
+            hearing.unlike = self._unlike(name) if unlike > QUIET else None
+        self._strayed = strayed
 
     def _unlike(self, name: str) -> Array | None:
         """How far speeds of the twin are from those that are said, of whom that is more than `QUIET`."""
@@ -676,8 +671,12 @@ class Engine:
                 found.append((one, other, float(force[0])))
         return found
 
-    def _note_captured(self, person: Mechanism, hearing: Hearing) -> None:
-        """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere."""
+    def _note_captured(self, person: Mechanism, hearing: Hearing) -> bool:
+        """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere.
+
+        Returns:
+            Whether it is.
+        """
         hearing.captured, hearing.captured_v = self._led[person.name]
         limit = self.model.workstation.engine.human_tracking_limit
         if (touches := self.state.touches) is not None:
@@ -687,6 +686,7 @@ class Engine:
         if hearing.error > limit:
             following = self._followings.get(person.name)
             hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
+        return hearing.held or hearing.error > limit
 
     def _diverged(self) -> SimulationDiverged:
         """Say what of the twin is not finite."""

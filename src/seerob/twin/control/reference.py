@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.bound import COLUMNS
-from seerob.kernels.pull import KNOTS, SLACK, Knots, along, greatest, join
+from seerob.kernels.pull import KNOTS, SLACK, Knots, along, greatest, take
 
 Indices = NDArray[np.int64]
 
@@ -45,7 +45,8 @@ class Reference:
             coast: How long it goes on at its speed after the newest sample [s]: the next one of a live
                 source may be late, and a robot in motion does not stop for that.
         """
-        self._largest = np.broadcast_to(np.asarray(largest_speed, float), len(home)).copy()
+        largest = np.broadcast_to(np.asarray(largest_speed, float), len(home)).copy()
+        self._whose = np.zeros(2, np.int64), np.array([coast]), largest
         self._coast = coast
         self._landings: list[float] = []
         self._zero = np.zeros(len(home))
@@ -61,13 +62,13 @@ class Reference:
         self._room.kept[:] = self._first, self._end
 
     def _make_room(self, count: int) -> None:
-        n, whose = len(self._zero), (np.zeros(2, np.int64), np.array([self._coast]))
+        n = len(self._zero)
         rows = np.zeros(count), np.zeros((count, n)), np.zeros((count, n))
-        self._room = Knots(*rows, np.zeros(count, bool), np.zeros(count, bool), *whose)
+        self._room = Knots(*rows, np.zeros(count, bool), np.zeros(count, bool), *self._whose)
         self.table[:] = KNOTS.rows(self._room)
 
     def bind(self, table: Indices) -> None:
-        """Have its samples in rows of a table of `seerob.kernels.pull.KNOTS`, shape (7, 4), from now on."""
+        """Have its samples in rows of a table of `seerob.kernels.pull.KNOTS`, shape (8, 4), from now on."""
         table[:] = self.table
         self.table = table
 
@@ -124,27 +125,19 @@ class Reference:
             self._first = self._end = 0
         elif t <= self._times[-1]:
             return False
-        self._add(t, q, qd)
-        self._drop(len(self._times) - MAX_KEPT)
-        # Velocities of the newest two samples where none were given, unless only a jump joins them.
-        if len(self._times) > 1 and join(self.table, self._largest):
-            self._landings.append(t)
-        return True
-
-    def _add(self, t: float, q: Array, qd: Array | None) -> None:
         if self._end == len(self._room.instants):
-            old, kept = self._room, slice(self._first, self._end)
-            count = self._end - self._first
+            old, kept, count = self._room, slice(self._first, self._end), self._end - self._first
             self._make_room(max(ROWS, 2 * count))
             for new, before in zip(self._room[:5], old[:5], strict=True):
                 new[:count] = before[kept]
             self._first, self._end = 0, count
-        room, row = self._room, self._end
-        room.instants[row], room.points[row], room.jumps[row], room.said[row] = t, q, False, qd is not None
-        room.speeds[row] = self._zero if qd is None else qd
+        speeds = self._zero if qd is None else qd
+        if take(self.table, self._first, self._end, t, q, speeds, qd is not None):
+            self._landings.append(t)
         self._end += 1
-        room.kept[:] = self._first, self._end
         self._times.append(t)
+        self._drop(len(self._times) - MAX_KEPT)
+        return True
 
     @property
     def jumped(self) -> bool:

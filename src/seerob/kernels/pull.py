@@ -42,6 +42,8 @@ class Knots(NamedTuple):
     """How long it goes on at its speed after the last one [s], shape (1,)."""
     largest: Array
     """Above it a motion is a jump [rad/s or m/s], shape (n,)."""
+    leaves_at: Array
+    """Largest speed of a joint at the newest sample [rad/s or m/s], shape (1,)."""
 
 
 class Joints(NamedTuple):
@@ -136,7 +138,7 @@ class Physics(NamedTuple):
 _FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
 KNOTS = Layout(
     Knots,
-    [(_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1), (_WHOLE, 1), (_FLOAT, 1), (_FLOAT, 1)],
+    [(_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1), (_WHOLE, 1), *[(_FLOAT, 1)] * 3],
 )
 JOINTS = Layout(
     Joints, [*[(_WHOLE, 1)] * 3, (_FLOAT, 2), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3]
@@ -294,57 +296,6 @@ def follow(motions: Indices, physics: Indices, t: float) -> None:
             all_.qvel[joints.v_places[i]] = all_.before[joints.v_places[i]] = speed + 0.0
 
 
-@njit(f"b1({_TABLE}, i8, i8, f8, {_ROW}, {_ROW}, b1)", cache=True, nogil=True, error_model="numpy")
-def take(table: Indices, first: int, row: int, t: float, q: Array, qd: Array, said: bool) -> bool:
-    """Make a sample the newest one, and join it to the one before; whether only a jump does.
-
-    Velocities of these two that nobody said are those of the parabola through them and the one before.
-
-    Args:
-        table: Of `KNOTS`.
-        first: Row of the oldest sample that is kept.
-        row: That of this one.
-        t: Its instant [s].
-        q: Position [rad or m], shape (n,).
-        qd: Velocity, or 0 where nobody says it, shape (n,).
-        said: Whether somebody does.
-    """
-    knots = _knots_in(table, 0)
-    instants, points, speeds, jumps, largest = (
-        knots.instants, knots.points, knots.speeds, knots.jumps, knots.largest
-    )  # fmt: skip
-    n, last = len(q), row - 1
-    knots.kept[0], knots.kept[1] = first, row + 1
-    instants[row], jumps[row], knots.said[row] = t, False, said
-    for i in range(n):
-        points[row, i], speeds[row, i] = q[i], qd[i]
-    if row == first:
-        return False
-    T = t - instants[last]
-    jump = beyond = False
-    for i in range(n):
-        beyond = beyond or abs(qd[i]) > largest[i]
-        chord = (q[i] - points[last, i]) / T
-        jump = jump or abs(chord) > largest[i] or abs(speeds[last, i]) > largest[i]
-    if jump or beyond:
-        jumps[row] = True
-        if beyond:
-            speeds[row] = 0.0
-        return True
-    bends = last > first and not jumps[last]
-    for i in range(n):
-        before = after = chord = (q[i] - points[last, i]) / T
-        if bends:
-            T0 = instants[last] - instants[last - 1]
-            bend = (chord - (points[last, i] - points[last - 1, i]) / T0) / (T + T0)
-            before, after = chord - T * bend, chord + T * bend
-        if not knots.said[last]:
-            speeds[last, i] = before
-        if not said:
-            speeds[row, i] = after
-    return False
-
-
 @njit(f"b1({_ROW}, f8)", cache=True, nogil=True)
 def tame(v: Array, wild: float) -> bool:
     """Whether every velocity is below ``wild``; what is not a number is not."""
@@ -362,6 +313,60 @@ def greatest(v: Array) -> float:
         if not abs(one) <= most and not np.isnan(most):
             most = abs(one)
     return most
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _jumps(knots: Knots, row: int, bends: bool) -> bool:
+    """Whether nothing but a jump joins a sample to the one before; else writes velocities nobody said.
+
+    Those are of the parabola through both and, where it bends, through the one before.
+    """
+    instants, points, speeds, largest = knots.instants, knots.points, knots.speeds, knots.largest
+    T, n, last = instants[row] - instants[row - 1], points.shape[1], row - 1
+    jump = beyond = False
+    for i in range(n):
+        chord = (points[row, i] - points[last, i]) / T
+        beyond = beyond or abs(speeds[row, i]) > largest[i]
+        jump = jump or abs(chord) > largest[i] or abs(speeds[last, i]) > largest[i]
+    if jump or beyond:
+        if beyond:
+            speeds[row] = 0.0
+        return True
+    for i in range(n):
+        before = after = chord = (points[row, i] - points[last, i]) / T
+        if bends:
+            T0 = instants[last] - instants[last - 1]
+            bend = (chord - (points[last, i] - points[last - 1, i]) / T0) / (T + T0)
+            before, after = chord - T * bend, chord + T * bend
+        if not knots.said[last]:
+            speeds[last, i] = before
+        if not knots.said[row]:
+            speeds[row, i] = after
+    return False
+
+
+@njit(f"b1({_TABLE}, i8, i8, f8, {_ROW}, {_ROW}, b1)", cache=True, nogil=True, error_model="numpy")
+def take(table: Indices, first: int, row: int, t: float, q: Array, qd: Array, said: bool) -> bool:
+    """Make a sample the newest one; whether nothing but a jump joins it to the one before.
+
+    Args:
+        table: Of `KNOTS`.
+        first: Row of the oldest sample that is kept.
+        row: That of this one.
+        t: Its instant [s].
+        q: Position [rad or m], shape (n,).
+        qd: Velocity, or 0 where nobody says it, shape (n,).
+        said: Whether somebody does.
+    """
+    knots = _knots_in(table, 0)
+    knots.kept[0], knots.kept[1] = first, row + 1
+    knots.instants[row], knots.said[row] = t, said
+    for i in range(len(q)):
+        knots.points[row, i], knots.speeds[row, i] = q[i], qd[i]
+    bends = row - 1 > first and not knots.jumps[row - 1]
+    jumps = row > first and _jumps(knots, row, bends)
+    knots.jumps[row], knots.leaves_at[0] = jumps, greatest(knots.speeds[row])
+    return jumps
 
 
 @njit(f"void({_TABLE}, i8, i8, f8)", cache=True, nogil=True, error_model="numpy")

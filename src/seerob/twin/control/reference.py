@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.bound import COLUMNS
-from seerob.kernels.pull import KNOTS, SLACK, Knots, along, greatest, take
+from seerob.kernels.pull import KNOTS, SLACK, Knots, along, take
 
 Indices = NDArray[np.int64]
 
@@ -46,7 +46,7 @@ class Reference:
                 source may be late, and a robot in motion does not stop for that.
         """
         largest = np.broadcast_to(np.asarray(largest_speed, float), len(home)).copy()
-        self._whose = np.zeros(2, np.int64), np.array([coast]), largest
+        self._limits = np.array([coast]), largest
         self._coast = coast
         self._landings: list[float] = []
         self._zero = np.zeros(len(home))
@@ -64,11 +64,12 @@ class Reference:
     def _make_room(self, count: int) -> None:
         n = len(self._zero)
         rows = np.zeros(count), np.zeros((count, n)), np.zeros((count, n))
-        self._room = Knots(*rows, np.zeros(count, bool), np.zeros(count, bool), *self._whose)
+        jumps, said = np.zeros((2, count), bool)
+        self._room = Knots(*rows, jumps, said, np.zeros(2, np.int64), *self._limits, np.zeros(1))
         self.table[:] = KNOTS.rows(self._room)
 
     def bind(self, table: Indices) -> None:
-        """Have its samples in rows of a table of `seerob.kernels.pull.KNOTS`, shape (8, 4), from now on."""
+        """Have its samples in rows of a table of `seerob.kernels.pull.KNOTS`, shape (9, 4), from now on."""
         table[:] = self.table
         self.table = table
 
@@ -80,7 +81,7 @@ class Reference:
     @property
     def leaves_at(self) -> float:
         """Largest speed of a joint at the newest sample [rad/s or m/s]; 0 before the first."""
-        return float(greatest(self._room.speeds[self._end - 1]))
+        return float(self._room.leaves_at[0])
 
     def between(self, begin: float, end: float) -> Array:
         """Instants of samples, and of its rest after the newest, between two others [s], shape (k,).
@@ -136,7 +137,8 @@ class Reference:
             self._landings.append(t)
         self._end += 1
         self._times.append(t)
-        self._drop(len(self._times) - MAX_KEPT)
+        if (count := len(self._times) - MAX_KEPT) > 0:
+            self._drop(count)
         return True
 
     @property
@@ -161,13 +163,13 @@ class Reference:
 
     def forget(self, t: float) -> None:
         """Drop what is not needed any more from ``t`` [s] on."""
-        self._drop(bisect_right(self._times, t) - 1)
+        if (count := bisect_right(self._times, t) - 1) > 0:
+            self._drop(count)
 
     def _drop(self, count: int) -> None:
-        if count > 0:
-            self._first += count
-            self._room.kept[0] = self._first
-            del self._times[:count]
+        self._first += count
+        self._room.kept[0] = self._first
+        del self._times[:count]
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""

@@ -18,7 +18,7 @@ BEYOND = 0.1
 
 def torques_of(sample: JointSample | PoseSample) -> Array | None:
     """Measured joint torques [N·m or N], shape (n,); None when there are none, or one cannot be."""
-    if isinstance(sample, PoseSample) or sample.tau is None or not (np.abs(sample.tau) <= LARGEST).all():
+    if isinstance(sample, PoseSample) or sample.tau is None or not _are_possible(sample.tau):
         return None
     return np.array(sample.tau)
 
@@ -28,8 +28,10 @@ def is_possible(sample: JointSample | PoseSample) -> bool:
     said = (
         (*sample.q, *(sample.qd or ())) if isinstance(sample, JointSample) else sample.position + sample.wxyz
     )
-    if not math.isfinite(sample.t):
-        return False
+    return math.isfinite(sample.t) and _are_possible(said)
+
+
+def _are_possible(said: tuple[float, ...]) -> bool:
     # What is not a number may hide from both ends, and not from the sum.
     return not said or (min(said) >= -LARGEST and max(said) <= LARGEST and math.isfinite(sum(said)))
 

@@ -11,7 +11,8 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact.clamped_regions import Clamping
-from seerob.session.run import Judge
+from seerob.criteria.stopping.onset import Foreseen
+from seerob.session.run import Judge, engine_of, pump, ticks
 from seerob.twin.engine import Engine
 
 AXIS = """
@@ -439,3 +440,46 @@ def test_a_run_that_begins_with_it_in_the_hand_does_not_know_where_it_is(tmp_pat
         # However it goes on.
         cell.go((LIFTED, opening), (LIFTED, WIDE))
     assert not Cell(tmp_path, STATION, angle=0.0, opening=SHUT).state.attachments.unknown
+
+
+def test_what_is_picked_up_speeds_up_with_the_hand_until_it_brakes(tmp_path):
+    """What was found of coming ticks while it lay there is forgotten."""
+    t = np.arange(61) * TICK
+    speed = np.clip(4 * (t - 0.3), 0, 0.8)
+    angle = np.cumsum(speed) * TICK
+    opening = np.clip(WIDE - 0.3 * t, 0.04, WIDE)
+    tables = {
+        f"{name}.csv": f"time [s],{head}\n"
+        + "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist())
+        for name, head, rows in (
+            ("arm", "J1 [rad],J2 [rad]", np.stack([t, angle, 0 * t], axis=1)),
+            ("hand", "J1 [m]", np.stack([t, opening / 2], axis=1)),
+        )
+    }
+    sources = "".join(
+        f'[[sources]]\nkind = "csv"\nrobot = "{name}"\nfile = "{name}.csv"\n' for name in ("arm", "hand")
+    )
+    post = '[[parts]]\nname = "post"\nshape = { sphere = 0.1 }\nat = { position = [0, 3, 0] }\n'
+    station = made(
+        tmp_path,
+        ROD.replace("1.2, 0, 0.12", "1.9, 0, 0.12") + post + sources,
+        {"arm.urdf": two_r(), **tables},
+    )
+    model = station.model
+    robot, held = model.robot("arm"), []
+    gap = model.gap(model.select("post"), robot.moving)
+    rod = gap.b.index(next(body.index for body in model.bodies if body.name == "rod"))
+    kept = Foreseen(model, robot, gap, 0.2, joints=False)
+
+    def judge(state):
+        known, anew = (each.at(state)(1.0) for each in (kept, Foreseen(model, robot, gap, 0.2, joints=False)))
+        # Fingers that slow down were faster when the ticks were looked at.
+        assert (known.S_r >= anew.S_r - 1e-4).all()
+        assert (known.v_s >= anew.v_s - 1e-4).all()
+        held.append(known.v_s[rod])
+        return ()
+
+    for _ in ticks(engine_of(model), judge, pump(station.sources, TICK, ahead={"arm": 0.3})):
+        pass
+    assert min(held) < 1e-6
+    assert max(held) > 0.5

@@ -36,6 +36,7 @@ from seerob.kernels import ahead as kernel
 from seerob.kernels.ahead import PARTS, WINDOW, joint_speeds, moved_on, until_braking
 from seerob.kernels.speed import by_coordinate
 from seerob.model.model import Body, Gap, Mechanism, Model
+from seerob.twin.moving_base import RESTS
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.spans import ROUNDING, Knots, Points, rows_of
 from seerob.twin.speed_noise import levers as levers_of
@@ -149,7 +150,7 @@ class Foreseen:
     speed of a joint is known and that of a point is bounded (`seerob.kernels.spans`). A reaction that begins
     until the next tick counts like one that begins now, so that S_p of a tick holds until the next. What
     others do that carry it or that it carries is not known ahead: they go on as they do. What was found of a
-    tick is kept as long as the motion there stays what it was.
+    tick is kept as long as the motion there stays what it was, and so does what they do.
     """
 
     def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float, *, joints: bool) -> None:
@@ -192,10 +193,10 @@ class Foreseen:
         if self._T_r > T_r:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
         q, qd = np.ascontiguousarray(q), np.ascontiguousarray(qd)
-        missing = self._missing(state, k, rows, q, qd)
-        self._parts.follow(state)
-        if missing:
-            self._parts.put_others(state.data_of(*self._with))
+        same = self._parts.follow(state)
+        if not self._parts.alone:
+            same = self._parts.put_others(state.data_of(*self._with)) and same
+        self._keep(state, k, rows, q, qd, same=same)
         # A twin that does not stand exactly where the motion has it may be faster now.
         v_now = state.fastest_speeds(self._gap.b)
         points, joints, later = np.empty((3, len(v_now))), self._no_joints, rows[:0]
@@ -228,8 +229,8 @@ class Foreseen:
         now = onset(1.0)
         return lambda scale: now if scale == 1.0 else onset(scale)
 
-    def _missing(self, state: State, k: int, rows: Indices, q: Array, qd: Array) -> int:
-        """Of how many ticks from tick k on nothing is known yet: where the motion is another one.
+    def _keep(self, state: State, k: int, rows: Indices, q: Array, qd: Array, *, same: bool) -> None:
+        """Keep what is known of ticks from tick k on, but where the motion is another one.
 
         Args:
             state: The twin.
@@ -237,17 +238,18 @@ class Foreseen:
             rows: Which instants are ticks, shape (s + 1,).
             q: Positions of the robot's joints at instants [rad or m], shape (m, j).
             qd: Velocities there, shape (m, j).
+            same: Whether what others do with its parts is as before, and it moves the same ones: what was
+                picked up did not move with it.
         """
         again = self._run() is state
-        missing = moved_on(self._window.table, again and k >= self._first, k, rows, q, qd)
-        if missing < 0:
+        kept = again and same and k >= self._first
+        if moved_on(self._window.table, kept, k, rows, q, qd) < 0:
             instants = int(np.diff(rows).max(initial=1)) + 1
             self._window = _Window(len(rows), instants, len(self._gap.b), q.shape[1])
-            missing = moved_on(self._window.table, False, k, rows, q, qd)
+            moved_on(self._window.table, False, k, rows, q, qd)
         if not again:
             self._run = weakref.ref(state)
         self._first = k
-        return int(missing)
 
 
 class _Window:
@@ -263,9 +265,11 @@ class _Parts:
 
     Attributes:
         table: Of `seerob.kernels.ahead.Parts`.
+        alone: Whether joints of the robot alone move its parts.
     """
 
     table: Indices
+    alone: bool
 
     def __init__(
         self,
@@ -296,12 +300,12 @@ class _Parts:
         )
         self._attached = b""
 
-    def follow(self, state: State) -> None:
-        """Resolve who moves whom now, where that is not as it was."""
+    def follow(self, state: State) -> bool:
+        """Resolve who moves whom now, where that is not as it was; whether it is."""
         ids, mj, data, robot = state.attachments.ids, self._mj, self._data, self._robot
         attached = ids.tobytes()
         if self._attached == attached:
-            return
+            return True
         self._attached = attached
         chains = self._points.chains(self._rows, ids, mj)
         own = {dof: row for row, dof in enumerate(robot.v_address.tolist())}
@@ -316,13 +320,19 @@ class _Parts:
         )  # fmt: skip
         self.table = PARTS.rows(self._bound)
         direct = np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not np.any(robot.offset)
-        self._alone = direct and chains.dofs.tolist() == robot.v_address.tolist()
+        self.alone = direct and chains.dofs.tolist() == robot.v_address.tolist()
+        self._beside = chains.dofs[rows < 0]
+        return False
 
-    def put_others(self, now: mujoco.MjData) -> None:
-        """Put all but the robot where they are now, unless joints of its own alone move its parts."""
-        if not self._alone:
-            for put, every, others in zip(self._moved, (now.qpos, now.qvel), self._others, strict=True):
-                put[others] = every[others]
+    def put_others(self, now: mujoco.MjData) -> bool:
+        """Put all but the robot where they are now; whether those that move its parts go on as before."""
+        every = tuple(zip(self._moved, (now.qpos, now.qvel), strict=True))
+        beside = self._beside
+        if all((np.abs(there[beside] - put[beside]) <= RESTS).all() for put, there in every):
+            return True
+        for (put, there), others in zip(every, self._others, strict=True):
+            put[others] = there[others]
+        return False
 
 
 def with_knots(

@@ -14,6 +14,7 @@ import pytest
 
 import seerob as sr
 from seerob import api
+from seerob.app.cli import main
 from seerob.protocols.links.tcp_server import close_server
 from seerob.recording.series import CODES
 from seerob.testing import sources_never_within
@@ -239,6 +240,26 @@ def test_what_a_plug_in_leaves_out_is_said_before_the_run(tmp_path, monkeypatch,
 def run_with_sinks(folder):
     station = sr.load(folder, allow_plugins=True)
     station.run(folder=folder / "out", sinks=station.workstation.sinks)
+
+
+def test_a_plug_in_that_fails_is_no_verdict(tmp_path, monkeypatch, capfd):
+    """The interpreter's own exit code of a traceback means exceeded."""
+    package = tmp_path / "path" / "own_failing"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    text = (ROOT / "examples/acme/verdict_changes.py").read_text()
+    (package / "own.py").write_text(
+        text.replace("for result in snapshot.results", "for result in snapshot.result")
+    )
+    monkeypatch.syspath_prepend(str(tmp_path / "path"))
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    swing(folder)
+    cell(folder, FROM_FILE + SINK.replace("KIND", "own_failing.own"))
+    assert main(["assess", str(folder), "--allow-plugins", "-o", str(tmp_path / "out")]) == 3
+    said = capfd.readouterr().err
+    assert "AttributeError" in said
+    assert said.endswith("seerob: a fault of the program or of a plug-in, see above; nothing is judged\n")
 
 
 def test_the_page_shows_each_file_as_it_is():

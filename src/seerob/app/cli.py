@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
@@ -69,7 +70,7 @@ def parser(asked: str = "") -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code; errors end in a message, never in a traceback."""
+    """Run one command and return its exit code; errors end in a message, faults in a traceback and one."""
     interrupts = Interrupts()
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(PrintableLines())
@@ -85,13 +86,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if interrupts.came:
             return stopped()
-        if not isinstance(error, SeerobError | OSError):
-            raise
         return _failed(error)
 
 
-def _failed(error: SeerobError | OSError) -> Exit:
-    if isinstance(error, BrokenPipeError):
+def _failed(error: Exception) -> Exit:
+    if not isinstance(error, SeerobError | OSError):
+        # A fault of seerob or of what somebody added to it; its own exit code 1 would read as exceeded.
+        traceback.print_exception(error)
+        sys.stderr.write("seerob: a fault of the program or of a plug-in, see above; nothing is judged\n")
+    elif isinstance(error, BrokenPipeError):
         # Whoever read has gone; the interpreter must not try to write the rest at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     elif isinstance(error, OSError):

@@ -76,6 +76,12 @@ def test_inverse_with_a_stopping_time(v, v_h, T_r, T_s, K, share):
     assert largest_speed_in_time(d, v_h, T_r, T_s, K, share) == pytest.approx(v, rel=1e-6)
 
 
+@pytest.mark.parametrize("inverse", [largest_speed_in_time, largest_speed_decelerating])
+def test_a_person_who_backs_away_is_refused_in_metres_per_second(inverse):
+    with pytest.raises(ValueError, match=r"-1\.6 m/s, "):
+        inverse(1.0, -1.6, 0.1, 2.0, 0.2)
+
+
 @given(x=st.tuples(positive, positive, positive, positive, positive), i=st.integers(0, 4), more=positive)
 def test_separation_distance_grows_with_every_input(x, i, more):
     def S_p(v_r, v_h, T_r, T_s, K, share):

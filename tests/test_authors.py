@@ -12,7 +12,8 @@ from seerob.core.errors import InputError, NotAsked, Undecided
 from seerob.core.snapshot import Result, Row, Verdict
 from seerob.core.verdict import ROUNDING
 from seerob.criteria.criterion import GIVEN_A_MODEL, Criterion
-from seerob.criteria.judging import Judge, contradiction, declared, needed
+from seerob.criteria.judging import Judge, contradiction
+from seerob.criteria.question import declared, needed
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.velocity import Velocity
 from seerob.session.run import bind

@@ -17,7 +17,7 @@ from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.core.verdict import judge_interval
 from seerob.criteria.between_ticks import FEW, MOST, least_margin, watched
 from seerob.criteria.criterion import Criterion, Follows, Moment
-from seerob.criteria.judging import bound_to
+from seerob.criteria.question import bound_to
 from seerob.session.run import Judge, engine_of, pump, ticks
 from seerob.twin.spans import ROUNDING, AllFalls, Fall, Points, Span, approaching, speeding
 

@@ -14,8 +14,9 @@ from seerob.core.markers import Label, Segment
 from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.core.verdict import judge_interval
 from seerob.criteria.criterion import Claim, Criterion
-from seerob.criteria.judging import UNBOUNDED, Judge, bound_to, relied_on, undecided
+from seerob.criteria.judging import Judge, undecided
 from seerob.criteria.noisy_speeds import NOISE, REMEMBERS
+from seerob.criteria.question import UNBOUNDED, bound_to, relied_on
 from seerob.description.humans.skeleton import BONES
 from seerob.recording.series import INFORMS
 from seerob.session import batch

@@ -13,7 +13,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
-from seerob.criteria.judging import UNBOUNDED
+from seerob.criteria.question import UNBOUNDED
 from seerob.outputs.notebook import results_html
 from seerob.outputs.sentences import summary
 from seerob.recording.recording import Recording

@@ -14,7 +14,7 @@ from seerob import load
 from seerob.core.samples import SignalSample
 from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.judging import bound_to
+from seerob.criteria.question import bound_to
 from seerob.devices.sources.web import Web
 from seerob.session.opening import open_sources
 from seerob.session.run import Judge, engine_of

@@ -23,8 +23,9 @@ from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, EvaluateMany
-from seerob.criteria.judging import Judge, Question, held_names, question_of, worded
+from seerob.criteria.judging import Judge
 from seerob.criteria.plausible_places import PlausiblePlaces
+from seerob.criteria.question import Question, held_names, question_of, worded
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags

@@ -15,7 +15,7 @@ from seerob.core.plugin import home, kind_of
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.criteria.judging import worded
+from seerob.criteria.question import worded
 from seerob.description.description import Description
 from seerob.devices.live.contradictions import looked_at
 from seerob.devices.live.listening import LiveSource, delay_of

@@ -18,9 +18,10 @@ from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.samples import Sample, printable_sample
 from seerob.core.snapshot import Result, Scene, Snapshot, Verdict
 from seerob.criteria.between_ticks import watched
-from seerob.criteria.judging import Bound as Bound  # noqa: PLC0414
 from seerob.criteria.judging import Judge as Judge  # noqa: PLC0414
-from seerob.criteria.judging import bound_to, undecided
+from seerob.criteria.judging import undecided
+from seerob.criteria.question import Bound as Bound  # noqa: PLC0414
+from seerob.criteria.question import bound_to
 from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model

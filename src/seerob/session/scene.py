@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 from seerob.core.plugin import kind_of
 from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
-from seerob.criteria.judging import Bound
+from seerob.criteria.question import Bound
 from seerob.criteria.scoring.phases import entered_for
 from seerob.description.norms.editions import headline
 from seerob.model.model import Model

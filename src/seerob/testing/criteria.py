@@ -16,7 +16,8 @@ from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING
 from seerob.criteria.between_ticks import BetweenTicks, least_margin, watched
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.judging import Judge, bound_to, declared
+from seerob.criteria.judging import Judge
+from seerob.criteria.question import bound_to, declared
 from seerob.description.humans.skeleton import BONES, PARENTS, ROOT
 from seerob.model.model import Mechanism, Model
 from seerob.session.station import Station, load

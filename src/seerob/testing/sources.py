@@ -14,7 +14,8 @@ from msgspec.structs import replace as changed
 from seerob.core.errors import SeerobError
 from seerob.core.samples import BodySample, JointSample, Mailbox, PoseSample, Quality, Sample, SignalSample
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.judging import Judge, declared
+from seerob.criteria.judging import Judge
+from seerob.criteria.question import declared
 from seerob.devices.live.contradictions import LookedAt
 from seerob.devices.live.listening import Listener, LiveSource, at_start, because
 from seerob.devices.live.receivers import PATIENCE

@@ -35,7 +35,7 @@ from seerob.criteria.contact.collision import Governing
 from seerob.criteria.contact.limits import Judged
 from seerob.criteria.contact.regions import REGIONS, without_limit
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.judging import held
+from seerob.criteria.question import held
 from seerob.criteria.safety.kinetic_energy import KineticEnergy
 from seerob.criteria.safety.power_and_force import STANDSTILL, Contacts, PowerAndForce
 from seerob.criteria.safety.separation import Separation

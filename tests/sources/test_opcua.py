@@ -280,6 +280,21 @@ def test_a_robot_is_bound_without_a_dictionary(tmp_path, server):
     assert {"emergency_stop": False, "operational_mode": "AUTOMATIC"}.items() <= signals[-1].values.items()
 
 
+def test_nothing_is_missing_of_a_robot_that_moves_and_stands_by_turns(tmp_path):
+    """Of one that stands the server says nothing but that it is there, five times as seldom."""
+
+    def by_turns(t):
+        phase = 2 * np.pi * min(t % 1.0, 0.5) / 0.5
+        swing = np.array([0.1, 0, 0, 0, 0, 0])
+        speed = swing * 4 * np.pi * np.sin(phase)
+        return tuple((HOME + swing * (1 - np.cos(phase))).tolist()), tuple(speed.tolist())
+
+    with OpcuaServer({}, {"R1": by_turns}) as turning:
+        story = lived(asked(cell(tmp_path, turning)), Story(400, lambda story: len(story.joints()) > 50))
+    assert not any("missing" in result.reason for s in story.snapshots for result in s.results)
+    assert len(story.joints()) > 50
+
+
 def test_what_a_controller_has_at_its_flange_and_which_robot_it_is_are_said(server):
     """4 kg that it has picked up; and the twin of another robot."""
     axes = {"joints": tuple("abcdef"), "units": ("rad",) * 6}

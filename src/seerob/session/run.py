@@ -195,12 +195,14 @@ def engine_of(model: Model, state: type[State] = State) -> Engine:
             timeout = source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
             # Devices that complement one another may fall silent one by one.
             driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
-    live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
+    listened = [s for s in model.workstation.sources if isinstance(s, LiveSource)]
+    live = {s.target() for s in listened}
     signals, following = signal_timeouts(model)
     return Engine(
         model,
         driven={**following, **driven},
         live={*live, *following},
+        complete={s.target() for s in listened if s.tells_changes},
         signals=signals,
         untimed=untimed(model),
         coarse=coarse(model),

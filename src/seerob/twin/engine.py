@@ -104,6 +104,7 @@ class Engine:
         *,
         driven: dict[str, float] | None = None,
         live: Collection[str] = (),
+        complete: Collection[str] = (),
         signals: dict[str, float] | None = None,
         untimed: dict[str, str] | None = None,
         coarse: Mapping[str, str] = MappingProxyType({}),
@@ -118,6 +119,7 @@ class Engine:
             driven: Time-out [s] of the source of each robot and human that a source drives.
             live: Those of them whose source is live; when a sample is late they coast, until the time-out;
                 machines do not.
+            complete: Those of them of whom each change is heard: no sample is missing between two.
             signals: Time-out [s] of each variable, or source of variables.
             untimed: Why nobody knows how late a variable is heard, by name.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
@@ -212,7 +214,7 @@ class Engine:
                 self._hearings[robot.name].timeout,
             )
             for robot in model.workstation.robots
-            if robot.name in coasting and controllers
+            if robot.name in coasting and robot.name not in complete and controllers
         }
         """By robot that is heard live."""
         self._said: dict[str, controller_check.ControllerCheck] = {}

@@ -225,6 +225,8 @@ class LiveSource(Source, frozen=True, kw_only=True):
     asked: ClassVar[bool] = False
     """Whether what is sent without a time is the answer to a question that was asked at its ``t``, or comes
     from this process: then nothing is late unseen."""
+    tells_changes: ClassVar[bool] = False
+    """Whether it hears of each change, and that there was none: then no sample is missing between two."""
     asks: ClassVar[str] = ""
     """A line of the workstation file that it needs and that no device can say: `seerob probe` shows it."""
 

@@ -38,6 +38,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
 
     loads: ClassVar[tuple[str, ...]] = ("asyncua",)
     asked: ClassVar[bool] = True
+    tells_changes: ClassVar[bool] = True
 
     robot: str
     """The robot it drives."""

@@ -324,7 +324,7 @@ def test_a_place_closes_where_it_faces_is_narrow_and_opens_wide_enough() -> None
     def rates(columns: list[int], about: float = 0.0) -> np.ndarray:
         g = gaps[:, columns]
         falls, near = -np.gradient(g, q, axis=0), np.minimum(g[1:], g[:-1])
-        looks = Looks(g, faces[:, columns], falls, near, np.ones(near.shape, bool))
+        looks = Looks(g, faces[:, columns], falls, near)
         return closing(looks, np.full((len(columns), 2), about), step, thickness, fits, least=0.004)
 
     for columns, growing, falling in (
@@ -375,7 +375,7 @@ def _spread(on: joint_gaps.Places, surface: np.ndarray) -> float:
 
 def test_no_point_of_a_surface_is_farther_from_a_place_than_its_piece_is_large() -> None:
     """And there are hardly more places than pieces; of what is large pieces are larger."""
-    h, rng = joint_gaps.PIECES[-1], np.random.default_rng(5)
+    h, rng = joint_gaps.PIECE, np.random.default_rng(5)
     half = np.array([0.1, 0.05, 0.025])
     box = trimesh.creation.box(2 * half)
     solid = Solid(mesh=Mesh(np.array(box.vertices), np.array(box.faces, np.int32)))
@@ -454,9 +454,7 @@ def test_each_threshold_of_what_clamps_is_where_it_is_said_to_be(off: float) -> 
     ) -> list[bool]:
         g = np.array(gaps)[:, None]
         near = np.minimum(g[1:], g[:-1])
-        looks = Looks(
-            g, np.ones(g.shape, bool), -np.gradient(g, 0.25, axis=0), near, np.ones(near.shape, bool)
-        )
+        looks = Looks(g, np.ones(g.shape, bool), -np.gradient(g, 0.25, axis=0), near)
         found = closing(looks, np.full((1, 1), about), step, np.array([thick]), np.array([thin]), least=least)
         assert found.shape == (2, 4, 1)
         assert not found[1].any()
@@ -487,26 +485,17 @@ def test_a_place_between_two_that_it_faces_from_one_only_closes_with_the_faster_
         ([0, 1, 0], [True, True]),
         ([0, 0, 0], [False, False]),
     ):
-        looks = Looks(gaps, np.array(faces, bool)[:, None], np.array([[0.1], [0.9], [0.0]]), near, near == 0)
+        looks = Looks(gaps, np.array(faces, bool)[:, None], np.array([[0.1], [0.9], [0.0]]), near)
         found = closing(looks, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
         np.testing.assert_allclose(found[0], np.where(growing, 0.9, 0.0))
         assert not found[1].any()
-        jump = Looks(gaps, np.ones((3, 1), bool), np.zeros((3, 1)), near, near == 0)
+        jump = Looks(gaps, np.ones((3, 1), bool), np.zeros((3, 1)), near)
         mean = closing(jump, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
         np.testing.assert_allclose(mean, [[0.2, 0.4], [0.0, 0.0]])
-        opening = Looks(gaps[::-1], looks.faces, -looks.falls, near, near == 0)
+        opening = Looks(gaps[::-1], looks.faces, -looks.falls, near)
         back = closing(opening, np.zeros((1, 1)), step, np.array([1.0]), np.array([0.1]), least=0.004)[..., 0]
         np.testing.assert_allclose(back[1], np.where(growing, 0.9, 0.0))
         assert not back[0].any()
-        unasked = closing(
-            Looks(gaps, looks.faces, looks.falls, near, near > 0),
-            np.zeros((1, 1)),
-            step,
-            np.array([1.0]),
-            np.array([0.1]),
-            least=0.004,
-        )
-        assert not unasked.any()
 
 
 def test_two_balls_clamp_as_early_whichever_way_they_come_together(tmp_path: Path) -> None:
@@ -546,3 +535,35 @@ def test_a_triangle_without_a_surface_has_no_place() -> None:
     strip = np.array([[[0.0, 0, 0], [0.4, 0, 0], [0.4, 0.01, 0]]])
     points, _ = joint_gaps._on_triangles(strip, 0.0125, 0.0)
     assert np.diff(np.sort([0.0, *points[:, 0].tolist(), 0.4])).max() < 2 * 0.0125
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_place_of_a_part_shuts_faster_than_the_part(seed: int) -> None:
+    """Of random pairs of parts around a hinge, each place alone, as the others are asked for elsewhere."""
+    chance = np.random.default_rng(seed)
+
+    def part() -> list[Solid]:
+        way, at = (
+            chance.normal(size=3),
+            np.array([chance.uniform(-0.1, 0.4), *chance.uniform(-0.08, 0.08, 2)]),
+        )
+        way *= chance.uniform(0.02, 0.12) / np.linalg.norm(way)
+        return [Solid(points=np.array([at - way, at + way]), radius=chance.uniform(0.02, 0.07))]
+
+    solids = [part(), part()]
+    angles = np.linspace(0, 2 * np.pi, 37)
+    turned = np.zeros((37, 3, 3))
+    turned[:, 0, 0] = turned[:, 1, 1] = np.cos(angles)
+    turned[:, 1, 0], turned[:, 0, 1] = np.sin(angles), -np.sin(angles)
+    turned[:, 2, 2] = 1
+    poses = [(np.tile(np.eye(3), (37, 1, 1)), np.zeros((37, 3))), (turned, np.tile([0.2, 0, 0], (37, 1)))]
+    thickness, fits, step = np.array([0.06, 0.3]), np.array([0.025, 0.15]), np.diff(angles)
+    rates = joint_gaps._rates(solids, poses, step, thickness, fits, joint_gaps.SLOWEST, None)
+    for i, j in ((0, 1), (1, 0)):
+        on = places(solids[i])
+        for k in range(0, len(on.points), 7):
+            alone = joint_gaps.Places(on.points[k : k + 1], on.normals[k : k + 1], on.about)
+            looks = joint_gaps._looks(alone, solids[j], (poses[i], poses[j]), step)
+            around = np.full((1, 2), on.about)
+            found = closing(looks, around, step, thickness, fits, least=joint_gaps.SLOWEST)
+            assert (found <= rates + 1e-9).all()

@@ -44,8 +44,8 @@ from seerob.twin.state import State
 
 STEPS = 72
 """Positions of a joint that are looked at, of a whole turn or of a slide."""
-PIECES = (0.08, 0.03, 0.0125)
-"""Into which a surface is divided [m], down to half a finger."""
+PIECE = 0.0125
+"""Into which a surface is divided [m]: half a finger."""
 MOST_PIECES = 200
 """Into so many the largest extent of a part is divided at most: what is larger is known less finely."""
 SLOWEST = 0.025
@@ -81,7 +81,7 @@ def places(solids: Sequence[Solid]) -> Places:
     """Places all over the surface of a body, none inside another of its solids."""
     points = np.concatenate([s.points if s.mesh is None else s.mesh.vertices for s in solids])
     size = float(np.ptp(points, axis=0).max() + 2 * max(s.radius for s in solids))
-    h = max(PIECES[-1], size / MOST_PIECES)
+    h = max(PIECE, size / MOST_PIECES)
     found = [_of_solid(solid, h) for solid in solids]
     if len(solids) > 1:
         found = [_outside(of, k, solids) for k, of in enumerate(found)]
@@ -112,7 +112,7 @@ def closing(looks: Looks, about: Array, step: Array, thickness: Array, fits: Arr
     mean = np.diff(gaps, axis=0) / step[:, None]
     for k, way in enumerate((1, -1)):
         fast = np.maximum(np.maximum(way * looks.falls[1:], way * looks.falls[:-1]), -way * mean)
-        closes = looks.asked & (looks.faces[1:] | looks.faces[:-1]) & (fast >= slowest - ROUNDING)
+        closes = (looks.faces[1:] | looks.faces[:-1]) & (fast >= slowest - ROUNDING)
         fast = np.where(closes, fast, 0.0)
         for r, thick in enumerate(thickness):
             counts = opens[:, r] & (looks.near - about[:, r] <= thick + ROUNDING)
@@ -132,90 +132,27 @@ class Looks:
     """How fast that gap falls while the joint grows [m/rad or m/m], likewise."""
     near: Array
     """Bound on the gap from one position to the next [m], shape (m, p)."""
-    asked: Flags
-    """Where all of that is known, likewise; elsewhere gaps are those of a place nearby."""
 
 
-class _Side:
-    """The places on one body of a pair, as the other sees them."""
-
-    def __init__(self, on: Places, other: Sequence[Solid], poses: Sequence[tuple[Array, Array]]) -> None:
-        self._on, self._other = on, other
-        (R, x), (S, y) = poses
-        # As seen from the other body, place by place: from one position to the next little changes.
-        across = np.swapaxes(S, 1, 2)
-        self._turn, self._shift = across @ R, np.einsum("mij,mj->mi", across, x - y)
-        self._left = np.arange(len(on.points))
-        self._wanted = np.ones((len(R) - 1, len(on.points)), bool)
-        self._gaps = np.zeros((len(R), len(on.points)))
-        """At a place that stands for each."""
-        self._varies = np.zeros(len(on.points), bool)
-        """Of which that is known."""
-
-    def look(self, h: float, step: Array, thickness: Array, fits: Array, least: float, found: Array) -> None:
-        """Raise rates, as `closing` tells them, by those of pieces of a size [m] that may still matter."""
-        on, left = self._on, self._left
-        if not len(left):
-            return
-        which, of = (np.arange(len(left)),) * 2 if h == PIECES[-1] else _stand_for(on, left, h)
-        about = np.full(len(which), on.about)
-        np.maximum.at(
-            about, of, on.about + np.linalg.norm(on.points[left] - on.points[left[which[of]]], axis=1)
-        )
-        wanted = np.zeros((len(step), len(which)), bool)
-        np.logical_or.at(wanted.T, of, self._wanted.T)
-        looks = self._looks(left[which], wanted, self._gaps[:, which], self._varies[which], step)
-        enough = h <= np.maximum(fits / 2, PIECES[-1])
-        around = np.where(enough, about[:, None], on.about)
-        np.maximum(found, closing(looks, around, step, thickness, fits, least=least), out=found)
-        widest, narrowest = looks.gaps.max(axis=0), looks.gaps.min(axis=0)
-        may = np.zeros_like(wanted)
-        for r in np.flatnonzero(~enough):
-            thick, thin, free = thickness[r], fits[r], (found[..., r] == 0).any(axis=0)[:, None]
-            may |= free & (looks.near - about <= thick + ROUNDING) & (widest + about >= thin - ROUNDING)
-        may &= wanted & (widest - narrowest + 2 * about >= least - ROUNDING)
-        self._wanted = may[:, of]
-        self._gaps, self._varies = looks.gaps[:, of], (widest - narrowest - 2 * about >= least)[of]
-        still = self._wanted.any(axis=0)
-        self._left, self._wanted = left[still], self._wanted[:, still]
-        self._gaps, self._varies = self._gaps[:, still], self._varies[still]
-
-    def _looks(
-        self, which: NDArray[np.int64], wanted: Flags, known: Array, varies: Flags, step: Array
-    ) -> Looks:
-        """Look at some places where it is wanted, and everywhere where it is not known how much they vary."""
-        points = np.einsum("mij,pj->mpi", self._turn, self._on.points[which]) + self._shift[:, None]
-        normals = np.einsum("mij,pj->mpi", self._turn, self._on.normals[which])
-        asked = np.zeros(known.shape, bool)
-        asked[1:] |= wanted
-        asked[:-1] |= wanted
-        asked |= ~varies
-        place, node = np.nonzero(asked.T)
-        distance, nearest = distances_from(self._other)(points[node, place])
-        way = nearest - points[node, place]
-        gaps, faces, falls = known.copy(), np.zeros(known.shape, bool), np.zeros(known.shape)
-        gaps[node, place] = np.maximum(distance, 0.0)
-        towards = (way * normals[node, place]).sum(axis=1)
-        faces[node, place] = (distance > 0) & (towards > ASIDE * distance)
-        moved = np.gradient(points, np.concatenate([[0.0], np.cumsum(step)]), axis=0)[node, place]
-        falls[node, place] = np.where(
-            distance > 0, (moved * way).sum(axis=1) / np.maximum(distance, ROUNDING), 0.0
-        )
-        half = np.minimum(step / 2, np.pi / 2)[:, None]
-        arcs = np.linalg.norm(np.diff(points, axis=0), axis=-1) * half / np.sin(half)
-        return Looks(gaps, faces, falls, (gaps[1:] + gaps[:-1] - arcs) / 2, wanted)
-
-
-def _stand_for(on: Places, left: NDArray[np.int64], h: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """One of some places for each piece of a size [m] that looks one way, and the piece of each."""
-    key = np.column_stack([np.floor(on.points[left] / h), np.round(on.normals[left])])
-    _, first, of = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    of = of.reshape(-1)
-    middle = np.zeros((len(first), 3))
-    np.add.at(middle, of, on.points[left])
-    middle /= np.bincount(of)[:, None]
-    order = np.lexsort((np.linalg.norm(on.points[left] - middle[of], axis=1), of))
-    return order[np.searchsorted(of[order], np.arange(len(first)))], of
+def _looks(on: Places, other: Sequence[Solid], poses: Sequence[tuple[Array, Array]], step: Array) -> Looks:
+    """The places on one body of a pair, as the other sees them at positions of the joint, `step` apart."""
+    (R, x), (S, y) = poses
+    # As seen from the other body, place by place: from one position to the next little changes.
+    across = np.swapaxes(S, 1, 2)
+    turn, shift = across @ R, np.einsum("mij,mj->mi", across, x - y)
+    points = np.einsum("mij,pj->pmi", turn, on.points) + shift
+    normals = np.einsum("mij,pj->pmi", turn, on.normals)
+    distance, nearest = (
+        part.reshape(*points.shape[:2], -1) for part in distances_from(other)(points.reshape(-1, 3))
+    )
+    distance, way = distance[..., 0], nearest - points
+    faces = (distance > 0) & ((way * normals).sum(axis=-1) > ASIDE * distance)
+    moved = np.gradient(points, np.concatenate([[0.0], np.cumsum(step)]), axis=1)
+    falls = np.where(distance > 0, (moved * way).sum(axis=-1) / np.maximum(distance, ROUNDING), 0.0)
+    half = np.minimum(step / 2, np.pi / 2)
+    arcs = np.linalg.norm(np.diff(points, axis=1), axis=-1) * half / np.sin(half)
+    gaps = np.maximum(distance, 0.0)
+    return Looks(gaps.T, faces.T, falls.T, ((gaps[:, 1:] + gaps[:, :-1] - arcs) / 2).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,10 +304,11 @@ def _rates(
         found = None if file is None else _read(file, shape)
         if found is None:
             found = np.zeros(shape)
-            sides = [_Side(places(solids[i]), solids[j], (poses[i], poses[j])) for i, j in ((0, 1), (1, 0))]
-            for h in PIECES:
-                for side in sides:
-                    side.look(h, step, thickness, fits, least, found)
+            for i, j in ((0, 1), (1, 0)):
+                on = places(solids[i])
+                looks = _looks(on, solids[j], (poses[i], poses[j]), step)
+                around = np.full((len(on.points), len(fits)), on.about)
+                np.maximum(found, closing(looks, around, step, thickness, fits, least=least), out=found)
             if file is not None:
                 _write(file, found)
         if len(_KNOWN) >= MOST_KNOWN:

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from live_stream import Stream
 from made_cell import FLOATING, TWO_R, made, two_r
+from seerob.core.samples import PoseSample
+from seerob.core.snapshot import Basis
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.figure import Figure
+from seerob.session.station import Station
 from seerob.twin.control.unheard import QUICKEST, Unheard
-from seerob.twin.spans import Gap, Path, Points
+from seerob.twin.engine import Engine
+from seerob.twin.spans import Fall, Gap, Path, Points
 
 TIMEOUT = 0.2
 
@@ -129,9 +137,15 @@ def test_no_motion_within_its_accelerations_leaves_the_bounds(station, speeds, s
 def test_the_bounds_are_those_of_the_hardest_way_there_and_back(station):
     """It speeds up for T/4, brakes and turns round for T/2, and brakes for T/4; no faster than its limit."""
     T = 0.08
-    for a, speeds, faster in ((6.0, True, 6 * T / 4), (6.0, False, 6 * T / 2), (2000.0, True, 10 - 0.5)):
+    for a, speeds, faster, away in (
+        (6.0, True, 6 * T / 4, 6 * T**2 / 16),
+        (6.0, False, 6 * T / 2, 6 * T**2 / 8),
+        # At its limit it is for all but the turn, where it is braked and speeds up again.
+        (2000.0, True, 10 - 0.5, (10 - 0.5) * T / 2),
+    ):
         _, (plain, loose) = span_of(station, T, speeds, a=a)
         assert loose.qd[0] - plain.qd[0] == pytest.approx(faster)
+        assert loose.away[0] - plain.away[0] == pytest.approx(away)
         assert loose.qdd[0] == a
 
 
@@ -193,6 +207,66 @@ def test_lost_packets_open_what_is_near_its_limit_and_no_more(
         assert set(verdicts) <= {"within", "undecided"}
         assert len(undecided) == (lost and name in open)
         assert all("samples of arm are missing from" in reason for reason in undecided)
+
+
+def test_one_acceleration_limit_is_that_of_all_joints(tmp_path, monkeypatch):
+    text = CELL.replace("[20, 20]", "[20]").replace("LIMIT", "1.5").replace("APART", "1.5")
+    live = Stream(made(tmp_path, text, {"arm.urdf": two_r()}), monkeypatch, "arm", packets(True))
+    told = [results[0].verdict for _, results, _ in live.ticks(450)]
+    assert told.count("undecided") == 1
+
+
+def test_poses_of_a_tool_may_be_missing_too(station):
+    model = station.model
+    engine = Engine(model, driven={"arm": TIMEOUT}, live={"arm"})
+    gaps = []
+    for k in range(60):
+        t = 0.01 * k
+        if not 0.3 < t < 0.39:
+            pose = {"position": (1.9, 0.1, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)}
+            engine.take([PoseSample(source="test", seq=0, t=t, target="arm/tip", **pose)])
+        state = engine.tick() if k else engine.start()
+        gaps += [] if state.path is None else state.path.gaps
+    (gap,) = gaps
+    assert (gap.begin, gap.end, gap.speeds) == (pytest.approx(0.3), pytest.approx(0.39), False)
+
+
+class Delicate(Criterion, frozen=True, kw_only=True):
+    """A bound of one's own that is wrong of a way of several ticks."""
+
+    unit: ClassVar[str] = "m/s"
+    limit: float = 5.0
+
+    def compute(self, model):
+        at = model.select("arm/l2")
+        return lambda twin: Figure(twin.fastest_speed(at), self.limit)
+
+    def basis(self, model):
+        return Basis(formula="", source="")
+
+    def depends(self, model):
+        return ("arm",)
+
+    def falls(self, model, points):
+        def fall(span, margin):
+            if span.T > 0.011:
+                raise RuntimeError("one tick at a time")
+            return Fall(0.01)
+
+        return fall
+
+
+def test_a_bound_of_ones_own_that_fails_ends_no_run(tmp_path, monkeypatch):
+    text = CELL.replace("LIMIT", "1.6").replace("APART", "1.5")
+    cell = made(tmp_path, text, {"arm.urdf": two_r()})
+    cell = Station(replace(cell.workstation, safety=(*cell.workstation.safety, Delicate(name="own"))))
+    live = Stream(cell, monkeypatch, "arm", packets(True))
+    told = [results for _, results, _ in live.ticks(450)]
+    assert {each[0].verdict for each in told} == {"within"}
+    own = [each[2] for each in told]
+    assert [r.verdict for r in own[:300]].count("within") > 250
+    assert own[-1].verdict == "undecided"
+    assert "failed: RuntimeError: one tick at a time" in own[-1].reason
 
 
 @pytest.mark.parametrize(("limit", "open"), [(2.45, False), (2.3, True)])

@@ -162,6 +162,19 @@ class Past(NamedTuple):
     """What limits followed from there."""
 
 
+class Back(NamedTuple):
+    """The way since before samples of robots are missing."""
+
+    first: Past
+    """The tick in which they were last heard."""
+    span: Span
+    """Bounds on all of it, whatever way they went."""
+    known: bool
+    """Whether they hold: it is remembered, and nothing was picked up or let go."""
+    text: str
+    """Why what has less room than these is not known to be within."""
+
+
 class Asking(NamedTuple):
     """What only who asks the criteria can do."""
 
@@ -239,20 +252,23 @@ class BetweenTicks:
             self._begins, self._ends = float(path.t[0]), float(path.t[-1])
             self._same = self._ids == ids.tobytes()
             self._remember(path)
+        back = None
+        if path is not None and path.gaps:
+            back = self._back(path.gaps, ids.tobytes(), speeds, state)
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
             try:
                 if i not in self._failed:
                     found[i] = self._one(i, watch, found[i], state, speeds)
+                    if back is not None:
+                        found[i] = self._look_back(i, watch, back, found[i], state)
             except Exception as error:
                 # One's own bound that fails must not end a run that others are judged in.
                 self._failed[i] = f"what bounds it between two ticks failed: {type(error).__name__}: {error}"
             if i in self._failed:
                 found[i] = asking.take_back(found[i], self._failed[i])
         self._ids, self._speeds = ids.tobytes(), speeds
-        if path is not None and path.gaps:
-            self._look_back(path.gaps, found, state)
         return tuple(found)
 
     def _remember(self, path: Path) -> None:
@@ -266,59 +282,48 @@ class BetweenTicks:
         while self._past[0].path.t[-1] < self._ends - KEPT:
             del self._past[0]
 
-    def _look_back(self, gaps: tuple[Gap, ...], found: list[Result], state: State) -> None:
-        """Take back what is within by less than robots may have done of which samples turn out to be missing.
-
-        They came to where they are now another way than the twin, as far as their accelerations let them.
-        """
-        assert self._ids is not None
-        assert self._speeds is not None
+    def _back(self, gaps: tuple[Gap, ...], ids: bytes, speeds: Array, state: State) -> Back:
+        """The way since before samples of robots are missing: they came another one than the twin."""
         begin = min(gap.begin for gap in gaps) + SLACK
-        past = self._past[
-            max((k for k, tick in enumerate(self._past) if tick.path.t[0] <= begin), default=0) :
-        ]
+        since = max((k for k, tick in enumerate(self._past) if tick.path.t[0] <= begin), default=0)
+        past = self._past[since:]
         first, path = past[0], Path.joined([tick.path for tick in past], gaps)
+        points = next(watch.points for watch in self._watches if watch is not None)
+        span = points.span(
+            path, float(path.t[0]), self._ends, np.frombuffer(first.ids, np.int64), state.model.mj
+        )
+        span.between_speeds(first.speeds, speeds)
+        span.foresee, span.knots = state.foresee, state.knots
+        if state.speed_errors:
+            span.derived(state.speed_noise(tuple(range(len(speeds)))), state.joint_noise())
         names = ", ".join(sorted({gap.name for gap in gaps}))
         text = (
             f"samples of {names} are missing from {begin:.4g} s to {max(gap.end for gap in gaps):.4g} s: not "
             "known to be within where it can have been meanwhile"
         )
-        span: Span | None = None
-        for i, watch in enumerate(self._watches):
-            before, now = first.ends[i], self._before[i]
-            result = found[i]
-            if (
-                watch is None
-                or watch.accepted
-                or not (result.verdict is _WITHIN or result.muted or result.nothing)
-            ):
-                continue
-            if before is None or now is None or before.verdict is _EXCEEDED or before.verdict is _UNDECIDED:
-                continue  # which was said there
-            if (
-                before.margin is None
-                and now.margin is None
-                and not (watch.lowest and (before.idle or now.idle))
-            ):
-                continue
-            if span is None:
-                ids = np.frombuffer(first.ids, np.int64)
-                span = watch.points.span(path, float(path.t[0]), self._ends, ids, state.model.mj)
-                span.between_speeds(first.speeds, self._speeds)
-                span.foresee, span.knots = state.foresee, state.knots
-                if state.speed_errors:
-                    bodies = tuple(range(len(self._speeds)))
-                    span.derived(state.speed_noise(bodies), state.joint_noise())
-            low = -np.inf
-            if first.ids == self._ids and first.path.t[0] <= begin:
-                with suppress(Undecided):
-                    low = self._lowest(watch, span, (before, now), first.moments.get(watch), state)
-                if isinstance(watch.falls, Speeding) and result.limit is not None and not path.broken:
-                    # Over several ticks how fast a point gets says more than how quickly it can get faster.
-                    off = max(end.margin[1] for end in (before, now) if end.margin is not None)
-                    low = max(low, result.limit - greatest(span.fast, watch.falls.rows) - float(np.max(off)))
-            if not low >= 0:
-                found[i] = replace(self._asking.take_back(result, text), muted=False)
+        return Back(first, span, first.ids == ids and first.path.t[0] <= begin, text)
+
+    def _look_back(self, i: int, watch: Watch, back: Back, result: Result, state: State) -> Result:
+        """Take back what is within by less than robots may have done whose samples turn out to be missing."""
+        before, now = back.first.ends[i], self._before[i]
+        if watch.accepted or not (result.verdict is _WITHIN or result.muted or result.nothing):
+            return result
+        if before is None or now is None or before.verdict is _EXCEEDED or before.verdict is _UNDECIDED:
+            return result  # which was said there
+        idle = watch.lowest is not None and (before.idle or now.idle)
+        margins = [end.margin for end in (before, now) if end.margin is not None]
+        if not margins and not idle:
+            return result
+        low, broken = -np.inf, back.span.path.broken
+        if back.known:
+            with suppress(Undecided):
+                low = self._lowest(watch, back.span, (before, now), back.first.moments.get(watch), state)
+            falls, limit = watch.falls, result.limit
+            if isinstance(falls, Speeding) and watch.criterion.at_most and limit is not None and not broken:
+                # Over several ticks how fast a point gets says more than how quickly it can get faster.
+                off = max(float(np.max(off)) for _, off in margins)
+                low = max(low, limit - greatest(back.span.fast, falls.rows) - off)
+        return result if low >= 0 else replace(self._asking.take_back(result, back.text), muted=False)
 
     def _lowest(
         self, watch: Watch, span: Span, ends: tuple[End, End], moment: Moment | None, state: State

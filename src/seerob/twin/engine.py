@@ -210,7 +210,7 @@ class Engine:
         self._unheard = {
             robot.name: Unheard(
                 robot.name,
-                np.array(robot.acceleration_limits or [QUICKEST] * len(model.mechanisms[robot.name].home)),
+                np.full(len(model.mechanisms[robot.name].home), robot.acceleration_limits or QUICKEST),
                 self._hearings[robot.name].timeout,
             )
             for robot in model.workstation.robots
@@ -303,11 +303,12 @@ class Engine:
                 if sample.payload is not None:
                     reason = reason or controller_check.heavier(sample.payload, self._carried[mechanism.name])
                 taken = self._take_one(mechanism.name, sample.t, np.array(sample.q, float), qd)
-                if taken and mechanism.name in self._unheard:
-                    self._unheard[mechanism.name].hear(sample.t, sample.seq, speeds=qd is not None)
             else:
                 taken, missed = self._take_pose(mechanism, sample)
                 reason = reason or missed
+            if taken and mechanism.name in self._unheard:
+                speeds = isinstance(sample, JointSample) and sample.qd is not None
+                self._unheard[mechanism.name].hear(sample.t, sample.seq, speeds=speeds)
             self._note(mechanism.name, sample.t, reason, sample, taken=taken)
             if isinstance(sample, JointSample) and not sample.placed:
                 self._hearings[mechanism.name].bones_heard.append(BonesHeard(sample.t, places=NOWHERE))

@@ -333,12 +333,14 @@ class Points:
         most = coupling @ gap.acceleration
         lasts, twice = gap.end - gap.begin, 1 if gap.speeds else 2
         faster = twice * (most + self._change[rows]) * lasts / 4
+        away = faster * lasts / 4
         with np.errstate(invalid="ignore"):
             capped = np.where(coupling > 0, coupling * limits, 0.0).sum(axis=1)
         allowed = np.maximum(capped - self._speed[rows], 0.0)
         faster = np.minimum(faster, allowed)
         self._varies[rows] += 4 * faster / T
-        self._away[rows] += faster * lasts / 4
+        # Soon at its limit, it goes on so for nearly half of the time, and comes back in the other half.
+        self._away[rows] += np.minimum(away, faster * lasts / 2)
         self._speed[rows] += faster
         self._change[rows] = np.maximum(self._change[rows], most)
 

@@ -9,6 +9,7 @@ import made_run
 import pytest
 from msgspec.structs import replace
 
+from seerob.app.console.progress import announced
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Result, Verdict
 from seerob.outputs.sinks.dossier import Dossier
@@ -186,6 +187,20 @@ def test_whoever_does_not_want_to_wait_waits_for_no_picture_that_is_not_begun(tm
     writer.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
     assert not list(tmp_path.iterdir())
     assert all(picture.done() for picture in writer._being_drawn.values())
+
+
+def test_what_fails_before_the_end_is_said_at_the_end_and_ends_no_run(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("seerob.outputs.picture.picture.Stage", full)
+    report = Dossier().open(made_run.scene(), made_run.MESHES, {}, tmp_path)
+    (writer,) = announced([report], ["report.html"], lambda _: None, outlived=True)
+    with writer:
+        writer.write(made_run.snapshot(50), ())
+        writer.begin()
+    assert "No space left" in str(writer.failure)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_mesh_that_cannot_be_read_is_a_finding_not_a_failure(tmp_path):

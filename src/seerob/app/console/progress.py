@@ -132,9 +132,10 @@ class Announced:
             self._writer.share(log)
 
     def begin(self) -> None:
-        """No tick comes any more."""
-        if isinstance(self._writer, BeginsAtEnd):
-            self._writer.begin()
+        """No tick comes any more; what fails here fails again when it is closed, which says so."""
+        if self.failure is None and isinstance(self._writer, BeginsAtEnd):
+            with suppress(SeerobError, OSError):
+                self._writer.begin()
 
     def close(self) -> None:
         """Finish files; nothing half-written stays behind."""

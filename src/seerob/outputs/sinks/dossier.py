@@ -116,11 +116,12 @@ class DossierWriter(AtEndWithResults):
             if snapshot is None or result is None or not result.markers:
                 continue
             chosen.append((snapshot, result))
+        chosen = chosen[: self._pictures]
+        stage = Stage(self._scene, self._meshes) if chosen else None
         self._pool = ThreadPoolExecutor(_AT_ONCE)  # most of a picture is drawn without the interpreter's lock
-        if chosen := chosen[: self._pictures]:
-            subjects = {info.name: info.subjects for info in self._scene.criteria}
-            stage = Stage(self._scene, self._meshes)
+        if stage is not None:
             self.findings.extend(stage.findings)
+            subjects = {info.name: info.subjects for info in self._scene.criteria}
             self._being_drawn = {
                 result.name: self._pool.submit(
                     stage.picture, snapshot, result, subjects=subjects.get(result.name, ())

@@ -21,9 +21,9 @@ USUAL = 32
 """Newest intervals between samples: a quarter of them are as short as usual, however many are lost."""
 MISSING = 1.8
 """Times the usual interval after which a sample is missing: the next but one is due after two."""
-QUICKEST = 30.0
-"""No joint accelerates harder that states nothing [rad/s² or m/s²]: published stopping tables of arms come to
-that."""
+QUICKEST = 35.0
+"""No joint accelerates harder that states nothing [rad/s² or m/s²]: the hardest stop of the published tables,
+of the wrist of a UR3, comes to 34.7 rad/s² (its speed over its stopping time)."""
 SEEN = 5e-3
 """How far a joint may go away unseen and come back [rad or m]: what its samples, and the twin, are off by."""
 

@@ -44,6 +44,7 @@ from seerob.description.robots import library
 from seerob.session import batch
 from seerob.session import run as road
 from seerob.session.reading import read
+from seerob.session.recorded_motion import recorded
 from seerob.session.station import Station
 from seerob.twin.engine import Engine
 
@@ -178,10 +179,13 @@ def batched(samples: int, criteria: tuple[Criterion, ...]) -> tuple[float, float
     feed = [one for _, one in zip(range(samples), pump(station), strict=False)]
     # What is compiled is loaded, and threads are there, before time is taken.
     batch.judged(
-        station.model, station.bound, batch.recorded(station.model, iter(feed[:600]), math.inf), threads=2
+        station.model,
+        station.bound,
+        recorded(station.model, iter(feed[:600]), math.inf),
+        threads=2,
     )
     begin = time.process_time()
-    motion = batch.recorded(station.model, iter(feed), math.inf)
+    motion = recorded(station.model, iter(feed), math.inf)
     followed, alone = time.process_time(), time.thread_time()
     batch.judged(station.model, station.bound, motion, threads=2)
     judged, alone = time.process_time(), time.thread_time() - alone
@@ -206,7 +210,7 @@ def pump(station: Station) -> road.Feed:
 def beside(samples: int) -> tuple[float, float]:
     """Processor time per sample of four criteria: here on one core, and Pinocchio with numpy [s]."""
     station = made(SHORT, physics=False)
-    motion = batch.recorded(
+    motion = recorded(
         station.model, (one for _, one in zip(range(samples), pump(station), strict=False)), math.inf
     )
     robot = station.model.robot(ROBOT)

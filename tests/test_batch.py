@@ -19,7 +19,7 @@ from seerob.core.verdict import judge
 from seerob.criteria.criterion import Criterion
 from seerob.recording.answers import Answers
 from seerob.recording.series import CODES, NO_VERDICT
-from seerob.session import batch as batches
+from seerob.session import recorded_motion
 from seerob.session.run import Judge
 from seerob.session.station import Station
 from seerob.twin.engine import Engine
@@ -365,10 +365,10 @@ def test_a_file_is_followed_in_arrays_as_sample_by_sample(tmp_path, monkeypatch,
     end = max(each[-1].t for each in samples.values())
     pumps = [Pump(Opened(samples=each, duration=end)) for each in samples.values()]
     feed = [tuple(s for pump in pumps for s in pump.until(0.01 * k)) for k in range(round(100 * end) + 3)]
-    together = batches.recorded(station.model, feed, end)
+    together = recorded_motion.recorded(station.model, feed, end)
     assert isinstance(together.ways, Ways)
-    monkeypatch.setattr(batches, "known_motion", lambda *_: None)
-    one_by_one = batches.recorded(station.model, feed, end)
+    monkeypatch.setattr(recorded_motion, "known_motion", lambda *_: None)
+    one_by_one = recorded_motion.recorded(station.model, feed, end)
     assert not isinstance(one_by_one.ways, Ways)
     for key in ("t", "q", "v"):
         np.testing.assert_array_equal(getattr(together, key), getattr(one_by_one, key))

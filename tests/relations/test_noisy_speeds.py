@@ -20,6 +20,7 @@ from made_cell import meant
 from seerob.core.snapshot import Verdict
 from seerob.recording.series import CODES
 from seerob.session import batch
+from seerob.session.recorded_motion import recorded
 from seerob.session.run import engine_of, looks_ahead, pump
 from seerob.session.station import load
 
@@ -120,7 +121,7 @@ def cell_of(cell, folder, figures):
 
 def at_ticks(made):
     """What everybody says at the ticks, whatever happens between them."""
-    motion = batch.recorded(made.model, pump(made.sources, made.workstation.engine.tick), made.duration)
+    motion = recorded(made.model, pump(made.sources, made.workstation.engine.tick), made.duration)
     findings = [found for _, opened in made.sources for found in opened.findings]
     bound = [replace(one, watch=None) for one in made.bound]
     found = batch.judged(made.model, bound, replace(motion, ways=None), threads=1, findings=findings)

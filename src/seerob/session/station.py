@@ -339,6 +339,7 @@ class Station:
             InputError: Arrays that do not fit, or a live source without them.
         """
         from seerob.session import batch
+        from seerob.session.recorded_motion import recorded
 
         findings: list[Finding] = []
         if q is None:
@@ -346,7 +347,7 @@ class Station:
                 raise InputError.at("batch", "q", "missing", "give positions with qd and t, or none of them")
             require_recorded(self.workstation)
             feed = road.pump(self.sources, self.workstation.engine.tick)
-            motion = batch.recorded(self.model, feed, self.duration)
+            motion = recorded(self.model, feed, self.duration)
             findings = [found for _, opened in self.sources for found in opened.findings]
         else:
             motion = motion_of(self.model, q, qd or {}, t)

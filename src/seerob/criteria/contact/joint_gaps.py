@@ -46,6 +46,8 @@ STEPS = 72
 """Positions of a joint that are looked at, of a whole turn or of a slide."""
 PIECE = 0.0125
 """Into which a surface is divided [m]: half a finger."""
+AT_ONCE = 2048
+"""Places that are looked at together: a door of 2 m² has 30 000, at 73 positions each."""
 MOST_PIECES = 200
 """Into so many the largest extent of a part is divided at most: what is larger is known less finely."""
 SLOWEST = 0.025
@@ -305,10 +307,12 @@ def _rates(
         if found is None:
             found = np.zeros(shape)
             for i, j in ((0, 1), (1, 0)):
-                on = places(solids[i])
-                looks = _looks(on, solids[j], (poses[i], poses[j]), step)
-                around = np.full((len(on.points), len(fits)), on.about)
-                np.maximum(found, closing(looks, around, step, thickness, fits, least=least), out=found)
+                on, both = places(solids[i]), (poses[i], poses[j])
+                for first in range(0, len(on.points), AT_ONCE):
+                    some = slice(first, first + AT_ONCE)
+                    looks = _looks(Places(on.points[some], on.normals[some], on.about), solids[j], both, step)
+                    around = np.full((looks.gaps.shape[1], len(fits)), on.about)
+                    np.maximum(found, closing(looks, around, step, thickness, fits, least=least), out=found)
             if file is not None:
                 _write(file, found)
         if len(_KNOWN) >= MOST_KNOWN:

@@ -8,8 +8,11 @@ import struct
 import numpy as np
 import pytest
 
+from free_ports import free_port
 from live_story import wait_for
 from made_cell import made
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
 from seerob.app.emulation.motions import swing
 from seerob.app.emulators.ros_tcp import RosTcpEndpoint
 from seerob.app.emulators.rosbridge import RosbridgeServer
@@ -50,7 +53,7 @@ def station(folder, server, text=STATION):
 
 def pose(x, t=0.0, **more):
     said = {"position": (x, 2.0, 1.5), "wxyz": (HALF, 0.0, 0.0, HALF), **more}
-    return PoseSample(source="s", seq=0, t=t, target="arm/tool0", **said)
+    return PoseSample(**{"source": "s", "seq": 0, "t": t, "target": "arm/tool0", **said})
 
 
 def at(t):
@@ -172,3 +175,100 @@ def test_every_message_is_serialised_as_ros_has_it(kind, edition):
 def test_encryption_is_of_rosbridge_only():
     with pytest.raises(ValueError, match="has no encryption"):
         CartesianTarget(at="arm/tool0", host="h", topic="/t", wire=TargetWire.ROS_TCP, tls=True)
+
+
+def load_of(tool):
+    return f"""
+[[tools]]
+name = "load"
+on = "arm/tool0"
+shape = {{ box = [0.1, 0.1, 0.1] }}
+mass = 3
+{tool}
+"""
+
+
+@pytest.mark.parametrize(
+    ("tool", "said", "at", "published_at"),
+    [
+        # The robot's own name is its tool point: by nature tool0, with a tool on it the tip of that.
+        ("", "arm", "arm/tool0", 0.0),
+        (load_of("tcp = { position = [0, 0, 0.1] }"), "arm", "arm/tool0", -0.1),
+        (load_of("tcp = { position = [0, 0, 0.1] }"), "arm/tool0", "arm", 0.1),
+        ("", "arm/flange", "arm/tool0", 0.0),
+    ],
+)
+def test_what_moves_with_the_tool_is_published_of_the_tool(tmp_path, server, tool, said, at, published_at):
+    model = station(tmp_path, server, STATION.replace('at = "arm/tool0"', f'at = "{at}"') + tool).model
+    (way,) = CartesianTargets(model, on_command_line=True).ways
+    # Straight up in the world, where z of what is said points.
+    way.note(0.0, (pose(1.0, target=said, wxyz=(1.0, 0.0, 0.0, 0.0)),))
+    assert way.take()["pose"]["position"]["z"] == pytest.approx(1.0 + published_at, abs=1e-9)
+    way.note(1.0, (pose(1.0, t=0.5, target="arm/forearm_link"),))
+    assert way.take() is None
+
+
+POSES = "t [s],x [m],y [m],z [m],qw,qx,qy,qz\n" + "".join(
+    f"{k / 50},0.5,0.3,0.6,0,1,0,0\n" for k in range(51)
+)
+BY_POSES = '[[sources]]\nkind = "tool_path"\nrobot = "arm"\nfile = "a.csv"\nframe = "world"\n'
+
+
+def test_a_run_says_how_many_were_sent_and_where_the_last_was(tmp_path, server, capsys):
+    """The documented forms of both tables: `at` of the target, none of the source."""
+    text = STATION.replace("[1, 2, 0.5], rpy_deg = [0, 0, 90]", "[0, 0, 0]")
+    (tmp_path / "a.csv").write_text(POSES, encoding="utf-8")
+    made(tmp_path, text.replace("PORT", str(server.port)) + BY_POSES)
+    call = ["run", str(tmp_path), "--no-record", "--seconds", "1", "--port", "0", "--allow-writing"]
+    cli.main(call)
+    sent = len(published(server))
+    assert sent > 10
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        f"/target_pose: {sent} poses of arm/tool0 sent, the last at 0.500, 0.300, 0.600 m in base_link"
+        in said
+    )
+
+
+def test_a_run_says_why_nothing_was_sent(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text(POSES, encoding="utf-8")
+    made(tmp_path, STATION.replace("PORT", str(free_port())) + BY_POSES)
+    call = ["run", str(tmp_path), "--no-record", "--seconds", "0.5", "--port", "0", "--allow-writing"]
+    cli.main(call)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "/target_pose: nothing was sent of arm/tool0: " in said
+    assert "refused" in said.partition("nothing was sent of arm/tool0")[2].lower()
+
+
+JOINTS = "t [s]," + ",".join(f"q{k} [rad]" for k in range(6)) + "\n" + "0,0,-1,1,0,0,0\n0.1,0,-1,1,0,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ('[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "q.csv"\n', "csv arm says joint positions"),
+        ("", "none drives arm"),
+        (
+            BY_POSES + 'at = "arm/forearm_link"\n',
+            "tool path arm says poses of arm/forearm_link",
+        ),
+        (
+            '[[sources]]\nkind = "rosbridge"\nrobot = "arm"\nhost = "127.0.0.1"\n',
+            "rosbridge arm says joint positions",
+        ),
+    ],
+)
+def test_check_file_refuses_a_target_of_which_nobody_says_poses(tmp_path, server, capsys, source, why):
+    (tmp_path / "q.csv").write_text(JOINTS, encoding="utf-8")
+    (tmp_path / "a.csv").write_text(POSES, encoding="utf-8")
+    station(tmp_path, server, STATION + source)
+    assert cli.main(["check-file", str(tmp_path)]) == Exit.ERROR
+    said = " ".join(capsys.readouterr().err.split())
+    assert "targets[0].at" in said
+    assert why in said
+
+
+def test_check_file_takes_a_target_whose_tool_follows_a_live_frame(tmp_path, server):
+    source = '[[sources]]\nkind = "rosbridge"\nrobot = "arm"\nhost = "127.0.0.1"\ncontent = "tf"\n'
+    station(tmp_path, server, STATION + source + 'child = "flange"\n')
+    assert cli.main(["check-file", str(tmp_path)]) == Exit.WITHIN

@@ -358,10 +358,12 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
             raise InputError.at(
                 self.where(), "joints", what, f"name one for each of {', '.join(target.joints)}"
             )
+        at = None
         if self.content is Content.TF:
             self._world_from_parent(target)
-            self._driven(target)
-        return LiveSource.open(replace(self, joints=self.joints or target.joints), folder, target)
+            at = self._driven(target)
+        opened = LiveSource.open(replace(self, joints=self.joints or target.joints), folder, target)
+        return replace(opened, poses_of=at)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Whose motion it is, and what the first message says and leaves out."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.shapes import Solid
 from seerob.core.snapshot import Finding, LinkMass, Origin
-from seerob.core.transforms import Array
+from seerob.core.transforms import Array, inverse, rotation_from_wxyz, transform
 from seerob.description.description import Description, Joint, Quantity
 from seerob.distance.least import Query, Shapes
 from seerob.workstation.variables import Variable
@@ -312,6 +312,22 @@ class Model:
         if name not in self.frames:
             raise UnknownName("link or frame", name, [*self.mechanisms, *self.frames])
         return self.frames[name]
+
+    def between(self, a: Frame, b: Frame) -> Array | None:
+        """Frame a from frame b, shape (4, 4); None where something can move one against the other."""
+        if self.mj.body_weldid[a.mj] != self.mj.body_weldid[b.mj]:
+            return None
+        a_from_b: Array = inverse(self._welded(a)) @ self._welded(b)
+        return a_from_b
+
+    def _welded(self, frame: Frame) -> Array:
+        """Pose of a frame in the body to which no joint connects its own, shape (4, 4)."""
+        pose, body = frame.body_from_frame, frame.mj
+        while body != self.mj.body_weldid[body]:
+            turn = rotation_from_wxyz(self.mj.body_quat[body])
+            pose = transform(turn, self.mj.body_pos[body]) @ pose
+            body = int(self.mj.body_parentid[body])
+        return pose
 
     def carrier(self, frame: Frame) -> Mechanism:
         """The robot, human or machine that moves a frame: of several the robot, else the innermost.

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from seerob.core.errors import InputError, Problem, SeerobError
+from seerob.core.errors import InputError, Problem, SeerobError, UnknownName
 from seerob.core.plugin import home, kind_of
-from seerob.core.samples import JointSample
+from seerob.core.samples import JointSample, PoseSample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.criteria.question import worded
@@ -67,6 +67,8 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
             problems += _begun(source, i, file)
         except InputError as error:
             problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
+    if not problems:  # whose source cannot be opened says no poses, which is not the mistake
+        problems += _unpublished(model, opened, file)
     if problems:
         raise InputError(problems)
     if opened:
@@ -78,6 +80,36 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
         source, first = opened[0]
         opened[0] = source, replace(first, findings=(*first.findings, *more))
     return tuple((source, delayed(each, source.begins or 0.0)) for source, each in opened)
+
+
+def _unpublished(model: Model, opened: Sequence[tuple[Source, Opened]], file: str) -> Iterator[Problem]:
+    """Cartesian targets of which no source says poses: nothing would ever be published."""
+    for i, table in enumerate(model.workstation.targets):
+        key = f"targets[{i}].at"
+        try:
+            frame = model.frame(table.at)
+            mover = model.carrier(frame).name
+        except UnknownName as error:
+            yield Problem(file, key, str(error))
+            continue
+        said: list[str] = []
+        for source, one in opened:
+            if source.target() != mover:
+                continue
+            if isinstance(source, LiveSource) and not _ships(source):
+                break  # what it says, nobody knows before it does
+            of = one.poses_of
+            if not isinstance(source, LiveSource):
+                first = next(iter(one.samples), None)
+                of = first.target if isinstance(first, PoseSample) else None
+            if of is not None and model.between(frame, model.frame(of)) is not None:
+                break
+            name = source.name or kind_of("sources", source)
+            said.append(f"{name} says {'joint positions' if of is None else f'poses of {of}'}")
+        else:
+            what = f"no source says poses of {table.at} ({'; '.join(said) or f'none drives {mover}'})"
+            remedy = f'drive {mover} by poses (tool_path, or content = "tf") of what moves with {table.at}'
+            yield Problem(file, key, f"{what}: nothing would be published", remedy)
 
 
 def reached(model: Model, opened: Sequence[tuple[Source, Opened]]) -> tuple[tuple[Source, Opened], ...]:

@@ -349,18 +349,36 @@ def targets_allowed(model: Model, *, on_command_line: bool) -> bool:
 class _Way:
     """One target at work: poses in, the newest of those that are due out."""
 
-    def __init__(self, table: CartesianTarget, frame_from_world: Array) -> None:
+    def __init__(self, model: Model, table: CartesianTarget, frame_from_world: Array) -> None:
         self.table = table
         self.published = 0
+        """Messages that were sent."""
+        self.last = ""
+        """Where that was which was sent last."""
+        self.heard = self.refused = 0
+        """Poses that came due, and those of them that were not sent since nobody may rely on them."""
+        self.reason = "not connected"
+        """Why nothing can be sent; empty while it can."""
+        self._model, self._frame = model, model.frame(table.at)
+        self._said_from_at: dict[str, Array | None] = {}
+        """By what a source says poses of; None of what does not move with the tool."""
         self._frame_from_world = frame_from_world
         self._ahead = deque[PoseSample](maxlen=AHEAD)
         self._newest = deque[PoseSample](maxlen=1)
 
     def note(self, now: float, samples: Sequence[Sample]) -> None:
         """Take what is said of the tool, and find what is due at a run time [s]."""
-        self._ahead.extend(s for s in samples if isinstance(s, PoseSample) and s.target == self.table.at)
+        self._ahead.extend(s for s in samples if isinstance(s, PoseSample) and self._moved_by(s) is not None)
         while self._ahead and self._ahead[0].t <= now:
             self._newest.append(self._ahead.popleft())
+            self.heard += 1
+
+    def _moved_by(self, sample: PoseSample) -> Array | None:
+        """The frame of which a pose is said, from the tool (4, 4); None where that moves on its own."""
+        if sample.target not in self._said_from_at:
+            said = self._model.frame(sample.target)
+            self._said_from_at[sample.target] = self._model.between(said, self._frame)
+        return self._said_from_at[sample.target]
 
     def take(self) -> dict[str, Any] | None:
         """The message that is to be published; None when there is nothing new."""
@@ -369,9 +387,31 @@ class _Way:
         sample = self._newest.pop()
         values = np.array([*sample.position, *sample.wxyz])
         if sample.quality is not Quality.GOOD or not np.isfinite(values).all() or not values[3:].any():
+            self.refused += 1
             return None
-        world = transform(rotation_from_wxyz(sample.wxyz), sample.position)
+        said_from_at = self._moved_by(sample)
+        assert said_from_at is not None
+        world = transform(rotation_from_wxyz(sample.wxyz), sample.position) @ said_from_at
         return message(self.table, self._frame_from_world @ world, time.time())
+
+    def sent(self, said: Mapping[str, Any]) -> None:
+        """Note what was sent."""
+        self.published += 1
+        pose = said.get("pose") or said.get("transform") or said
+        place = pose["translation" if "translation" in pose else "position"]
+        self.last = ", ".join(f"{place[axis]:.3f}" for axis in "xyz")
+
+    def __str__(self) -> str:
+        """How many were sent, in a line, and why none were."""
+        table = self.table
+        if self.published:
+            within = f" in {table.frame_id}" if table.message is not TargetMessage.POSE else ""
+            last = f"{self.published} poses of {table.at} sent, the last at {self.last} m{within}"
+            return f"{table.topic}: {last}{f'; {self.reason}' if self.reason else ''}"
+        why = self.reason or "no pose of it was heard"
+        if not self.reason and self.heard:
+            why = f"{self.heard} poses were heard, {self.refused} that nobody may rely on"
+        return f"{table.topic}: nothing was sent of {table.at}: {why}"
 
 
 def message(table: CartesianTarget, pose: Array, now: float) -> dict[str, Any]:
@@ -420,7 +460,7 @@ class CartesianTargets(Closing):
                 frame = np.eye(4) if table.link is None else _standing(model, table.link)
             except UnknownName as error:
                 raise InputError.at("workstation", f"targets[{i}]", str(error)) from error
-            self.ways.append(_Way(table, inverse(frame)))
+            self.ways.append(_Way(model, table, inverse(frame)))
         self._over = Event()
         self._threads = [Thread(target=self._run, args=(way,), daemon=True) for way in self.ways]
 
@@ -450,12 +490,12 @@ class CartesianTargets(Closing):
             try:
                 async with wired(table) as wire:
                     _log.info("%s: targets of %s are published", table.topic, table.at)
-                    failing = False
+                    failing, way.reason = False, ""
                     await self._session(way, wire)
             except (OSError, EOFError, SeerobError) as error:
                 if not failing:
                     _log.warning("%s: cannot be published: %s", table.topic, because(error))
-                failing = True
+                failing, way.reason = True, because(error)
                 await asyncio.to_thread(self._over.wait, PAUSE)
 
     async def _session(self, way: _Way, wire: Wire) -> None:
@@ -466,7 +506,7 @@ class CartesianTargets(Closing):
             said = way.take() if now >= due else None
             if said is not None:
                 await wire.publish(said)
-                way.published += 1
+                way.sent(said)
                 due = now + table.every
             await wire.listen(min(BEAT, table.every))
         await wire.end()

@@ -75,6 +75,9 @@ class Opened(Struct, frozen=True, kw_only=True):
     reach: Callable[[], tuple[Finding, ...]] | None = None
     """Connects, for what a live source says of itself; only a run and `seerob probe` call it. None where
     there is nothing to ask, or it was asked."""
+    poses_of: str | None = None
+    """Of a live source, full name of the link or tool whose poses it says; None where it says none. What a
+    recorded one says is looked at."""
 
     def __repr__(self) -> str:
         return f"<Opened: {self.duration:g} s, {len(self.findings)} findings>"

@@ -124,10 +124,13 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             tell_pages(view.server, "Ctrl-C ends the run")
             _tell_ends(station)
             writers += _triggers(station, allow=options.allow_writing)
-            writers += _targets(station, allow=options.allow_writing)
+            targets = _targets(station, allow=options.allow_writing)
+            writers += targets
             summary = station.run(writers=writers, live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
     _tell_rest(station, summary.duration)
+    for way in (way for each in targets for way in each.ways):
+        line("sent", str(way), "" if way.published else "yellow")
     for name, (late, bound) in summary.late.items():
         text = f"{name}: heard up to {1e3 * late:.0f} ms later than at its best; {1e3 * bound:.0f} ms may be"
         line("late", text, "yellow" if late > bound else "")

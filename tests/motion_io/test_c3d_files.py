@@ -153,3 +153,37 @@ def test_a_file_that_ends_early_says_so(tmp_path):
     captured = c3d.read(path, MarkerReading(file="r.c3d"))
     assert captured.count == FRAMES - 10
     assert any("10 frames are missing at the end" in f.text for f in captured.findings)
+
+
+TWICE = ["S:LFHD", "S:C7", "S:LASI", "S:LANK", "S:L-Asi", "S:RANK"]
+
+
+def test_one_name_for_two_points_is_refused_and_may_be_left_out(tmp_path):
+    path = written(tmp_path / "r.c3d", positions(), names=TWICE)
+    with pytest.raises(InputError, match=r"one name for several points: LASI \(2 times, up to 0.7"):
+        c3d.read(path, MarkerReading(file="r.c3d"))
+    left_out = c3d.read(path, MarkerReading(file="r.c3d", unused=frozenset({"LASI"})))
+    assert left_out.layout.names == ("LFHD", "C7", "LASI", "LANK", "RANK")
+
+
+def test_one_name_for_points_that_are_never_seen_together_is_refused(tmp_path):
+    values = positions()
+    values[:, 4] = values[:, 2]
+    values[:15, 4], values[15:, 2] = np.nan, np.nan
+    path = written(tmp_path / "r.c3d", values, names=TWICE)
+    with pytest.raises(InputError, match="never seen together"):
+        c3d.read(path, MarkerReading(file="r.c3d"))
+
+
+def test_one_point_under_one_name_twice_is_its_mean_and_said(tmp_path):
+    values = positions()
+    values[:, 4] = values[:, 2] + [0.0, 4.0, 0.0]
+    values[3, 2] = np.nan
+    path = written(tmp_path / "r.c3d", values, names=TWICE)
+    found = c3d.read(path, MarkerReading(file="r.c3d"))
+    k = found.layout.names.index("LASI")
+    got = np.array([frame.positions[k] for frame in found.frames])
+    expected = values[:, 2] + [0.0, 2.0, 0.0]
+    expected[3] = values[3, 4]
+    np.testing.assert_allclose(got, 1e-3 * expected, atol=1e-6)
+    assert any("LASI is there 2 times, at most 4 mm apart" in f.text for f in found.findings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Seen
-from seerob.devices.capture.xsens import anatomical, differences, joint_angles, turns
+from seerob.devices.capture.xsens import ISB_TPOSE, anatomical, differences, joint_angles, turns
 from seerob.devices.sources import mvnx
 from seerob.devices.sources import mvnx as _mvnx_stream
 from seerob.devices.sources.mvnx import lengths, read
@@ -100,6 +101,57 @@ def test_segments_that_are_turned_in_the_t_pose_are_turned_back(tmp_path):
     assert np.degrees(apart(tpose.orientations, np.tile([1.0, 0, 0, 0], (23, 1))).max()) < 0.1
 
 
+ANATOMICAL = Rotation.from_quat(ISB_TPOSE, scalar_first=True).as_matrix()
+
+
+def without_angles(frames):
+    return [f.replace("jointAngle", "other") for f in frames]
+
+
+@pytest.mark.parametrize("change", [lambda f: f, lambda f: [*f[:2], *f[3:]], lambda f: f[3:], without_angles])
+def test_segments_that_are_anatomical_frames_are_known_by_joint_angles_or_arms(tmp_path, change):
+    """As MVN 4.2.4 writes them in MVNX 3."""
+
+    def theirs(frames):
+        return change([frames[1].replace('"tpose"', '"tpose-isb"'), *frames[1:]])
+
+    straight = read(made(tmp_path / "a.mvnx", Q))
+    path = made(tmp_path / "b.mvnx", Q, version=3, turned=ANATOMICAL, change=theirs)
+    captured = read(path)
+    assert np.degrees(apart(orientations(captured), orientations(straight)).max()) < 0.1
+    text = told(captured)
+    assert (
+        "segments have the axes of the anatomical frames" in text or "as its tpose and tpose-isb say" in text
+    )
+    for pose in captured.calibration:
+        assert np.degrees(apart(pose.orientations, np.tile([1.0, 0, 0, 0], (23, 1))).max()) < 0.1
+
+
+def test_joint_angles_count_more_than_the_frames_of_the_t_pose(tmp_path):
+    def wrong(frames):
+        return [frames[0].replace("identity", "tpose-isb"), *frames[1:2], *frames[3:]]
+
+    straight = read(made(tmp_path / "a.mvnx", Q))
+    captured = read(made(tmp_path / "b.mvnx", Q, change=wrong))
+    assert np.degrees(apart(orientations(captured), orientations(straight)).max()) < 0.1
+
+
+def test_segments_with_axes_of_no_known_file_are_refused(tmp_path):
+    turned = np.broadcast_to(Rotation.from_euler("z", 90, degrees=True).as_matrix(), (23, 3, 3))
+    with pytest.raises(InputError, match=r"jointAngle: its joint angles are .* whatever their axes"):
+        read(made(tmp_path / "a.mvnx", Q, turned=ANATOMICAL @ turned, special=False))
+    with pytest.raises(InputError, match=r"orientation: the arms' segments point .* beside the arms"):
+        read(made(tmp_path / "b.mvnx", Q, turned=turned, special=False, change=without_angles))
+
+
+def test_a_segment_that_is_there_twice_is_refused(tmp_path):
+    path = made(tmp_path / "a.mvnx", Q[:2])
+    doubled = path.read_text(encoding="utf-8").replace('label="L5"', 'label="L3"', 1)
+    path.write_text(doubled, encoding="utf-8")
+    with pytest.raises(InputError, match="segments: twice: L3"):
+        read(path)
+
+
 def test_joint_angles_that_are_not_those_of_the_segments_are_told(tmp_path):
     def changed(frames):
         return [f.replace("<jointAngle>", "<jointAngle>90 0 0 ") for f in frames]
@@ -110,7 +162,14 @@ def test_joint_angles_that_are_not_those_of_the_segments_are_told(tmp_path):
         moved = [f[: f.index("<jointAngle>")] + tails[k - 20] for k, f in enumerate(normal)]
         return frames[:3] + moved
 
-    assert "warning: its joint angles differ" in told(read(made(tmp_path / "a.mvnx", Q, change=swapped)))
+    def touched(frames):
+        return [*frames[:9], re.sub("<jointAngle>[^ ]+", "<jointAngle>80", frames[9]), *frames[10:]]
+
+    with pytest.raises(InputError, match=r"jointAngle: its joint angles are .* from those of its segments"):
+        read(made(tmp_path / "a.mvnx", Q, change=swapped))
+    captured = read(made(tmp_path / "c.mvnx", Q, change=touched), human="op")
+    assert "warning: its joint angles differ" in told(captured)
+    assert [f.holds for f in captured.findings if f.level == "warning"] == [("op",)]
     # Another count of numbers is no comparison.
     assert "joint angles" not in told(read(made(tmp_path / "b.mvnx", Q, change=changed)))
 

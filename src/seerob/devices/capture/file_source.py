@@ -167,6 +167,7 @@ class MarkerFile(CaptureFile, frozen=True, kw_only=True):
             up=self.up,
             unit=self.unit or "",
             convention=self.convention,
+            unused=frozenset(name for name, bone in self.mapping.items() if bone == ""),
         )
 
 

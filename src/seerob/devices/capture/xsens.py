@@ -1,6 +1,7 @@
 """What Xsens MVN's segment frames mean: how they lie in the bones, and the joint angles that follow.
 
-A segment's frame is the world's in the T-pose: x forward, y left, z up, arms to the sides. In an MVNX file
+A segment's frame is the world's in the T-pose: x forward, y left, z up, arms to the sides. Segments of other
+files (MVN 4.2, MVNX 3) have the anatomical frames themselves, with z along an arm. In an MVNX file
 the frame ``tpose`` has the orientations in that pose, and ``tpose-isb`` those of the anatomical frames, which
 are the world's when the arms hang with the palms forward. So the anatomical frame is
 
@@ -8,8 +9,8 @@ are the world's when the arms hang with the palms forward. So the anatomical fra
 
 and the angles of a joint are those of :math:`R_{parent}^T R_{child}` in ISB axes (X forward, Y up, Z right)
 in the order Z, X, Y. That this gives the joint angles of a file was tried on a real one (MVN 2019,
-11 sensors): within 0.01° away from the singular pose. Which way each angle counts is Xsens' clinical
-convention; that of the knee is the manual's, the legs of that file stood still.
+11 sensors): within 0.01° away from the singular pose; and that segments are the anatomical frames, on one of
+MVN 4.2.4 (17 sensors): within 0.03°. Which way each angle counts is Xsens' clinical convention.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ _ISB = {
 }
 ISB_TPOSE: Array = np.array([_ISB.get(name, (1.0, 0.0, 0.0, 0.0)) for name in SEGMENTS])
 """Anatomical frames in the ideal T-pose, where every segment's is the world's: w first, shape (23, 4)."""
+
+FROM_ANATOMICAL: Array = ISB_TPOSE * (1.0, -1.0, -1.0, -1.0)
+"""Anatomical from ideal segment, which has the world's axes in the T-pose: w first, shape (23, 4)."""
 
 _PARENT = np.array([SEGMENTS.index(parent) for _, parent, _ in JOINTS])
 _CHILD = np.array([SEGMENTS.index(child) for _, _, child in JOINTS])
@@ -81,6 +85,31 @@ def correction(tpose: Array, tpose_isb: Array) -> tuple[Array, float]:
     turn = turn / np.linalg.norm(turn, axis=1, keepdims=True)
     largest = 2 * np.arctan2(np.linalg.norm(turn[:, 1:], axis=1), np.abs(turn[:, 0])).max()
     return turn, float(largest)
+
+
+_ARMS = [
+    (SEGMENTS.index(f"{side}{part}"), SEGMENTS.index(f"{side}{following}"), aside)
+    for side, aside in (("Right", -1.0), ("Left", 1.0))
+    for part, following in (("UpperArm", "ForeArm"), ("ForeArm", "Hand"))
+]
+
+
+def beside_arms(positions: Array, wxyz: Array) -> Array:
+    """How far the arms' segments are from pointing along the arms, with frames of the world's T-pose [rad].
+
+    Args:
+        positions: Origins of segments, in any unit, shape (n, 23, 3).
+        wxyz: World from segment, w first, shape (n, 23, 4).
+
+    Returns:
+        Both upper arms and forearms, shape (n, 4).
+    """
+    R = rotation_from_wxyz(wxyz)
+    angles = []
+    for part, following, aside in _ARMS:
+        way = np.einsum("nji,nj->ni", R[:, part], positions[:, following] - positions[:, part])
+        angles.append(np.arctan2(np.hypot(way[:, 0], way[:, 2]), aside * way[:, 1]))
+    return np.stack(angles, axis=1)
 
 
 def joint_angles(rotations: Array) -> Array:

@@ -28,7 +28,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, product
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.devices.capture.file_source import CaptureFile
-from seerob.devices.capture.xsens import anatomical, correction, differences
+from seerob.devices.capture.xsens import FROM_ANATOMICAL, anatomical, beside_arms, correction, differences
 from seerob.protocols.tracking.mvn_pose import JOINTS, METRES, PARENTS, SEGMENTS, unit_of
 
 CHUNK = 1 << 16
@@ -264,6 +264,12 @@ CHECKED = 200
 """Frames at most whose joint angles are compared."""
 AGREE = math.radians(0.1)
 """Angles that are no further apart are the same."""
+CONTRADICTION = math.radians(5.0)
+"""Joint angles that are farther from those of the segments are of other segments; a choice, about as far as
+MVN itself may be off."""
+BESIDE = math.radians(20.0)
+"""An arm's segment that points farther beside its arm has other axes; a choice, hypotheses are a quarter turn
+apart."""
 NO_TURN = math.radians(0.05)
 """Rounding of the numbers in a file."""
 ROUNDING = 1.1e-3
@@ -368,19 +374,21 @@ class _Survey:
     special: dict[str, CaptureFrame] = field(default_factory=dict)
     unit: str | None = None
     kept: list[CaptureFrame] | None = field(default_factory=list)
-    checked: list[tuple[Array, Array]] = field(default_factory=list)
-    angles: int = 0
+    checked: list[tuple[Array, Array, Array | None]] = field(default_factory=list)
+    """Positions, orientations and joint angles of frames spread over the file."""
 
 
-def read(path: Path, *, file: str = "") -> Captured:
+def read(path: Path, *, file: str = "", human: str = "") -> Captured:
     """A whole recording.
 
     Args:
         path: The file.
         file: Its name, for messages.
+        human: Of whom nothing is within while joint angles and segments of the file contradict each other.
 
     Raises:
-        InputError: The file is missing, or is no MVNX with segments, a frame rate and frames.
+        InputError: The file is missing, is no MVNX with segments, a frame rate and frames, or its segments
+            are turned in no way that is known.
     """
     name = file or str(path)
     items = stream(path, name)
@@ -395,7 +403,7 @@ def read(path: Path, *, file: str = "") -> Captured:
     if found.unit is None:
         what = "the trunk of the first frame is not as long as a person's in any unit"
         raise InputError.at(name, "position", what, "is it an export of MVN, in metres?")
-    turn, turned = _turn(name, found.special)
+    turn, turned = _turn(name, found, human)
     metres = METRES[found.unit]
     kept = None
     if found.kept is not None:
@@ -413,7 +421,7 @@ def read(path: Path, *, file: str = "") -> Captured:
         count=found.frames,
         calibration=poses,
         lengths=lengths(head),
-        findings=(*findings, *more, *turned, *_angles(name, found, turn)),
+        findings=(*findings, *more, *turned),
     )
 
 
@@ -426,6 +434,8 @@ def _file(path: Path, name: str, head: Head) -> _File:
     if head.rate is None or not RATES[0] <= head.rate <= RATES[1]:
         what = f"frameRate is {head.rate}" if head.rate is not None else "no frameRate"
         problems.append(Problem(name, "subject", what, f"{RATES[0]:g} to {RATES[1]:g} Hz"))
+    if double := sorted({name for name in head.segments if head.segments.count(name) > 1}):
+        problems.append(Problem(name, "segments", f"twice: {', '.join(double)[:120]}", "export it again"))
     missing = [name for name in SEGMENTS if name not in head.segments]
     if missing:
         what = f"no segment {', '.join(missing[:4])}{' …' if len(missing) > 4 else ''}"
@@ -463,22 +473,21 @@ def _survey(file: _File, head: Head, items: Iterator[Head | RawFrame]) -> _Surve
             if found.kept is not None:
                 found.kept.append(frame)
                 found.kept = None if len(found.kept) > KEPT else found.kept
-            if "jointAngle" in raw.texts and len(head.joints) == len(JOINTS):
-                found.angles += 1
-                if found.angles % every == 0:
-                    _check(found, frame, raw)
-                    if len(found.checked) > CHECKED:
-                        found.checked, every = found.checked[::2], 2 * every
+            if found.frames % every == 0:
+                assert frame.orientations is not None  # every frame of this format has them
+                angles = _joint_angles(raw) if len(head.joints) == len(JOINTS) else None
+                found.checked.append((frame.positions, frame.orientations, angles))
+                if len(found.checked) > CHECKED:
+                    found.checked, every = found.checked[::2], 2 * every
     return found
 
 
-def _check(found: _Survey, frame: CaptureFrame, raw: RawFrame) -> None:
+def _joint_angles(raw: RawFrame) -> Array | None:
+    """[rad], shape (22, 3); None when there are none, or not so many."""
     try:
-        angles = numbers(raw.texts["jointAngle"], 3 * len(JOINTS)).reshape(-1, 3)
-    except ValueError:
-        return
-    assert frame.orientations is not None  # every frame of this format has them
-    found.checked.append((frame.orientations, np.radians(angles)))
+        return np.radians(numbers(raw.texts["jointAngle"], 3 * len(JOINTS)).reshape(-1, 3))
+    except (KeyError, ValueError):
+        return None
 
 
 def _calibration(
@@ -542,32 +551,89 @@ def _findings(name: str, head: Head, found: _Survey) -> list[Finding]:
     return said
 
 
-def _angles(name: str, found: _Survey, turn: Array | None) -> list[Finding]:
-    """Whether the file's joint angles are those of its segments."""
-    if not found.checked:
-        return []
-    q, angles = (np.stack(columns) for columns in zip(*found.checked, strict=True))
-    if turn is not None:
-        q = product(q.reshape(-1, 4), np.tile(turn, (len(q), 1))).reshape(q.shape)
-    with np.errstate(invalid="ignore"):
-        off = float(np.nanmax(differences(anatomical(q), angles), initial=0.0))
-    text = f"its joint angles differ from those of its segments by at most {math.degrees(off):.2f}°"
-    if off > AGREE:
-        text += ": it is not clear which are right; the segments are used"
-    return [Finding(level="note" if off <= AGREE else "warning", subject=name, text=text)]
+def _turn(name: str, found: _Survey, human: str) -> tuple[Array | None, list[Finding]]:
+    """What turns the file's segments into those that have the world's axes in the T-pose.
+
+    Files differ in what a segment's axes are. Which it is the file's own joint angles say; without them the
+    frames tpose and tpose-isb, if the arms' segments then lie along the arms, or the arms alone.
+
+    Raises:
+        InputError: No hypothesis fits.
+    """
+
+    def say(level: str, text: str) -> Finding:
+        return Finding(level=level, subject=name, text=text)
+
+    hypotheses = _hypotheses(found.special)
+    off = [_off(found, turn) for turn, _ in hypotheses]
+    if not len(off[0]):
+        beside = [_beside(found, turn) for turn, _ in hypotheses]
+        fits = [k for k, angle in enumerate(beside) if angle < BESIDE]
+        if not fits:
+            what = f"the arms' segments point {_degrees(min(beside))} beside the arms, whatever their axes"
+            raise InputError.at(name, "orientation", what, "is it an export of MVN? export it again")
+        turn, text = hypotheses[fits[0]]
+        return turn, [say("assumed", f"{text}: the arms' segments point along the arms then")]
+    best = min(range(len(off)), key=lambda k: float(np.median(off[k])))
+    turn, text = hypotheses[best]
+    usual, largest = float(np.median(off[best])), float(off[best].max())
+    if usual > CONTRADICTION:
+        what = f"its joint angles are {_degrees(usual)} from those of its segments, whatever their axes"
+        raise InputError.at(name, "jointAngle", what, "was it edited? export it again, or without jointAngle")
+    said = [say("note", f"{text}; its joint angles agree")]
+    differ = f"its joint angles differ from those of its segments by at most {_degrees(largest)}"
+    if largest <= AGREE:
+        return turn, [*said, say("note", differ)]
+    differ += ": it is not clear which are right; the segments are used"
+    held = (human,) if human and largest > CONTRADICTION else ()
+    return turn, [*said, Finding(level="warning", subject=name, text=differ, holds=held)]
 
 
-def _turn(name: str, special: dict[str, CaptureFrame]) -> tuple[Array | None, list[Finding]]:
-    """The correction by the frames tpose and tpose-isb, where the file has both."""
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.2f}°"
+
+
+def _hypotheses(special: dict[str, CaptureFrame]) -> list[tuple[Array | None, str]]:
+    """What turns segments into those of the ideal T-pose, and what they are then; the likeliest first."""
+    found: list[tuple[Array | None, str]] = []
     tpose, isb = (special.get(kind) for kind in ("tpose", "tpose-isb"))
-    if tpose is None or isb is None or tpose.orientations is None or isb.orientations is None:
-        text = "no frames tpose and tpose-isb: segments are taken to have the world's axes in the T-pose"
-        return None, [Finding(level="assumed", subject=name, text=text)]
-    turn, largest = correction(tpose.orientations, isb.orientations)
-    if not np.isfinite(largest) or largest < NO_TURN:
-        return None, []
-    text = f"segments are turned by up to {math.degrees(largest):.2f}°, as its tpose and tpose-isb say"
-    return turn, [Finding(level="note", subject=name, text=text)]
+    if tpose is not None and isb is not None and tpose.orientations is not None:
+        assert isb.orientations is not None  # every frame of this format has them
+        turn, largest = correction(tpose.orientations, isb.orientations)
+        if np.isfinite(largest):
+            turned = f"are turned by up to {_degrees(largest)}" if largest > NO_TURN else "are not turned"
+            text = f"segments {turned}, as its tpose and tpose-isb say"
+            found.append((turn if largest > NO_TURN else None, text))
+    return [
+        *found,
+        (None, "segments have the world's axes in the T-pose"),
+        (FROM_ANATOMICAL, "segments have the axes of the anatomical frames, z along an arm"),
+    ]
+
+
+def _off(found: _Survey, turn: Array | None) -> Array:
+    """Largest angle between joints by the file and by its segments of each frame [rad], shape (frames,)."""
+    both = [(q, angles) for _, q, angles in found.checked if angles is not None]
+    if not both:
+        return np.empty(0)
+    q, angles = (np.stack(columns) for columns in zip(*both, strict=True))
+    with np.errstate(invalid="ignore"):
+        off = differences(anatomical(_every(q, turn)), angles)
+    known = np.isfinite(off)
+    return np.asarray(np.where(known, off, 0.0).max(axis=1)[known.any(axis=1)])
+
+
+def _beside(found: _Survey, turn: Array | None) -> float:
+    """Largest of the arms' segments' usual angles beside the arms [rad]; infinite when none is known."""
+    p, q = (np.stack(columns) for columns in zip(*((p, q) for p, q, _ in found.checked), strict=True))
+    with np.errstate(invalid="ignore"):
+        angles = beside_arms(p, _every(q, turn))
+    known = angles[np.isfinite(angles).all(axis=1)]
+    return float(np.median(known, axis=0).max()) if len(known) else math.inf
+
+
+def _every(q: Array, turn: Array | None) -> Array:
+    return q if turn is None else product(q.reshape(-1, 4), np.tile(turn, (len(q), 1))).reshape(q.shape)
 
 
 class Mvnx(CaptureFile, frozen=True, kw_only=True):
@@ -575,7 +641,7 @@ class Mvnx(CaptureFile, frozen=True, kw_only=True):
 
     def read(self, path: Path) -> Captured:
         """The file's 23 segments, and its calibration poses."""
-        found = read(path, file=self.file)
+        found = read(path, file=self.file, human=self.human)
         first = next(iter(found.frames)).subject
         if self.subject and self.subject != first:
             raise InputError.at(self.file, "subject", f"no {self.subject!r} in it", f"it has {first!r}")

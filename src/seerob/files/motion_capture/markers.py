@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from seerob.core.quantities import LENGTHS
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, transform
 from seerob.description.capture.captured import Captured, Layout, Seen
+from seerob.description.capture.mapping import plain
 from seerob.files.motion_capture.frame_arrays import FrameArrays, checked
 from seerob.files.motion_capture.upright import CLEAR, Up, up_axis, world_from_file
 
@@ -19,6 +20,8 @@ WIDE = 50.0
 """Points of one person that are further apart than this are in another unit [m]."""
 SEEN = 0.02
 """A marker that is seen in a smaller share of the frames is left out."""
+ALIKE = 0.01
+"""Points of one name that are never farther apart [m] are one point twice; a choice, a marker's size."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +38,8 @@ class MarkerReading:
     """Unit of the coordinates."""
     convention: str = ""
     """Whose set of markers it is."""
+    unused: frozenset[str] = frozenset()
+    """Names that shall not be used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +85,7 @@ def recording(
     if seen is Seen.MARKERS:
         chosen = _named_and_seen(points, chosen, reading.file, said)
     factor = LENGTHS[_unit(points, reading, said)]
+    points, chosen = _each_once(points, chosen, factor, reading, said)
     values = points.values[:, chosen] * factor
     _check_width(values, reading.file)
     names = tuple(points.names[k].rpartition(":")[2] for k in chosen)
@@ -147,6 +153,47 @@ def _named_and_seen(points: Points, chosen: list[int], file: str, said: list[Fin
     if weak:
         _note(said, file, f"seen in less than 90 % of the frames: {', '.join(weak)[:200]}", "warning")
     return kept
+
+
+def _each_once(
+    points: Points, chosen: list[int], factor: float, reading: MarkerReading, said: list[Finding]
+) -> tuple[Points, list[int]]:
+    """One column per name: the mean of columns that show one point.
+
+    Raises:
+        InputError: Columns of one name show several points: which is meant nobody knows.
+    """
+    columns: dict[str, list[int]] = {}
+    for k in chosen:
+        columns.setdefault(plain(points.names[k]) or points.names[k], []).append(k)
+    values, one, apart = points.values, [], []
+    for own in columns.values():
+        one.append(own[0])
+        name = points.names[own[0]].rpartition(":")[2]
+        if len(own) == 1 or name in reading.unused:
+            continue
+        group = points.values[:, own]
+        seen = np.asarray(np.isfinite(group).all(axis=2))[..., None]
+        together = group[seen.all(axis=(1, 2))] * factor
+        extent = together.max(axis=1) - together.min(axis=1)
+        far = float(np.linalg.norm(extent, axis=1).max()) if len(together) else np.inf
+        if far > ALIKE:
+            how = f"up to {far:.3g} m apart" if len(together) else "never seen together"
+            apart.append(f"{name} ({len(own)} times, {how})")
+        else:
+            values = values.copy() if values is points.values else values
+            count = seen.sum(axis=1)
+            values[:, own[0]] = np.where(
+                count > 0, np.where(seen, group, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan
+            )
+            text = f"{name} is there {len(own)} times, at most {1e3 * far:.2g} mm apart: their mean is used"
+            _note(said, reading.file, text, "warning")
+    if apart:
+        remedy = f'rename one, or use none: mapping = {{ "{apart[0].partition(" (")[0]}" = "" }}'
+        raise InputError.at(
+            reading.file, "", f"one name for several points: {', '.join(apart)[:300]}", remedy
+        )
+    return replace(points, values=values), one
 
 
 def _unit(points: Points, reading: MarkerReading, said: list[Finding]) -> str:

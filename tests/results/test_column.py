@@ -32,13 +32,15 @@ def ticks(count):
 @pytest.mark.parametrize("count", [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 7])
 def test_everything_comes_back(count):
     spill = Spill()
-    numbers, codes = Column("d", spill), Column("B", spill)
+    numbers, both = Column("d", spill), Column("=dB", spill)
     for k in range(count):
         numbers.append(k / 7)
-        codes.append(k % 256)
-    assert len(numbers) == len(codes) == count
+        both.append(k / 3, k % 256)
+    assert len(numbers) == len(both) == count
     assert np.array_equal(np.frombuffer(numbers.tobytes()), np.arange(count) / 7)
-    assert np.array_equal(np.frombuffer(codes.tobytes(), np.uint8), np.arange(count) % 256)
+    rows = np.frombuffer(both.tobytes(), [("number", "f8"), ("code", "u1")])
+    assert np.array_equal(rows["number"], np.arange(count) / 3)
+    assert np.array_equal(rows["code"], np.arange(count) % 256)
 
 
 def test_a_disk_that_is_full_is_said_once_and_nothing_is_lost(monkeypatch, caplog):
@@ -56,19 +58,19 @@ def test_a_disk_that_is_full_is_said_once_and_nothing_is_lost(monkeypatch, caplo
 
 
 def test_whoever_reads_meanwhile_sees_a_beginning_of_it():
-    numbers, wrong, over = Column("d", Spill()), [], threading.Event()
+    numbers, wrong, over = Column("dd", Spill()), [], threading.Event()
 
     def read():
         while not over.is_set():
             least = len(numbers)
-            found = np.frombuffer(numbers.tobytes())
-            if len(found) < least or not np.array_equal(found, np.arange(len(found))):
+            found = np.frombuffer(numbers.tobytes()).reshape(-1, 2)
+            if len(found) < least or not np.array_equal(found.T, [np.arange(len(found))] * 2):
                 wrong.append(len(found))
 
     reader = threading.Thread(target=read)
     reader.start()
     for k in range(12 * BLOCK):
-        numbers.append(k)
+        numbers.append(k, k)
     over.set()
     reader.join()
     assert wrong == []

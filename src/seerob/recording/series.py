@@ -8,7 +8,7 @@ of the time between than that all was within. Without any limit it has no verdic
 
 What a run of eight hours says of one criterion is 80 MB. A `Column` keeps a block of it in memory, and a
 `Spill` takes the full blocks of many columns in a file without a name; nothing is rounded or left out, and
-reading a column puts it together again.
+reading a column puts it together again. All that is said at an instant is one row of one column.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from __future__ import annotations
 import logging
 import math
 import os
+import struct
 import tempfile
 import weakref
-from array import array
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from threading import Lock
@@ -93,41 +93,42 @@ class Spill:
 
 
 class Column:
-    """Numbers of one type, appended one by one, by one thread; any thread may read.
+    """Rows of numbers, appended one by one, by one thread; any thread may read.
 
     Args:
-        typecode: As of `array.array`.
+        form: Of a row, as of `struct`.
         spill: Takes full blocks.
     """
 
-    def __init__(self, typecode: str, spill: Spill) -> None:
-        self._typecode, self._spill = typecode, spill
+    def __init__(self, form: str, spill: Spill) -> None:
+        row = struct.Struct(form)
+        self._pack, self._width, self._spill = row.pack, row.size, spill
         self._blocks: list[int | bytes] = []
         """Full ones: where each begins in the file, or itself."""
-        self._newest: array[Any] = array(typecode)
+        self._newest = bytearray()
         self._count = 0
-        self._size = BLOCK * self._newest.itemsize
+        self._size = BLOCK * row.size
 
     def __len__(self) -> int:
         return self._count
 
-    def append(self, number: float) -> None:
-        """Add one."""
-        self._newest.append(number)
-        if len(self._newest) == BLOCK:
+    def append(self, *numbers: float) -> None:
+        """Add a row."""
+        self._newest += self._pack(*numbers)
+        self._count += 1
+        if len(self._newest) == self._size:
             with self._spill.lock:
-                data = self._newest.tobytes()
+                data = bytes(self._newest)
                 begin = self._spill.write(data)
                 self._blocks.append(data if begin is None else begin)
-                self._newest = array(self._typecode)
-        self._count += 1
+                self._newest = bytearray()
 
     def tobytes(self) -> bytes:
-        """All of them, in the machine's own form."""
+        """All of them, one after the other: at least as many as there were when it was called."""
         with self._spill.lock:
             old = [b if isinstance(b, bytes) else self._spill.read(b, self._size) for b in self._blocks]
-            # One step under the interpreter's lock: a reader never sees an array that is being grown.
-            return b"".join((*old, self._newest.tobytes()))
+            # One step under the interpreter's lock: a reader never sees a row that is being written.
+            return b"".join((*old, bytes(self._newest)))
 
 
 NO_VERDICT = 255
@@ -139,6 +140,9 @@ CODES: dict[Verdict | None, int] = {
 }
 """Verdict → the byte that stands for it in arrays, as in `snapshot.Trace`."""
 
+_COLUMNS = np.dtype([("t", "f8"), ("value", "f8"), ("limit", "f8"), ("reason", "i4"), ("verdict", "u1")])
+_ROW = "=dddiB"
+"""What is kept of an instant, packed: the reason by its number, the verdict by its code."""
 MAX_REASONS = 4096
 """Distinct reasons kept per series; a reason with a changing number in it must not fill the memory."""
 
@@ -301,8 +305,7 @@ class Series:
         """Whether limits bound from above."""
         self._tracker = tracker
         self._spill = spill = Spill() if spill is None else spill
-        self._t, self._values, self._limits = Column("d", spill), Column("d", spill), Column("d", spill)
-        self._reasons = Column("i", spill)
+        self._rows = Column(_ROW, spill)
         self._reason_of: dict[str, int] = {"": 0}
         self._parts: dict[str, Series] = {}
         self._whole = whole
@@ -314,8 +317,6 @@ class Series:
         self._has_limit = False
         self._unseen = False
         """Whether nobody knows if there was something to judge between instants at which there was not."""
-        # Appended last at each tick: its length is how many ticks are whole.
-        self._verdicts = Column("B", spill)
 
     def __repr__(self) -> str:
         verdict = "no verdict" if self.verdict is None else self.verdict.value
@@ -324,7 +325,7 @@ class Series:
     @property
     def known(self) -> bool:
         """Whether anything was heard."""
-        return len(self._verdicts) > 0
+        return len(self._rows) > 0
 
     def repeats(self, result: Result) -> bool:
         """Whether this is the last result of a criterion with a period, shown again, and no worse since."""
@@ -384,14 +385,11 @@ class Series:
 
     def append(self, result: Result, t: float) -> None:
         """Add what the criterion said in the snapshot at run time ``t`` [s]."""
-        self._last_t, self._last_verdict = result.t, result.verdict
-        self._t.append(t)
-        self._values.append(math.nan if result.value is None else result.value)
-        self._limits.append(math.nan if result.limit is None else result.limit)
-        code = self._reason_of.get(result.reason, -1)
-        if code < 0 and len(self._reason_of) < MAX_REASONS:
-            code = self._reason_of[result.reason] = len(self._reason_of)
-        self._reasons.append(code)
+        verdict, value, limit = result.verdict, result.value, result.limit
+        self._last_t, self._last_verdict = result.t, verdict
+        reason = self._reason_of.get(result.reason, -1)
+        if reason < 0 and len(self._reason_of) < MAX_REASONS:
+            reason = self._reason_of[result.reason] = len(self._reason_of)
         for part in result.parts:
             series = self._parts.get(part.name)
             if series is None:
@@ -400,47 +398,51 @@ class Series:
                 )
                 self._parts[part.name] = series
             series.append(part, t)
-        if result.verdict is Verdict.UNDECIDED:
+        if verdict is Verdict.UNDECIDED:
             said = {part.name for part in result.parts}
             for name, series in self._parts.items():
                 series._passed_over = series._passed_over or name not in said
-        self._said.add(CODES[result.verdict])
-        self._has_limit = self._has_limit or result.limit is not None
-        self._verdicts.append(CODES[result.verdict])
+        code = CODES[verdict]
+        self._said.add(code)
+        self._has_limit = self._has_limit or limit is not None
+        self._rows.append(
+            t, math.nan if value is None else value, math.nan if limit is None else limit, reason, code
+        )
 
     def __len__(self) -> int:
-        return len(self._verdicts)
+        return len(self._rows)
 
-    def _floats(self, data: Column) -> Array:
-        n = len(self._verdicts)
-        return np.frombuffer(data.tobytes(), np.float64)[:n]
+    def _column(self, name: str) -> NDArray[Any]:
+        found = np.ascontiguousarray(np.frombuffer(self._rows.tobytes(), _COLUMNS)[name])
+        found.setflags(write=False)
+        return found
 
     @property
     def t(self) -> Array:
         """Run time of the snapshots [s], shape (n,)."""
-        return self._floats(self._t)
+        return self._column("t")
 
     @property
     def values(self) -> Array:
         """In `unit`, shape (n,); nan where there was none."""
-        return self._floats(self._values)
+        return self._column("value")
 
     @property
     def limits(self) -> Array:
         """In `unit`, shape (n,); nan where there was none."""
-        return self._floats(self._limits)
+        return self._column("limit")
 
     @property
     def verdicts(self) -> NDArray[np.uint8]:
         """0 within, 1 exceeded, 2 undecided, 255 none, shape (n,)."""
-        return np.frombuffer(self._verdicts.tobytes(), np.uint8)
+        return self._column("verdict")
 
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why UNDECIDED or what governs, per tick; ``…`` beyond the `MAX_REASONS` distinct ones kept."""
+        codes = self._column("reason").tolist()
         texts = (*self._reason_of, "…")
-        codes = np.frombuffer(self._reasons.tobytes(), np.intc)[: len(self)]
-        return tuple(texts[code] for code in codes.tolist())
+        return tuple(texts[code] for code in codes)
 
     @property
     def parts(self) -> Mapping[str, Series]:

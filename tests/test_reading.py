@@ -39,6 +39,11 @@ WRONG = {
     "unknown at the top": ('titel = "x"', "titel", "'title'"),
     "unknown group": ("[[saftey]]\nkind='velocity'", "saftey", "'safety'"),
     "unknown in a table": (ROBOT + "modle = 1", "robots[0].modle", "'model'"),
+    "what is missing, under another name": (
+        HUMAN.replace("stature", "height"),
+        "humans[0].height",
+        "'stature'",
+    ),
     "unknown two levels down": (
         ROBOT + "base = { positon = [0, 0, 0] }",
         "robots[0].base.positon",

@@ -6,6 +6,7 @@ import json
 import os
 import random
 import re
+import shutil
 import socket
 import subprocess
 import sys
@@ -17,6 +18,8 @@ from mcap.writer import Writer
 
 import seerob as sr
 from seerob.app.cli import COMMANDS
+from seerob.app.console.terminal import tell
+from seerob.core.snapshot import Finding
 
 FILES = ["report.html", "results.xlsx", "run.mcap"]
 
@@ -351,6 +354,34 @@ def test_a_folder_that_cannot_be_made_is_one_line(capsys, tmp_path, recorded, co
     assert code == 3
     assert err.count("\n") == 1
     assert str(tmp_path / "file" / "out") in err
+
+
+def test_what_is_computed_again_lies_beside_the_run_not_in_it(capsys, tmp_path, recorded):
+    run = tmp_path / "cell" / "runs" / "first"
+    run.mkdir(parents=True)
+    shutil.copy(recorded[1] / "run.mcap", run)
+    assert seerob(capsys, "report", run / "run.mcap", "--json")[0] == 0
+    assert len(list((tmp_path / "cell" / "runs").iterdir())) == 2
+    assert [path.name for path in run.iterdir()] == ["run.mcap"]
+
+
+def test_equal_findings_stand_in_one_line_and_the_tenth_says_how_many_follow(capsys):
+    equal = [Finding(level="assumed", subject=f"arm {k}", text="masses are guessed") for k in range(8)]
+    others = [Finding(level="assumed", subject="arm", text=f"guess {k}") for k in range(12)]
+    warned = [Finding(level="warning", subject="arm", text=f"odd {k}", holds=("arm",)) for k in range(12)]
+    tell([*equal, *others])
+    shown = capsys.readouterr().out.splitlines()
+    assert "arm 0, arm 1, arm 2, arm 3, arm 4, arm 5 and 2 more: masses are guessed" in " ".join(
+        shown[0].split()
+    )
+    assert len(shown) == 10
+    assert "and 4 more assumptions" in shown[-1]
+    # What holds a verdict is never among them.
+    tell([*others, *warned])
+    shown = capsys.readouterr().out.splitlines()
+    assert [line.split(maxsplit=1)[0] for line in shown] == ["warning"] * 12 + ["and"]
+    tell([*others, *warned], verbose=True)
+    assert len(capsys.readouterr().out.splitlines()) == 24
 
 
 def test_report_of_a_recording_repeats_it_and_a_changed_workstation_says_what_changed(

@@ -82,6 +82,18 @@ def test_missing_empty_and_too_large_files(tmp_path):
         load_meshes(path, units="m")
 
 
+@pytest.mark.parametrize("name", ["part.stl", "part.obj", "part.dae"])
+def test_a_web_page_that_was_saved_instead_of_the_file_is_named(tmp_path, name):
+    (tmp_path / name).write_text("\n<!DOCTYPE html>\n<html><title>Not found</title></html>")
+    with pytest.raises(InputError, match=r"is a web page, not a mesh.*download the file itself"):
+        load_meshes(tmp_path / name, units="m")
+
+
+def test_a_path_as_another_system_writes_it_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"write / between folders"):
+        load_meshes(tmp_path / "cad\\part.stl", units="m")
+
+
 @pytest.mark.parametrize("name", ["a.sldprt", "a.CATPart", "a.jt", "a.step", "a.3dxml", "a.prt"])
 def test_proprietary_files_say_which_export_to_ask_for(tmp_path, name):
     with pytest.raises(InputError) as caught:

@@ -196,6 +196,7 @@ def test_files_that_are_something_else_say_so(tmp_path):
         archive.writestr("a.txt", "hello")
     for source, file, word in (
         (Csv, "missing.csv", "no such file"),
+        (Csv, "data\\missing.csv", "write / between folders, not \\; looked for"),
         (Csv, ".", "is a folder"),
         (Csv, "empty.csv", "is empty"),
         (Csv, "binary.csv", "binary data"),

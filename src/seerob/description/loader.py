@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from seerob.core.errors import InputError, suggestion
-from seerob.core.files.bounded import TooLarge, content
+from seerob.core.files.bounded import TooLarge, content, missing_file
 from seerob.description.description import Description
 from seerob.description.formats import mjcf, urdf
 from seerob.description.formats.resolve import Resolver, as_written_or_in_other_case, of_distribution
@@ -102,6 +102,6 @@ def _path(model: str, folder: Path) -> tuple[Path, Path]:
         raise InputError.at(model[:200], "", f"is no name of a file: {error.args[-1]}", "name one") from error
     found = as_written_or_in_other_case(path)
     if found is None:
-        hint = suggestion(model, [f"library:{known}" for known in library.names()])
+        hint = missing_file(model, suggestion(model, [f"library:{known}" for known in library.names()]))
         raise InputError.at(model, "", "is a folder" if path.is_dir() else f"no such file {path}", hint)
     raise InputError.at(model, "", f"no such file {path}", f"upper and lower case differ from {found.name}")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.errors import InputError, suggestion
-from seerob.core.files.bounded import TooLarge, content
+from seerob.core.files.bounded import TooLarge, content, missing_file
 from seerob.core.printable import printable
 from seerob.core.quantities import LENGTHS
 from seerob.core.shapes import Mesh
@@ -157,7 +157,7 @@ def _reader(path: Path) -> Callable[[MeshSource], RawFile]:
 def _content(path: Path, max_bytes: int) -> bytes:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "there is no such file"
-        raise InputError.at(path, "", what, "name a mesh file")
+        raise InputError.at(path, "", what, missing_file(path, "name a mesh file"))
     try:
         held = content(path, max_bytes)
     except TooLarge as error:
@@ -166,6 +166,9 @@ def _content(path: Path, max_bytes: int) -> bytes:
         raise InputError.at(path, "", f"cannot be read: {error.strerror}", "check its permissions") from error
     if not held:
         raise InputError.at(path, "", "is empty", "export it again")
+    if held[:512].lstrip(b"\xef\xbb\xbf \t\r\n")[:14].lower().startswith((b"<!doctype html", b"<html")):
+        what = "is a web page, not a mesh: a link was saved instead of the file"
+        raise InputError.at(path, "", what, "download the file itself")
     return held
 
 

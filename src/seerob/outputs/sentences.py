@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from seerob.core.figures import against, between, figure, margin, with_unit
-from seerob.core.snapshot import Verdict
+from seerob.core.snapshot import Finding, Verdict
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES, Series, Worst
 
@@ -27,8 +27,26 @@ _NUMBERS = (
     "twelve",
 )
 
+_LEVELS = ("warning", "assumed", "note")
+_ABOUT = 6
+"""Names before a finding."""
 _LISTED = 15
 """Names in a sentence."""
+
+
+def grouped(findings: Iterable[Finding]) -> list[Finding]:
+    """What was found, equal texts as one that names everything it is about; what holds a verdict first."""
+    about: dict[tuple[str, str, bool], list[str]] = {}
+    for one in findings:
+        about.setdefault((one.level, one.text, bool(one.holds)), []).append(one.subject)
+    order = sorted(about, key=lambda key: (not key[2], _LEVELS.index(key[0]) if key[0] in _LEVELS else -1))
+    found = []
+    for level, text, holds in order:
+        subjects = list(dict.fromkeys(about[level, text, holds]))
+        more = f" and {len(subjects) - _ABOUT} more" if len(subjects) > _ABOUT else ""
+        who = f"{', '.join(subjects[:_ABOUT])}{more}"
+        found.append(Finding(level=level, subject=who, text=text, holds=("*",) * holds))
+    return found
 
 
 def number(value: float | None, unit: str = "") -> str:

@@ -133,11 +133,15 @@ def convert(
     fields = {f.encode_name: f for f in fields_of(wanted) if f.encode_name not in hidden}
     before = len(problems)
     values: dict[str, object] = {}
+    given = {field for name in table if (field := _field(name, fields)[0]) is not None}
+    missing = [name for name, info in fields.items() if info.required and name not in given]
     for name, value in table.items():
         place = _join(key, name)
         field, factor = _field(name, fields)
         if field is None:
             remedy = _wrong_unit(name, fields) or suggestion(name, [*fields, *beside])
+            if len(missing) == 1 and "did you mean" not in remedy:
+                remedy = f"did you mean {missing[0]!r}, which is missing? {remedy}"
             problems.append(Problem(file, place, "unknown key", remedy))
         elif field in values:
             problems.append(Problem(file, place, f"{field!r} is given twice, in two units", "keep one"))

@@ -21,6 +21,7 @@ from seerob.app.console.terminal import (
     OUT,
     Exit,
     add_output,
+    add_verbose,
     add_workstation,
     allowed,
     describe,
@@ -46,6 +47,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     add_workstation(sub)
     add_output(sub)
+    add_verbose(sub)
     text = "also least distances and largest speeds of the whole motion as bounds, in a section of the report"
     sub.add_argument("--between-samples", action="store_true", help=text)
     add_permissible(sub)
@@ -63,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     scene = station.scene()
     if not options.json:
         describe(station)
-        tell(scene.findings)
+        tell(scene.findings, verbose=options.verbose)
     bounds = _bounds(station) if options.between_samples else []
     every = []
     if options.permissible:

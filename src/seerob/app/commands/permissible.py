@@ -22,6 +22,7 @@ from seerob.app.console.sinks import refuse_existing
 from seerob.app.console.terminal import (
     OUT,
     add_output,
+    add_verbose,
     add_workstation,
     allowed,
     describe,
@@ -105,6 +106,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     ):
         sub.add_argument(f"--{name}", type=type_, default=default, help=f"{text} (default: {default:g})")
     add_output(sub)
+    add_verbose(sub)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -123,7 +125,7 @@ def run(options: argparse.Namespace) -> int:
             raise InputError.at(folder / name, "", "exists already", "give another folder with -o")
     if not options.json:
         describe(station)
-        tell(station.scene().findings)
+        tell(station.scene().findings, verbose=options.verbose)
     wish = by_name(Wish, options, by=By(options.by))
     bounds: list[Bound] = []
     cut: list[PathSegment] = []

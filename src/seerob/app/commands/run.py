@@ -13,6 +13,7 @@ from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sin
 from seerob.app.console.terminal import (
     Exit,
     add_allowed,
+    add_verbose,
     allowed,
     describe,
     exit_code,
@@ -42,6 +43,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     )
     add_allowed(sub)
     add_page(sub)
+    add_verbose(sub)
     sub.add_argument(
         "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
     )
@@ -71,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     describe(station)
     reach(station)
     scene = station.scene()
-    tell(scene.findings)
+    tell(scene.findings, verbose=options.verbose)
     return live(station, scene, options)
 
 

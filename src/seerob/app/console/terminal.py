@@ -11,7 +11,7 @@ import logging
 import math
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from enum import IntEnum
 from pathlib import Path
@@ -158,6 +158,12 @@ def allowed(options: argparse.Namespace) -> Allowed:
     return Allowed(options.allow_plugins, options.allow_outside)
 
 
+def add_verbose(sub: argparse.ArgumentParser) -> None:
+    """The option of commands that begin with what was found."""
+    text = f"every finding, notes too; without it the first {MOST_FINDINGS}, and whatever warns"
+    sub.add_argument("-v", "--verbose", action="store_true", help=text)
+
+
 def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> None:
     """Options of commands that write files."""
     text = f"folder to write to (default: runs/<time> beside the {beside})"
@@ -166,15 +172,17 @@ def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> 
 
 
 def run_folder(near: Path, wanted: Path | None) -> Path:
-    """A new folder for the files of one run."""
+    """A new folder for the files of one run: in ``runs``, of which ``near`` is one or has one."""
     if wanted is not None:
         return wanted
+    # A recording lies in the folder of its run.
+    runs = near.parent if near.absolute().parent.name == "runs" else near / "runs"
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    folder = near / "runs" / stamp
+    folder = runs / stamp
     n = 1
     while folder.exists():
         n += 1
-        folder = near / "runs" / f"{stamp}-{n}"
+        folder = runs / f"{stamp}-{n}"
     return folder
 
 
@@ -201,15 +209,24 @@ def describe(station: Station) -> None:
     line("workstation", f"{w.title}: {', '.join(parts)}", "bold")
 
 
-def tell(findings: tuple[Finding, ...]) -> None:
-    """Warnings and assumptions, one line each; notes are in the report."""
-    for finding in findings:
-        if finding.level != "note":
-            line(
-                finding.level,
-                f"{finding.subject}: {finding.text}",
-                "dim" if finding.level == "assumed" else "yellow",
-            )
+MOST_FINDINGS = 10
+"""Lines at the start, where nobody asks for more."""
+
+
+def tell(findings: Iterable[Finding], *, verbose: bool = False) -> None:
+    """Warnings and assumptions, equal ones in a line; notes are in the report.
+
+    What holds a verdict and what warns stands there, however much it is.
+    """
+    from seerob.outputs.sentences import grouped
+
+    found = [one for one in grouped(findings) if verbose or one.level != "note"]
+    least = sum(one.level == "warning" or bool(one.holds) for one in found)
+    shown = found if verbose or len(found) <= MOST_FINDINGS else found[: max(least, MOST_FINDINGS - 1)]
+    for one in shown:
+        line(one.level, f"{one.subject}: {one.text}", "yellow" if one.level == "warning" else "dim")
+    if len(shown) < len(found):
+        line("", f"and {len(found) - len(shown)} more assumptions; --verbose, check-file, the report", "dim")
 
 
 def tell_results(summary: Summary) -> None:

@@ -20,6 +20,11 @@ REMEDY = (
 )
 
 
+def missing_file(name: str | Path, remedy: str) -> str:
+    """What to do about a file that is not there."""
+    return f"write / between folders, not \\; {remedy}" if "\\" in str(name) else remedy
+
+
 def leads_outside(path: Path, folder: Path) -> Path | None:
     """Where a path leads when that exists outside a folder; None when it does not."""
     try:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from seerob.core.errors import InputError, suggestion
-from seerob.core.files.bounded import TooLarge, sizes
+from seerob.core.files.bounded import TooLarge, missing_file, sizes
 from seerob.core.files.parser_process import parsed, parsed_one_by_one
 from seerob.core.printable import printable
 from seerob.files.tables.grid import MAX_COLUMNS, Cell, Grid
@@ -47,7 +47,7 @@ def check_file(path: Path, name: str, max_bytes: int = MAX_BYTES) -> bytes:
     if not there:
         if path.is_dir():
             raise InputError.at(name, "", "is a folder", "give the file that is meant")
-        raise InputError.at(name, "", "no such file", f"looked for {path}")
+        raise InputError.at(name, "", "no such file", missing_file(name, f"looked for {path}"))
     size = path.stat().st_size
     if size == 0:
         raise InputError.at(name, "", "the file is empty")

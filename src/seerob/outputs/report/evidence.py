@@ -10,14 +10,14 @@ from seerob.core.snapshot import LinkMass, MechanismInfo, Scene, Verdict
 from seerob.description.humans.skeleton import BONES
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.report.report import DOUBTFUL, UNKNOWN, WHO, Report, Setup, input_row
-from seerob.outputs.sentences import number
+from seerob.outputs.sentences import grouped, number
 from seerob.recording.bone_errors import BoneErrors
 
 
 def assumed(report: Report) -> Html:
     """Findings, and inputs that nobody measured or stated."""
     rows: list[list[str | Html]] = []
-    for finding in report.findings:
+    for finding in grouped(report.findings):
         mark = {"note": "note", "assumed": "! assumed", "warning": "! warning"}.get(
             finding.level, finding.level
         )

@@ -137,3 +137,22 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path, pictur
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(InputError, match="not a ROS bag that can be read"):
         ros_bag.read(path, KNOWN)
+
+
+def test_what_the_tracker_only_predicts_is_not_seen(tmp_path, pictures):
+    """Low, 1, is a joint that is not observed: as none, 0, and unlike medium and high."""
+    text = long(pictures).splitlines()
+    for level, seen in ((0, False), (1, False), (2, True), (3, True)):
+        path = tmp_path / f"{level}.csv"
+        rows = [line[:-1] + str(level) if "\tELBOW_LEFT\t" in line else line for line in text]
+        path.write_text("\n".join(rows))
+        captured = kinect_recording.read_text(path, KNOWN)
+        elbow = np.stack([frame.confidence for frame in captured.frames])[:, JOINTS.index("ELBOW_LEFT")]
+        assert set(elbow[np.isfinite(elbow)]) == {float(seen)}
+        assert not any("no confidences in it" in f.text for f in captured.findings)
+
+
+def test_a_file_without_confidences_says_what_that_means(tmp_path, pictures):
+    for kind in ("json", "ros1"):
+        path, read = write(tmp_path, pictures, kind)
+        assert any("only predicts count as seen" in f.text for f in read(path, KNOWN).findings)

@@ -63,6 +63,9 @@ def recording(pictures: Iterable[Picture], reading: Reading, notes: tuple[Findin
     follower = persons.Follower(reading.subject)
     chosen = [follower.choose(picture) for picture in kept]
     frames, rate, found = checked(_arrays(kept, chosen), file=reading.file, subject="")
+    if frames.confidence is None:
+        text = f"{reading.file}: no confidences in it: joints that the tracker only predicts count as seen"
+        notes = (*notes, Finding(level="assumed", subject="", text=text))
     said = [*notes, *found, *persons.findings(follower, file=reading.file, subject="", start=start)]
     if not reading.level:
         world_from_camera, finding = camera_upright(frames.positions, file=reading.file)

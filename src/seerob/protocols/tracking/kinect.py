@@ -73,9 +73,9 @@ LAYOUT = Layout(
     convention="azure_kinect",
     parents=tuple(parent for _, parent in _BONES),
 )
-CONFIDENCE = np.array([0.0, 0.3, 1.0, 1.0])
-"""Of the tracker's levels none, low, medium and high: 0 is out of the picture or too far, low is predicted
-behind something else, medium is the best that the tracker gives. The 0.3 is our choice."""
+CONFIDENCE = np.array([0.0, 0.0, 1.0, 1.0])
+"""Of the tracker's levels none, low, medium and high: none is out of the picture or too far, low is not
+observed but predicted, behind something else; medium is the best that the tracker gives."""
 
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """The camera's optical axes (x right, y down, z forward) in the camera as a thing (x forward, y left, z up).
@@ -203,7 +203,7 @@ def body_object(body: Body) -> BodyObject:
         orientations = [tuple(row) for row in _optical(body.orientations, back=True).round(6).tolist()]
     levels: list[int] = []
     if body.confidence is not None:
-        levels = [2 if c > 0.5 else 1 if c > 0.0 else 0 for c in body.confidence.tolist()]
+        levels = [2 if c > 0.0 else 0 for c in body.confidence.tolist()]
     return BodyObject(
         body_id=body.id,
         joint_positions=[tuple(row) for row in positions.tolist()],

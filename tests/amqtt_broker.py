@@ -9,15 +9,15 @@ from in_a_loop import in_a_loop
 
 
 @contextmanager
-def broker(port):
-    """Another maker's broker, in a thread of its own."""
+def broker(port, *, anonymous=True):
+    """Another maker's broker, in a thread of its own; it lets everybody in, or nobody."""
     from amqtt.broker import Broker
 
     logging.getLogger("amqtt").setLevel(logging.CRITICAL)
     logging.getLogger("transitions").setLevel(logging.CRITICAL)
     config = {
         "listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}},
-        "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
+        "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": anonymous}},
     }
 
     async def serve(ready, over):

@@ -266,3 +266,13 @@ def test_of_what_no_time_is_said_that_is_told(port, monkeypatch, tmp_path):
         findings = reached(Mqtt(name="plc", host="127.0.0.1", port=port), tmp_path, target)
     (told,) = [f.text for f in findings if "played again" in f.text]
     assert told.startswith("no time is said of belt/speed: ")
+
+
+def test_a_broker_that_lets_nobody_in_is_no_broker_that_is_not_there(port):
+    source = Mqtt(name="plc", host="127.0.0.1", port=port)
+    with broker(port, anonymous=False):
+        said = " ".join(f.text for f in reached(source, None, Target(variables=(SPEED,))))
+    assert "not let in at start: the broker refuses: " in said
+    assert "not reached at start" in " ".join(
+        f.text for f in reached(source, None, Target(variables=(SPEED,)))
+    )

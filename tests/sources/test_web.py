@@ -71,7 +71,7 @@ def test_only_who_has_the_token_is_answered(way):
         with listening(way(server, token_env="SEEROB_PLC_TOKEN"), ALL) as heard:
             wait_for(lambda: good(heard))
         said = " ".join(f.text for f in reached(way(server), None, ALL))
-        assert "not reached at start" in said
+        assert "not let in at start" in said
         assert "401" in said or "403" in said
 
 

@@ -35,6 +35,7 @@ COMMANDS = (
     "emulate",
     "probe",
     "variables",
+    "opcua",
     "explain",
     "measure",
     "capture",

@@ -7,3 +7,7 @@ from seerob.core.errors import SeerobError
 
 class ProtocolError(SeerobError):
     """What the other end sent cannot be understood; the connection has to begin anew."""
+
+
+class NotLetIn(ProtocolError):
+    """The other end is there and lets nobody in: a login, a certificate or a right is not what it wants."""

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import OUT, Exit, add_allowed, allowed, line, port, seconds
 from seerob.core.errors import InputError, SeerobError
-from seerob.devices.live.listening import Arrivals
+from seerob.devices.live.listening import TRIED_AGAIN, Arrivals
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
+from seerob.protocols import NotLetIn
 from seerob.workstation.variables import Kind, Variable
 
 if TYPE_CHECKING:
@@ -112,6 +113,12 @@ def add(sub: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the kinematics of that very robot to a new file",
     )
+    sub.add_argument(
+        "--server-certificate",
+        type=Path,
+        metavar="FILE",
+        help="write the certificate that an OPC UA server shows to a new file, so that no other is taken",
+    )
     add_allowed(sub)
     sub.add_argument("--seconds", type=seconds, default=3.0, help="how long to listen (default: 3)")
 
@@ -134,10 +141,13 @@ def run(options: argparse.Namespace) -> int:
     where = f"{options.kind} {options.address or ''}".strip()
     if options.address is not None and (port := getattr(source, "port", None)) is not None:
         where += f" (port {port})"
+    _tell_endpoints(source, given, options.server_certificate, where)
     try:
         findings = asyncio.run(source.ask())
     except InputError:
         raise
+    except NotLetIn as error:
+        raise InputError.at(where, "", f"not let in: {because(error)}") from error
     except (OSError, EOFError, SeerobError) as error:
         remedy = "is it switched on, is the address right, does a firewall stand between?"
         raise InputError.at(where, "", because(error), remedy) from error
@@ -197,7 +207,7 @@ def _workstation(path: Path, allow: Allowed) -> int:
     for finding in said:
         style = "" if finding.level == "note" else "yellow"
         line(finding.level, f"{finding.subject}: {finding.text}", style)
-    return Exit.ERROR if any("not reached at start" in f.text for f in said) else Exit.WITHIN
+    return Exit.ERROR if any(TRIED_AGAIN in f.text for f in said) else Exit.WITHIN
 
 
 def heard_rate(source: LiveSource, given: dict[str, object], rate: float | None) -> int | None:
@@ -249,6 +259,54 @@ def _variables(source: VariablesSource, kind: str, given: dict[str, object], wai
         line("note", f"seerob variables my_cell --browse {name} writes a dictionary of them")
     OUT.print(_snippet(kind, {"name": name} | given), markup=False)
     return Exit.WITHIN
+
+
+def _tell_endpoints(source: LiveSource, given: dict[str, object], save: Path | None, where: str) -> None:
+    """Say what an OPC UA server offers and whose certificate it shows; pin that where it is asked for.
+
+    Args:
+        source: As it was given.
+        given: Its options; the file is added.
+        save: Where the certificate is written to.
+        where: For messages.
+
+    Raises:
+        InputError: There is no certificate to write, or it cannot be.
+    """
+    import asyncio
+
+    from seerob.devices.live.listening import because
+    from seerob.devices.sources.opcua import Opcua
+    from seerob.devices.sources.opcua_robot import OpcuaRobot
+    from seerob.protocols.plc.opcua_client import endpoints
+    from seerob.protocols.plc.opcua_security import certificate, chosen, pem_of
+
+    if not isinstance(source, Opcua | OpcuaRobot):
+        if save is not None:
+            what = "its protocol has no certificate of the server to write"
+            raise InputError.at(where, "--server-certificate", what, "leave it out")
+        return
+    try:
+        offered = asyncio.run(endpoints(source.url))
+    except (OSError, SeerobError) as error:
+        raise InputError.at(where, "", because(error), "is it switched on, is the address right?") from error
+    for each in offered:
+        line("offers", str(each))
+    way = chosen(offered, source.security.value) or next((e for e in offered if e.certificate), None)
+    if way is not None and way.certificate:
+        line("server", f"its certificate: {certificate(way.certificate)}")
+    if save is None:
+        return
+    if way is None or not way.certificate:
+        raise InputError.at(where, "--server-certificate", "the server shows none", "leave it out")
+    try:
+        with save.open("xb") as file:
+            file.write(pem_of(way.certificate))
+    except OSError as error:
+        what = f"cannot be written: {error.strerror}"
+        raise InputError.at(save, "--server-certificate", what, "give the name of a new file") from error
+    given["server_certificate"] = str(save)
+    line("wrote", f"{save}: compare its fingerprint with what the server itself shows", "bold")
 
 
 def _save_calibration(source: LiveSource, path: Path, where: str) -> None:

@@ -41,6 +41,7 @@ from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock, Instant
 from seerob.devices.live.held_back import HeldBack
+from seerob.protocols import NotLetIn
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
 from seerob.workstation.source import Opened, Source, Target
 
@@ -188,6 +189,7 @@ STOP_WITHIN = 1.0
 """A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
 ASK_WITHIN = 1.5
 """At start [s]."""
+TRIED_AGAIN = "it is tried again during the run"
 STILL = "it says the same of the person to the last bit, again and again: is it still measured?"
 """What is measured has noise, and nobody stands so still."""
 UNTIMED = "it sends no time, so that nobody knows how late it is: give a bound as delay of the source"
@@ -294,7 +296,8 @@ class LiveSource(Source, frozen=True, kw_only=True):
         except (OSError, EOFError, SeerobError) as error:
             about = self.target() or self.name
             who = "" if about == self.name else f"{self.name}: "
-            text = f"{who}not reached at start: {because(error)}; it is tried again during the run"
+            how = "not let in" if isinstance(error, NotLetIn) else "not reached"
+            text = f"{who}{how} at start: {because(error)}; {TRIED_AGAIN}"
             return (Finding(level="warning", subject=about, text=text),)
 
     def contact(self) -> Contact:
@@ -391,6 +394,8 @@ class Listener:
         self._stopping = False
         self._up: bool | None = False if again else None
         self._seq = 0
+        self._word = ""
+        """What it was when it was lost last."""
 
     def start(self) -> None:
         """Begin to listen; returns at once."""
@@ -429,18 +434,18 @@ class Listener:
         while True:
             self._clock.reconnect()
             begun = time.monotonic()
-            reason = await self._session()
+            word, reason = await self._session()
             if self._stopping:
                 return
             # Who speaks for less than the last pause and falls silent again is tried less and less often.
             if self._up and time.monotonic() - begun > pause:
                 pause = FIRST_PAUSE
-            self._lose(reason)
+            self._lose(word, reason)
             await asyncio.sleep(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
 
-    async def _session(self) -> str:
-        """Listen until the connection ends; why it did."""
+    async def _session(self) -> tuple[str, str]:
+        """Listen until the connection ends: what that is, and why it did."""
         try:
             async with contextlib.aclosing(self._source.listen(self._target)) as samples:
                 async for sample in samples:
@@ -449,13 +454,15 @@ class Listener:
                     if self._stopping:
                         break
                     self.take(sample)
+        except NotLetIn as error:
+            return "not let in", because(error)
         except (OSError, EOFError, SeerobError) as error:
-            return because(error)
+            return "not heard", because(error)
         except Exception as error:
             if self._up is not False:  # once per loss
                 _log.exception("%s: a mistake in the source itself", self.name)
-            return f"{type(error).__name__}: {error}"
-        return "the other end closed the connection"
+            return "not heard", f"{type(error).__name__}: {error}"
+        return "not heard", "the other end closed the connection"
 
     def take(self, sample: Sample) -> None:
         """Hear what the source has yielded, and post what is news.
@@ -562,12 +569,12 @@ class Listener:
         found, until = self._found.get(what, ("", 0.0))
         return found if host <= until else ""
 
-    def _lose(self, reason: str) -> None:
-        """One line per loss, however often it is tried again."""
-        if self._up is not False:
-            _log.warning("%s: not heard: %s", self.name, reason)
+    def _lose(self, word: str, reason: str) -> None:
+        """One line per loss, and per answer that is another, however often it is tried again."""
+        if self._up is not False or (word, self._word) == ("not let in", "not heard"):
+            _log.warning("%s: %s: %s", self.name, word, reason)
             self._arrivals.lose()
-            self._up = False
+        self._up, self._word = False, word
 
 
 class _Person:

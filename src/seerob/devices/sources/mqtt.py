@@ -19,7 +19,7 @@ from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.files.tables.mapping import toml_value
-from seerob.protocols import ProtocolError
+from seerob.protocols import NotLetIn, ProtocolError
 from seerob.protocols.links.credentials import Server, secret, trusting
 from seerob.protocols.links.json_pointer import document, parts
 from seerob.protocols.plc import sparkplug
@@ -236,6 +236,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
     async def _client(self, folder: Path = Path()) -> AsyncGenerator[aiomqtt.Client, None]:
         need("aiomqtt")
         import aiomqtt
+        from aiomqtt.exceptions import MqttConnectError
 
         name = self.password_env
         password = None if name is None else secret("password_env", name, self._server)
@@ -254,6 +255,8 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
         try:
             async with known_end(client), client:
                 yield client
+        except MqttConnectError as error:
+            raise NotLetIn(f"the broker refuses: {str(error).partition('] ')[2] or error}") from error
         except aiomqtt.MqttError as error:
             raise ConnectionError(str(error).partition("] ")[2] or str(error)) from error
 

@@ -23,6 +23,7 @@ from seerob.protocols.plc.opcua_client import (
     address,
     connect,
     find,
+    not_pinned,
     said_unit,
     stated_unit,
     write_bool,
@@ -105,7 +106,8 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             changes = Changes()
             await changes.watch(client, {}, self.interval)
             text = f"variables subscribed at {self.url}, every {1e3 * (changes.revised or 0):.0f} ms at most"
-            return (Finding(level="note", subject=self.name or "opcua", text=text),)
+            name = self.name or "opcua"
+            return (Finding(level="note", subject=name, text=text), *not_pinned(self.way(), client, name))
 
     async def changes(
         self, variables: tuple[Variable, ...], folder: Path

@@ -22,7 +22,7 @@ from seerob.devices.variables.access import missing, with_absolute_paths
 from seerob.devices.variables.live_source import PULSES
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
-from seerob.protocols.plc.opcua_client import Changes, NodeValue, Security, Way, connect
+from seerob.protocols.plc.opcua_client import Changes, NodeValue, Security, Way, connect, not_pinned
 from seerob.protocols.plc.opcua_robotics import MODES, Robot, robots
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables import unit
@@ -131,7 +131,8 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
                 if self.origin is MotionOrigin.CONTROLLER
                 else origin_finding(self.origin, self.robot, heard)
             )
-            return (origin, *(Finding(level="note", subject=self.robot, text=t) for t in said))
+            notes = (Finding(level="note", subject=self.robot, text=t) for t in said)
+            return (origin, *notes, *not_pinned(self.way(), client, self.robot))
 
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Joint samples whenever an axis changes or the server shows that none has, and signals."""

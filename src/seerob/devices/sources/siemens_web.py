@@ -21,7 +21,7 @@ from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
-from seerob.protocols import ProtocolError
+from seerob.protocols import NotLetIn, ProtocolError
 from seerob.protocols.links.credentials import Server, secret, server_of, trusting
 from seerob.protocols.links.http_answer import answer
 from seerob.protocols.plc import s7_web
@@ -158,7 +158,11 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             session = _Session(client, self.url.rstrip("/") + s7_web.PATH)
             await _give_back(session)
             password = secret("password_env", self.password_env, self._server)
-            found = s7_web.result(await session.post(s7_web.login(self.user, password)))
+            said = await session.post(s7_web.login(self.user, password))
+            try:
+                found = s7_web.result(said)
+            except ProtocolError as error:
+                raise NotLetIn(f"login of {self.user!r}: {error}") from error
             token = found.get("token") if isinstance(found, dict) else None
             if not isinstance(token, str):
                 raise ProtocolError("logged in without a token")

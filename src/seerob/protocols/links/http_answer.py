@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from seerob.protocols import ProtocolError
+from seerob.protocols import NotLetIn, ProtocolError
 
 if TYPE_CHECKING:
     import httpx
@@ -35,12 +35,15 @@ async def answer(
 
     Raises:
         OSError: There is none.
+        NotLetIn: Who asks is not known, or may not.
         ProtocolError: It is too large, or no success.
     """
     import httpx
 
     try:
         async with client.stream(method, url, content=content, headers=headers) as said:
+            if said.status_code in (httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN):
+                raise NotLetIn(f"{who} answers with HTTP {said.status_code}: it wants another login or token")
             if said.status_code != httpx.codes.OK:
                 raise ProtocolError(f"{who} answers with HTTP {said.status_code}")
             found = bytearray()

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from seerob.protocols import ProtocolError
+from seerob.protocols import NotLetIn, ProtocolError
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -137,10 +137,11 @@ async def linked_to(
     Raises:
         OSError: There is no connection.
         TimeoutError: It does not answer.
+        NotLetIn: Who asks is not known, or may not.
         ProtocolError: No such server is there.
     """
     from websockets.asyncio.client import connect
-    from websockets.exceptions import InvalidHandshake, InvalidURI
+    from websockets.exceptions import InvalidHandshake, InvalidStatus, InvalidURI
     from websockets.typing import Subprotocol
 
     class Straight(connect):
@@ -167,6 +168,9 @@ async def linked_to(
     try:
         socket = await opening
     except (InvalidHandshake, InvalidURI) as error:
+        if isinstance(error, InvalidStatus) and error.response.status_code in (401, 403):
+            what = f"the server at {at} answers with HTTP {error.response.status_code}"
+            raise NotLetIn(f"{what}: it wants another login or token") from error
         raise ProtocolError(f"no {what} answers at {at}: {error}") from error
     async with socket:
         if protocols and socket.subprotocol is None:

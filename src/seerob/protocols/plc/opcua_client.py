@@ -14,6 +14,7 @@ import base64
 import binascii
 import logging
 import re
+import socket
 import time
 import traceback
 from collections.abc import AsyncGenerator, Iterator, Mapping
@@ -29,8 +30,17 @@ from msgspec import Meta
 
 from seerob.core.errors import SeerobError
 from seerob.core.extras import need
-from seerob.protocols import ProtocolError
+from seerob.core.snapshot import Finding
+from seerob.protocols import NotLetIn, ProtocolError
 from seerob.protocols.links.credentials import Server, secret, server_of
+from seerob.protocols.plc.opcua_security import (
+    Endpoint,
+    certificate,
+    chosen,
+    endpoint,
+    why_another,
+    why_refused,
+)
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -305,35 +315,34 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
 
     Raises:
         OSError: There is no connection.
-        ProtocolError: The server refuses.
+        NotLetIn: The server is there and refuses.
+        ProtocolError: It is no such server.
         InputError: asyncua is not installed.
     """
-    need("asyncua")
-    from asyncua.client.client import Client
     from asyncua.ua.uaerrors import UaError
 
-    for name in SILENT:
-        logging.getLogger(name).setLevel(logging.CRITICAL)
-    client = Client(way.url, timeout=PATIENCE)
-    client.session_timeout = SESSION
-    client.name = client.description = "seerob"
+    client = _client(way.url)
     if way.user is not None:
         client.set_user(way.user)
         if way.password_env is not None:
             client.set_password(secret("password_env", way.password_env, server(way)))
     try:
-        if way.security is not Security.NONE:
-            await _protect(client, way, folder)
         async with asyncio.timeout(3 * PATIENCE):
             with plainly_cancelled(), hung_up_on_failure(client):
+                if way.security is not Security.NONE:
+                    await _protect(client, way, folder)
                 await client.connect()
     except TimeoutError as error:
         raise TimeoutError("no answer in time") from error
-    except UaError as error:
-        raise ProtocolError(f"the server refuses: {_text(error)}") from error
-    except ValueError as error:
-        raise ProtocolError(str(error)) from error
+    except SeerobError:
+        raise
     except Exception as error:
+        if not isinstance(error, OSError) or client.uaclient.protocol is not None:  # somebody is there
+            await _refused(error, way, folder)
+        if isinstance(error, UaError):
+            raise ProtocolError(f"the server refuses: {_text(error)}") from error
+        if isinstance(error, ValueError):
+            raise ProtocolError(str(error)) from error
         _refuse_garbled(error)
         raise
     link = client.uaclient.protocol
@@ -356,6 +365,83 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
         await asyncio.sleep(0)
 
 
+def _client(url: str) -> Client:
+    """A client of asyncua that says who it is, and is silent about the rest.
+
+    Raises:
+        InputError: asyncua is not installed.
+    """
+    need("asyncua")
+    from asyncua.client.client import Client
+
+    for name in SILENT:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    client = Client(url, timeout=PATIENCE)
+    client.session_timeout = SESSION
+    client.name = client.description = "seerob"
+    client.application_uri = own_uri()
+    return client
+
+
+def own_uri() -> str:
+    """What this application calls itself where no certificate says it."""
+    return f"urn:{socket.gethostname()}:seerob"
+
+
+async def endpoints(url: str) -> tuple[Endpoint, ...]:
+    """What a server offers to whoever asks.
+
+    Raises:
+        OSError: There is no connection.
+        ProtocolError: It is no such server, or does not say.
+    """
+    client = _client(url)
+    try:
+        async with asyncio.timeout(2 * PATIENCE):
+            with plainly_cancelled(), hung_up_on_failure(client):
+                said = await client.connect_and_get_server_endpoints()
+    except (OSError, SeerobError):
+        raise
+    except Exception as error:
+        raise ProtocolError(f"it does not say what it offers: {_text(error)}") from error
+    finally:
+        hang_up(client.uaclient.protocol)
+    return tuple(map(endpoint, said))
+
+
+async def _refused(error: Exception, way: Way, folder: Path) -> None:
+    """Raise why the server lets nobody in, where what it offers, and what it was given, tell.
+
+    Raises:
+        NotLetIn: With what would be right.
+    """
+    try:
+        offered = await endpoints(way.url)
+    except (OSError, SeerobError):
+        return
+    own = None
+    if way.certificate is not None and way.security is not Security.NONE:
+        own = certificate((folder / way.certificate).read_bytes())
+    said = f"{type(error).__name__}: {_text(error)}"
+    if isinstance(error, OSError | AssertionError):
+        said = ""  # it only ended the connection, which is no word
+    why = why_another(offered, way.security.value) or why_refused(
+        offered, way.security.value, error=said, own=own, user=way.user
+    )
+    if why:
+        raise NotLetIn(why) from error
+
+
+def not_pinned(way: Way, client: Client, subject: str) -> tuple[Finding, ...]:
+    """What is believed of a server whose certificate nobody gave, while a session is protected."""
+    if way.security is Security.NONE or way.server_certificate is not None:
+        return ()
+    shown = client.security_policy.peer_certificate
+    who = f": {certificate(shown)}" if shown else ""
+    text = f"whoever answers at {way.url} is believed{who}; give server_certificate, so that no other is"
+    return (Finding(level="assumed", subject=subject, text=text),)
+
+
 def _refuse_garbled(error: Exception) -> None:
     """Raise a ProtocolError for bytes on which asyncua failed: they are the server's mistake, not ours."""
     if isinstance(error, OSError | SeerobError):
@@ -369,17 +455,28 @@ def _refuse_garbled(error: Exception) -> None:
 async def _protect(client: Client, way: Way, folder: Path) -> None:
     from asyncua import ua
     from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+    from asyncua.crypto.uacrypto import CertProperties
 
     encrypt = ua.MessageSecurityMode.SignAndEncrypt
     mode = encrypt if way.security is Security.ENCRYPT else ua.MessageSecurityMode.Sign
     if way.certificate is None or way.key is None:
         raise ProtocolError("a protected session needs certificate and key")
-    server = None if way.server_certificate is None else content(folder / way.server_certificate)
+    own = certificate((folder / way.certificate).read_bytes())
+    client.application_uri = own.uris[0] if own.uris else own_uri()
+    # Some servers do not answer at all who encrypts for another: what they offer is asked before.
+    offered = await endpoints(way.url)
+    shown = chosen(offered, way.security.value)
+    pinned = None if way.server_certificate is None else folder / way.server_certificate
+    meant = None if pinned is None else certificate(pinned.read_bytes())
+    if why := why_another(offered, way.security.value, meant):
+        raise NotLetIn(why)
+    assert shown is not None
+    server = CertProperties(path_or_content=shown.certificate, extension="der")
     await client.set_security(
         SecurityPolicyBasic256Sha256,
         certificate=content(folder / way.certificate),
         private_key=content(folder / way.key),
-        server_certificate=server,
+        server_certificate=server if pinned is None else content(pinned),
         mode=mode,
     )
 

@@ -230,6 +230,58 @@ def test_all_mistakes_at_once(tmp_path):
     }
 
 
+BOX = "<collision><geometry><box size='0.1 0.1 0.1'/></geometry></collision>"
+
+
+@pytest.mark.parametrize(
+    ("shape", "words"),
+    [
+        ("<mesh filename='no.stl'/>", "no.stl: no such file"),
+        ("<mesh filename='broken.stl'/>", "broken.stl:  is truncated"),
+        ("<mesh filename='http://x/a.stl'/>", "never fetched"),
+        ("<box size='1 1'/>", "is '1 1'"),
+        ("<box size='1 1 0'/>", "is 1 1 0"),
+        ("", "holds nothing"),
+    ],
+)
+def test_what_only_the_eye_needs_is_left_out_and_said(tmp_path, shape, words):
+    (tmp_path / "broken.stl").write_bytes(bytes(20))
+    visual = f"<visual><geometry>{shape}</geometry></visual>"
+    look = "<visual><geometry><box size='0.2 0.2 0.2'/></geometry></visual>"
+    made = read(tmp_path, arm(INERTIAL + BOX + visual + look))
+    assert len(made.link("arm").visual) == len(made.link("arm").solids) == 1
+    (said,) = [f for f in made.findings if "left out of pictures" in f.text]
+    assert words in said.text
+    assert said.level == "warning"
+    # Where it is the only shape, distances need it.
+    assert any(words in str(problem) for problem in problems(tmp_path, arm(INERTIAL + visual)))
+
+
+def test_a_mesh_that_only_one_link_shows_is_missed_by_the_one_that_collides(tmp_path):
+    mesh = "<geometry><mesh filename='no.stl'/></geometry>"
+    text = robot(
+        f"<link name='base'>{BOX}<visual>{mesh}</visual></link>",
+        f"<link name='arm'>{INERTIAL}<collision>{mesh}</collision></link>",
+        joint("j", "base", "arm"),
+    )
+    (problem,) = problems(tmp_path, text)
+    assert problem.key == "link[arm].collision[0].mesh"
+
+
+@pytest.mark.parametrize(
+    "shape", ["<box size='0 0 0'/>", "<sphere radius='0.0'/>", "<cylinder radius='0' length='0'/>"]
+)
+def test_a_shape_of_no_size_is_none(tmp_path, shape):
+    dummy = f"<{{0}}><geometry>{shape}</geometry></{{0}}>"
+    made = read(tmp_path, arm(INERTIAL + dummy.format("collision") + dummy.format("visual")))
+    assert made.link("arm").solids == made.link("arm").visual == ()
+    assert "collision[0] has no size at all" in texts(made)
+    shown = "<visual><geometry><box size='0.2 0.2 0.2'/></geometry></visual>"
+    made = read(tmp_path, arm(INERTIAL + dummy.format("collision") + shown))
+    assert len(made.link("arm").solids) == 1
+    assert "use the visual one" in texts(made)
+
+
 def mesh_link(uri, tag="collision", scale=""):
     shape = f'<mesh filename="{uri}" {scale}/>'
     return f'{INERTIAL}<{tag}><origin xyz="0 0 1"/><geometry>{shape}</geometry></{tag}>'

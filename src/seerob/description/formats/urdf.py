@@ -27,7 +27,7 @@ from seerob.description.mesh import LoadedMeshes, load_meshes
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.mesh_mending import with_insides
-from seerob.description.xml_values import FARTHEST, HEAVIEST, SMALLEST, Reader, parse_xml
+from seerob.description.xml_values import FARTHEST, HEAVIEST, NUMBER, SMALLEST, Reader, parse_xml
 
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
 WITHOUT_UNIT = {".stl", ".obj", ".ply", ".off"}
@@ -41,12 +41,31 @@ class Shapes:
     resolver: Resolver
     colors: dict[str, shapes.Color] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
-    loaded: dict[tuple[str, tuple[float, float, float]], LoadedMeshes | None] = field(default_factory=dict)
+    loaded: dict[tuple[str, tuple[float, float, float]], LoadedMeshes | list[Problem]] = field(
+        default_factory=dict
+    )
+    """By name and scale: the meshes, or what is wrong with the file."""
 
     def read_colors(self, robot: Element) -> None:
         """Remembers the materials that the robot declares for all its links."""
         for i, material in enumerate(robot.findall("material")):
             self._color(material, f"material[{i}]")
+
+    def shown(self, link: Element, name: str) -> tuple[Mesh, ...]:
+        """What can be read of the link's ``<visual>`` elements where others are there for distances.
+
+        What cannot is left out of the pictures, with a finding.
+        """
+        problems = self.reader.problems
+        before = len(problems)
+        found = self.visual(link, name)
+        for problem in problems[before:]:
+            text = f"{problem.key.partition('.')[2]} is left out of pictures: {problem.what}"
+            self.reader.finding(
+                "warning", name, f"{text}; how far it stands out of the collision shape is unknown"
+            )
+        del problems[before:]
+        return found
 
     def visual(self, link: Element, name: str) -> tuple[Mesh, ...]:
         """Everything in the link's ``<visual>`` elements, in the link's frame."""
@@ -81,6 +100,8 @@ class Shapes:
     def _elements(self, link: Element, name: str, tag: str) -> Iterator[tuple[str, Element, Element, Array]]:
         for i, element in enumerate(link.findall(tag)):
             key = f"link[{name}].{tag}[{i}]"
+            if _is_void(element):
+                continue
             geometry = element.find("geometry")
             kinds = [] if geometry is None else [child for child in geometry if child.tag in SHAPES]
             if len(kinds) != 1:
@@ -140,13 +161,18 @@ class Shapes:
         if (uri, (x, y, z)) not in self.loaded:
             self.loaded[uri, (x, y, z)] = self._load(uri, (x, y, z), key, link)
         loaded = self.loaded[uri, (x, y, z)]
-        return [] if loaded is None else [(named.name, named.mesh) for named in loaded.meshes]
+        if isinstance(loaded, LoadedMeshes):
+            return [(named.name, named.mesh) for named in loaded.meshes]
+        said = {problem.what for problem in self.reader.problems}
+        self.reader.problems += [each._replace(key=f"{key}.mesh") for each in loaded if each.what not in said]
+        return []
 
-    def _load(self, uri: str, scale: tuple[float, float, float], key: str, link: str) -> LoadedMeshes | None:
+    def _load(
+        self, uri: str, scale: tuple[float, float, float], key: str, link: str
+    ) -> LoadedMeshes | list[Problem]:
         found = self.resolver.find(uri)
         if isinstance(found, Problem):
-            self.reader.problem(f"{key}.mesh", f"{uri}: {found.what}", found.remedy)
-            return None
+            return [found._replace(file=self.reader.file, what=f"{uri}: {found.what}")]
         if found.remark:
             self.reader.finding("warning", link, found.remark)
         unitless = found.path.suffix.lower() in WITHOUT_UNIT
@@ -156,9 +182,10 @@ class Shapes:
                 found.path, units="m" if unitless else None, up="z" if unitless else None, scale=scale
             )
         except InputError as error:
-            for problem in error.problems:
-                self.reader.problem(f"{key}.mesh", f"{uri}: {problem.key} {problem.what}", problem.remedy)
-            return None
+            return [
+                Problem(self.reader.file, "", f"{uri}: {problem.key} {problem.what}", problem.remedy)
+                for problem in error.problems
+            ]
         for finding in loaded.findings:
             self.reader.finding(finding.level, link, f"{uri}: {finding.text}")
         folder = uri.rpartition("/")[0]
@@ -179,6 +206,16 @@ class Shapes:
         if name:
             self.colors[name] = (r, g, b, a)
         return (r, g, b, a)
+
+
+def _is_void(element: Element) -> bool:
+    """Whether a shape is a box, sphere or cylinder of no size at all, as frames have that nothing is at."""
+    geometry = element.find("geometry")
+    kinds = [] if geometry is None else [child for child in geometry if child.tag in SHAPES]
+    if len(kinds) != 1 or kinds[0].tag == "mesh":
+        return False
+    sizes = " ".join(kinds[0].get(each, "") for each in ("size", "radius", "length")).split()
+    return bool(sizes) and all(NUMBER.fullmatch(each) and float(each) == 0 for each in sizes)
 
 
 def moved(solid: Solid, a_from_b: Array) -> Solid:
@@ -364,8 +401,12 @@ def _link(
     if parent is not None:
         parent_from_link = reader.origin(joints[parent[1]], f"joint[{parent[1]}]")
         joint = _joint(reader, parent[1], joints[parent[1]])
-    visual = geometry.visual(element, name)
-    tag = "collision" if element.find("collision") is not None else "visual"
+    for each in ("collision", "visual"):
+        for i, shape in enumerate(element.findall(each)):
+            if _is_void(shape):
+                reader.finding("note", name, f"{each}[{i}] has no size at all: nothing is there")
+    tag = "visual" if all(map(_is_void, element.findall("collision"))) else "collision"
+    visual = geometry.visual(element, name) if tag == "visual" else geometry.shown(element, name)
     if tag == "visual" and visual:
         reader.finding(
             "note", name, "no collision shape in the file: distances and contacts use the visual one"

@@ -125,6 +125,8 @@ class BodyPoint(Struct, frozen=True, kw_only=True):
     """How much its orientation counts: 1 for one that is good to `ORIENTATION_SCALE`."""
     confidence: float | None = None
     """From 0 (guessed) to 1 (seen), as the device says; None when it does not."""
+    rolled: bool = True
+    """Whether its orientation tells how the bone is turned about its long axis."""
 
 
 POSITION_SCALE = 0.02

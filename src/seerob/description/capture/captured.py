@@ -132,6 +132,8 @@ class Captured:
     """Number of frames in ``frames``."""
     calibration: tuple[CaptureFrame, ...] = ()
     """Calibration poses that the file contains."""
+    rest: CaptureFrame | None = None
+    """A skeleton's pose when nothing is turned, in any axes; None where turns do not tell how it moves."""
     placed: bool = True
     """Whether its positions say where the person stands, and not only how its points lie to each other."""
     lengths: dict[str, float] = field(default_factory=dict)

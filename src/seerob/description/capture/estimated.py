@@ -62,7 +62,7 @@ def turned(points: Iterable[BodyPoint]) -> set[Turn]:
     places: dict[str, set[Vec3]] = defaultdict(set)
     for p in points:
         if p.wxyz is not None and p.orientation_weight > 0 and p.bone in _TURNING:
-            found |= {(p.bone, axis) for axis in range(3)}
+            found |= {(p.bone, axis) for axis in range(3) if axis != 1 or p.rolled}
         if p.position is not None and p.position_weight > 0:
             places[p.bone].add(p.at)
     for bone, (after, there) in _END_OF.items():

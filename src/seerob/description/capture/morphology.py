@@ -28,6 +28,8 @@ SURE = 0.5
 """Confidence that counts as seen well."""
 SPREAD = 0.1
 """A spread above this share of a length is told as a warning."""
+LOW_NECK = 0.02
+"""The base of the neck is not so far below the shoulders [m], whose height it has."""
 DEVIATION = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 BETWEEN: dict[str, tuple[str, str]] = {
@@ -110,13 +112,20 @@ def measure(
         found = _length([_distances(seen, *(end.format(side=side) for end in ends)) for side in SIDES])
         if found is not None:
             measured[key] = found
+    low: tuple[Finding, ...] = ()
     hips, shoulders = (_pair(seen, bone) for bone in ("thigh", "upper_arm"))
     for key, values in (("hip_centres", _across(hips)), ("shoulders", _across(shoulders))):
         if (found := _length([values])) is not None:
             measured[key] = found
     if hips is not None and "neck" in seen:
         middle = 0.5 * (hips[0] + hips[1])
-        if (found := _length([np.linalg.norm(seen["neck"] - middle, axis=1)])) is not None:
+        if shoulders is not None and (below := _below(seen["neck"], middle, shoulders)) > LOW_NECK:
+            text = (
+                f"trunk not measured: the joint of the neck is {1e3 * below:.0f} mm below the shoulders, not "
+                "at the base of the neck"
+            )
+            low = (Finding(level="assumed", subject=name, text=text),)
+        elif (found := _length([np.linalg.norm(seen["neck"] - middle, axis=1)])) is not None:
             measured["trunk"] = found
     if not measured:
         what = f"no bone is seen well from both ends in {FEWEST} frames"
@@ -132,9 +141,18 @@ def measure(
         scale = measured["trunk"].value / sum(usual[key] for key in TRUNK)
         own |= {key: usual[key] * scale for key in TRUNK}
     body(name=name, stature=tall, mass=mass, sex=sex, lengths=lengths, own_lengths=own)  # may refuse
-    return Morphology(
-        tall, stature is not None, own, measured, tuple(_length_findings(measured, tall, stature, name))
-    )
+    told = (*_length_findings(measured, tall, stature, name), *low)
+    return Morphology(tall, stature is not None, own, measured, told)
+
+
+def _below(neck: Array, hips: Array, shoulders: tuple[Array, Array]) -> float:
+    """How far a joint mostly is below the shoulders, along the trunk [m]; 0 when nobody knows."""
+    way = 0.5 * (shoulders[0] + shoulders[1]) - hips
+    with np.errstate(invalid="ignore"):
+        length = np.linalg.norm(way, axis=1)
+        below = length - ((neck - hips) * way).sum(axis=1) / length
+    below = below[np.isfinite(below)]
+    return float(np.median(below)) if len(below) else 0.0
 
 
 def _joint_centres(frames: Iterable[CaptureFrame], observer: Observer) -> dict[str, Array]:

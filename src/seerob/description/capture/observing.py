@@ -41,6 +41,8 @@ class Row:
     """Weight of its orientation."""
     fitted: bool = False
     """Its place on the bone is still to be found: see `seerob.description.capture.mapping.Place`."""
+    rolled: bool = True
+    """Whether its orientation tells how the bone is turned about itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,7 @@ class Observer:
                     position_weight=wp,
                     orientation_weight=wo,
                     confidence=sure,
+                    rolled=row.rolled,
                 )
             )
         return tuple(out)

@@ -23,6 +23,7 @@ from seerob.description.capture.calibration import CalibrationPose
 from seerob.description.capture.captured import Captured, CaptureFrame, Exchanges
 from seerob.description.capture.mapping import read_conventions
 from seerob.description.capture.observing import Observer
+from seerob.description.capture.rest_pose import by_rest_pose
 from seerob.devices.capture.options import (
     Calibration,
     CutOff,
@@ -120,8 +121,20 @@ class CaptureFile(Source, frozen=True, kw_only=True):
         )
         if self.calibration.pose is not CalibrationPose.NONE:
             window = self._window(captured)
-            bound, found = calibrated(self, window, captured.layout, bound, description)
-            findings = (*findings, *found.findings)
+            bound, calibration = calibrated(self, window, captured.layout, bound, description)
+            findings = (*findings, *calibration.findings)
+        elif captured.rest is not None:
+            bound, found = by_rest_pose(
+                captured.rest,
+                captured.layout,
+                bound,
+                description,
+                subject=subject,
+                orientation=self.weights.orientation,
+                bones=self.weights.bones,
+                mapped=self.mapping,
+            )
+            findings = (*findings, *found)
         world_from_root = np.eye(4) if target is None else np.array(target.world_from_base or np.eye(4))
         bound, fit = registered(captured, bound, description, world_from_root, subject)
         bound, left_out = placed_only(bound, subject, "no frame shows where")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TextIO
@@ -325,6 +325,8 @@ LOOKED_AT = 200
 """Frames from which the direction up is guessed."""
 CLEARLY = 1.5
 """Who extends farther along one axis by this factor is upright along it."""
+SHIFTING = 0.02
+"""Share of the longest chain; joints that shift by less are where their OFFSET has them."""
 HEAD, FEET = ("head", "neck"), ("foot", "ankle", "toe")
 """Parts of joints' names."""
 
@@ -390,6 +392,24 @@ def guess_up(file: BvhFile) -> tuple[Up, bool]:
     return (Up.Z if z > y else Up.Y), max(y, z) > CLEARLY * min(y, z)
 
 
+def _turned_up(positions: Array, turns: Array, up: Up) -> tuple[Array, Array]:
+    """Into axes with z up: who looks along z in a file with y up looks along x here."""
+    return (positions[..., [2, 0, 1]], turns[..., [0, 3, 1, 2]]) if up is Up.Y else (positions, turns)
+
+
+def shifting(file: BvhFile) -> list[str]:
+    """Joints, but the root, whose channels of position put them farther from their OFFSET than `SHIFTING`."""
+    far = SHIFTING * chain(file)
+    return [
+        joint.name
+        for joint in file.joints
+        if joint.parent >= 0
+        and any(
+            np.nanmax(np.abs(file.values[:, k] - joint.offset[axis])) > far for axis, k in joint.translations
+        )
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class _Frames:
     """Can be iterated again and again; a chunk at a time is in memory."""
@@ -402,9 +422,7 @@ class _Frames:
         whole = self.file.whole()
         for start in range(0, len(whole), CHUNK):
             positions, turns = self.file.poses(slice(start, start + CHUNK))
-            positions = self.metres * positions
-            if self.up is Up.Y:  # who looks along z there looks along x here
-                positions, turns = positions[..., [2, 0, 1]], turns[..., [0, 3, 1, 2]]
+            positions, turns = _turned_up(self.metres * positions, turns, self.up)
             for k, (p, q) in enumerate(zip(positions, turns, strict=True), start):
                 if whole[k]:
                     yield CaptureFrame(t=k * self.file.period, positions=p, orientations=q)
@@ -477,9 +495,21 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
         rate=1 / found.period,
         count=int(found.whole().sum()),
         placed=placed,
+        rest=None if shifting(found) else _rest(found, METRES[unit], up),
         lengths=_lengths(found, METRES[unit]),
         findings=tuple(said),
     )
+
+
+def _rest(file: BvhFile, metres: float, up: Up) -> CaptureFrame:
+    """The skeleton with nothing turned."""
+    values = np.zeros((1, file.values.shape[1]))
+    for joint in file.joints:
+        for axis, column in joint.translations:
+            values[0, column] = joint.offset[axis]
+    positions, turns = replace(file, values=values).poses(slice(0, 1))
+    positions, turns = _turned_up(metres * positions[0], turns[0], up)
+    return CaptureFrame(t=0.0, positions=positions, orientations=turns, pose="rest")
 
 
 def _lengths(file: BvhFile, metres: float) -> dict[str, float]:

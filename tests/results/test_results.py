@@ -60,13 +60,13 @@ def test_arrays_hold_what_was_added_and_the_worst_is_the_smallest_severity(rows)
 def test_thinning_loses_no_extremum_and_no_exceedance(rows, most):
     series = log_of(tick(k, result(v, verdict)) for k, (v, verdict) in enumerate(rows))["speed"]
     trace = series.thin(most)
-    t, values = np.frombuffer(trace.t, "<f8"), np.frombuffer(trace.values, "<f4")
+    t, values = np.frombuffer(trace.t, "<f8"), np.frombuffer(trace.values, "<f8")
     codes = np.frombuffer(trace.verdicts, np.uint8)
-    assert len(t) == len(values) == len(codes) == len(trace.limits) // 4 <= most
+    assert len(t) == len(values) == len(codes) == len(trace.limits) // 8 <= most
     assert (np.diff(t) > 0).all()
     assert set(t) <= set(series.t)
-    assert values.max() == np.float32(series.max())
-    assert values.min() == np.float32(series.min())
+    assert values.max() == series.max()
+    assert values.min() == series.min()
     assert (E in dict(series.shares())) == (1 in codes)
     assert (t[0], t[-1]) == (series.t[0], series.t[-1])
 

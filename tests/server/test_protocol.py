@@ -63,8 +63,8 @@ def test_who_comes_late_gets_the_past_and_the_present(live):
         trace = late.of(History).traces[0]
         assert trace.name == "distance"
         np.testing.assert_array_equal(np.frombuffer(trace.t, "<f8"), [snapshot(k).t for k in range(200)])
-        values = np.array([snapshot(k).results[0].value for k in range(200)], "<f4")
-        np.testing.assert_array_equal(np.frombuffer(trace.values, "<f4"), values)
+        values = np.array([snapshot(k).results[0].value for k in range(200)])
+        np.testing.assert_array_equal(np.frombuffer(trace.values, "<f8"), values)
         np.testing.assert_array_equal(np.frombuffer(trace.verdicts, "u1"), values > 1)
         assert late.of(Snapshot) == snapshot(199)
 
@@ -233,8 +233,8 @@ def test_the_whole_recording_comes_as_history():
         history = page.until(
             lambda m: isinstance(m, History) and m.traces[0].t[-8:] == np.float64(frames[-1].t).tobytes()
         )
-        values = np.frombuffer(history.traces[0].values, "<f4")
-        true = np.array([f.results[0].value for f in frames], "<f4")
+        values = np.frombuffer(history.traces[0].values, "<f8")
+        true = np.array([f.results[0].value for f in frames])
         assert len(values) <= 4000
         assert (values.min(), values.max()) == (true.min(), true.max())
 

@@ -2,6 +2,7 @@
 
 import { rows, select, selection, toggleMuted } from "./page_state";
 import type { Actions } from "./panels/app_context";
+import { keysShown } from "./panels/Keys";
 import { worstOf } from "./posture/instants";
 import { orderedRows } from "./row_order";
 import type { TimeControl } from "./time_control";
@@ -19,6 +20,8 @@ export function listenToKeys(actions: Actions): void {
   window.addEventListener("keydown", (event) => {
     if (event.key === "Tab") byKeys = true;
     if (event.ctrlKey || event.metaKey || event.altKey || needsKeys(event.target, event.key)) return;
+    // An open dialog takes its own keys, and time stands still behind it.
+    if (keysShown.peek() && event.key !== "?") return;
     const act = actionOf(event.key, event.shiftKey, actions);
     if (!act) return;
     event.preventDefault();
@@ -54,6 +57,10 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
     case "l":
     case "L":
       return () => time.follow();
+    case "?":
+      return () => {
+        keysShown.value = !keysShown.peek();
+      };
     case "Escape":
       return () => select(null);
     default:

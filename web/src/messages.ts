@@ -11,8 +11,8 @@ export type LinkState = "connecting" | "open" | "lost" | "refused";
 export interface TracePoints {
   name: string;
   t: Float64Array;
-  values: Float32Array;
-  limits: Float32Array;
+  values: Float64Array;
+  limits: Float64Array;
   /** 0 within, 1 exceeded, 2 undecided, 255 none. */
   verdicts: Uint8Array;
 }

@@ -39,8 +39,8 @@ export class PointCollector {
       points.push({
         name,
         t: Float64Array.from(g.t),
-        values: Float32Array.from(g.values),
-        limits: Float32Array.from(g.limits),
+        values: Float64Array.from(g.values),
+        limits: Float64Array.from(g.limits),
         verdicts: Uint8Array.from(g.verdicts),
       });
     }

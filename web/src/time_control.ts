@@ -80,9 +80,10 @@ export class TimeControl {
     this.seek(t);
   }
 
-  /** To an instant that was looked up: whether it can still be shown. A live run keeps the last minutes. */
+  /** To an instant that was looked up: whether it can be shown here. A live run keeps the last minutes. */
   visit(t: number): boolean {
     const { start } = reach.value;
+    if (!mayControl.value) return false;
     if (isLive.value && t < start - 0.1) return false;
     if (!isLive.value && transport.value.playing) this.command("pause");
     this.seek(t);

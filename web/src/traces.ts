@@ -21,8 +21,8 @@ const SPAN_VERDICTS = new Map<number, Span["verdict"]>([
 
 export class Trace {
   t: Float64Array;
-  values: Float32Array;
-  limits: Float32Array;
+  values: Float64Array;
+  limits: Float64Array;
   verdicts: Uint8Array;
   length = 0;
   spans: Span[] = [];
@@ -41,8 +41,8 @@ export class Trace {
     private readonly capacity = 40_000,
   ) {
     this.t = new Float64Array(1024);
-    this.values = new Float32Array(1024);
-    this.limits = new Float32Array(1024);
+    this.values = new Float64Array(1024);
+    this.limits = new Float64Array(1024);
     this.verdicts = new Uint8Array(1024);
   }
 
@@ -131,8 +131,8 @@ export class Trace {
       return next;
     };
     this.t = copy(new Float64Array(size), this.t);
-    this.values = copy(new Float32Array(size), this.values);
-    this.limits = copy(new Float32Array(size), this.limits);
+    this.values = copy(new Float64Array(size), this.values);
+    this.limits = copy(new Float64Array(size), this.limits);
     this.verdicts = copy(new Uint8Array(size), this.verdicts);
   }
 }
@@ -143,8 +143,8 @@ export function traceFromWire(wire: WireTrace, capacity: number): Trace {
   trace.append({
     name: wire.name,
     t: new Float64Array(wire.t.slice().buffer),
-    values: new Float32Array(wire.values.slice().buffer),
-    limits: new Float32Array(wire.limits.slice().buffer),
+    values: new Float64Array(wire.values.slice().buffer),
+    limits: new Float64Array(wire.limits.slice().buffer),
     verdicts: wire.verdicts,
   });
   return trace;

@@ -450,9 +450,9 @@ export interface Trace {
   name: string;
   /** Little-endian float64 run times [s]. */
   t: Uint8Array;
-  /** Little-endian float32, NaN where there was no value. */
+  /** Little-endian float64, NaN where there was no value. */
   values: Uint8Array;
-  /** Little-endian float32, NaN where there was none. */
+  /** Little-endian float64, NaN where there was none. */
   limits: Uint8Array;
   /** One byte each: 0 within, 1 exceeded, 2 undecided, 255 none. */
   verdicts: Uint8Array;

@@ -4,7 +4,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { load } from "./source.mjs";
 
-const { Trace } = await load("traces");
+const { against } = await load("figures");
+const { Trace, traceFromWire } = await load("traces");
 const { ago, worseElsewhere } = await load("elsewhere");
 const { heldAt, worstInstants, worstWith } = await load("worst_instant");
 
@@ -15,8 +16,8 @@ function trace(name, verdicts, values = verdicts.map(() => 1), limit = 1) {
   made.append({
     name,
     t: Float64Array.from(verdicts, (_, i) => i),
-    values: Float32Array.from(values),
-    limits: Float32Array.from(verdicts, () => limit),
+    values: Float64Array.from(values),
+    limits: Float64Array.from(verdicts, () => limit),
     verdicts: Uint8Array.from(verdicts),
   });
   return made;
@@ -42,6 +43,13 @@ test("an exceedance is told before anything undecided, and who had it last is na
   assert.deepEqual(found.criteria, ["speed", "separation"]);
   // A verdict holds from its point to the next one.
   assert.deepEqual(found.latest, { name: "separation", end: 3 });
+});
+
+test("a limit out of a trace of the wire is the one that was given, whatever its digits", () => {
+  const bytes = (numbers) => new Uint8Array(Float64Array.from(numbers).buffer);
+  const wire = { name: "gap", t: bytes([0]), values: bytes([0.15]), limits: bytes([0.15]), verdicts: [0] };
+  const { value, limit } = worstInstants(traceFromWire(wire, 10), false, 1)[0];
+  assert.deepEqual(against(value, limit, "m", false), { value: "0.15", limit: "0.15" });
 });
 
 test("how long ago is said in words", () => {

@@ -148,7 +148,7 @@ test("what was worse before is named beside what is now, and a click goes to its
   assert.ok(seen.includes(`Worst of ${named}: `), seen);
   assert.match(seen, /at \d+:\d\d\.\d\d/);
   if (seen.includes("older than")) {
-    await page.getByRole("button", { name: "Close" }).click();
+    await page.getByRole("button", { name: "close" }).click();
   } else {
     const [, minutes, seconds] = seen.match(/at (\d+):(\d\d\.\d\d)/);
     const shown = await page.waitForFunction(

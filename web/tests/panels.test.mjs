@@ -270,7 +270,7 @@ test("posture and separation of the same instant stand in one row", async () => 
   }
 });
 
-test("the pill leads to the worst instant of what it names, and its figures stay", async () => {
+test("the pill leads to the worst instant of what it names, whose figures stay until the cursor moves on", async () => {
   await seek(10);
   await page.waitForSelector(".pill.state-exceeded .now-undecided");
   await page.locator(".pill-elsewhere").click();
@@ -286,6 +286,22 @@ test("the pill leads to the worst instant of what it names, and its figures stay
     least = Math.min(least, one.value - one.limit);
   }
   assert.ok(here.value - here.limit <= least + 1e-6);
+  // Figures of traces are those of results, not nearest numbers of half their digits.
+  const { value, limit } = against(here.value, here.limit, "m", false);
+  assert.ok(
+    seen.replaceAll("\u00a0", " ").includes(`${value} m (≥ ${limit} m)`),
+    `${seen}: ${value}, ${limit}`,
+  );
+  const marked = await page.evaluate(() => {
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    const found = [];
+    while (walker.nextNode())
+      if (walker.currentNode.data.includes("✕")) found.push(walker.currentNode.parentElement);
+    return found.map((element) => Boolean(element.closest("[class*=exceeded]")));
+  });
+  assert.ok(marked.length > 3 && marked.every(Boolean), "✕ stands on something that is not exceeded");
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction(() => !document.querySelector(".visited"));
 });
 
 test("a phone held upright loses nothing to the right", async () => {

@@ -72,6 +72,20 @@ test("arrows step by one snapshot, with shift by a second; Home and End go to th
   await reaches(0);
 });
 
+test("? says what the keys do, and time stands still behind it", async () => {
+  const t = await settled(page);
+  await page.keyboard.press("?");
+  const said = page.getByRole("dialog", { name: "Keys" });
+  await said.getByText("to the worst instant of the selected criterion").waitFor();
+  await page.keyboard.press("ArrowRight");
+  assert.equal(await settled(page), t);
+  await page.keyboard.press("Escape");
+  await said.waitFor({ state: "hidden" });
+  await page.getByRole("button", { name: /^Keys/ }).click();
+  await said.getByRole("button", { name: "close" }).click();
+  await said.waitFor({ state: "hidden" });
+});
+
 test("] goes to where a limit begins to be exceeded, and [ back", async () => {
   const start = await settled(page);
   await page.keyboard.press("]");

@@ -11,8 +11,8 @@ function traceOf(points, capacity, name = "x") {
   trace.append({
     name: "x",
     t: Float64Array.from(column(0)),
-    values: Float32Array.from(column(1)),
-    limits: Float32Array.from(column(2)),
+    values: Float64Array.from(column(1)),
+    limits: Float64Array.from(column(2)),
     verdicts: Uint8Array.from(column(3)),
   });
   return trace;

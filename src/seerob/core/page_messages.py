@@ -29,9 +29,9 @@ class Trace(Struct, frozen=True, kw_only=True):
     t: bytes
     """Little-endian float64 run times [s]."""
     values: bytes
-    """Little-endian float32, NaN where there was no value."""
+    """Little-endian float64, NaN where there was no value."""
     limits: bytes
-    """Little-endian float32, NaN where there was none."""
+    """Little-endian float64, NaN where there was none."""
     verdicts: bytes
     """One byte each: 0 within, 1 exceeded, 2 undecided, 255 none."""
 

@@ -588,7 +588,7 @@ class Series:
         return Trace(
             name=self.name,
             t=self.t[i].astype("<f8").tobytes(),
-            values=self.values[i].astype("<f4").tobytes(),
-            limits=self.limits[i].astype("<f4").tobytes(),
+            values=self.values[i].astype("<f8").tobytes(),
+            limits=self.limits[i].astype("<f8").tobytes(),
             verdicts=self.verdicts[i].tobytes(),
         )

@@ -4,6 +4,7 @@ import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { scene } from "../page_state";
 import { VisitedInstant } from "./ElsewhereNote";
+import { Keys } from "./Keys";
 import { Legend } from "./Legend";
 import { Plots } from "./Plots";
 import { Properties } from "./Properties";
@@ -45,6 +46,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <TransportBar />
         <Timeline />
       </footer>
+      <Keys />
     </div>
   );
 }

@@ -1,6 +1,6 @@
 // Beside the verdict of this instant: what is worse at another one, and the way there.
 
-import { signal } from "@preact/signals";
+import { signal, useSignalEffect } from "@preact/signals";
 import { ago, type Elsewhere } from "../elsewhere";
 import { against, withUnit } from "../figures";
 import { formatTime } from "../format";
@@ -14,12 +14,19 @@ interface Visited {
   unit: string;
   atMost: boolean;
   instant: Instant;
-  /** Whether it could be shown; a live run only keeps the last minutes. */
+  /** Whether it could be shown: a live run only keeps the last minutes, and who only looks on moves no cursor. */
   shown: boolean;
+  /** Where the cursor of a recording is, or goes to [s]; and what of a live run was looked at then. */
+  cursor: number;
+  back: number | null;
+  /** How near the cursor came to it [s]. */
+  nearest: number;
 }
 
 /** What differs by less is the same instant on the page: times are read to a hundredth [s]. */
 const NEAR_S = 0.01;
+
+const TOO_OLD = "older than what a live run keeps to look back at; the recording has it";
 
 const visited = signal<Visited | null>(null);
 
@@ -35,7 +42,18 @@ export function ElsewhereNote({ other }: { other: Elsewhere }) {
     const instant = worstWith(trace, info.at_most, verdict);
     if (!instant) return;
     const shown = time.visit(instant.t);
-    visited.value = { name, unit: info.unit, atMost: info.at_most, instant, shown };
+    const cursor = shown ? instant.t : now.peek();
+    const back = lookingAt.peek();
+    visited.value = {
+      name,
+      unit: info.unit,
+      atMost: info.at_most,
+      instant,
+      shown,
+      cursor,
+      back,
+      nearest: Number.POSITIVE_INFINITY,
+    };
   };
   const more = criteria.length > 1 ? ` +${criteria.length - 1}` : "";
   return (
@@ -54,9 +72,23 @@ export function ElsewhereNote({ other }: { other: Elsewhere }) {
   );
 }
 
-/** What was visited last: its figures stay readable even where the instant itself is no longer kept. */
+// The cursor of a recording is moved by the server, a little later; that of a live run here, at once.
+function movedOn(seen: Visited): boolean {
+  if (isLive.value) return lookingAt.value !== seen.back;
+  const off = Math.abs(now.value - seen.cursor);
+  if (off <= seen.nearest) seen.nearest = off;
+  return off > seen.nearest && seen.nearest <= Math.max(NEAR_S, scene.value?.period ?? 0);
+}
+
+/**
+ * What was visited last, until the cursor moves on. Its figures stay readable even where the instant itself is no
+ * longer kept.
+ */
 export function VisitedInstant() {
   const { time } = useActions();
+  useSignalEffect(() => {
+    if (visited.value && movedOn(visited.value)) visited.value = null;
+  });
   const seen = visited.value;
   if (!seen) return null;
   const { name, unit, atMost, instant, shown } = seen;
@@ -71,29 +103,21 @@ export function VisitedInstant() {
         Worst of <strong>{name}</strong>: <strong>{withUnit(figures.value, unit)}</strong>
         {limit} at {formatTime(instant.t)}
         {elsewhere && <em> – shown is {formatTime(now.value)}, the nearest that is kept</em>}
-        {!shown && <em> – older than what a live run keeps to look back at; the recording has it</em>}
+        {!shown && <em> – {isLive.value ? TOO_OLD : "whoever may control the replay goes there"}</em>}
       </span>
       {isLive.value && lookingAt.value !== null && (
-        <button
-          type="button"
-          class="link"
-          onClick={() => {
-            visited.value = null;
-            time.follow();
-          }}
-        >
+        <button type="button" class="link" onClick={() => time.follow()}>
           back to live
         </button>
       )}
       <button
         type="button"
-        class="visited-close"
-        aria-label="Close"
+        class="link"
         onClick={() => {
           visited.value = null;
         }}
       >
-        ✕
+        close
       </button>
     </div>
   );

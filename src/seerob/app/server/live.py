@@ -95,8 +95,8 @@ class _Past:
         return Trace(
             name=name,
             t=np.array(self.t, "<f8").tobytes(),
-            values=np.array(self.values, "<f4").tobytes(),
-            limits=np.array(self.limits, "<f4").tobytes(),
+            values=np.array(self.values, "<f8").tobytes(),
+            limits=np.array(self.limits, "<f8").tobytes(),
             verdicts=self.verdicts.tobytes(),
         )
 

@@ -16,13 +16,17 @@ import trimesh
 import seerob as sr
 from kept_run import Kept
 from made_cell import FLOATING, TWO_R, heard, made, two_r
+from seerob.app.cli import main
 from seerob.app.console.progress import Announced
-from seerob.core.errors import InputError
+from seerob.app.console.terminal import Exit
+from seerob.core.errors import InputError, SimulationDiverged
 from seerob.core.markers import plain
+from seerob.core.snapshot import Verdict
 from seerob.outputs.sink import Closing
+from seerob.outputs.sinks.dossier import Dossier
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
-from seerob.session.run import Clock, Judge, bind, pump, ticks
+from seerob.session.run import Clock, Judge, bind, engine_of, pump, ticks
 from seerob.session.station import load_recorded
 from seerob.twin.engine import Engine, last_tick
 from seerob.workstation.source import Opened, Source
@@ -388,3 +392,49 @@ def test_what_takes_long_begins_when_no_tick_comes_any_more_and_before_any_write
         station.run(writers=writers, stop=up_to(1), progress=progress)
     begins = [] if fails else [("a", "begin"), ("b", "begin")]
     assert told == [("a", 0), ("b", 0), *begins, "writing b", ("b", "close"), ("a", "close")]
+
+
+def test_a_run_that_breaks_off_is_recorded_whole_and_nothing_of_it_is_within(tmp_path):
+    """Whatever came next, nobody judged it: neither report nor recording may say that all was well."""
+    limit = '[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\nlimit = 9\n'
+    station = made(tmp_path, FLOATING + TWO_R + MOVED + limit, {"arm.urdf": two_r(), "motion.csv": CSV})
+    assert station.run().verdict is Verdict.WITHIN
+
+    def heard_until(t):
+        for samples in pump(station.sources, 0.01):
+            if any(sample.t > t for sample in samples):
+                raise InputError.at("motion.csv", "row 60", "is torn", "send it again")
+            yield samples
+
+    out = tmp_path / "out"
+    out.mkdir()
+    sinks = [Recorder(lossless=True), Dossier(file="said.html")]
+    with pytest.raises(InputError, match="is torn"):
+        station.run(folder=out, sinks=sinks, feed=heard_until(0.6), end=station.duration)
+    recording = Recording.open(out / "run.mcap")
+    found = recording.check()
+    assert recording.complete
+    assert [s.t for s in recording.snapshots()] == pytest.approx(
+        np.arange(len(list(recording.ticks()))) / 100
+    )
+    assert [f.holds for f in found] == [("*",)]
+    assert "broke off" in found[0].text
+    assert "motion.csv: row 60: is torn" in found[0].text
+    assert main(["report", str(out / "run.mcap"), "-o", str(tmp_path / "again")]) == Exit.UNDECIDED
+    page = (out / "said.html").read_text()
+    assert "is torn" in page
+    assert 'class="verdict undecided"' in page
+    assert 'class="verdict within"' not in page
+
+
+def test_a_physics_that_gives_up_ends_the_run_with_a_sentence(tmp_path):
+    station = made(tmp_path, FLOATING + TWO_R + MOVED, {"arm.urdf": two_r(), "motion.csv": CSV})
+    engine = engine_of(station.model)
+    engine.start()
+    for _ in range(5):
+        engine.tick()
+    engine._mj.opt.integrator = 99
+    with pytest.raises(
+        SimulationDiverged, match=r"gave up after 0\.050 s: mj_step: invalid integrator; lower"
+    ):
+        engine.tick()

@@ -17,6 +17,8 @@ from seerob.criteria.contact.clamped_regions import Clamping
 from seerob.criteria.contact.clamping import STILL, RelativeJoints
 from seerob.criteria.contact.joint_gaps import Looks, _Joint, closing, places
 from seerob.session.station import Station, load
+from seerob.twin.spans import Path as Way
+from seerob.twin.spans import Points, Span
 
 HAND, CHEST = "Hands and fingers", "Chest"
 ARM = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
@@ -426,6 +428,80 @@ def test_no_point_of_a_surface_is_farther_from_a_place_than_its_piece_is_large()
         half = np.array([0.0, 0.0, long / 2])
         large = [capsule(-half, half, thick), capsule(np.zeros(3), axis, 0.01)]
         assert places(large).about == pytest.approx((long + 2 * thick) / joint_gaps.MOST_PIECES / 2)
+
+
+@pytest.mark.parametrize(
+    ("limits", "share", "first", "last", "turns"),
+    [
+        ("", None, -math.pi, math.pi, True),
+        ('lower="-6.2" upper="6.2"', None, -6.2, 2 * math.pi - 6.2, True),
+        ('lower="-3.141592653589793" upper="3.141592653589793"', None, -math.pi, math.pi, True),
+        ('lower="-3.1" upper="3.1"', None, -3.1, 3.1, False),
+        ('lower="-0.4" upper="1.5"', None, -0.4, 1.5, False),
+        ('lower="-6.2" upper="6.2"', 0.5, -6.2, 6.2, False),  # what follows by a half is elsewhere a turn on
+        ('lower="-6.2" upper="6.2"', 2, -6.2, 2 * math.pi - 6.2, True),
+    ],
+)
+def test_a_joint_is_looked_at_once_round_or_from_end_to_end(
+    tmp_path: Path, limits: str, share: float | None, first: float, last: float, turns: bool
+) -> None:
+    urdf = two_r(mimic="" if share is None else f'<mimic joint="j1" multiplier="{share}"/>')
+    if limits:
+        urdf = urdf.replace("continuous", "revolute").replace('velocity="10"', f'velocity="10" {limits}')
+    model = made(tmp_path, FLOATING + ARM, {"arm.urdf": urdf}).model
+    joint = _Joint.of(model, RelativeJoints(model), ("arm", 0))
+    assert joint.turns is turns
+    assert [joint.grid[0], joint.grid[-1]] == pytest.approx([first, last])
+
+
+def spanned(station: Station, before: tuple, after: tuple, T: float, noise: float = 0.0) -> Span:
+    """The arm on a cubic from positions and speeds of its joints to others, within a time."""
+    model, points = station.model, Points(station.model)
+    q, v = (np.array(both, float) for both in zip(before, after, strict=True))
+    ids = np.array([body.mj for body in model.bodies])
+    span = points.span(Way(np.array([0.0, T]), q, v), 0.0, T, ids, model.mj)
+    span.derived(np.zeros(len(model.bodies)), np.full(model.mj.nv, noise))
+    return span
+
+
+def test_at_no_instant_of_a_span_a_joint_clamps_faster_than_is_known_at_either_end(tmp_path: Path) -> None:
+    """Elbows that fold, unfold, turn back and fly through within 0.2 s."""
+    chance, T, station = np.random.default_rng(1), 0.2, elbow(tmp_path)
+    robot = station.model.robot("arm")
+    gaps = Clamping(station.model, robot, {}, (HAND, CHEST), None)._joints
+    every, some = np.ones((len(robot.moving), 2), bool), 0
+    for _ in range(30):
+        q0 = np.array([0.0, chance.choice([-1, 1]) * chance.uniform(2.2, 3.0)])
+        v0, v1 = np.array([[0.0, chance.uniform(-3, 3)] for _ in range(2)])
+        ends = (q0, v0), (q0 + T * (v0 + v1) / 2 + [0, chance.uniform(-0.2, 0.2)], v1)
+        span, met = spanned(station, *ends, T), np.zeros(every.shape)
+        for t in np.linspace(0, T, 20).tolist():
+            met = np.maximum(met, gaps.speeds(state_at(station, arm=span.path.at(t)), every))
+        for end in ends:
+            assert (met <= gaps.speeds(state_at(station, arm=end), every, span) + 1e-9).all()
+        some += bool(met.any())
+    assert 5 < some < 30
+
+
+def test_a_joint_that_cannot_get_there_in_a_span_clamps_nothing(tmp_path: Path) -> None:
+    """By its speed it gets 3 mrad on, and by noise of its speed alone it closes as fast as that noise."""
+    station = elbow(tmp_path)
+    robot = station.model.robot("arm")
+    gaps = Clamping(station.model, robot, {}, (HAND,), None)._joints
+    every = np.ones((len(robot.moving), 1), bool)
+
+    def ever(q: float, qd: float, then: float, noise: float = 0.0) -> float:
+        T = 0.01
+        before, after = ((0.0, q), (0.0, qd)), ((0.0, q + T * (qd + then) / 2), (0.0, then))
+        span = spanned(station, before, after, T, noise)
+        return float(gaps.speeds(state_at(station, arm=before), every, span).max())
+
+    assert ever(1.0, 0.3, 0.3) == 0.0
+    assert ever(2.7, -0.3, -0.3) == 0.0  # opens, and goes on opening
+    at_once = float(gaps.speeds(state_at(station, arm=((0.0, 2.7), (0.0, 0.3))), every).max())
+    assert ever(2.7, 0.3, 0.3) == pytest.approx(at_once, rel=0.05)
+    assert ever(2.7, -0.1, 0.3) == pytest.approx(at_once, rel=0.05)  # turns back
+    assert ever(2.7, 0.0, 0.0, noise=0.3) == pytest.approx(at_once, rel=0.05)
 
 
 def test_a_pair_clamps_as_fast_as_its_joint_closes_it_where_it_is_and_no_slower_joint_does() -> None:

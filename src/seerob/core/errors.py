@@ -66,7 +66,7 @@ class NotAsked(SeerobError):
 
 
 class SimulationDiverged(SeerobError):
-    """The physics produced a number that is not finite; the message names body and time."""
+    """The physics gave up, or produced a number that is not finite; the message names body and time."""
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

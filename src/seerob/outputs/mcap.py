@@ -69,6 +69,7 @@ from seerob.core.transforms import Array, cross
 from seerob.outputs.picture.marker_shapes import prism
 from seerob.outputs.picture.stage_bodies import read_glb
 from seerob.recording.format import (
+    BROKEN_OFF,
     DIGEST,
     END_METADATA,
     FILE_PREFIX,
@@ -533,11 +534,17 @@ class McapTape:
         os.fsync(self._file.fileno())
         self.kept = self.ticks
 
-    def finish(self, counts: dict[str, int]) -> None:
-        """Write the end mark and the index, and close."""
+    def finish(self, counts: dict[str, int], broken_off: str = "") -> None:
+        """Write the end mark and the index, and close.
+
+        Args:
+            counts: Of ticks, and of what was left out.
+            broken_off: Why the run ended before it was over; empty when it did not.
+        """
         try:
             self._mcap.flush()
             end = {DIGEST: self._digest.hexdigest(), **{k: str(n) for k, n in counts.items()}}
+            end |= {BROKEN_OFF: broken_off} if broken_off else {}
             self._mcap.add_metadata(END_METADATA, end)
             self._mcap.finish()
             self._file.flush()

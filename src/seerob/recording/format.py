@@ -171,6 +171,8 @@ METADATA = "seerob"
 """Name of the metadata record at the start: layout, versions, wall-clock time."""
 END_METADATA = "seerob.end"
 """Name of the metadata record at the end: how many ticks, how many were left out, and `DIGEST`."""
+BROKEN_OFF = "broken_off"
+"""Of `END_METADATA`: the error that ended the run before it was over; only where one did."""
 DIGEST = "sha256"
 """Of `END_METADATA`: of all messages on `SAMPLES` and `SNAPSHOT`, one after the other. It finds what was cut
 out, put in or changed since; whoever wants to deceive can write another."""

@@ -23,10 +23,11 @@ import msgspec
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError
-from seerob.core.printable import printable_record
+from seerob.core.printable import printable, printable_record
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Aspect, Finding, Marker, Result, Row, Scene, Snapshot
 from seerob.recording.format import (
+    BROKEN_OFF,
     DIGEST,
     END_METADATA,
     FILE_PREFIX,
@@ -438,6 +439,8 @@ class Recording:
         if self._index.beyond:
             short.append(f"{self._index.beyond} bytes lie behind its end: more was joined to the recording")
         end = self._index.metadata.get(END_METADATA, {})
+        if reason := end.get(BROKEN_OFF):
+            short.append(f"the run broke off at t = {self.end:.3f} s: {printable(reason)}")
         for key, text, heard in (
             (
                 "dropped",

@@ -99,6 +99,11 @@ class ResultLog(Mapping[str, Series]):
         self._worse = tuple(worse)
         return self._worse
 
+    def break_off(self, reason: str) -> None:
+        """Note why the run ended before it was over: nothing of it is known to be within."""
+        for series in self._series.values():
+            series.broken_off = reason
+
     def _begin(self, name: str, unit: str, at_most: bool, between: str | None) -> Series:
         tracker = WorstTracker()
         series = Series(

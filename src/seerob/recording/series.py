@@ -315,6 +315,8 @@ class Series:
         self._last_verdict: Verdict | None = None
         self._said: set[int] = set()
         self._has_limit = False
+        self.broken_off = ""
+        """Why the run ended before it was over; empty when it did not."""
         self._unseen = False
         """Whether nobody knows if there was something to judge between instants at which there was not."""
 
@@ -376,6 +378,8 @@ class Series:
 
     def gap(self) -> str:
         """Why what was within whenever it was asked is not known to be within throughout; empty if it is."""
+        if self.broken_off:
+            return self.broken_off
         if self._is_open:
             why = self.open or "it was not asked"
             return f"not known in {self._seconds[_OPEN]:.4g} s of the run: {why}"
@@ -461,7 +465,7 @@ class Series:
 
     def _unknown(self) -> bool:
         """Whether something is not known of it, or of the whole, beside the instants that are there."""
-        known = not (self._is_open or self._is_one_instant or self._passed_over)
+        known = not (self.broken_off or self._is_open or self._is_one_instant or self._passed_over)
         return not known or (self._whole is not None and self._whole._unknown())
 
     def _never_applied(self) -> bool:

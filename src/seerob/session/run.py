@@ -351,18 +351,22 @@ def run(
         judge: Callable[[State], tuple[Result, ...]] = Judge(bound, scene.findings)
         if before is not None:
             judge = no_greener(judge, *before)
-        for out, samples in ticks(engine, judge, feed, end):
-            done, t = done + 1, out.t
-            for writer in writers:
-                writer.write(out, samples)
-            log.add(out)  # after those who look on
-            for name, latest in out.late.items():
-                late[name] = max(latest, late.get(name, latest))
-            progress(t)
-            if stop():
-                break
-            if clock is not None:
-                clock.wait(t + model.workstation.engine.tick)
+        try:
+            for out, samples in ticks(engine, judge, feed, end):
+                done, t = done + 1, out.t
+                for writer in writers:
+                    writer.write(out, samples)
+                log.add(out)  # after those who look on
+                for name, latest in out.late.items():
+                    late[name] = max(latest, late.get(name, latest))
+                progress(t)
+                if stop():
+                    break
+                if clock is not None:
+                    clock.wait(t + model.workstation.engine.tick)
+        except Exception as error:
+            log.break_off(f"the run broke off after {t:.4g} s: {error}")
+            raise
         for writer in writers:
             if isinstance(writer, BeginsAtEnd):
                 writer.begin()

@@ -265,7 +265,7 @@ class Station:
         Raises:
             InputError: A source, a criterion or a sink cannot be used as the file has it, or a live
                 source is asked to run in any other than real time.
-            SimulationDiverged: The physics produced a number that is not finite.
+            SimulationDiverged: The physics gave up, or produced a number that is not finite.
         """
         if sinks and folder is None:
             raise InputError.at("run", "folder", "missing", "sinks need a folder to write to")

@@ -62,6 +62,8 @@ touched it between two ticks is not told. Own choice."""
 BEATS = 0.05
 """Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
 nobody says that it stopped."""
+FAULTS = (mujoco.FatalError, mujoco.UnexpectedError)
+"""How MuJoCo gives up."""
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
 
@@ -492,7 +494,7 @@ class Engine:
         """Advance by one tick and return the twin then.
 
         Raises:
-            SimulationDiverged: A position that is not finite.
+            SimulationDiverged: A position that is not finite, or MuJoCo gave up.
         """
         start, t = self._now, self._next()
         if abs(t - start - self._period) > kernel.SLACK:
@@ -577,7 +579,10 @@ class Engine:
         for step in range(self._steps):
             if not begun or self._landing or self._task_pulls:
                 self._pull(step, start + step * self._dt)
-            mujoco.mj_step(self._mj, self._data)
+            try:
+                mujoco.mj_step(self._mj, self._data)
+            except FAULTS as error:
+                raise self._gave_up(error) from error
             begun = kernel.end(physics, step, self._centred, WILD)
             if not begun and self.controllers:
                 self._put_back(step + 1, start + (step + 1) * self._dt)
@@ -610,7 +615,10 @@ class Engine:
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:
             self._put(mechanism, *self._references[mechanism.name].at(t))
-        mujoco.mj_forward(self._mj, self._data)
+        try:
+            mujoco.mj_forward(self._mj, self._data)
+        except FAULTS as error:
+            raise self._gave_up(error) from error
         self._show(t)
 
     def _put(self, mechanism: Mechanism, q: Array, v: Array, a: Array) -> None:
@@ -690,6 +698,12 @@ class Engine:
             following = self._followings.get(person.name)
             hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
         return hearing.held or hearing.error > limit
+
+    def _gave_up(self, error: Exception) -> SimulationDiverged:
+        return SimulationDiverged(
+            f"the physics gave up after {self._now:.3f} s: {error}; lower engine.timestep, or check masses, "
+            "contacts and samples"
+        )
 
     def _diverged(self) -> SimulationDiverged:
         """Say what of the twin is not finite."""

@@ -7,11 +7,13 @@ import time
 from collections import deque
 from pathlib import Path
 from threading import Condition, Thread
+from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from msgspec import Meta
 
 from seerob.core.errors import InputError, SeerobError
+from seerob.core.printable import printable
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.outputs.sink import Closing, Sink, Visited
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 
 FLUSH_PERIOD = 0.4
 """Longest time that a tick waits before it is on disk [s]."""
+
+MAX_REASON = 2000
+"""Longest reason that is recorded of a run that broke off [characters]."""
 
 _BACKLOG = 20
 """How many times `Recorder.queue` ticks may wait with their samples only."""
@@ -95,6 +100,7 @@ class RecorderWriter(Closing):
         self._condition = Condition()
         self._closing = False
         self._error: Exception | None = None
+        self._broken_off = ""
         self._last = (-1, -math.inf)
         self._taken = 0
         self._visited: Visited | None = None
@@ -139,6 +145,13 @@ class RecorderWriter(Closing):
             visitors = () if self._visited is None else self._visited.take()
             self._waiting.append(_Waiting(seq, t, samples, kept, visitors))
             self._condition.notify_all()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if isinstance(error, Exception):
+            self._broken_off = printable(str(error) or type(error).__name__)[:MAX_REASON]
+        super().__exit__(kind, error, trace)
 
     def close(self) -> None:
         """Write what waits and finish the file.
@@ -200,7 +213,7 @@ class RecorderWriter(Closing):
             if done:
                 if self._visited is not None:
                     self._tape.visitors(max(self._last[1], 0.0), self._visited.take(end=True))
-                self._tape.finish(self._counts())
+                self._tape.finish(self._counts(), self._broken_off)
                 return
             if taken and oldest is None:
                 oldest = time.monotonic()

@@ -6,7 +6,17 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decima
 import numpy as np
 import pytest
 
-from seerob.core.figures import DECIMALS, against, between, figure, margin, with_unit, worded
+from seerob.core.figures import (
+    DECIMALS,
+    against,
+    between,
+    figure,
+    margin,
+    rounded_down,
+    rounded_up,
+    with_unit,
+    worded,
+)
 
 
 def back(text):
@@ -131,3 +141,15 @@ def test_where_a_value_lies_is_rounded_outward(unit):
         assert shown_low <= low + noise
         assert shown_high >= high - noise
     assert between(-math.inf, 0.29, "m") == "−∞ m and 0.29 m"
+
+
+@pytest.mark.parametrize("unit", [*DECIMALS, "", "mm", "%"])
+def test_a_bound_is_rounded_away_from_what_it_keeps(unit):
+    rng = np.random.default_rng(7)
+    for value in rng.normal(0, 10.0 ** rng.integers(-3, 3, (200, 1)), (200, 3)).ravel().tolist():
+        low, high = back(rounded_down(value, unit)), back(rounded_up(value, unit))
+        last = 10.0 ** -DECIMALS.get(unit, min(max(3 - math.floor(math.log10(abs(value))), 0), 9))
+        noise = 1e-11 * abs(value) + 1e-3 * last
+        assert value - 1.01 * last <= low <= value + noise
+        assert value - noise <= high <= value + 1.01 * last
+    assert (rounded_down(0.29996, "m"), rounded_up(0.29992, "m")) == ("0.2999 m", "0.3 m")

@@ -152,7 +152,7 @@ def test_what_is_not_the_real_surface_is_unknown() -> None:
     ball = mesh(trimesh.creation.icosphere(subdivisions=3, radius=0.05))
     assert solid_shape(Solid(mesh=ball)).unknown == ""
     assert "envelope" in solid_shape(Solid(mesh=ball, note="envelope")).unknown
-    assert "2.0 mm" in solid_shape(Solid(mesh=ball, deviation=0.002)).unknown
+    assert "lie 2 mm" in solid_shape(Solid(mesh=ball, deviation=0.002)).unknown
     assert body_shape((Solid(mesh=ball), Solid(mesh=ball, note="envelope"))).unknown
     assert body_shape(()).unknown
 

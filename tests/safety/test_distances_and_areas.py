@@ -115,6 +115,15 @@ def test_a_body_wholly_inside_is_inside(tmp_path):
     assert a.value < 0
 
 
+@pytest.mark.parametrize("depth", [4e-5, 1.2341e-3, 0.0999])
+def test_how_deep_somebody_is_inside_is_never_said_to_be_less(tmp_path, depth):
+    a = judged(tmp_path, AREA.format(x=2.5 - depth, on="") + WATCH.format(of="arm"))["a"]
+    (said,) = (m.label for m in a.markers if getattr(m, "label", None))
+    low, high = said.removeprefix("between ").removesuffix(" m deep").split(" m and ")
+    assert float(low) <= depth <= float(high)
+    assert float(high) <= -a.interval[0] + 1e-4
+
+
 def test_area_on_a_link_moves_with_it_and_is_not_part_of_the_robot(tmp_path):
     tables = (
         AREA.format(x=1.5, on='on = "arm/l2"\n')

@@ -9,6 +9,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, results_at, state_at, two_r
 from seerob.core.errors import InputError, UnknownName
+from seerob.core.figures import against
 from seerob.criteria.judging import Judge
 from seerob.distance.voxels import offset_shell
 from seerob.twin.engine import Engine
@@ -140,7 +141,8 @@ def test_who_is_inside_is_told_with_the_distance_by_which(tmp_path):
     assert (found.verdict, found.reason, found.limit, found.at_most) == ("exceeded", "post", 0.0, False)
     assert (post.name, post.verdict, post.limit, post.at_most) == ("post", "exceeded", 0.0, False)
     assert found.value == post.value == pytest.approx(room, abs=1e-9)
-    assert post.reason == f"{np.hypot(0.95, 1.1):.3f} m from arm/l2, S_p {S_p2:.3f} m"
+    shown = against(np.hypot(0.95, 1.1), S_p2, "m", at_most=False)
+    assert post.reason == f"{shown.value} m from arm/l2, S_p {shown.limit} m"
     assert (largest.name, largest.value) == ("largest S_p", pytest.approx(S_p2, abs=1e-9))
     assert {found.unit, post.unit, largest.unit} == {"m"}
     lit = [m for m in found.markers if type(m).__name__ == "Segment"]

@@ -97,6 +97,16 @@ def worded(value: float, limit: float | None, unit: str = "", *, at_most: bool) 
     return f"{against(value, limit, unit, at_most=at_most).value} {unit}"
 
 
+def rounded_down(value: float, unit: str = "") -> str:
+    """A bound from below, rounded down, with its unit."""
+    return with_unit(_text(value, _places(unit, value), ROUND_FLOOR), unit)
+
+
+def rounded_up(value: float, unit: str = "") -> str:
+    """A bound from above, rounded up, with its unit."""
+    return with_unit(_text(value, _places(unit, value), ROUND_CEILING), unit)
+
+
 def margin(value: float, limit: float, unit: str = "", *, at_most: bool) -> str:
     """How far a value is inside (rounded down) or beyond (rounded up) its limit, with the unit."""
     gap = limit - value if at_most else value - limit

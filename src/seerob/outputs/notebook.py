@@ -11,7 +11,7 @@ from seerob.core.snapshot import CriterionInfo, Verdict
 from seerob.core.transforms import Array
 from seerob.outputs.html import Html, table, tag
 from seerob.outputs.palette import DARK_HEX, MARK, WORD
-from seerob.outputs.sentences import bound, covered, extremum
+from seerob.outputs.sentences import bound, covered, extremum, percent
 from seerob.recording.answers import EXCEEDED, UNDECIDED, Codes
 from seerob.recording.result_log import ResultLog, Series
 
@@ -21,7 +21,7 @@ _HEAD = ("criterion", "verdict", "worst", "limit", "at", "what is known")
 def results_html(results: ResultLog) -> Html:
     """The criteria of a run, one row each, below the verdict of the whole."""
     decided = results.decided
-    share = "" if decided is None or decided >= 1 else f", decided {100 * decided:.0f} % of the time or more"
+    share = "" if decided is None or decided >= 1 else f", decided {percent(decided)} of the time or more"
     headline = tag("p", _mark(results.verdict), f"the run is {WORD[results.verdict]}{share}")
     return tag("div", headline, table(_HEAD, [_row(series) for series in results.values()]))
 

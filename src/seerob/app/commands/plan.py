@@ -17,6 +17,7 @@ from seerob.app.console.loading import compiled
 from seerob.app.console.progress import spinner
 from seerob.app.console.terminal import Exit, add_workstation, allowed, cache_folder, describe, line, seconds
 from seerob.core.errors import InputError
+from seerob.core.figures import rounded_down
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -239,7 +240,8 @@ def run(options: argparse.Namespace) -> int:
     write_whole(options.output, found.toml().encode())
     text = (
         f"{len(found.q)} postures; between them nothing comes nearer than "
-        f"{found.least:.3f} m to {found.robot} (margin {found.margin:g} m, {found.asked} postures looked at)"
+        f"{rounded_down(found.least, 'm')} to {found.robot} "
+        f"(margin {found.margin:g} m, {found.asked} postures looked at)"
     )
     line("planned", text)
     if given is not None:

@@ -22,6 +22,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.core import figures
 from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.shapes import Mesh, Solid
@@ -195,7 +196,8 @@ def solid_shape(solid: Solid) -> ContactShape:
     if solid.note:
         unknown = f"its surface is not the real one ({solid.note})"
     elif solid.deviation > HIDDEN:
-        unknown = f"the real surface may lie {solid.deviation * 1e3:.1f} mm outside the shape that is known"
+        off = figures.rounded_up(solid.deviation * 1e3, "mm")
+        unknown = f"the real surface may lie {off} outside the shape that is known"
     return ContactShape(shape.points, shape.radii, unknown, shape.resolution, shape.unknown_at)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
 
+from seerob.core import figures
 from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
@@ -539,7 +540,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         if found.silent > 0:
             reasons.append(f"coverage {100 * found.coverage:.1f} %: {found.silent:.1f} s not heard")
         if not known:
-            reasons.append(f"the points lie between {ends[0]:.1f} and {ends[1]:.1f}")
+            reasons.append(f"the points lie between {figures.between(*ends)}")
         if found.counting:
             reasons.append(f"counting: {found.heard:.1f} of {self.cycle:g} s, judged after a whole cycle")
         if known and not missing and not found.counting and found.silent == 0:
@@ -653,4 +654,4 @@ def _pairs(low: Points, high: Points) -> list[tuple[str, float, float]]:
 
 def _rating(points: float) -> str:
     band = "0 to 25" if points <= 25 else "above 25, up to 50" if points <= 50 else "above 50"
-    return f"{points:.1f} points: {band}"
+    return f"{figures.rounded_up(points)} points: {band}"

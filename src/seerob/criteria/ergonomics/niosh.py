@@ -17,6 +17,7 @@ import numpy as np
 from msgspec import Meta, Struct, structs
 from numpy.typing import ArrayLike
 
+from seerob.core import figures
 from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.snapshot import Basis, Input, Origin, Result
@@ -412,7 +413,7 @@ class Niosh(Criterion, frozen=True, kw_only=True):
                     value=own if math.isfinite(own) else None,
                     limit=self.limit,
                     verdict=verdict_of(Figure(own, self.limit), at_most=True),
-                    reason=f"recommended weight {weight:.1f} kg, governed by the {end}",
+                    reason=f"recommended weight {figures.rounded_down(weight, 'kg')}, governed by the {end}",
                 )
             )
         if math.isinf(index):

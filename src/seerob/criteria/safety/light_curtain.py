@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.core import figures
 from seerob.core.snapshot import Basis, Marker, Segment, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.figure import Figure, Shown, Twin
@@ -141,7 +142,8 @@ class _Curtain:
             return Sight(Seen.MAYBE, f"{where}, detection capability not given")
         # Known to the finer beams: the true height is up to two of their steps more.
         if height < capability - 2 * self.pitch / FINER:
-            text = f"{where}, {height * 1e3:.0f} mm high, detection capability {capability * 1e3:.0f} mm"
+            shown = figures.against(height * 1e3, capability * 1e3, "mm", at_most=False)
+            text = f"{where}, {shown.value} mm high, detection capability {shown.limit} mm"
             return Sight(Seen.MAYBE, text)
         return Sight(Seen.DETECTED, where)
 

@@ -11,6 +11,7 @@ from typing import Annotated, ClassVar, cast
 import numpy as np
 from msgspec import Meta, Struct
 
+from seerob.core import figures
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Highlight, Marker, Segment
 from seerob.core.transforms import Array
@@ -144,7 +145,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
             if figure.parts is not None:
                 reason = ", ".join(figure.parts.names)
             elif verdict is Verdict.UNDECIDED:
-                mm = f"{near.off * 1e3:.1f} mm"
+                mm = figures.rounded_up(near.off * 1e3, "mm")
                 reason = f"{near.perhaps} is within {mm}, what its shape and its place may be off by"
 
             def draw() -> tuple[Marker, ...]:
@@ -229,4 +230,6 @@ def _line(deep: Depth, border: Array) -> tuple[Segment, ...]:
     if not all(map(math.isfinite, end)):
         return ()
     start = tuple(border.tolist())
-    return (Segment(start=start, end=end, label=f"{deep.at_least:.3f} m deep", verdict=Verdict.EXCEEDED),)
+    low, high = figures.rounded_down(deep.at_least, "m"), figures.rounded_up(deep.at_most, "m")
+    label = f"{high if deep.at_most == deep.at_least else f'between {low} and {high}'} deep"
+    return (Segment(start=start, end=end, label=label, verdict=Verdict.EXCEEDED),)

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
-from seerob.core import markers
+from seerob.core import figures, markers
 from seerob.core.errors import InputError, Undecided
 from seerob.core.shapes import contains
 from seerob.core.snapshot import Basis, Result
@@ -212,11 +212,13 @@ class _Scan:
             return Sight(Seen.MISSED, self._hidden(placed, body, nearest))
         capability = self.sensor.capability
         width = self._width(placed, body, beams)
-        where = f"{width * 1e3:.0f} mm wide at {distance[beams].min():.2f} m"
+        limit = None if capability is None else capability * 1e3
+        shown = figures.against(width * 1e3, limit, "mm", at_most=False)
+        where = f"{shown.value} mm wide at {distance[beams].min():.2f} m"
         if capability is None:
             return Sight(Seen.MAYBE, f"{where}, detection capability not given")
         if width < capability:
-            return Sight(Seen.MAYBE, f"{where}, detection capability {capability * 1e3:.0f} mm")
+            return Sight(Seen.MAYBE, f"{where}, detection capability {shown.limit} mm")
         return Sight(Seen.DETECTED, where)
 
     def _width(self, placed: _Placed, body: int, beams: NDArray[np.int64]) -> float:

@@ -465,8 +465,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
             k, S_p = parts.governs, at.S_p
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts.names[k]} ↔ {nearest}"
-            if at.seen[0] > (self.human_speed or WALKING):
-                where += f", and {human} is seen at {at.seen[0]:.2f} m/s, faster than v_h"
+            if at.seen[0] > (v_h := self.human_speed or WALKING):
+                seen = figures.worded(at.seen[0], v_h, "m/s", at_most=True)
+                where += f", and {human} is seen at {seen}, faster than v_h"
             if verdict is _UNDECIDED:
                 where = f"{where}: {self._undecided_reason(model, state, at, k, shared)}"
             value, limit = float(found.distance[k]), float(S_p[k])
@@ -504,7 +505,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
             noisy = human in state.speed_errors and NOISY not in at.now.more
             why = "; ".join(filter(None, (at.now.more, NOISY * noisy)))
-            return f"S_p is up to {most[k]:.3f} m {why}"
+            return f"S_p is up to {figures.rounded_up(float(most[k]), 'm')} {why}"
         return deciding((*shared.ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
 
     @staticmethod

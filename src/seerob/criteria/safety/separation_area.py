@@ -17,6 +17,7 @@ import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from seerob.core import figures
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.core.transforms import Array
@@ -153,7 +154,8 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             for e in near.inside:
                 i, _ = divmod(e, len(gap.b))
                 robot = model.bodies[gap.a[i]].name
-                where.append(f"{found.distance[e]:.3f} m from {robot}, S_p {near.S_p[i]:.3f} m")
+                shown = figures.against(float(found.distance[e]), float(near.S_p[i]), "m", at_most=False)
+                where.append(f"{shown.value} m from {robot}, S_p {shown.limit} m")
 
             def draw() -> tuple[Marker, ...]:
                 lit: list[Marker] = []
@@ -173,7 +175,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """Why somebody who is outside may be inside all the same."""
         if near.unknown:
             return f"{near.unknown}; the area is at least what is drawn"
-        who, off = model.bodies[near.perhaps].name, f"{near.off * 1e3:.1f} mm"
+        who, off = model.bodies[near.perhaps].name, figures.rounded_up(near.off * 1e3, "mm")
         return f"{who} is within {off}, what shapes, places and S_p may be off by"
 
     def remembers(self, model: Model) -> bool:

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, cast
 
 from msgspec import Meta
 
+from seerob.core import figures
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Hull, Input, Origin, Result
 from seerob.core.verdict import Verdict
@@ -149,7 +150,7 @@ class _Way:
             hull = Hull(
                 vertices=tuple((x, y, z) for x, y, z in mesh.vertices.round(4).tolist()),
                 faces=tuple((a, b, c) for a, b, c in mesh.faces.tolist()),
-                label=f"{self.sweep.grid.volume * 1e3:.0f} L",
+                label=figures.rounded_up(self.sweep.grid.volume * 1e3, "L"),
                 verdict=verdict,
             )
             self._drawn = t, hull

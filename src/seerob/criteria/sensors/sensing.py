@@ -11,6 +11,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from seerob.core import figures
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Highlight, Input, Label, Marker, Origin, Result, Verdict
 from seerob.core.transforms import Array
@@ -214,7 +215,7 @@ class Presence:
         if near.entered:
             reason = self._worst_sight(near.entered)
         elif not keeps(least, 0.0, at_most=False):
-            off = f"{near.off * 1e3:.1f} mm"
+            off = figures.rounded_up(near.off * 1e3, "mm")
             reason = f"{names[near.perhaps].name} is within {off}, what its shape and its place may be off by"
         else:
             reason = "; ".join(near.undecided_reasons) or names[near.who].name

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seerob.core.figures import figure
+from seerob.core.figures import figure, rounded_up
 from seerob.core.snapshot import CriterionInfo, Scene
 from seerob.core.transforms import Array
 from seerob.description.humans.body_areas import area_in
@@ -176,4 +176,4 @@ def _figure(value: Cell, unit: str) -> str:
 
 
 def _percent(used: float) -> str:
-    return "no distance left" if math.isinf(used) else f"{100 * used:.0f} %"
+    return "no distance left" if math.isinf(used) else rounded_up(100 * used, "%")

@@ -25,6 +25,7 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
+from seerob.core import figures
 from seerob.core.errors import InputError, Undecided
 from seerob.core.samples import JointSample
 from seerob.core.transforms import Array
@@ -83,14 +84,19 @@ class Bound:
             "to": self.end,
         }
 
+    def worded(self) -> str:
+        """The bound with its sign, rounded to the worse side."""
+        if self.at_most:
+            return f"≤ {figures.rounded_up(self.value, self.unit)}"
+        return f"≥ {figures.rounded_down(self.value, self.unit)}"
+
     def sentence(self) -> str:
         """Sentence of the report."""
         if not math.isfinite(self.value):
             return f"{self.what}: no bound, {self.note} (met at {self.at:.3f} s)"
-        sign = "≤" if self.at_most else "≥"
         text = (
-            f"{self.what} {sign} {self.value:.4f} {self.unit} at every instant from {self.start:.3f} s to "
-            f"{self.end:.3f} s (worst met {self.found:.4f} {self.unit} at {self.at:.3f} s)"
+            f"{self.what} {self.worded()} at every instant from {self.start:.3f} s to {self.end:.3f} s "
+            f"(worst met {figures.figure(self.found, self.unit)} at {self.at:.3f} s)"
         )
         return f"{text}; {self.note}" if self.note else text
 

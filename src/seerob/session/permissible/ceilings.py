@@ -28,6 +28,7 @@ import numpy as np
 from msgspec.structs import replace as changed
 
 from seerob.core.errors import InputError, Problem, Undecided
+from seerob.core.figures import rounded_down
 from seerob.core.snapshot import Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import admitted
@@ -247,7 +248,7 @@ def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer,
             distance = np.minimum(distance, least)
         S_p, (speed, share) = inverse(state, distance)
         k = int((distance - S_p).argmin())
-        part = f"{names[k]}: {distance[k]:.3f} m from {human}"
+        part = f"{names[k]}: {rounded_down(float(distance[k]), 'm')} from {human}"
         part += " at the nearest place of the way" if fixed else ""
         if share.value is not None:
             at = math.nan if speed.value is None else speed.value

@@ -10,6 +10,7 @@ import numpy as np
 from msgspec.structs import replace as changed
 
 from seerob.core.errors import InputError
+from seerob.core.figures import rounded_up
 from seerob.core.samples import JointSample, PoseSample, Sample
 from seerob.core.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.files.trajectories.trajectory import TrajectorySamples
@@ -335,7 +336,9 @@ class _Held:
 
 def _between_stations(verified: Verified, robot: str) -> Iterator[Finding]:
     if not verified.kept:
-        what = f"uses {verified.use:.4f} of what is permitted at {verified.at:.3f} s ({verified.what})"
+        what = (
+            f"uses {rounded_up(verified.use)} of what is permitted at {verified.at:.3f} s ({verified.what})"
+        )
         if verified.undecided:
             what = f"cannot be judged at {verified.undecided} of {verified.asked} instants"
         text = f"between the stations of the map the plan {what}: give a smaller spacing or a larger margin"
@@ -345,9 +348,8 @@ def _between_stations(verified: Verified, robot: str) -> Iterator[Finding]:
 def _about(found: SpeedMap, motion: GivenMotion, wish: Wish) -> Iterator[Finding]:
     path, name = found.path, found.robot
     off = float(path.deviation.max())
-    text = (
-        f"the path is off the given motion by at most {off:.2g} rad or m in any joint (by bound, not sampled)"
-    )
+    most = rounded_up(off, "rad or m")
+    text = f"the path is off the given motion by at most {most} in any joint (by bound, not sampled)"
     yield Finding(level="note", subject=name, text=text)
     if off > wish.tolerance * (1 + 1e-9):
         text = f"the path is off by more than the tolerance of {wish.tolerance:g}: the motion is too rough"

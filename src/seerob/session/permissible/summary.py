@@ -13,6 +13,7 @@ from itertools import starmap
 import numpy as np
 
 from seerob.core.extras import need
+from seerob.core.figures import figure, rounded_down, rounded_up
 from seerob.core.snapshot import Result, Scene
 from seerob.core.transforms import Array
 from seerob.files.trajectories.path_map import Place, path_markers
@@ -85,14 +86,19 @@ def sentences(found: PermissibleSpeed) -> tuple[str, ...]:
         *head,
         f"Cycle time {motion.before:.3f} s as given, {motion.duration:.3f} s rescaled ({change:+.3f} s); "
         f"the map is kept with a margin of {motion.margin:.1%}.",
-        f"At 1 kHz and wherever the jerk jumps, the rescaled motion uses at most {used.map:.1%} of the map, "
-        f"{used.velocity:.1%} of a joint's speed, {used.acceleration:.1%} of its acceleration and "
-        f"{used.jerk:.1%} of its jerk. Its path is off the given one by at most "
-        f"{float(found.path.deviation.max()):.2g} rad or m in any joint.",
+        f"At 1 kHz and wherever the jerk jumps, the rescaled motion uses at most {_used(used.map)} of the "
+        f"map, {_used(used.velocity)} of a joint's speed, {_used(used.acceleration)} of its acceleration and "
+        f"{_used(used.jerk)} of its jerk. Its path is off the given one by at most "
+        f"{rounded_up(float(found.path.deviation.max()), 'rad or m')} in any joint.",
         _between(verified),
         "The rescaled motion is a plan: no controller has executed it. The criteria were asked again of a "
         "run of it, and their verdicts are those of the whole run.",
     )
+
+
+def _used(share: float) -> str:
+    """A share of a limit, rounded up."""
+    return rounded_up(100 * share, "%")
 
 
 def _between(verified: Verified) -> str:
@@ -102,7 +108,7 @@ def _between(verified: Verified) -> str:
         return f"{head}; at {verified.undecided} of {verified.asked} instants it cannot be told."
     worst = f", at {verified.at:.3f} s ({verified.what})" if verified.use > 0 else ""
     return (
-        f"{head} while it moves, {verified.asked} times; it uses at most {verified.use:.1%} of what they "
+        f"{head} while it moves, {verified.asked} times; it uses at most {_used(verified.use)} of what they "
         f"permit there{worst}. That is a sampling, not a bound."
     )
 
@@ -172,7 +178,11 @@ def _segment(one: PathSegment) -> tuple[str, ...]:
     c = one.governing
     blocked = c is not None and c.share == 0
     permitted = (
-        "undecided" if np.isnan(one.permissible) else "none" if blocked else f"{one.tool_speed:.3f} m/s"
+        "undecided"
+        if np.isnan(one.permissible)
+        else "none"
+        if blocked
+        else rounded_down(one.tool_speed, "m/s")
     )
     name = "speed of a joint" if c is None else f"{c.criterion}: {c.region}" if c.region else c.criterion
     governs = one.joint if c is None else c.reason if c.undecided or blocked else c.governs
@@ -182,7 +192,7 @@ def _segment(one: PathSegment) -> tuple[str, ...]:
         f"{one.start:.2f} s to {one.end:.2f} s",
         f"{one.way:.3f} m",
         permitted,
-        f"{one.given:.3f} m/s",
+        rounded_up(one.given, "m/s"),
         name,
         (c.contact if c is not None else "") or "–",
         governs,
@@ -198,7 +208,9 @@ def _float(cell: Cell) -> float:
 def _least(found: PermissibleSpeed) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for c, t, invalid_reason in least_by_region(found.map):
-        speed = "undecided" if c.undecided else "–" if not np.isfinite(c.speed) else f"{c.speed:.3f} m/s"
+        speed = (
+            "undecided" if c.undecided else "–" if not np.isfinite(c.speed) else rounded_down(c.speed, "m/s")
+        )
         if not c.undecided and c.share == 0:
             speed = "none"
         if invalid_reason and not c.undecided:
@@ -214,8 +226,8 @@ def bounds_section(bounds: Sequence[Bound]) -> ReportSection:
     rows = tuple(
         (
             b.what,
-            f"{'≤' if b.at_most else '≥'} {b.value:.4f} {b.unit}" if np.isfinite(b.value) else "no bound",
-            f"{b.found:.4f} {b.unit} at {b.at:.3f} s",
+            b.worded() if np.isfinite(b.value) else "no bound",
+            f"{figure(b.found, b.unit)} at {b.at:.3f} s",
             f"{b.start:.3f} s to {b.end:.3f} s",
             b.note or "–",
         )

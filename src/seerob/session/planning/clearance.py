@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.figures import against
 from seerob.core.transforms import Array
 from seerob.distance.least import Per, Query, Survey
 from seerob.model.model import Mechanism, Model
@@ -143,7 +144,8 @@ class Clearance:
         for own, least in ((False, margin), (True, OWN_MARGIN)):
             near = self.nearest(q, own=own)
             if near is not None and near.distance < least:
-                return f"{near.distance:.4f} m at {near.what}, less than {least:g} m"
+                shown = against(near.distance, least, "m", at_most=False)
+                return f"{shown.value} m at {near.what}, less than {shown.limit} m"
         return ""
 
     def clear(self, a: Array, b: Array, margin: float) -> bool:

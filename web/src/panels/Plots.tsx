@@ -19,11 +19,9 @@ import {
 } from "../page_state";
 import { Chart, type ChartView } from "../plots/chart";
 import { ranked } from "../plots/ranking";
+import { redrawEveryMs } from "../scene/effort";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
-
-/** Plots are drawn anew at most this often. */
-const REDRAW_MS = 60;
 
 /** Widths of the time window [s]; null for the whole recording. */
 const WINDOWS: readonly [number | null, string][] = [
@@ -92,7 +90,7 @@ function Plot({ name }: { name: string }) {
     };
     const stop = effect(() => {
       void [tracesRevision.value, now.value, chosenWindow.value, reach.value];
-      timer ??= setTimeout(draw, REDRAW_MS);
+      timer ??= setTimeout(draw, redrawEveryMs());
     });
     return () => {
       stop();

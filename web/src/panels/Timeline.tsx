@@ -6,6 +6,7 @@ import { formatTime } from "../format";
 import { isLive, now, reach, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { drawLanes, LANE_PX, type TimeRange, timeAt } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
+import { redrawEveryMs } from "../scene/effort";
 import { useActions } from "./app_context";
 
 /** A live run's strip shows at least so much [s], so that it does not race at the start. */
@@ -28,18 +29,18 @@ export function Timeline() {
     draw();
     const resized = new ResizeObserver(draw);
     resized.observe(target);
-    let waiting = 0;
+    let waiting: ReturnType<typeof setTimeout> | null = null;
     const stop = effect(() => {
       void [tracesRevision.value, now.value, reach.value, stale.value];
-      waiting ||= requestAnimationFrame(() => {
-        waiting = 0;
+      waiting ??= setTimeout(() => {
+        waiting = null;
         draw();
-      });
+      }, redrawEveryMs());
     });
     return () => {
       stop();
       resized.disconnect();
-      cancelAnimationFrame(waiting);
+      if (waiting !== null) clearTimeout(waiting);
     };
   }, [key]);
 

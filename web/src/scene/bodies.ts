@@ -1,22 +1,21 @@
 // The bodies of the twin: one group per node, posed by the newest block, dressed by its mesh.
 
-import {
-  Box3,
-  Group,
-  LineSegments,
-  type Material,
-  Mesh,
-  MeshStandardMaterial,
-  type Object3D,
-  Quaternion,
-  Vector3,
-} from "three";
+import { Box3, Group, LineSegments, type Material, Mesh, type Object3D, Quaternion, Vector3 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Doubts, doubtOf } from "../doubts";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
+import { drawnBySoftware } from "./effort";
 import { featureEdges } from "./feature_edges";
-import { bodyMaterial, doubtMaterial, lineMaterial, markerMaterial, scoreMaterial } from "./materials";
+import {
+  bodyMaterial,
+  doubtMaterial,
+  glow,
+  lineMaterial,
+  markerMaterial,
+  ownMaterial,
+  scoreMaterial,
+} from "./materials";
 import { veilMaterial } from "./veil";
 
 /** Role of what is only room: a safety area. */
@@ -65,8 +64,12 @@ export class Body {
       part.receiveShadow = true;
       // Its own copy: bodies that share a mesh are selected one by one.
       part.material = Array.isArray(part.material)
-        ? part.material.map((m) => m.clone())
-        : part.material.clone();
+        ? part.material.map(ownMaterial)
+        : ownMaterial(part.material);
+      if (drawnBySoftware() && !part.geometry.hasAttribute("normal")) {
+        part.geometry = part.geometry.toNonIndexed();
+        part.geometry.computeVertexNormals();
+      }
       this.dressed.push({ mesh: part, own: part.material });
     }
     this.extent.setFromObject(model);
@@ -131,9 +134,7 @@ export class Body {
       else if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
       else if (this.painted !== undefined) mesh.material = bodyMaterial(this.painted);
       else mesh.material = this.worn === undefined ? own : scoreMaterial(this.worn);
-      for (const material of [own].flat()) {
-        if (material instanceof MeshStandardMaterial) material.emissive.setHex(this.lit ? SELECTED_GLOW : 0);
-      }
+      for (const material of [own].flat()) glow(material, this.lit ? SELECTED_GLOW : 0);
     }
   }
 }

@@ -7,10 +7,13 @@ import {
   type Material,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  type MeshStandardMaterialParameters,
   PointsMaterial,
+  type WebGLProgramParametersWithUniforms,
 } from "three";
 import { DOUBT_COLOR, NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
+import { drawnBySoftware } from "./effort";
 
 export type Tone = Verdict | "none";
 
@@ -21,14 +24,74 @@ export function colorOf(tone: Tone): number {
 
 // UNDECIDED is hatched on the screen, so that it differs in more than colour.
 function hatch(material: Material): void {
-  material.onBeforeCompile = (shader) => {
+  const before = material.onBeforeCompile.bind(material);
+  const key = material.customProgramCacheKey();
+  material.onBeforeCompile = (shader, renderer) => {
+    before(shader, renderer);
     shader.fragmentShader = shader.fragmentShader.replace(
       "#include <opaque_fragment>",
       `#include <opaque_fragment>
        if (mod(gl_FragCoord.x - gl_FragCoord.y, 12.0) < 5.0) gl_FragColor.a *= 0.25;`,
     );
   };
-  material.customProgramCacheKey = () => "hatched";
+  material.customProgramCacheKey = () => `${key} hatched`;
+}
+
+// One light from above the right shoulder, less from the sky than from the floor, and some from the eye, so that
+// no side is dark; worked out where corners are, not pixels: a twentieth of the work.
+const CORNER_LIGHT = `
+  vec3 across = normalize(normalMatrix * normal);
+  float above = dot(across, viewMatrix[1].xyz);
+  float key = max(dot(across, (viewMatrix * vec4(0.40, 0.77, 0.49, 0.0)).xyz), 0.0);
+  float toEye = abs(dot(across, normalize(mvPosition.xyz)));
+  vLight = own + 0.26 + 0.12 * above + 0.55 * key + 0.16 * toEye;`;
+
+function lightCorners(shader: WebGLProgramParametersWithUniforms, own: number, glow: Color): void {
+  Object.assign(shader.uniforms, { own: { value: own }, glow: { value: glow } });
+  shader.vertexShader = `uniform float own;\nvarying float vLight;\n${shader.vertexShader}`.replace(
+    "#include <project_vertex>",
+    `#include <project_vertex>\n${CORNER_LIGHT}`,
+  );
+  shader.fragmentShader = `uniform vec3 glow;\nvarying float vLight;\n${shader.fragmentShader}`.replace(
+    "#include <opaque_fragment>",
+    "outgoingLight = outgoingLight * vLight + glow;\n#include <opaque_fragment>",
+  );
+}
+
+/** A surface that light falls on. */
+interface Solid extends MeshStandardMaterialParameters {
+  /** How much of its colour it gives off itself. */
+  own?: number;
+}
+
+function solid({ own = 0, roughness = 0.7, ...look }: Solid): Material {
+  const { color } = look;
+  if (!drawnBySoftware())
+    return new MeshStandardMaterial({
+      ...look,
+      roughness,
+      metalness: 0,
+      ...(own > 0 && color !== undefined && { emissive: color, emissiveIntensity: own }),
+    });
+  const glow = new Color(0);
+  const material = new MeshBasicMaterial({ ...look, fog: false });
+  material.userData.glow = glow;
+  material.onBeforeCompile = (shader) => lightCorners(shader, own, glow);
+  material.customProgramCacheKey = () => "corners";
+  return material;
+}
+
+/** A body's own copy of the material that it came with. */
+export function ownMaterial(given: Material): Material {
+  if (!drawnBySoftware() || !(given instanceof MeshStandardMaterial)) return given.clone();
+  const { color, map, side, transparent, opacity, alphaTest, vertexColors } = given;
+  return solid({ color, map, side, transparent, opacity, alphaTest, vertexColors });
+}
+
+/** Let a material of one's own give off light, sRGB; 0 for none. */
+export function glow(material: Material, color: number): void {
+  if (material instanceof MeshStandardMaterial) material.emissive.setHex(color);
+  else if (material.userData.glow instanceof Color) material.userData.glow.setHex(color);
 }
 
 type Kind = "line" | "ghost" | "fill";
@@ -99,13 +162,10 @@ export function dotMaterial(verdict: Verdict | null): Material {
 export function bodyMaterial(verdict: Verdict | null): Material {
   const tone: Tone = verdict ?? "none";
   return once(`body ${tone}`, () => {
-    const color = new Color(colorOf(tone));
-    const material = new MeshStandardMaterial({
-      color,
-      emissive: color,
-      emissiveIntensity: 0.45,
+    const material = solid({
+      color: colorOf(tone),
+      own: 0.45,
       roughness: 0.6,
-      metalness: 0,
       side: DoubleSide,
       toneMapped: false,
       transparent: tone === "undecided",
@@ -118,10 +178,9 @@ export function bodyMaterial(verdict: Verdict | null): Material {
 /** The shared material of a body that may be elsewhere: no colour of its own, and seen through. */
 export function doubtMaterial(): Material {
   return once("doubt", () => {
-    const material = new MeshStandardMaterial({
+    const material = solid({
       color: DOUBT_COLOR,
       roughness: 0.9,
-      metalness: 0,
       side: DoubleSide,
       transparent: true,
       opacity: 0.8,
@@ -140,14 +199,6 @@ export function scoreMaterial(color: number): Material {
     for (const key of made.keys()) if (key.startsWith("score ")) made.delete(key);
   }
   return once(`score ${color}`, () => {
-    return new MeshStandardMaterial({
-      color,
-      emissive: color,
-      emissiveIntensity: 0.3,
-      roughness: 0.65,
-      metalness: 0,
-      side: DoubleSide,
-      toneMapped: false,
-    });
+    return solid({ color, own: 0.3, roughness: 0.65, side: DoubleSide, toneMapped: false });
   });
 }

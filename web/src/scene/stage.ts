@@ -8,6 +8,7 @@ import {
   HemisphereLight,
   Mesh,
   NeutralToneMapping,
+  NoToneMapping,
   PCFShadowMap,
   PerspectiveCamera,
   PlaneGeometry,
@@ -15,10 +16,15 @@ import {
   ShadowMaterial,
   WebGLRenderer,
 } from "three";
-import { drawnBySoftware } from "./effort";
+import { drawnBySoftware, Sharpness } from "./effort";
 import { makeGrid } from "./grid";
 
 const BACKGROUND = 0x10151c;
+/** Pictures per second below which pixels are made larger, and the largest of them, by processor and by graphics card. */
+const LEAST_RATE = { software: 24, hardware: 45 };
+const LEAST_SHARPNESS = { software: 0.6, hardware: 1 };
+/** After so long without a picture the last one is drawn again as sharp as can be [ms]. */
+const STILL_MS = 300;
 
 export class Stage {
   readonly renderer: WebGLRenderer;
@@ -30,12 +36,21 @@ export class Stage {
   readonly world = new Group();
   readonly grid = makeGrid();
   private dirty = true;
+  private tickedAt = Number.NEGATIVE_INFINITY;
+  private drawnAt = Number.NEGATIVE_INFINITY;
+  private readonly sharpest: number;
+  private readonly sharpness: Sharpness;
 
   constructor(readonly element: HTMLElement) {
     const light = drawnBySoftware();
+    const kind = light ? "software" : "hardware";
     this.renderer = new WebGLRenderer({ antialias: !light });
-    this.renderer.setPixelRatio(Math.min(globalThis.devicePixelRatio, light ? 1 : 2));
-    this.renderer.toneMapping = NeutralToneMapping;
+    this.sharpest = Math.min(globalThis.devicePixelRatio, light ? 1 : 2);
+    const least = Math.min(LEAST_SHARPNESS[kind], this.sharpest);
+    this.sharpness = new Sharpness(this.sharpest, least, LEAST_RATE[kind]);
+    this.renderer.setPixelRatio(this.sharpest);
+    // Of light at corners every colour is shown as it is.
+    this.renderer.toneMapping = light ? NoToneMapping : NeutralToneMapping;
     this.renderer.shadowMap.enabled = !light;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
@@ -44,7 +59,9 @@ export class Stage {
     this.scene.fog = new Fog(BACKGROUND, 14, 40);
     this.world.rotation.x = -Math.PI / 2;
     this.rig.add(this.camera);
-    this.scene.add(this.world, this.rig, ...lights(), floor(), this.grid);
+    this.scene.add(this.world, this.rig, this.grid);
+    // Bodies bring their own light there, and a floor only shows shadows.
+    if (!light) this.scene.add(...lights(), floor());
     new ResizeObserver(() => this.resize()).observe(element);
     this.resize();
   }
@@ -64,10 +81,24 @@ export class Stage {
   run(each: (time: number) => void): void {
     this.renderer.setAnimationLoop((time: number) => {
       each(time);
-      if (!this.dirty && !this.renderer.xr.isPresenting) return;
-      this.dirty = false;
-      this.renderer.render(this.scene, this.camera);
+      if (this.renderer.xr.isPresenting) {
+        this.renderer.render(this.scene, this.camera);
+        return;
+      }
+      // What comes after a picture waits for it.
+      if (this.drawnAt === this.tickedAt) this.sharpness.take(time - this.drawnAt, time);
+      this.tickedAt = time;
+      if (this.dirty) this.draw(this.sharpness.ratio, time);
+      else if (time - this.drawnAt > STILL_MS && this.renderer.getPixelRatio() < this.sharpest)
+        this.draw(this.sharpest, time);
     });
+  }
+
+  private draw(ratio: number, time: number): void {
+    this.dirty = false;
+    this.drawnAt = time;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.renderer.render(this.scene, this.camera);
   }
 
   private resize(): void {
@@ -82,7 +113,7 @@ export class Stage {
 }
 
 function lights(): (HemisphereLight | DirectionalLight)[] {
-  const sky = new HemisphereLight(0xe8f0ff, 0x39414f, 1.7);
+  const sky = new HemisphereLight(0xe8f0ff, 0x7d8592, 1.8);
   const key = new DirectionalLight(0xfff4e6, 2.1);
   key.position.set(2.6, 5, 3.2);
   key.castShadow = true;

@@ -27,6 +27,8 @@ export interface Frame {
   results: Result[];
   looks: Snapshot["looks"];
   doubts: Snapshot["doubts"];
+  /** What was told last of them. */
+  sources: Snapshot["sources"];
 }
 
 export type FromWorker =

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "7fddbb06c4eef7ea";
+export const SCHEMA = "95cb98cbfa473aa9";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -281,6 +281,30 @@ export interface Result {
   nothing: boolean;
 }
 
+/** How a live source is heard, or where targets are sent to. */
+export interface SourceLine {
+  /** Whether it is heard now, or is let in where it is sent to. */
+  heard: boolean;
+  /** Mean while heard [1/s]. */
+  rate: number | null;
+  /** Standard deviation of the interval between arrivals [s]. */
+  jitter: number | null;
+  /** How much later than its fastest sample the newest one arrived [s]; None where it sends no time. */
+  latency: number | null;
+  /** How late a sample may be to count [s]. */
+  bound: number | null;
+  /** Samples with news. */
+  received: number;
+  /** Samples that its own time says are missing. */
+  lost: number;
+  /** Times it was lost after it had been heard. */
+  losses: number;
+  /** Targets and bools that were written to it. */
+  sent: number;
+  /** Why it was not heard last, or was not let in; empty before that happened. */
+  word: string;
+}
+
 /** The twin and its results at one tick. */
 export interface Snapshot {
   type: "snapshot";
@@ -311,6 +335,11 @@ export interface Snapshot {
    * `poses` has them, with the reason.
    */
   doubts: Record<string, string>;
+  /**
+   * How live sources are heard, and targets sent, by name; told about once a second and for a
+   * tenth of one, empty in between.
+   */
+  sources: Record<string, SourceLine>;
 }
 
 /** One body of the scene; its index is its slot in `Snapshot.poses`. */
@@ -545,7 +574,7 @@ export interface Command {
 }
 
 export const DEFAULTS = {
-  snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {} },
+  snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {}, sources: {} },
 };
 
 export const FIELDS = {

@@ -105,6 +105,9 @@ function heard(snapshot: Snapshot, raw: Uint8Array): void {
   if (lookingAt === null) show(snapshot);
 }
 
+// Told now and then; what was told last stands.
+let sources: Snapshot["sources"] = {};
+
 function show(snapshot: Snapshot): void {
   if (writer) {
     writer.write(snapshot.poses, snapshot.t, snapshot.seq);
@@ -115,7 +118,8 @@ function show(snapshot: Snapshot): void {
     post({ kind: "poses", buffer, t: snapshot.t, seq: snapshot.seq }, [buffer]);
   }
   const { seq, t, joints, tracking, late, results, looks, doubts } = snapshot;
-  waiting = { seq, t, joints, tracking, late, results, looks, doubts };
+  if (Object.keys(snapshot.sources).length > 0) sources = snapshot.sources;
+  waiting = { seq, t, joints, tracking, late, results, looks, doubts, sources };
   deliver();
 }
 

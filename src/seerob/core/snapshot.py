@@ -250,6 +250,45 @@ class Result(Struct, frozen=True, kw_only=True, array_like=True):
         return f"<Result {self.name!r}: {value}, {verdict}>"
 
 
+class SourceLine(Struct, frozen=True, kw_only=True):
+    """How a live source is heard, or where targets are sent to."""
+
+    heard: bool = False
+    """Whether it is heard now, or is let in where it is sent to."""
+    rate: float | None = None
+    """Mean while heard [1/s]."""
+    jitter: float | None = None
+    """Standard deviation of the interval between arrivals [s]."""
+    latency: float | None = None
+    """How much later than its fastest sample the newest one arrived [s]; None where it sends no time."""
+    bound: float | None = None
+    """How late a sample may be to count [s]."""
+    received: int = 0
+    """Samples with news."""
+    lost: int = 0
+    """Samples that its own time says are missing."""
+    losses: int = 0
+    """Times it was lost after it had been heard."""
+    sent: int = 0
+    """Targets and bools that were written to it."""
+    word: str = ""
+    """Why it was not heard last, or was not let in; empty before that happened."""
+
+    def __str__(self) -> str:
+        """In a line."""
+        words = ["heard" if self.heard else "not heard"]
+        if self.rate is not None and self.jitter is not None:
+            words.append(f"{self.rate:.1f}/s, jitter {1e3 * self.jitter:.2f} ms")
+        if self.latency is not None and self.bound is not None:
+            words.append(f"latency {1e3 * self.latency:.1f} ms ({1e3 * self.bound:.0f} ms may be)")
+        words.append(f"{self.received} received, {self.lost} lost, lost {self.losses} times")
+        if self.sent:
+            words.append(f"{self.sent} sent")
+        if self.word:
+            words.append(f"last word: {self.word}")
+        return "; ".join(words)
+
+
 class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot", omit_defaults=True):
     """The twin and its results at one tick."""
 
@@ -274,6 +313,9 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot", omit_defaults=
     doubts: dict[str, str] = {}
     """Robots, humans, machines (with all that they move, `Node.mover`) and single nodes that may not be where
     `poses` has them, with the reason."""
+    sources: dict[str, SourceLine] = {}
+    """How live sources are heard, and targets sent, by name; told about once a second and for a
+    tenth of one, empty in between."""
 
     def __repr__(self) -> str:
         verdict = worst([result.verdict for result in self.results])

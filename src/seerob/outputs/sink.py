@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
@@ -11,7 +11,7 @@ from typing import Protocol, Self, runtime_checkable
 from msgspec import Struct
 
 from seerob.core.samples import Sample
-from seerob.core.snapshot import CriterionInfo, Scene, Snapshot
+from seerob.core.snapshot import CriterionInfo, Scene, Snapshot, SourceLine
 from seerob.recording.format import Visitor
 from seerob.recording.result_log import ResultLog
 
@@ -61,6 +61,14 @@ class BeginsAtEnd(Protocol):
 
     def begin(self) -> None:
         """No tick comes any more; `close` does."""
+
+
+@runtime_checkable
+class Sends(Protocol):
+    """A writer that sends to machines or controllers."""
+
+    def lines(self, known: Mapping[str, SourceLine]) -> dict[str, SourceLine]:
+        """Add what was sent to how live sources are heard, by name."""
 
 
 class Visited(Protocol):

@@ -16,7 +16,7 @@ from itertools import count
 
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.samples import Sample, printable_sample
-from seerob.core.snapshot import Result, Scene, Snapshot, Verdict
+from seerob.core.snapshot import Result, Scene, Snapshot, SourceLine, Verdict
 from seerob.criteria.between_ticks import watched
 from seerob.criteria.judging import Judge as Judge  # noqa: PLC0414
 from seerob.criteria.judging import undecided
@@ -26,7 +26,7 @@ from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model
 from seerob.outputs.notebook import results_html
-from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Writer
+from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
 from seerob.recording.result_log import ResultLog
 from seerob.session.opening import coarse, signal_timeouts, untimed
 from seerob.session.scene import Looks, invalid_reasons
@@ -157,6 +157,7 @@ def snapshot(
     results: tuple[Result, ...],
     looks: Looks | None = None,
     late: dict[str, tuple[float, float]] | None = None,
+    sources: dict[str, SourceLine] | None = None,
 ) -> Snapshot:
     """What goes out of a state."""
     mechanisms, hearings = state.model.mechanisms.values(), state.hearings
@@ -171,6 +172,7 @@ def snapshot(
         results=results,
         looks={} if looks is None else looks.at(state),
         doubts=invalid_reasons(state),
+        sources=sources or {},
     )
 
 
@@ -210,18 +212,33 @@ def engine_of(model: Model, state: type[State] = State) -> Engine:
     )
 
 
+Lines = Callable[[], dict[str, SourceLine]]
+"""How live sources are heard, by name."""
+LINES_EVERY = 1.0
+"""Run time between two tellings of that [s]."""
+LINES_STAND = 0.1
+"""Every tick of so long says it [s]: a page is not sent each."""
+
+
 def ticks(
-    engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed, end: float = math.inf
+    engine: Engine,
+    judge: Callable[[State], tuple[Result, ...]],
+    feed: Feed,
+    end: float = math.inf,
+    lines: Lines = dict,
 ) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
     """The road: for each tick what goes out, and the samples it was made from; ``end`` of `Engine` [s]."""
-    engine.end = end
+    engine.end, told, now = end, -math.inf, dict[str, SourceLine]()
     looks, lateness = Looks(engine.model), Lateness(engine.model)
     for seq, heard in enumerate(feed):
         samples = tuple(map(printable_sample, heard))
         engine.take(samples)
         late = lateness.take(samples)
         state = engine.tick() if seq else engine.start()
-        yield snapshot(state, seq, judge(state), looks, late), samples
+        if state.t >= told + LINES_EVERY:
+            now, told = lines(), state.t
+        shown = now if state.t < told + LINES_STAND else None
+        yield snapshot(state, seq, judge(state), looks, late, shown), samples
 
 
 def no_greener(
@@ -296,6 +313,8 @@ class Summary:
     late: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Per robot and human that a live source drives: by how much samples came too late at worst, and how late
     they may come [s]."""
+    sources: Mapping[str, SourceLine] = field(default_factory=dict)
+    """How live sources were heard, and targets sent, by name."""
 
     @property
     def verdict(self) -> Verdict | None:
@@ -321,6 +340,7 @@ def run(
     end: float = math.inf,
     writers: Sequence[Writer] = (),
     clock: Clock | None = None,
+    lines: Lines = dict,
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Summary:
@@ -335,6 +355,7 @@ def run(
         end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
         writers: Open sinks; they are closed at the end, whatever happens.
         clock: Real time; as fast as possible when None.
+        lines: How live sources are heard.
         stop: Asked once per tick.
         progress: Told the run time once per tick [s].
     """
@@ -342,6 +363,14 @@ def run(
     begun = time.perf_counter()
     done, t = 0, 0.0
     late: dict[str, tuple[float, float]] = {}
+    sending = [writer for writer in writers if isinstance(writer, Sends)]
+
+    def told() -> dict[str, SourceLine]:
+        found = lines()
+        for writer in sending:
+            found = writer.lines(found)
+        return found
+
     with ExitStack() as open_writers, settled():
         for writer in writers:
             open_writers.enter_context(writer)
@@ -352,7 +381,7 @@ def run(
         if before is not None:
             judge = no_greener(judge, *before)
         try:
-            for out, samples in ticks(engine, judge, feed, end):
+            for out, samples in ticks(engine, judge, feed, end, told):
                 done, t = done + 1, out.t
                 for writer in writers:
                     writer.write(out, samples)
@@ -378,4 +407,5 @@ def run(
         wall=time.perf_counter() - begun,
         slipped=0.0 if clock is None else clock.slipped,
         late=late,
+        sources=told(),
     )

@@ -288,11 +288,13 @@ class Station:
                 endless=live,
                 ahead=road.looks_ahead(self.model),
             )
+        lines: road.Lines = dict
         with ExitStack() as until_the_end:
             if clock and heard:
                 targets = [(source, source_target(self.model, source)) for source in heard]
                 offers = next((w.offers for w in writers if isinstance(w, HasOffers)), None)
                 listening = until_the_end.enter_context(Receivers(targets, offers))
+                lines = listening.lines
                 road.warm_up(self.model)  # while they begin
                 feed = hear(feed, listening, clock)
             bound = self.bound  # refused, if so, before anything is open
@@ -306,6 +308,7 @@ class Station:
                 end=end,
                 writers=[*opened, *writers],
                 clock=clock,
+                lines=lines,
                 stop=stop,
                 progress=progress,
             )

@@ -15,7 +15,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -23,10 +23,11 @@ from threading import Condition, Event, Thread
 from typing import Any, Protocol, Self
 
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.core.errors import InputError, SeerobError, UnknownName
 from seerob.core.samples import PoseSample, Quality, Sample
-from seerob.core.snapshot import Snapshot
+from seerob.core.snapshot import Snapshot, SourceLine
 from seerob.core.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.devices.live.listening import because
 from seerob.devices.motion_files import fixed_links
@@ -109,6 +110,8 @@ class Triggers(Closing):
             for trigger in model.workstation.triggers
             for variable in [model.dictionary[trigger.variable]]
         ]
+        self._sent = Counter[str]()
+        """Bools that were written, by source."""
         self._condition = Condition()
         self._stopping = False
         self._thread = Thread(target=self._run, name="seerob-triggers", daemon=True)
@@ -129,6 +132,11 @@ class Triggers(Closing):
             if any(edge.waits for edge in self._edges):
                 self._condition.notify()
 
+    def lines(self, known: Mapping[str, SourceLine]) -> dict[str, SourceLine]:
+        """How sources are heard, and how many bools were written to them."""
+        sent = dict(self._sent)
+        return {**known, **{n: replace(known.get(n, SourceLine()), sent=sent[n]) for n in sent}}
+
     def close(self) -> None:
         """End; what waits is not written any more."""
         with self._condition:
@@ -147,6 +155,7 @@ class Triggers(Closing):
                     _log.warning("%s: could not be written: %s", edge.variable.name, reason)
                 elif not reason:
                     edge.written = wanted
+                    self._sent[edge.variable.source] += 1
                     word = str(wanted).lower()
                     _log.info("%s: %s written (%s)", edge.variable.name, word, edge.trigger.criterion)
                 edge.failing = bool(reason)
@@ -401,6 +410,10 @@ class _Way:
         place = pose["translation" if "translation" in pose else "position"]
         self.last = ", ".join(f"{place[axis]:.3f}" for axis in "xyz")
 
+    def line(self) -> SourceLine:
+        """How many were sent, and why it is none now."""
+        return SourceLine(heard=not self.reason, sent=self.published, received=self.heard, word=self.reason)
+
     def __str__(self) -> str:
         """How many were sent, in a line, and why none were."""
         table = self.table
@@ -473,6 +486,10 @@ class CartesianTargets(Closing):
         """Note what is due; returns at once."""
         for way in self.ways:
             way.note(snapshot.t, samples)
+
+    def lines(self, known: Mapping[str, SourceLine]) -> dict[str, SourceLine]:
+        """How sources are heard, and how many poses went to each topic."""
+        return {**known, **{f"{w.table.host} {w.table.topic}": w.line() for w in self.ways}}
 
     def close(self) -> None:
         """End; what waits is not published any more."""

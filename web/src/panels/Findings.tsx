@@ -1,8 +1,10 @@
 // What whoever reads a result must know about the model it was made with.
 
-import { link, scene, select } from "../page_state";
+import { Fragment } from "preact";
+import { formatNumber } from "../format";
+import { frame, link, scene, select, stale } from "../page_state";
 import { unseen } from "../scene/viewer";
-import type { Finding } from "../wire";
+import type { Finding, SourceLine } from "../wire";
 
 const LOOKS: Record<string, { icon: string; word: string; rank: number }> = {
   warning: { icon: "!", word: "warning", rank: 0 },
@@ -29,6 +31,7 @@ export function Findings() {
         What was noticed, repaired or assumed while the model was built. Each of these bears on the results.
       </p>
       {findings.length === 0 ? <p class="empty">Nothing was found.</p> : <FindingList findings={findings} />}
+      <Sources />
       {scene.value && (
         <dl class="fingerprint">
           <dt>Workstation</dt>
@@ -41,6 +44,40 @@ export function Findings() {
       )}
     </section>
   );
+}
+
+/** A line for each live source, and for each topic that targets are sent to. */
+export function Sources() {
+  const told = Object.entries(frame.value?.sources ?? {});
+  if (told.length === 0) return null;
+  return (
+    <section class="sources" aria-label="Live sources">
+      <h3>Live sources</h3>
+      <dl class="fingerprint">
+        {told.map(([name, line]) => (
+          <Fragment key={name}>
+            <dt>{name}</dt>
+            <dd class={stale.value ? "stale" : line.heard ? "" : "unknown"}>{sourceLine(line)}</dd>
+          </Fragment>
+        ))}
+      </dl>
+    </section>
+  );
+}
+
+export function sourceLine(line: SourceLine): string {
+  const ms = (seconds: number) => `${formatNumber(1e3 * seconds)} ms`;
+  const words = [line.heard ? "heard" : "not heard"];
+  if (line.rate !== null && line.jitter !== null) {
+    words.push(`${formatNumber(line.rate)}/s, jitter ${ms(line.jitter)}`);
+  }
+  if (line.latency !== null && line.bound !== null) {
+    words.push(`latency ${ms(line.latency)} (${ms(line.bound)} may be)`);
+  }
+  words.push(`${line.received} received, ${line.lost} lost, lost ${line.losses} times`);
+  if (line.sent > 0) words.push(`${line.sent} sent`);
+  if (line.word !== "") words.push(`last word: ${line.word}`);
+  return words.join("; ");
 }
 
 export function FindingList({ findings }: { findings: readonly Finding[] }) {

@@ -133,6 +133,9 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
     _tell_rest(station, summary.duration)
     for way in (way for each in targets for way in each.ways):
         line("sent", str(way), "" if way.published else "yellow")
+    for name in sorted(station.contacts().keys() & summary.sources.keys()):
+        heard = summary.sources[name]
+        line("source", f"{name}: {heard}", "" if heard.heard and not heard.losses else "yellow")
     for name, (late, bound) in summary.late.items():
         text = f"{name}: heard up to {1e3 * late:.0f} ms later than at its best; {1e3 * bound:.0f} ms may be"
         line("late", text, "yellow" if late > bound else "")

@@ -36,7 +36,7 @@ from seerob.core.extras import need
 from seerob.core.host_name import check_host, check_url
 from seerob.core.printable import printable
 from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
-from seerob.core.snapshot import Finding
+from seerob.core.snapshot import Finding, SourceLine
 from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock, Instant
@@ -395,7 +395,8 @@ class Listener:
         self._up: bool | None = False if again else None
         self._seq = 0
         self._word = ""
-        """What it was when it was lost last."""
+        """What it was when it was lost last, and why."""
+        self._reason = ""
 
     def start(self) -> None:
         """Begin to listen; returns at once."""
@@ -417,6 +418,21 @@ class Listener:
     def statistics(self) -> Statistics:
         """What arrived so far."""
         return self._arrivals.statistics(self._clock.offset)
+
+    def line(self) -> SourceLine:
+        """How it is heard."""
+        found, timed = self.statistics(), self._clock.offset is not None
+        return SourceLine(
+            heard=bool(self._up),
+            rate=found.rate,
+            jitter=found.jitter,
+            latency=self._clock.latency if timed else None,
+            bound=self._bound if timed else None,
+            received=found.count,
+            lost=found.missed,
+            losses=found.losses,
+            word=self._word and f"{self._word}: {self._reason}",
+        )
 
     def _run(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
@@ -574,7 +590,7 @@ class Listener:
         if self._up is not False or (word, self._word) == ("not let in", "not heard"):
             _log.warning("%s: %s: %s", self.name, word, reason)
             self._arrivals.lose()
-        self._up, self._word = False, word
+        self._up, self._word, self._reason = False, word, reason
 
 
 class _Person:

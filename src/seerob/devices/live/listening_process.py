@@ -14,6 +14,7 @@ import logging
 import os
 import pickle
 import platform
+import select
 import sys
 from threading import Lock
 from typing import BinaryIO
@@ -21,7 +22,7 @@ from typing import BinaryIO
 import msgspec
 
 from seerob.devices.live.listening import Listener, LiveSource, stop
-from seerob.devices.live.source_process import Order, ProcessMessage, SharedMailbox
+from seerob.devices.live.source_process import LINE_EVERY, Order, ProcessMessage, SharedMailbox
 from seerob.workstation.source import Target
 
 SLICE = 100_000
@@ -137,7 +138,8 @@ def main() -> int:
         listener.start()
         with contextlib.suppress(OSError):
             forwarder.say(ProcessMessage(ready=True))
-            sys.stdin.buffer.read(1)
+            while not select.select([sys.stdin], [], [], LINE_EVERY)[0]:
+                forwarder.say(ProcessMessage(line=listener.line()))
         stop((listener,))
     return 0
 

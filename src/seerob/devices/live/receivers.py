@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.samples import Mailbox, Quality, Sample, SignalSample, key
+from seerob.core.snapshot import SourceLine
 from seerob.devices.live.headset_offers import Offers, TakesOffers
 from seerob.devices.live.listening import Listener, LiveSource, delay_of, name_of, stop
 from seerob.devices.live.source_process import SourceProcess, pickled_source
@@ -97,6 +98,11 @@ class Receivers:
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each; ``t`` on the host's clock."""
         return (*self._box.take(), *(sample for process in self._processes for sample in process.take()))
+
+    def lines(self) -> dict[str, SourceLine]:
+        """How each is heard, by name."""
+        here = {listener.name: listener.line() for listener in self._here}
+        return here | {process.name: process.line for process in self._processes}
 
 
 AFTER = 1e-6

@@ -31,9 +31,11 @@ from typing import IO, NamedTuple
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.core.errors import SeerobError
 from seerob.core.samples import Quality, Sample, SignalSample, key
+from seerob.core.snapshot import SourceLine
 from seerob.devices.live.device_clock import ClockState
 from seerob.devices.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
@@ -174,6 +176,8 @@ COMMAND = (sys.executable, "-P", "-m", "seerob.devices.live.listening_process")
 """``-P``: the folder it is started in is none to take modules from."""
 BEGIN_WITHIN = 10.0
 """How long a run waits until it listens [s]."""
+LINE_EVERY = 1.0
+"""How often it says how it hears [s]."""
 LONGEST_LINE = 1 << 20
 """A line of the listening process's log is read up to this length [byte]."""
 SPARE = 2.0
@@ -198,13 +202,15 @@ class Order(NamedTuple):
 
 
 class ProcessMessage(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A line from the other process: a record of the log, or that it listens now."""
+    """A line from the other process: a record of the log, how it hears, or that it listens now."""
 
     ready: bool = False
     logger: str = ""
     level: int = 0
     text: str = ""
     trace: str | None = None
+    line: SourceLine | None = None
+    """How the source is heard."""
 
 
 def pickled_source(source: LiveSource, target: Target | None) -> bytes | None:
@@ -229,6 +235,8 @@ class SourceProcess:
 
     def __init__(self, name: str, pair: bytes) -> None:
         self.name = name
+        self.line = SourceLine()
+        """How it is heard."""
         self._pair = pair
         self._box: SharedMailbox | None = None
         self._known: ClockState | None = None
@@ -293,6 +301,7 @@ class SourceProcess:
                 return
             if time.monotonic() - begun > LONGEST_PAUSE:
                 pause = FIRST_PAUSE
+            self.line = replace(self.line, heard=False, word=f"its process has ended ({how})")
             _log.error("%s: the process that listened has ended (%s) and is started again", self.name, how)
             again = True
             self._stopping.wait(pause)
@@ -346,6 +355,8 @@ class SourceProcess:
                 with self._lock:
                     self._listens = True
                 self._begun.set()
+            elif found.line is not None:
+                self.line = found.line
             else:
                 _log_again(found)
 

@@ -47,7 +47,9 @@ def test_the_twin_follows_and_each_instant_has_posture_and_safety():
     assert [s.name for s in one.scores] == ["RULA", "REBA"]
     assert [s.name for s in one.measures] == ["robot – operator", "separation", "contact"]
     rows = {round(row[1], 2): row for row in _posture_safety.rows(one, 10_000)}
-    upright, low = rows[0.5], rows[2.8]
+    upright, low = rows[0.5], rows[2.3]
+    # Hands that the camera has only predicted for longer than half a second are not scored.
+    assert math.isnan(rows[2.8][2])
     assert low[2] > upright[2]
     assert low[3] > upright[3]
     # The posture that is worse for the back also brings the person nearer to the robot.

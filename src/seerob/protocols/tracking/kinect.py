@@ -203,7 +203,8 @@ def body_object(body: Body) -> BodyObject:
         orientations = [tuple(row) for row in _optical(body.orientations, back=True).round(6).tolist()]
     levels: list[int] = []
     if body.confidence is not None:
-        levels = [2 if c > 0.0 else 0 for c in body.confidence.tolist()]
+        predicted = np.isfinite(body.positions).all(axis=1)
+        levels = np.where(body.confidence > 0.0, 2, np.where(predicted, 1, 0)).tolist()
     return BodyObject(
         body_id=body.id,
         joint_positions=[tuple(row) for row in positions.tolist()],

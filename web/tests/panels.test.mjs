@@ -313,4 +313,36 @@ test("a phone held upright loses nothing to the right", async () => {
   }
 });
 
+for (const [width, height] of [
+  [844, 390],
+  [667, 375],
+]) {
+  test(`a phone held across (${width} × ${height}) shows room, verdict and time at once, none over another`, async () => {
+    await page.setViewportSize({ width, height });
+    await tab("Criteria");
+    const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    assert.ok(over <= 0, `${over} px too wide`);
+    const boxes = await Promise.all(
+      [
+        ".room canvas",
+        ".legend",
+        ".view-tools .tools",
+        ".view-tools .overlays",
+        ".right",
+        ".clock",
+        ".pill",
+      ].map((one) => page.locator(one).first().boundingBox()),
+    );
+    const [room, legend, views, overlays, right, clock, pill] = boxes;
+    assert.ok(room.height >= 190 && room.width >= 320, `the room has ${room.width} × ${room.height}`);
+    for (const { x, y, width: wide, height: high } of boxes)
+      assert.ok(x >= 0 && y >= 0 && x + wide <= width + 1 && y + high <= height, `${x} ${y} ${wide} ${high}`);
+    for (const tools of [views, overlays])
+      assert.ok(tools.y + tools.height < legend.y, "tools lie over the legend");
+    assert.ok(room.x + room.width <= right.x + 1 && room.y + room.height <= clock.y + 1);
+    assert.ok(pill.y + pill.height <= room.y + 1, "the pill lies over the room");
+    assert.ok(await page.locator("tr[data-criterion] .badge").first().isVisible());
+  });
+}
+
 test("nothing complained", () => assert.deepEqual(browser.complaints, []));

@@ -162,3 +162,31 @@ def test_a_pipe_is_no_bag_and_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "motion.bag")
     with pytest.raises(InputError, match=r"motion\.bag: cannot be read: is a pipe or a device"):
         topics_of(tmp_path / "motion.bag", "motion.bag")
+
+
+@pytest.mark.parametrize(
+    ("profile", "library", "said"),
+    [
+        ("", "foxglove", "the profile ''"),
+        ("x", "a", "the profile 'x'"),
+        ("", "seerob 1", 'kind = "recording"'),
+    ],
+)
+def test_an_mcap_file_of_another_profile_is_not_called_broken(tmp_path, profile, library, said):
+    """Written by the mcap library; nothing of it needs to be repaired."""
+    from mcap.writer import Writer
+
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile=profile, library=library)
+        schema = writer.register_schema("foxglove.SceneUpdate", "jsonschema", b"{}")
+        channel = writer.register_channel("/joints", "json", schema)
+        writer.add_message(channel, 0, b"{}", 0)
+        writer.finish()
+    with pytest.raises(InputError) as caught:
+        topics_of(tmp_path / "a.mcap", "a.mcap")
+    assert said in str(caught.value)
+    assert "reindex" not in str(caught.value)
+    (tmp_path / "a.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:12])
+    with pytest.raises(InputError, match="reindex"):
+        topics_of(tmp_path / "a.mcap", "a.mcap")

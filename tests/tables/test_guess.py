@@ -257,3 +257,43 @@ def test_numbers_beyond_all_bounds_are_refused_and_not_computed_with(tmp_path, c
         read_motion(table(tmp_path / "a.csv", header, [values]))
     assert words in str(error.value)
     assert "row 9" in str(error.value)
+
+
+STRANGE = ["clk", "Sensor A", "Sensor B", "Sensor C"]
+
+
+@pytest.mark.parametrize(
+    ("header", "delimiter", "comma"),
+    [(None, ",", False), (None, " ", False), (None, ";", True), (STRANGE, ";", True), (STRANGE, "\t", False)],
+)
+def test_columns_that_no_header_explains_are_proposed_in_a_snippet_that_reads_them(
+    tmp_path, header, delimiter, comma
+):
+    """As units are that no header declares: everything is asked, and nothing is used before."""
+    file = table(tmp_path / "a.csv", header or [], [T, Q], delimiter=delimiter, comma=comma)
+    if header is None:
+        file.write_text(file.read_text().lstrip())
+    found = guess(file)
+    assert {"header_row", "time", "joints", "time_unit", "joint_unit"} <= set(found.questions)
+    with pytest.raises(InputError, match="no row names a time and joints") as caught:
+        read_motion(file)
+    assert ("header_row = 0" in str(caught.value)) is (header is None)
+    motion, _, _ = read_motion(file, confirm(found))
+    np.testing.assert_allclose(motion.t, T, atol=1e-9)
+    np.testing.assert_allclose(motion.q, Q, atol=1e-9)
+
+
+def test_what_holds_no_instants_is_not_proposed_as_a_motion(tmp_path):
+    """Columns that do not grow, fewer than there are joints, and words."""
+    still = table(tmp_path / "still.csv", STRANGE, [0 * T, 0 * Q])
+    few = table(tmp_path / "few.csv", STRANGE[:2], [T, Q[:, :1]])
+    words = table(tmp_path / "words.csv", STRANGE, [["a"] * 20] * 4)
+    for file in (still, few, words):
+        with pytest.raises(InputError, match=r"header_row \(0 where no row names the columns\)"):
+            guess(file)
+
+
+def test_a_log_of_rtde_is_told_from_any_other_table(tmp_path):
+    head = ["timestamp", *(f"{which}_q_{i}" for which in ("target", "actual") for i in range(3))]
+    with pytest.raises(InputError, match=r'a log of RTDE, which kind = "ur_record" reads'):
+        read_motion(table(tmp_path / "a.csv", head, [T, Q, Q], delimiter=" "))

@@ -11,6 +11,7 @@ is a picture in which nobody was seen. ROS 1 bags, and ROS 2 bags in SQLite and 
 
 from __future__ import annotations
 
+import struct
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ from seerob.core.errors import InputError
 from seerob.core.extras import need
 from seerob.core.files.bounded import regular
 from seerob.core.files.parser_process import parsed, parsed_one_by_one
+from seerob.core.printable import printable
 from seerob.core.snapshot import Finding
 from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture.frame_arrays import check_size
@@ -248,7 +250,42 @@ def _check(path: Path, file: str) -> None:
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.glob("*"))
     if size > LARGEST_BAG:
         raise InputError.at(file, "", f"{size} bytes, more than {LARGEST_BAG}", "split the bag")
+    profile, library = mcap_header(path) or (_ROS2, "")
+    if library.startswith("seerob"):
+        raise InputError.at(file, "", "a recording of seerob, not a ROS bag", 'write kind = "recording"')
+    if profile != _ROS2:
+        what = (
+            f"an MCAP file of the profile {profile!r} (written by {library or 'nobody says'}), not of ROS 2"
+        )
+        remedy = (
+            "only that profile says that messages are those of ROS 2: record with ros2 bag, or export a table"
+        )
+        raise InputError.at(file, "", what, remedy)
     need("rosbags")
+
+
+_MAGIC, _HEADER, _ROS2 = b"\x89MCAP0\r\n", 1, "ros2"
+_MOST_NAMED = 1000
+"""Bytes of a name in a file's header."""
+
+
+def mcap_header(path: Path) -> tuple[str, str] | None:
+    """Profile and library that an MCAP file names in its first record; None of any other file.
+
+    Args:
+        path: A file, or the folder of a ROS 2 bag, which is none.
+    """
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        begin = file.read(len(_MAGIC) + 9)
+        if len(begin) < len(_MAGIC) + 9 or not begin.startswith(_MAGIC) or begin[len(_MAGIC)] != _HEADER:
+            return None
+        texts = []
+        for _ in range(2):
+            (length,) = struct.unpack("<I", file.read(4).ljust(4, b"\0"))
+            texts.append(file.read(min(length, _MOST_NAMED)).decode("utf-8", "replace"))
+    return printable(texts[0]), printable(texts[1])
 
 
 def _messages(path: Path, topic: str, file: str) -> Iterator[tuple[float, Any]]:

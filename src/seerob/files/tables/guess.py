@@ -7,7 +7,9 @@ guess is asked, never used: `Guess.questions` says what, `Guess.toml` how to ans
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice, pairwise
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -17,8 +19,8 @@ from msgspec import convert, structs
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.transforms import CONVENTIONS, Array, columns_of, is_convention
-from seerob.files.tables.grid import blank, number
-from seerob.files.tables.headers import ROTATION_VECTOR, UR_POSE, Layout, Role, find_layout
+from seerob.files.tables.grid import Cell, blank, number
+from seerob.files.tables.headers import PREVIEW, ROTATION_VECTOR, SEARCH, UR_POSE, Layout, Role, find_layout
 from seerob.files.tables.mapping import Mapping, Motion
 from seerob.files.tables.table_files import candidates
 from seerob.workstation.source import Target
@@ -423,8 +425,10 @@ class Guess:
     def error(self) -> InputError:
         """The questions as an error whose remedy is the text to paste."""
         problems = [Problem(self.file, f"mapping.{key}", text) for key, text in self.questions.items()]
+        log = {"timestamp", "actual_q_0"} <= {h.text for h in self.layout.headers}
         remedy = (
-            "put this below the source in the workstation file, with what is wrong corrected:\n\n"
+            ('it is a log of RTDE, which kind = "ur_record" reads without asking; or ' if log else "")
+            + "put this below the source in the workstation file, with what is wrong corrected:\n\n"
             + self.toml()
         )
         problems[-1] = problems[-1]._replace(remedy=remedy)
@@ -460,6 +464,10 @@ def guess(
         for grid, base in candidates(path, name, given)
         if (layout := find_layout(grid, given, () if target is None else target.joints, motion)) is not None
     ]
+    if not fitting and motion is Motion.JOINTS and given.header_row is None:
+        proposed = _proposed(path, name, given, target)
+        if proposed is not None:
+            return proposed
     if not fitting:
         what = f"no row names a time and {motion}"
         raise InputError.at(name, "header", what, _remedy(path, name, given, motion))
@@ -475,6 +483,78 @@ def guess(
         questions = {"sheet": f"{len(usable)} sheets hold {motion} over time: {names}", **best.questions}
         best = Guess(best.file, best.mapping, questions, best.notes, best.layout)
     return best
+
+
+FEWEST = 3
+"""Numbers in a row that may be a table of motion: an instant and two joints."""
+
+
+def _proposed(path: Path, name: str, given: Mapping, target: Target | None) -> Guess | None:
+    """What columns of numbers may be where no header says it, all of it to be confirmed; None without any.
+
+    The first column that always grows is taken for the time, those after it for the joints. A table whose
+    first row holds numbers has no header.
+    """
+    found: tuple[int, Guess] | None = None
+    for grid, base in candidates(path, name, given):
+        rows = list(islice(grid.rows(), PREVIEW + SEARCH))
+        numbers = [_numbers(row) for row in rows]
+        first = next((k for k, row in enumerate(numbers[:SEARCH]) if len(row) >= FEWEST), None)
+        if first is None:
+            continue
+        whole = [row for row in numbers[first:] if row]
+        columns = [i for i in whole[0] if all(i in row for row in whole)]
+        time = next((i for i in columns if _grows([row[i] for row in whole])), None)
+        joints = [i for i in columns if time is not None and i > time]
+        wanted = len(target.joints) if target is not None else len(joints)
+        if time is None or len(joints) < max(1, wanted) or (found and found[0] >= len(columns)):
+            continue
+        header = next((k for k in range(first, 0, -1) if len(list(_filled(rows[k - 1]))) >= FEWEST), 0)
+        layout = find_layout(grid, structs.replace(given, header_row=header))
+        if layout is None:
+            continue
+        names = [layout.reference(i) for i in (time, *joints[:wanted])]
+        proposal = structs.replace(
+            given,
+            header_row=header,
+            time=names[0] if given.time is None else given.time,
+            joints=tuple(names[1:]) if given.joints is None else given.joints,
+        )
+        one = _one(name, layout, base, proposal, target, Motion.JOINTS)
+        if isinstance(one, Guess):
+            none = "the first row holds numbers: header_row = 0 says that no row names the columns"
+            said = f"row {header} reads: " + " | ".join(h.text for h in layout.headers[:12] if h.text)
+            asked = {
+                "header_row": f"no row names a time and joints; {said if header else none}",
+                "time": "the first column that always grows",
+                "joints": "the columns after it, in their order",
+            }
+            asked = {key: text for key, text in asked.items() if getattr(given, key) is None}
+            found = len(columns), Guess(name, one.mapping, asked | one.questions, one.notes, layout)
+    return None if found is None else found[1]
+
+
+def _numbers(row: Sequence[Cell]) -> dict[int, float]:
+    """Numbers by column, from 0; none where a cell is something else."""
+    found = {}
+    for i, cell in enumerate(row):
+        if blank(cell):
+            continue
+        value = number(cell)
+        value = number(cell, decimal_comma=True) if isinstance(value, str) else value
+        if isinstance(value, str):
+            return {}
+        found[i] = value
+    return found
+
+
+def _filled(row: Sequence[Cell]) -> Iterator[Cell]:
+    """Cells with something in them."""
+    return (cell for cell in row if not blank(cell))
+
+
+def _grows(values: list[float]) -> bool:
+    return len(values) > 1 and all(a < b for a, b in pairwise(values))
 
 
 def _one(
@@ -518,4 +598,5 @@ def _remedy(path: Path, name: str, given: Mapping, motion: Motion) -> str:
                 break
     seen = f" (the first row reads: {shown[0]})" if shown else " (the table is empty)"
     columns = "joints" if motion is Motion.JOINTS else "tcp_position, tcp_orientation, tcp_convention"
-    return f"name the columns in [sources.mapping]: header_row, time, {columns} and their units" + seen
+    rows = "header_row (0 where no row names the columns)"
+    return f"name the columns in [sources.mapping]: {rows}, time, {columns} and their units" + seen

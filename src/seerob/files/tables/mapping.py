@@ -85,7 +85,7 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     sheet: str | None = None
     """Sheet of a workbook."""
     header_row: int | None = None
-    """Row with the names of the columns, from 1."""
+    """Row with the names of the columns, from 1; 0 where there is none, and columns go by their numbers."""
     group_row: int | None = None
     """Row above it whose cells stand for several columns (``Position``, ``Velocity``); they become
     the first word of the names below."""

@@ -30,7 +30,8 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <TopBar />
       <aside class="left" aria-label="Scene and properties">
         <SceneTree />
-        <section class="selection scroll" aria-label="Properties">
+        {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls can be reached by keys */}
+        <section class="selection scroll" aria-label="Properties" tabIndex={0}>
           <Properties />
         </section>
       </aside>

@@ -6,7 +6,7 @@ import type { Basis, Input } from "../wire";
 export function BasisView({ basis }: { basis: Basis }) {
   return (
     <div class="basis">
-      <h4>Basis</h4>
+      <h3>Basis</h3>
       <p class="formula">{basis.formula}</p>
       <p class="cited">{basis.source}</p>
       {basis.inputs.length > 0 && (
@@ -21,7 +21,7 @@ export function BasisView({ basis }: { basis: Basis }) {
       )}
       {basis.not_modelled.length > 0 && (
         <>
-          <h4>Not modelled</h4>
+          <h3>Not modelled</h3>
           <ul class="not-modelled">
             {basis.not_modelled.map((text) => (
               <li key={text}>{text}</li>

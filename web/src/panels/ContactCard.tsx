@@ -13,7 +13,7 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
   if (!told) {
     return (
       <div class="contact-head">
-        <h3>{spot ? `Area ${spot.area}` : "Whole body"}</h3>
+        <h2>{spot ? `Area ${spot.area}` : "Whole body"}</h2>
         <p class="reason">Nothing that moves is within reach.</p>
       </div>
     );
@@ -25,14 +25,14 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
   const figures = against(row.value, row.limit, row.unit, true);
   return (
     <div class={`contact-head card-${look}`}>
-      <h3>
+      <h2>
         {side !== "" && `${side} `}
         {row.name}
         <span class="unit">
           {row.areas.length ? ` area ${row.areas.join(", ")}` : ""}
           {row.group && row.group !== row.name ? ` · ${row.group}` : ""}
         </span>
-      </h3>
+      </h2>
       <p class="contact-speed">
         {row.verdict && row.state !== "forbidden" ? <StateBadge state={row.verdict} /> : LOOK_WORDS[look]}
         {row.limit != null && (

@@ -52,7 +52,7 @@ export function Sources() {
   if (told.length === 0) return null;
   return (
     <section class="sources" aria-label="Live sources">
-      <h3>Live sources</h3>
+      <h2>Live sources</h2>
       <dl class="fingerprint">
         {told.map(([name, line]) => (
           <Fragment key={name}>

@@ -87,7 +87,7 @@ function WorstInstants() {
   if (all.length === 0) return null;
   return (
     <div class="worst-instants">
-      <h3>Worst instants</h3>
+      <h2>Worst instants</h2>
       {all.map(({ info, instants }) => (
         <div key={info.name} class="instant-row">
           <span class="criterion-name">{info.name}</span>

@@ -51,7 +51,7 @@ export function SceneTree() {
           .filter((role) => role.owners.length > 0)
           .map((role) => (
             <div key={role.title} class="role">
-              <h3>{role.title}</h3>
+              <h2>{role.title}</h2>
               <ul>
                 {role.owners.map((owner) => (
                   <OwnerItem key={owner.name} owner={owner} open={search.value !== ""} />

@@ -15,7 +15,7 @@ export function TradeTable() {
   if (rows.length === 0 || !columns.some((c) => c.group !== "ergonomics")) return null;
   return (
     <div class="trade">
-      <h3>Posture against separation</h3>
+      <h2>Posture against separation</h2>
       <div class="trade-scroll">
         <table>
           <thead>

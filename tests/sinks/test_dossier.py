@@ -136,7 +136,7 @@ def test_it_is_an_evaluation_and_claims_nothing_more(page, word):
 
 def test_pictures_are_drawn_for_the_worst_criteria_first(tmp_path, page):
     alts = [a["alt"] for t, a in page.tags if t == "img"]
-    assert [alt.split(" at ")[0] for alt in alts] == ["separation", "tool speed"]
+    assert [alt.split(": ")[0] for alt in alts] == ["separation", "tool speed"]
     only = [a["alt"] for t, a in Page(write(tmp_path, 60, pictures=1)).tags if t == "img"]
     assert only == alts[:1]
 

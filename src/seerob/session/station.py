@@ -177,6 +177,7 @@ class Station:
             name for rule in station.safety if isinstance(name := getattr(rule, "measurements", None), str)
         ]
         named += [*measured, *(curve for name in measured for curve in curves(self.model.folder / name))]
+        named.append(station.report.logo)
         references = [name for name in named if isinstance(name, str)]
         return {
             **self.model.files,

@@ -91,6 +91,19 @@ class Engine(_Table, frozen=True, kw_only=True):
             raise ValueError(f"tick = {self.tick} s is not a whole number of timesteps of {self.timestep} s")
 
 
+class ReportCover(_Table, frozen=True, kw_only=True):
+    """What the first page of a report says besides; nothing of it is judged."""
+
+    customer: str = ""
+    """For whom the workstation is evaluated."""
+    author: str = ""
+    """Who answers for it."""
+    revision: str = ""
+    """Of the workstation, as its owner counts."""
+    logo: str | None = None
+    """A PNG or JPEG file of at most 1 MB, beside this one."""
+
+
 class Robot(_Table, frozen=True, kw_only=True):
     """A robot arm or any other chain of joints."""
 
@@ -381,6 +394,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     allow_writing: bool = False
     """Whether ``[[triggers]]`` and ``[[targets]]`` may write; the command line must allow it too."""
     engine: Engine = Engine()
+    report: ReportCover = ReportCover()
     robots: tuple[Robot, ...] = ()
     tools: tuple[Tool, ...] = ()
     workpieces: tuple[Workpiece, ...] = ()

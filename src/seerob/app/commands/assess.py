@@ -16,7 +16,7 @@ from seerob.app.commands.permissible_result import (
 )
 from seerob.app.console.loading import compiled
 from seerob.app.console.progress import announced, progress
-from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
+from seerob.app.console.sinks import add_pdf, file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
     OUT,
     Exit,
@@ -48,6 +48,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     add_workstation(sub)
     add_output(sub)
     add_verbose(sub)
+    add_pdf(sub)
     text = "also least distances and largest speeds of the whole motion as bounds, in a section of the report"
     sub.add_argument("--between-samples", action="store_true", help=text)
     add_permissible(sub)
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
 
     require_recorded(station.workstation)
     folder = run_folder(station.model.folder, options.output)
-    sinks = sinks_of(station.workstation, lossless=True)
+    sinks = sinks_of(station.workstation, lossless=True, pdf=options.pdf)
     refuse_existing(sinks, folder)
     scene = station.scene()
     if not options.json:

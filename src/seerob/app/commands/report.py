@@ -17,7 +17,7 @@ from seerob.app.commands.permissible_result import (
 )
 from seerob.app.console.loading import compiled
 from seerob.app.console.progress import compile_loops, progress
-from seerob.app.console.sinks import refuse_existing, sinks_of, tell_files
+from seerob.app.console.sinks import add_pdf, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
     OUT,
     WORDS,
@@ -47,6 +47,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     add_allowed(sub)
     add_permissible(sub)
     add_output(sub, beside="recording")
+    add_pdf(sub)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
             allow_outside=options.allow_outside,
         )
     folder = run_folder(options.recording.parent, options.output)
-    sinks = sinks_of(station.workstation, lossless=True, record=False)
+    sinks = sinks_of(station.workstation, lossless=True, record=False, pdf=options.pdf)
     refuse_existing(sinks, folder)
     every = []
     if options.permissible:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.loading import compiled
 from seerob.app.console.progress import announced, spinner
-from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
+from seerob.app.console.sinks import add_pdf, file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
     Exit,
     add_allowed,
@@ -44,6 +44,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     add_allowed(sub)
     add_page(sub)
     add_verbose(sub)
+    add_pdf(sub)
     sub.add_argument(
         "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
     )
@@ -96,7 +97,7 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
     from seerob.outputs.sink import RecordsVisitors
 
     folder = run_folder(station.model.folder, options.output)
-    sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False)
+    sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False, pdf=options.pdf)
     refuse_existing(sinks, folder)
     stopped = Stopped()
     with LiveView(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,13 +22,22 @@ if TYPE_CHECKING:
     from seerob.workstation.workstation import Workstation
 
 
-def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -> list[Sink]:
+def add_pdf(sub: argparse.ArgumentParser) -> None:
+    """The option of commands that write a report."""
+    text = "also print the report to PDF, by a Chromium, Chrome or Edge that is installed"
+    sub.add_argument("--pdf", action="store_true", help=text)
+
+
+def sinks_of(
+    workstation: Workstation, *, lossless: bool, record: bool = True, pdf: bool = False
+) -> list[Sink]:
     """Sinks for a run.
 
     Args:
         workstation: Whose ``[[sinks]]`` come first.
         lossless: Whether the recorder may hold the run up: only when the run is not live.
         record: Whether to record at all; not when a recording is computed again.
+        pdf: Whether reports are printed, too.
     """
     from seerob.outputs.sinks.dossier import Dossier
     from seerob.outputs.sinks.excel import Excel
@@ -40,6 +50,7 @@ def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -
         chosen = [sink for sink in chosen if not isinstance(sink, Recorder)]
     # The recorder first: it alone touches the disk when it is opened, and may be refused.
     chosen.sort(key=lambda sink: not isinstance(sink, Recorder))
+    chosen = [replace(s, pdf=s.pdf or pdf) if isinstance(s, Dossier) else s for s in chosen]
     return [replace(s, lossless=lossless) if isinstance(s, Recorder) else s for s in chosen]
 
 
@@ -64,6 +75,12 @@ def file_of(sink: Sink) -> str:
     return str(getattr(sink, "file", ""))
 
 
+def files_of(sink: Sink) -> list[str]:
+    """Names of all files that a sink writes in the run's folder."""
+    printed = str(getattr(sink, "printed", "")) if getattr(sink, "pdf", False) else ""
+    return [name for name in (file_of(sink), printed) if name]
+
+
 def refuse_existing(sinks: list[Sink], folder: Path) -> None:
     """Refuse a folder that holds files of another run.
 
@@ -71,17 +88,18 @@ def refuse_existing(sinks: list[Sink], folder: Path) -> None:
         InputError: Naming the first of them.
     """
     for sink in sinks:
-        if file_of(sink) and (folder / file_of(sink)).exists():
-            raise InputError.at(folder / file_of(sink), "", "exists already", "give another folder with -o")
+        for name in files_of(sink):
+            if (folder / name).exists():
+                raise InputError.at(folder / name, "", "exists already", "give another folder with -o")
 
 
 def tell_files(sinks: list[Sink], folder: Path, writers: Sequence[Announced] = ()) -> bool:
     """One line per file that was written, or could not be; whether all of them are there."""
     failed = {writer.file: writer for writer in writers if writer.failure is not None}
     for sink in sinks:
-        file = file_of(sink)
-        if file and file not in failed:
-            line("wrote", str(folder / file))
+        if file_of(sink) not in failed:
+            for name in files_of(sink):
+                line("wrote", str(folder / name))
     for file, writer in failed.items():
         line("not written", f"{folder / file}: {writer.failure}", "bold red")
         if writer.elsewhere is not None:

@@ -6,54 +6,35 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 
 from seerob.core.figures import figure
-from seerob.core.snapshot import LinkMass, MechanismInfo, Scene, Verdict
+from seerob.core.snapshot import LinkMass, MechanismInfo, Origin, Scene, Verdict
 from seerob.description.humans.skeleton import BONES
 from seerob.outputs.html import Html, joined, table, tag, whole
-from seerob.outputs.report.report import DOUBTFUL, UNKNOWN, WHO, Report, Setup, input_row
+from seerob.outputs.report.report import UNKNOWN, WHO, Report, Setup
 from seerob.outputs.sentences import grouped, number
 from seerob.recording.bone_errors import BoneErrors
 
 
 def assumed(report: Report) -> Html:
-    """Findings, and inputs that nobody measured or stated."""
-    rows: list[list[str | Html]] = []
-    for finding in grouped(report.findings):
-        mark = {"note": "note", "assumed": "! assumed", "warning": "! warning"}.get(
-            finding.level, finding.level
-        )
-        rows.append([finding.subject, whole(mark), finding.text])
-    guessed: list[list[str | Html]] = []
-    for name, basis in report.bases.items():
-        for item in basis.inputs:
-            if item.origin in DOUBTFUL:
-                guessed.append([name, *input_row(item)])
-    return joined(
-        [
-            tag("h2", "What was assumed, and by whom"),
-            tag("p", "Nothing was assumed, repaired or found odd.") if not rows and not guessed else None,
-            table(["about", "kind", "what was found while the model was built"], rows) if rows else None,
-            joined(
-                [
-                    tag("h4", "Figures that nobody measured or stated"),
-                    table(["criterion", "input", "value", "origin", "source"], guessed),
-                ]
-            )
-            if guessed
-            else None,
-        ]
-    )
+    """What was found while the model was built."""
+    if not report.findings:
+        return tag("p", "Nothing was assumed, repaired or found odd.")
+    marks = {"note": "note", "assumed": "! assumed", "warning": "! warning"}
+    rows = [[f.subject, whole(marks.get(f.level, f.level)), f.text] for f in grouped(report.findings)]
+    return table(["about", "kind", "what was found while the model was built"], rows)
 
 
 def not_covered(report: Report) -> Html:
     """What no twin can tell, what these criteria leave out, and what stayed undecided."""
-    left_out: dict[str, list[str]] = {}
+    whose: dict[str, list[str]] = {}
     for name, basis in report.bases.items():
         for item in basis.not_modelled:
-            left_out.setdefault(item, []).append(name)
+            whose.setdefault(item, []).append(name)
+    left_out: dict[str, list[str]] = {}
+    for item, names in whose.items():
+        left_out.setdefault(", ".join(names), []).append(item)
     silent = [s.name for s in report.log.values() if s.verdict is Verdict.UNDECIDED]
     return joined(
         [
-            tag("h2", "What is not covered and must be measured"),
             tag(
                 "p",
                 "A twin shows the motion that it was given. Another program, another person, a failing part "
@@ -64,7 +45,9 @@ def not_covered(report: Report) -> Html:
             tag("p", f"Still to be decided by other means: {', '.join(silent)}.", class_="doubt")
             if silent
             else None,
-            table(["left out", "by"], [[item, ", ".join(names)] for item, names in left_out.items()])
+            table(
+                ["criterion", "leaves out"], [[names, "; ".join(items)] for names, items in left_out.items()]
+            )
             if left_out
             else None,
         ]
@@ -95,14 +78,16 @@ def evaluated(report: Report) -> Html:
         [name, f"{len(data)} bytes", tag("code", hashlib.sha256(data).hexdigest())]
         for name, data in sorted(report.files.items())
     ]
+    alike: dict[tuple[str, Origin, str], list[str]] = {}
+    for node in scene.nodes:
+        mass = f" {number(node.mass, 'kg')}" if node.mass is not None else ""
+        alike.setdefault((node.role, node.mass_origin, node.note), []).append(f"{node.name}{mass}")
     bodies = [
-        [node.name, whole(node.role), whole(number(node.mass, "kg")), WHO[node.mass_origin], node.note or "–"]
-        for node in scene.nodes
+        ["; ".join(names), role, WHO[origin], note or "–"] for (role, origin, note), names in alike.items()
     ]
     heads = ["source", "drives", "from", "what it is", "time-out", "at its end"]
     return joined(
         [
-            tag("h2", "What was evaluated"),
             table(["", ""], facts),
             bone_errors(log.bones),
             tag("h4", "Sources"),
@@ -112,7 +97,7 @@ def evaluated(report: Report) -> Html:
             tag("h4", "Input files") if files else None,
             table(["file", "size", "SHA-256"], files) if files else None,
             tag("h4", "Bodies of the twin"),
-            table(["body", "role", "mass", "mass is", "geometry"], bodies),
+            table(["bodies and masses", "role", "mass is", "geometry"], bodies),
             masses(scene),
         ]
     )

@@ -6,6 +6,7 @@ It looks right on a screen, on paper, and without colour.
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Sequence
 
 from seerob.core.snapshot import Basis, CriterionInfo, Verdict
 from seerob.outputs.html import Html, joined, table, tag, whole
@@ -13,7 +14,7 @@ from seerob.outputs.palette import DARK_HEX, HEX
 from seerob.outputs.report import plots as _plots
 from seerob.outputs.report.evidence import assumed, evaluated, not_covered
 from seerob.outputs.report.posture_safety import posture_safety_section
-from seerob.outputs.report.report import Report, ReportSection, ReportTable, badge, input_row
+from seerob.outputs.report.report import DOUBTFUL, Report, ReportSection, ReportTable, badge, grouped_inputs
 from seerob.outputs.report.time_shares import spread_over_time
 from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
 from seerob.recording.series import Series
@@ -64,17 +65,77 @@ figure {{ margin: .8rem 0; }}
 figure img, figure svg {{ width: 100%; height: auto; display: block; }}
 figure img {{ border: 1px solid var(--rule); border-radius: .3rem; }}
 figcaption {{ font-size: .84rem; color: var(--soft); margin-top: .3rem; }}
+.cover dl {{ display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; margin: .8rem 0;
+  font-size: .88rem; }}
+.cover dt {{ color: var(--soft); }}
+.cover dd {{ margin: 0; }}
+.inputs {{ table-layout: fixed; }}
+.inputs th:nth-child(2) {{ width: 12%; }}
+.inputs th:nth-child(3) {{ width: 10%; }}
+.inputs th:last-child {{ width: 42%; }}
+.inputs tbody th {{ font-weight: normal; }}
+.logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
+.contents a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
+.contents ol {{ columns: 2; margin: .4rem 0; padding-left: 1.4rem; font-size: .88rem; }}
+.cover dl {{ display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; margin: .8rem 0;
+  font-size: .88rem; }}
+.cover dt {{ color: var(--soft); }}
+.cover dd {{ margin: 0; }}
+.cover ol {{ columns: 2; margin: .4rem 0; font-size: .88rem; }}
+.cover a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
+.inputs {{ table-layout: fixed; }}
+.inputs th:nth-child(2) {{ width: 12%; }}
+.inputs th:nth-child(3) {{ width: 10%; }}
+.inputs th:last-child {{ width: 42%; }}
+.inputs tbody th {{ font-weight: normal; }}
+.logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
 section.criterion {{ border-top: 1px solid var(--rule); padding-top: .2rem; margin-top: 1.6rem; }}
-h2 + section.criterion {{ border-top: none; margin-top: 0; }}
+h2 + .cover dl {{ display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; margin: .8rem 0;
+  font-size: .88rem; }}
+.cover dt {{ color: var(--soft); }}
+.cover dd {{ margin: 0; }}
+.inputs {{ table-layout: fixed; }}
+.inputs th:nth-child(2) {{ width: 12%; }}
+.inputs th:nth-child(3) {{ width: 10%; }}
+.inputs th:last-child {{ width: 42%; }}
+.inputs tbody th {{ font-weight: normal; }}
+.logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
+.contents a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
+.contents ol {{ columns: 2; margin: .4rem 0; padding-left: 1.4rem; font-size: .88rem; }}
+section.criterion {{ border-top: none; margin-top: 0; }}
+@media print, (min-width: 56rem) {{
+  .evidence {{ display: grid; grid-template-columns: 4fr 6fr; gap: 1rem; align-items: center; }}
+  .evidence > :only-child {{ grid-column: 1 / -1; }}
+}}
+@media print, (min-width: 56rem) {{
+  .evidence {{ display: grid; grid-template-columns: 4fr 6fr; gap: 1rem; align-items: center; }}
+  .evidence > :only-child {{ grid-column: 1 / -1; }}
+}}
 @media screen and (max-width: 56rem) {{
   table {{ display: block; overflow-x: auto; }}
 }}
-@page {{ size: A4; margin: 16mm 14mm; }}
+@page {{ size: A4; margin: 14mm 14mm 16mm;
+  @bottom-right {{ content: counter(page) " / " counter(pages); font: 8pt sans-serif; color: #5a6672; }} }}
 @media print {{
-  body {{ max-width: none; padding: 0; font-size: 10.5pt; }}
+  body {{ max-width: none; padding: 0; font-size: 9.5pt; line-height: 1.4; }}
+  h2 {{ margin: 1.4rem 0 .5rem; }}
+  h3 {{ margin: .9rem 0 .2rem; }}
+  h4 {{ margin: .6rem 0 .2rem; }}
+  p, ul {{ margin: .25rem 0; }}
+  figure {{ margin: .3rem 0; }}
   h2, h3, h4 {{ break-after: avoid; }}
-  table {{ font-size: 8.5pt; }}
-  th, td {{ padding: .2rem .4rem; }}
+  table {{ font-size: 7.5pt; line-height: 1.3; margin: .3rem 0; }}
+  th, td {{ padding: .1rem .4rem; }}
+  section.criterion {{ margin-top: .6rem; }}
+  .lanes {{ width: 80%; }}
+  .lead {{ margin: .1rem 0 .3rem; font-size: 8pt; }}
+  .parts {{ font-size: 6.8pt; }}
+  .parts th, .parts td {{ padding: .02rem .4rem; }}
+  .parts .badge {{ font-size: 6pt; padding: 0 .3rem; border-width: 1px; }}
+  .appendix {{ font-size: 8.5pt; }}
+  .appendix h4 {{ margin: .4rem 0 .1rem; }}
+  .appendix table {{ font-size: 6.8pt; }}
+  .formula {{ padding: .25rem .6rem; font-size: 7.5pt; }}
   .badge {{ font-size: 7.5pt; padding: .05rem .4rem; }}
   thead th {{ white-space: normal; overflow-wrap: normal; }}
   td {{ min-width: 3.4rem; }}
@@ -83,17 +144,12 @@ h2 + section.criterion {{ border-top: none; margin-top: 0; }}
   .overview .badge {{ font-size: 6.5pt; padding: .02rem .3rem; }}
   .overview tbody th {{ min-width: 6rem; }}
   .overview td {{ min-width: 0; }}
-  .overview td:last-child {{ min-width: 6.5rem; }}
+  .overview td:last-child {{ min-width: 15rem; }}
   figure, tr, .verdict {{ break-inside: avoid; }}
   thead {{ display: table-header-group; }}
   * {{ print-color-adjust: exact; -webkit-print-color-adjust: exact; }}
 }}
 """
-
-
-def added(sections: tuple[ReportSection, ...]) -> Html:
-    """All of them, in order."""
-    return joined([_section(section) for section in sections])
 
 
 def _section(section: ReportSection) -> Html:
@@ -104,7 +160,6 @@ def _section(section: ReportSection) -> Html:
         picture = tag("figure", image, tag("figcaption", section.caption))
     return joined(
         [
-            tag("h2", section.title),
             [tag("p", sentence) for sentence in section.sentences],
             picture,
             [_table(one) for one in section.tables],
@@ -134,18 +189,37 @@ def page(report: Report) -> str:
         tag("title", title),
         tag("style", Html(STYLE)),
     )
+    sections = {
+        "Verdicts": _verdicts(report),
+        "Criterion by criterion": _criteria(report),
+        "Posture against safety": posture_safety_section(report.scene, report.log),
+        **{section.title: _section(section) for section in report.sections},
+        "What is not covered and must be measured": not_covered(report),
+        "What was assumed, and by whom": assumed(report),
+        "Where the figures come from": _origins(report),
+        "What was evaluated": evaluated(report),
+    }
+    written = {name: content for name, content in sections.items() if content}
+    sections = {
+        "Verdicts": _verdicts(report),
+        "Criterion by criterion": _criteria(report),
+        "Posture against safety": posture_safety_section(scene, report.log),
+        **{section.title: _section(section) for section in report.sections},
+        "What is not covered and must be measured": not_covered(report),
+        "What was assumed, and by whom": assumed(report),
+        "Where the figures come from": _origins(report),
+        "What was evaluated": evaluated(report),
+    }
+    written = {name: content for name, content in sections.items() if content}
     body = tag(
         "body",
-        tag("h1", title),
-        tag("p", f"seerob {scene.version} · figures from {scene.edition} · {report.date}", class_="lead"),
-        _opening(report),
-        _verdicts(report),
-        _criteria(report),
-        posture_safety_section(report.scene, report.log),
-        added(report.sections),
-        assumed(report),
-        not_covered(report),
-        evaluated(report),
+        _cover(report, title, list(written)),
+        [
+            tag(
+                "div", tag("h2", name, id=_place(k)), content, class_="appendix" if name in APPENDIX else None
+            )
+            for k, (name, content) in enumerate(written.items())
+        ],
     )
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en") + "\n"
 
@@ -154,6 +228,85 @@ _SHARES = (
     "Shares are of the run's time. Decided is what was within or exceeded; what is left of it was undecided, "
     "or a criterion did not apply (muted, nobody near)."
 )
+
+
+APPENDIX = ("What was assumed, and by whom", "Where the figures come from", "What was evaluated")
+"""What a first reader may leave out."""
+
+
+def _place(k: int) -> str:
+    return f"section-{k + 1}"
+
+
+def _cover(report: Report, title: str, contents: Sequence[str]) -> Html:
+    """The first page: what, for whom, by whom, when; the verdict, what to do, and what is where."""
+    scene, cover = report.scene, report.setup.cover
+    facts = {
+        "customer": cover.customer,
+        "author": cover.author,
+        "revision": cover.revision,
+        "written": f"{report.date}, by seerob {scene.version}",
+        "figures from": scene.edition,
+        "inputs, SHA-256": scene.workstation_hash,
+    }
+    return tag(
+        "div",
+        _logo(report),
+        tag("h1", title),
+        tag("dl", [[tag("dt", name), tag("dd", text)] for name, text in facts.items() if text]),
+        _opening(report),
+        tag("h4", "What to do"),
+        tag("ul", [tag("li", text) for text in to_do(report)]),
+        tag("h4", "Contents"),
+        tag("ol", [tag("li", tag("a", name, href=f"#{_place(k)}")) for k, name in enumerate(contents)]),
+        class_="cover",
+    )
+
+
+_IMAGES = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpeg"}
+_LARGEST_LOGO = 1 << 20
+"""[byte]"""
+
+
+def _logo(report: Report) -> Html | None:
+    name = report.setup.cover.logo
+    if name is None:
+        return None
+    data = report.files.get(name, b"")
+    kind = next((kind for begin, kind in _IMAGES.items() if data.startswith(begin)), None)
+    if kind is None or len(data) > _LARGEST_LOGO:
+        return tag("p", f"{name} is no PNG or JPEG file of at most 1 MB: no logo.", class_="lead")
+    return tag("img", src=f"data:image/{kind};base64,{b64encode(data).decode()}", alt="", class_="logo")
+
+
+_LISTED = 6
+"""What is to be done of one kind, at most."""
+
+
+def to_do(report: Report) -> list[str]:
+    """What stands between this run and a verdict that all is within, the worst first."""
+    exceeded, undecided = [], []
+    for series in report.log.ranked():
+        if series.verdict is Verdict.EXCEEDED:
+            worst = series.worst()
+            what = f"{reached(worst, series)} at {worst.t:.2f} s, {_limit(series)} is admissible"
+            exceeded.append(f"Change the cell, its motion or its task: {series.name} is {what}.")
+        elif series.verdict is Verdict.UNDECIDED:
+            reason = (series.worst().reason if series.known else "") or "it was not decided all the time"
+            undecided.append(f"Give what is not known: {series.name}: {reason}.")
+    texts = []
+    for each in (exceeded, undecided):
+        more = len(each) - _LISTED
+        texts += [*each[:_LISTED], *([f"And {more} more, below."] if more > 0 else [])]
+    inputs = (item for basis in report.bases.values() for item in basis.inputs)
+    doubtful = {(item.name, item.origin) for item in inputs if item.origin in DOUBTFUL}
+    if doubtful:
+        number = "one input" if len(doubtful) == 1 else f"{len(doubtful)} inputs"
+        texts.append(f"Measure or state {number} that nobody did, marked among where the figures come from.")
+    return [
+        *texts,
+        "Measure at the real workstation what no twin can tell, listed under what is not covered.",
+    ]
 
 
 def _opening(report: Report) -> Html:
@@ -224,10 +377,14 @@ def _verdicts(report: Report) -> Html:
     shown = [s for s in report.log.ranked() if s.known]
     return joined(
         [
-            tag("h2", "Verdicts"),
             table(head, rows, class_="overview"),
             tag("p", _SHARES, class_="lead"),
-            tag("figure", _plots.lanes(shown, salt="lanes"), tag("figcaption", "The verdicts over the run."))
+            tag(
+                "figure",
+                _plots.lanes(shown, salt="lanes"),
+                tag("figcaption", "The verdicts over the run."),
+                class_="lanes",
+            )
             if shown
             else None,
         ]
@@ -241,7 +398,7 @@ def _limit(series: Series) -> str:
 
 def _criteria(report: Report) -> Html:
     infos = {info.name: info for info in report.scene.criteria}
-    sections = [tag("h2", "Criterion by criterion")]
+    sections = []
     for series in report.log.ranked():
         sections.append(
             tag(
@@ -249,11 +406,17 @@ def _criteria(report: Report) -> Html:
                 tag("h3", series.name, " ", badge(series.verdict)),
                 _described(infos.get(series.name)),
                 [tag("p", sentence) for sentence in about(series)],
-                _picture(report, series),
-                tag("figure", _plots.curve(series, salt=_anchor(report, series))) if series.known else None,
+                tag(
+                    "div",
+                    _picture(report, series),
+                    tag("figure", _plots.curve(series, salt=_anchor(report, series)))
+                    if series.known
+                    else None,
+                    class_="evidence",
+                ),
                 spread_over_time(infos.get(series.name), series),
                 _parts(series),
-                _basis(report.bases.get(series.name)),
+                _formula(report.bases.get(series.name)),
                 id=_anchor(report, series),
                 class_="criterion",
             )
@@ -274,9 +437,9 @@ def _picture(report: Report, series: Series) -> Html | None:
     if png is None:
         return None
     worst = series.worst()
-    what = f"{series.name} at {worst.t:.2f} s, its worst instant: {reached(worst, series)}"
+    what = f"{reached(worst, series)} at {worst.t:.2f} s, its worst instant"
     source = f"data:image/png;base64,{b64encode(png).decode()}"
-    return tag("figure", tag("img", src=source, alt=what), tag("figcaption", f"{what}."))
+    return tag("figure", tag("img", src=source, alt=f"{series.name}: {what}"), tag("figcaption", f"{what}."))
 
 
 def _parts(series: Series) -> Html | None:
@@ -298,26 +461,24 @@ def _parts(series: Series) -> Html | None:
         )
     head = ["part", "verdict", "worst value", "limit", "at", "exceeded", "undecided"]
     text = "Shares are of the ticks in which the part was spoken of."
-    return joined([tag("h4", "By part"), table(head, rows), tag("p", text, class_="lead")])
+    return joined([tag("h4", "By part"), table(head, rows, class_="parts"), tag("p", text, class_="lead")])
 
 
-def _basis(basis: Basis | None) -> Html:
+def _formula(basis: Basis | None) -> Html:
     if basis is None:
         return tag("p", "The criterion did not say what its figure rests on.", class_="doubt")
-    content: list[Html | None] = [
-        tag("h4", "Where the figure comes from"),
-        tag("p", basis.formula, class_="formula"),
-        tag("p", basis.source),
-        table(["input", "value", "origin", "source"], [input_row(i) for i in basis.inputs])
-        if basis.inputs
-        else None,
-    ]
-    if basis.not_modelled:
-        content += [
-            tag("h4", "What it leaves out"),
-            tag("ul", [tag("li", item) for item in basis.not_modelled]),
-        ]
-    return joined(content)
+    return joined([tag("p", basis.formula, class_="formula"), tag("p", basis.source, class_="lead")])
+
+
+def _origins(report: Report) -> Html:
+    """Every input of every criterion with where it comes from; what nobody measured or stated first."""
+    items = [(name, item) for name, basis in report.bases.items() for item in basis.inputs]
+    items.sort(key=lambda one: one[1].origin not in DOUBTFUL)
+    text = "What is marked ! nobody measured or stated: it is assumed, estimated or missing."
+    head = ["inputs", "criteria", "origin", "source"]
+    return (
+        joined([tag("p", text), table(head, grouped_inputs(items), class_="inputs")]) if items else Html("")
+    )
 
 
 def _anchor(report: Report, series: Series) -> str:

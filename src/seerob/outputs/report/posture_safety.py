@@ -152,7 +152,7 @@ def posture_safety_section(scene: Scene, log: ResultLog) -> Html | None:
         "The same instants: those at which a score is highest, or most of a limit is used. In brackets "
         "how much of its limit is used; 100 % is the limit. – is not known or not assessed."
     )
-    return joined([tag("h2", "Posture against safety"), tag("p", text), *parts])
+    return joined([tag("p", text), *parts])
 
 
 def _line(one: Sides, row: list[Cell]) -> list[str | Html]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import shlex
 import sys
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
@@ -17,12 +18,12 @@ import msgspec
 from seerob.core import plugin
 from seerob.core.errors import SeerobError, UnknownName
 from seerob.core.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
-from seerob.outputs.html import Html, tag, whole
+from seerob.outputs.html import Html, tag
 from seerob.outputs.palette import MARK, WORD
 from seerob.outputs.sentences import number
 from seerob.recording.result_log import ResultLog
 from seerob.workstation.source import Source
-from seerob.workstation.workstation import Engine
+from seerob.workstation.workstation import Engine, ReportCover
 
 
 @dataclass(frozen=True)
@@ -90,15 +91,21 @@ def badge(verdict: Verdict | None) -> Html:
     return tag("span", f"{MARK[verdict]} {WORD[verdict]}", class_=f"badge {name}")
 
 
-def input_row(item: Input) -> list[str | Html]:
-    """Cells of one input of a basis: its name, value, origin and source."""
-    value: str | Html = item.value if isinstance(item.value, str) else whole(number(item.value, item.unit))
-    origin = (
-        tag("span", f"! {WHO[item.origin]}", class_="doubt whole")
-        if item.origin in DOUBTFUL
-        else WHO[item.origin]
-    )
-    return [item.name, value, origin, item.source or "–"]
+def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]:
+    """Inputs with the names of their criteria: those of one origin, source and criteria are one row."""
+    rows: dict[tuple[Origin, str], dict[str, dict[str, None]]] = {}
+    for name, item in items:
+        value = item.value if isinstance(item.value, str) else number(item.value, item.unit)
+        text = item.name if value in ("", "–") else f"{item.name}: {value}"
+        rows.setdefault((item.origin, item.source), {}).setdefault(text, {})[name] = None
+    found: list[list[str | Html]] = []
+    for (origin, source), texts in rows.items():
+        by: dict[str, list[str]] = {}
+        for text, names in texts.items():
+            by.setdefault(", ".join(names), []).append(text)
+        who = tag("span", f"! {WHO[origin]}", class_="doubt") if origin in DOUBTFUL else WHO[origin]
+        found += [["; ".join(each), criteria, who, source or "–"] for criteria, each in by.items()]
+    return found
 
 
 UNKNOWN = "unknown: the workstation file is not at hand or cannot be read"
@@ -124,6 +131,8 @@ class Setup:
     """Name, what it drives, where it comes from, class of origin, time-out, at the end."""
     readable: bool
     """Whether the workstation file was there."""
+    cover: ReportCover = field(default_factory=ReportCover)
+    """What the first page says besides."""
 
 
 def setup(files: dict[str, bytes]) -> Setup:
@@ -136,7 +145,11 @@ def setup(files: dict[str, bytes]) -> Setup:
         return Setup((("physics", UNKNOWN),), (), readable=False)
     entries = table.get("sources", [])
     found = [_source(e) for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
-    return Setup(_engine(table.get("engine", {})), tuple(found), readable=True)
+    try:
+        cover = msgspec.convert(table.get("report", {}), ReportCover)
+    except msgspec.ValidationError:
+        cover = ReportCover()
+    return Setup(_engine(table.get("engine", {})), tuple(found), readable=True, cover=cover)
 
 
 def command() -> str:

@@ -31,6 +31,13 @@ class Dossier(Sink, frozen=True, kw_only=True):
     """Name in the run's folder; an earlier report of that name is replaced."""
     pictures: Annotated[int, Meta(ge=0)] = 12
     """Largest number of pictures of worst instants; the worst criteria come first."""
+    pdf: bool = False
+    """Whether it is also printed to a PDF file beside it, by an installed Chromium, Chrome or Edge."""
+
+    @property
+    def printed(self) -> str:
+        """Name of the PDF file."""
+        return f"{Path(self.file).stem}.pdf"
 
     def open(
         self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path
@@ -38,7 +45,7 @@ class Dossier(Sink, frozen=True, kw_only=True):
         """Start to collect; nothing is written before `DossierWriter.close`.
 
         Raises:
-            InputError: The file's name or the number of pictures is wrong.
+            InputError: The file's name or the number of pictures is wrong, or nothing is there to print.
         """
         if self.file != Path(self.file).name or not self.file.endswith((".html", ".htm")):
             raise InputError.at(
@@ -46,7 +53,12 @@ class Dossier(Sink, frozen=True, kw_only=True):
             )
         if self.pictures < 0:
             raise InputError.at(folder, "dossier.pictures", f"{self.pictures} is negative", "0 or more")
-        return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures)
+        if self.pdf:
+            from seerob.outputs.report.printing import browser
+
+            browser()
+        pdf = folder / self.printed if self.pdf else None
+        return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures, pdf=pdf)
 
 
 class DossierWriter(AtEndWithResults):
@@ -56,7 +68,14 @@ class DossierWriter(AtEndWithResults):
     """
 
     def __init__(
-        self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], path: Path, *, pictures: int
+        self,
+        scene: Scene,
+        meshes: dict[str, bytes],
+        files: dict[str, bytes],
+        path: Path,
+        *,
+        pictures: int,
+        pdf: Path | None = None,
     ) -> None:
         """Use `Dossier.open`."""
         super().__init__(scene.criteria)
@@ -66,6 +85,7 @@ class DossierWriter(AtEndWithResults):
         self.sections: list[ReportSection] = []
         """What a command adds to the report, after the criteria."""
         self._scene, self._meshes, self._files, self._pictures = scene, meshes, files, pictures
+        self._pdf = pdf
         self._worst: dict[str, Snapshot] = {}
         self._pool: ThreadPoolExecutor | None = None
         self._being_drawn: dict[str, Future[bytes]] = {}
@@ -99,8 +119,14 @@ class DossierWriter(AtEndWithResults):
             command=command(),
             sections=tuple(self.sections),
         )
-        write_whole(self.path, page(report).encode())
-        self._tell(len(pictures) + 1, len(pictures) + 1)
+        html, steps = page(report).encode(), len(pictures) + 1 + (self._pdf is not None)
+        write_whole(self.path, html)
+        self._tell(len(pictures) + 1, steps)
+        if self._pdf is not None:
+            from seerob.outputs.report.printing import printed
+
+            write_whole(self._pdf, printed(html))
+            self._tell(steps, steps)
 
     def begin(self) -> None:
         """Begin to draw; `close` waits for it."""
@@ -140,7 +166,7 @@ class DossierWriter(AtEndWithResults):
         try:
             for name, picture in self._being_drawn.items():
                 drawn[name] = picture.result()
-                self._tell(len(drawn), len(self._being_drawn) + 1)
+                self._tell(len(drawn), len(self._being_drawn) + 1 + (self._pdf is not None))
         finally:
             self.abandon()
         return drawn

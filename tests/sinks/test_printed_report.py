@@ -1,0 +1,72 @@
+"""The report on paper, and its first page: printed by a browser that nobody here wrote."""
+
+import base64
+import re
+from pathlib import Path
+
+import made_run
+import pytest
+from test_dossier import Page
+
+import seerob as sr
+from seerob.core.errors import InputError
+from seerob.outputs.report import printing
+from seerob.outputs.sinks.dossier import Dossier
+
+DEMO = Path(__file__).parents[2] / "workstations" / "ur10_assembly"
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+COVER = b"""[report]
+customer = "Works <b>4</b>"
+author = "A. Author"
+revision = "C"
+logo = "logo.png"
+"""
+
+
+def written(folder, files):
+    with Dossier().open(made_run.scene(), made_run.MESHES, files, folder) as writer:
+        for k in range(60):
+            writer.write(made_run.snapshot(k), made_run.samples(k))
+    return Page((folder / "report.html").read_text())
+
+
+def test_the_demo_is_a_dozen_pages_and_begins_with_its_verdict(tmp_path):
+    summary = sr.load(DEMO).run(folder=tmp_path, sinks=[Dossier(pdf=True)])
+    data = (tmp_path / "report.pdf").read_bytes()
+    assert 5 <= len(re.findall(rb"/Type\s*/Page\b", data)) <= 12
+    page = Page((tmp_path / "report.html").read_text())
+    assert page.text.index("At least one limit is exceeded.") < page.text.index("Contents")
+    for name, series in summary.results.items():
+        if series.verdict is sr.Verdict.EXCEEDED:
+            assert f"Change the cell, its motion or its task: {name} is " in page.text
+
+
+def test_the_first_page_says_for_whom_by_whom_and_which_revision(tmp_path):
+    page = written(tmp_path, {"workstation.toml": COVER, "logo.png": PIXEL})
+    text = page.text[: page.text.index("Contents")]
+    for word in ("Works <b>4</b>", "A. Author", "revision", made_run.scene().workstation_hash):
+        assert word in text
+    logo = next(a for t, a in page.tags if t == "img")
+    assert logo["src"] == f"data:image/png;base64,{base64.b64encode(PIXEL).decode()}"
+
+
+@pytest.mark.parametrize("logo", [None, b"<svg onload='alert(1)'/>", PIXEL + bytes(1 << 20)])
+def test_what_is_no_small_picture_is_no_logo(tmp_path, logo):
+    files = {"workstation.toml": COVER} | ({} if logo is None else {"logo.png": logo})
+    page = written(tmp_path, files)
+    assert "logo.png is no PNG or JPEG file of at most 1 MB: no logo." in page.text
+
+
+def test_without_a_browser_nothing_begins(tmp_path, monkeypatch):
+    monkeypatch.setattr(printing, "BROWSERS", ())
+    monkeypatch.delenv("CHROMIUM", raising=False)
+    with pytest.raises(InputError, match="no Chromium, Chrome or Edge is installed; install one"):
+        Dossier(pdf=True).open(made_run.scene(), {}, {}, tmp_path)
+
+
+def test_a_browser_that_prints_nothing_is_said(tmp_path, monkeypatch):
+    monkeypatch.setenv("CHROMIUM", "/bin/false")
+    with pytest.raises(InputError, match="printed nothing"):
+        printing.printed(b"<p>")

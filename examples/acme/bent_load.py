@@ -50,7 +50,7 @@ class BentLoad(Rule, frozen=True, kw_only=True):
         """Look up person and phases once, and return the function that counts the points."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, (), Handled.from_task)
-        error = self.error() or 0.0  # of all angles, or by the name of each
+        error = self.error(model) or 0.0  # of all angles, or by the name of each
         accuracy = error.get("trunk_flexion", 0.0) if isinstance(error, Mapping) else error
 
         def compute(twin: Twin) -> Figure:

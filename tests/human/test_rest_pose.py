@@ -11,11 +11,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from seerob.description.capture.fitting import Fitter, pulls
+from seerob.description.capture.following import Following
 from seerob.description.humans import manikin
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.sources.bvh import Bvh, read
+from seerob.workstation.conversion import convert
 from seerob.workstation.source import Opened, Target
 
 PERSON = manikin.build(name="op", stature=1.7, mass=70, sex="female")
@@ -73,7 +75,10 @@ def _swing(one, other):
     return Rotation.from_rotvec(axis / size * angle if size > 1e-9 else np.zeros(3))
 
 
-def at_rest():
+CROUCHED = Rotation.from_euler("x", -50, degrees=True)
+
+
+def at_rest(squat):
     """File from bone in the pose of rest: trunk upright, arms as in our T-pose, legs along their joints."""
     T, _ = bone_poses(PERSON, posture(PERSON, "t_pose"))
     found = {}
@@ -83,6 +88,8 @@ def at_rest():
         if part in ("thigh", "shank"):
             way = LEG * ((1.0 if side == "left" else -1.0), 1, 1)
             found[bone] = _swing(found[bone].apply([0, -1, 0]), way) * found[bone]
+        if part == "thigh" and squat:
+            found[bone] = CROUCHED * found[bone]
     return found
 
 
@@ -96,15 +103,14 @@ def written(path, postures, *, thumbs=True, turn=AS_IT_IS, squat=False):
     """
     names = [n for n in SKELETON if thumbs or "Thumb" not in n]
     R, _ = bone_poses(PERSON, np.stack(postures))
-    rest = at_rest()
+    rest = at_rest(squat)
     turn = Rotation.from_matrix(turn)
-    crouched = Rotation.from_euler("x", -50, degrees=True)
     lines = ["HIERARCHY"]
 
     def joint(name, depth):
         parent, offset, _ = SKELETON[name]
         if squat and name.endswith("Leg") and not name.endswith("UpLeg"):
-            offset = crouched.apply(offset)
+            offset = CROUCHED.apply(offset)
         lines.extend([f"{'JOINT' if parent else 'ROOT'} {name}", "{"])
         lines.append("OFFSET " + " ".join(f"{x:.6f}" for x in turn.apply(offset)))
         lines.append(
@@ -205,7 +211,38 @@ def test_nobody_stands_in_the_pose_of_rest(tmp_path):
     (said,) = (f for f in opened.findings if "pose of rest" in f.text)
     assert said.level == "warning"
     assert "thigh does not hang" in said.text
-    assert all(p.wxyz is None for p in next(iter(opened.samples)).points)
+    sample = next(iter(opened.samples))
+    assert all(p.wxyz is None for p in sample.points)
+    assert _untold(sample) == {
+        "trunk_flexion",
+        "neck_flexion",
+        "shoulder_flexion",
+        "shoulder_elevation",
+    }
+    assert any("flexion of trunk, neck and upper arms is not assessed" in f.text for f in opened.findings)
+
+
+def test_where_nobody_stands_an_accuracy_or_calibration_lets_judge(tmp_path):
+    path = written(tmp_path / "x.bvh", [POSTURES[0]] * 40, squat=True)
+    for options in (
+        {"accuracy": 0.4},
+        {"calibration": {"pose": "tpose", "start": 0.0, "duration": 0.5}},
+    ):
+        source = convert(
+            {"human": "op", "file": path.name, "unit": "cm"} | options, Bvh, file="", key="", problems=[]
+        )
+        sample = next(iter(source.open(path.parent, Target(description=PERSON)).samples))
+        assert sample.upright
+        assert "trunk_flexion" not in _untold(sample)
+
+
+def _untold(sample):
+    """Angles of somebody followed that are not told because joints of the trunk may be anywhere."""
+    following = Following(PERSON, np.eye(4))
+    following.hear(sample)
+    (found,) = list(following.until(sample.t))[-1:]
+    leaning = {"trunk_flexion", "neck_flexion", "shoulder_flexion", "shoulder_elevation"}
+    return {name for name, _ in found.undetermined} & leaning
 
 
 def test_joints_that_shift_tell_nothing_by_how_they_turn(tmp_path):

@@ -8,10 +8,16 @@ from made_mvnx import PERSON, Q, made
 from test_bvh import FRAMES, expected
 from test_bvh import made as made_bvh
 
+from kept_run import Kept
+from seerob.core.snapshot import Origin, Verdict
 from seerob.core.transforms import rotation_from_wxyz
+from seerob.criteria.scoring.measured import ANGLES_OF
+from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.options import AZURE_KINECT, XSENS
 from seerob.devices.sources.bvh import Bvh
 from seerob.devices.sources.mvnx import Mvnx
+from seerob.session.station import load
 from seerob.workstation.source import Target
 
 TARGET = Target(name="op", joints=(), units=(), lower=(), upper=(), velocity=(), description=PERSON)
@@ -56,3 +62,79 @@ def test_another_person_than_the_one_in_the_file(tmp_path):
     made(tmp_path / "x.mvnx", Q)
     with pytest.raises(InputError, match="it has 'Anna'"):
         Mvnx(human="op", file="x.mvnx", subject="Bob").open(tmp_path, TARGET)
+
+
+CELL = """
+engine = { physics = false }
+
+[[humans]]
+name = "op"
+stature = 1.8
+mass = 80
+sex = "male"
+
+[[sources]]
+kind = "mvnx"
+human = "op"
+file = "x.mvnx"
+SOURCE
+[[ergonomics]]
+kind = "rula"
+human = "op"
+action_level = 1
+RULE
+[[ergonomics.phases]]
+load = 0
+muscle_arms = false
+muscle_body = false
+supported_arms = "none"
+back_supported = true
+legs = "balanced"
+"""
+
+
+def scored(folder, *, source="", rule=""):
+    """RULA of somebody who sits upright with the forearms level, as MVN recorded it."""
+    q = posture(PERSON, {"both_elbow_flexion_deg": 80.0, "both_elbow_pronation_deg": 90.0})
+    made(folder / "x.mvnx", np.stack([q] * 40))
+    text = CELL.replace("SOURCE", source).replace("RULE", rule)
+    (folder / "workstation.toml").write_text(text, encoding="utf-8")
+    kept = Kept()
+    station = load(folder)
+    station.run(writers=[kept])
+    (result,) = kept.snapshots[-1].results
+    (basis,) = (c.basis for c in station.scene().criteria)
+    return result, {i.name: i for i in basis.inputs if "accuracy" in i.name}, station
+
+
+def test_what_is_known_of_a_device_makes_intervals_of_scores(tmp_path):
+    """Of MVN 9° and 15° are: an upright neck may be bent back, and the score lies across the limit."""
+    result, inputs, _ = scored(tmp_path)
+    assert result.verdict is Verdict.UNDECIDED
+    low, high = result.interval
+    assert low <= 2 < high
+    assert inputs["accuracy of the shoulder, mvnx op"].value == 15
+    assert inputs["accuracy of the angles, mvnx op"].value == 9
+    assert "Mavor et al. 2020" in inputs["accuracy of the angles, mvnx op"].source
+
+
+@pytest.mark.parametrize("where", ["source", "rule"])
+def test_who_knows_better_says_so_of_the_device_or_in_the_rule(tmp_path, where):
+    result, inputs, _ = scored(tmp_path, **{where: "accuracy = 0.01"})
+    assert (result.verdict, result.value) == (Verdict.WITHIN, 1)
+    (told,) = inputs.values()
+    assert (told.value, told.origin) == (pytest.approx(0.573, abs=1e-3), Origin.GIVEN)
+
+
+def test_what_nobody_knows_of_a_device_is_said(tmp_path):
+    made_bvh(tmp_path / "x.bvh")
+    unknown = "angles of a posture may be off that x.bvh captures nobody says"
+    for options, said in (({}, True), ({"accuracy": 0.1}, False)):
+        source = Bvh(human="op", file="x.bvh", **options)
+        assert (source.posture_error() is None) == said
+        assert any(unknown in f.text for f in source.open(tmp_path, TARGET).findings) == said
+
+
+def test_errors_of_devices_are_of_joints_that_there_are():
+    for known in (XSENS, AZURE_KINECT):
+        assert known.joints.keys() <= ANGLES_OF.keys()

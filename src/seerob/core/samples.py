@@ -146,6 +146,9 @@ class BodySample(SampleBase, frozen=True, kw_only=True, tag="body"):
     """The person, as the device calls it."""
     placed: bool = True
     """Whether positions say where the person stands; if not, they are of the posture alone."""
+    upright: bool = True
+    """Whether somebody who stands upright is upright by it; not where nobody knows where joints of the trunk
+    are in a body."""
     latency: float = 0.0
     """By how much ``t`` was put earlier than the device's time of arrival or stamp [s]."""
     hold: float = 0.5

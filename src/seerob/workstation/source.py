@@ -61,6 +61,20 @@ class Target(Struct, frozen=True, kw_only=True):
     """Folder of the workstation file, where relative paths start."""
 
 
+class PostureError(Struct, frozen=True, kw_only=True):
+    """How far angles of a posture may be off that a device captured."""
+
+    angles: float
+    """[rad]"""
+    joints: dict[str, float] = {}
+    """Joint, by the names of `seerob.criteria.scoring.measured.ANGLES_OF` → of its angles [rad], where that
+    differs."""
+    given: bool = False
+    """Whether the workstation file says so."""
+    source: str
+    """Who found it, and how."""
+
+
 class Opened(Struct, frozen=True, kw_only=True):
     """A source that has read what it can read without a connection."""
 
@@ -111,6 +125,10 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def target(self) -> str:
         """Name of the robot or human it drives; empty for signals."""
         return ""
+
+    def posture_error(self) -> PostureError | None:
+        """How far angles of a posture may be off that it captured; None when nobody knows."""
+        return None
 
     def coarse(self, folder: Path) -> str:
         """Why what it says is too coarse for energies and forces; empty when it is not.

@@ -476,7 +476,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         """Look up every name in the model once and return the function that computes the points."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, EawsPhase.from_task)
-        error = self.error()
+        error = self.error(model)
         screening = Screening(self.cycle, self.minimum_hold, self.interpolation)
         given = asdict(self.entered)
         missing = tuple(name.replace("_", " ") for name, value in given.items() if value is None)
@@ -624,7 +624,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
                     for name, value in asdict(self.entered).items()
                 ),
                 *chosen(self.thresholds, EawsThresholds()),
-                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured, model, self.human),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(

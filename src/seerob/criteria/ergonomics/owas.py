@@ -262,7 +262,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
     def compute(self, model: Model) -> Compute:
         """Look up every name in the model once and return the function that computes the category."""
         read = bind_posture(model, self.human, self.unmeasured)
-        phases, unknown, error = self.entered(model), OwasPhase(), self.error()
+        phases, unknown, error = self.entered(model), OwasPhase(), self.error(model)
 
         def category(angles: Angles, phase: OwasPhase) -> Figure:
             measured = settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
@@ -391,7 +391,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
                 *provenance.motion(model, self.human),
                 *entered(self.entered(model), OwasPhase()),
                 *chosen(self.thresholds, OwasThresholds()),
-                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured, model, self.human),
                 Input(
                     name="arm at or above shoulder level",
                     value="elbow or wrist at the height of the shoulder's joint or above",
@@ -402,7 +402,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             ),
             not_modelled=(
                 "categories of the shares of time of single codes: the category is of one posture",
-                *((ACCURACY_NOTE,) if self.error() is not None else ()),
+                *((ACCURACY_NOTE,) if self.error(model) is not None else ()),
             ),
         )
 

@@ -10,9 +10,11 @@ import msgspec
 
 from seerob.core.snapshot import Input, Origin
 from seerob.criteria.scoring.held_work import WorkDetection
-from seerob.criteria.scoring.measured import ArmPolicy, JointAccuracy
+from seerob.criteria.scoring.measured import ANGLES_OF, Accuracy, ArmPolicy, JointAccuracy
 from seerob.criteria.scoring.phases import Phase
 from seerob.criteria.scoring.spans import Thresholds
+from seerob.model.model import Model
+from seerob.workstation.source import PostureError
 
 PROJECTION_NOTE = "sideways angles are taken out of the sagittal plane, not projected on the frontal one"
 ACCURACY_NOTE = "errors of the angles that depend on each other: each angle is varied on its own"
@@ -121,7 +123,11 @@ def chosen_angles(
 
 
 def posture_quality(
-    accuracy: float | None, joints: JointAccuracy | None, unmeasured: Sequence[str]
+    accuracy: float | None,
+    joints: JointAccuracy | None,
+    unmeasured: Sequence[str],
+    model: Model,
+    human: str,
 ) -> tuple[Input, ...]:
     """How accurate the angles are, and bones that nobody measures."""
     single = () if joints is None else ((k, v) for k, v in msgspec.structs.asdict(joints).items())
@@ -135,8 +141,49 @@ def posture_quality(
             source = "workstation file"
             found.append(Input(name=label, value=angle, unit="deg", origin=Origin.GIVEN, source=source))
         elif name == "angles":
-            found.append(Input(name=label, origin=Origin.MISSING, source="not given"))
+            heard = _captured_errors(model, human) if joints is None else []
+            found += heard or [Input(name=label, origin=Origin.MISSING, source="not given")]
     return tuple(found)
+
+
+def captured_accuracy(model: Model, human: str) -> Accuracy | None:
+    """The worst accuracy of the devices that see a person, by angle [rad]; None when nobody knows any."""
+    known = [error for _, error in _devices(model, human) if error is not None]
+    if not known:
+        return None
+    return {
+        name: max(error.joints.get(joint, error.angles) for error in known)
+        for joint, names in ANGLES_OF.items()
+        for name in names
+    }
+
+
+def _devices(model: Model, human: str) -> list[tuple[str, PostureError | None]]:
+    """Names of sources that captured a person, and how far angles may be off."""
+    sources = [s for s in model.workstation.sources if s.captured and s.target() == human]
+    return [(source.name, source.posture_error()) for source in sources]
+
+
+def _captured_errors(model: Model, human: str) -> list[Input]:
+    found = []
+    for name, error in _devices(model, human):
+        if error is None:
+            found.append(
+                Input(name=f"accuracy of the angles, {name}", origin=Origin.MISSING, source="not known")
+            )
+            continue
+        origin = Origin.GIVEN if error.given else Origin.STATED
+        for joint, value in (("angles", error.angles), *error.joints.items()):
+            found.append(
+                Input(
+                    name=f"accuracy of the {joint}, {name}",
+                    value=round(math.degrees(value), 6),
+                    unit="deg",
+                    origin=origin,
+                    source=error.source,
+                )
+            )
+    return found
 
 
 def _plain(value: object) -> float | str:

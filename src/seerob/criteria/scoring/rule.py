@@ -20,6 +20,7 @@ from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import (
     ACCURACY_NOTE,
     PROJECTION_NOTE,
+    captured_accuracy,
     choices,
     entered,
     posture_quality,
@@ -122,15 +123,23 @@ class PostureRule(Criterion, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         check_order(getattr(self, "phases", ()))
-        self.error()
+        self.own_error()
 
     def subjects(self) -> tuple[str, ...]:
         """The person."""
         return (self.human,)
 
-    def error(self) -> Accuracy | None:
-        """Accuracy of each angle [rad]; None when nobody gave one."""
+    def own_error(self) -> Accuracy | None:
+        """Accuracy of each angle [rad] that the rule itself was given; None when it was not."""
         return accuracy_of(self.accuracy, self.joint_accuracy)
+
+    def error(self, model: Model) -> Accuracy | None:
+        """Accuracy of each angle [rad]: the rule's own, else the worst of the devices that see the person.
+
+        None when nobody knows one.
+        """
+        own = self.own_error()
+        return captured_accuracy(model, self.human) if own is None else own
 
 
 class ScoredPosture(PostureRule, frozen=True, kw_only=True):
@@ -188,7 +197,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
     def compute(self, model: Model) -> Compute:
         """Look up every name in the model once and return the function that computes scores."""
         read = bind_posture(model, self.human, self.unmeasured)
-        phases, unknown, error = self.entered(model), self.PHASE(), self.error()
+        phases, unknown, error = self.entered(model), self.PHASE(), self.error(model)
         watch = (
             None if self.detect is None else WorkMonitor(self.detect, hold=self.static, count=self.REPEATED)
         )
@@ -254,12 +263,12 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
                 *entered(self.entered(model), self.PHASE()),
                 *watched(self.detect, self.static, self.REPEATED),
                 *choices(self.thresholds, self.arm),
-                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured, model, self.human),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(
                 *not_modelled,
                 PROJECTION_NOTE,
-                *((ACCURACY_NOTE,) if self.error() is not None else ()),
+                *((ACCURACY_NOTE,) if self.error(model) is not None else ()),
             ),
         )

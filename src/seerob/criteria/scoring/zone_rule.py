@@ -75,7 +75,7 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         """Look up every name in the model once and return the function that computes the score."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, SupportPhase.from_task)
-        rows, error = self.zones(model).rows, self.error()
+        rows, error = self.zones(model).rows, self.error(model)
         self._refuse_idle(rows)
         watch = ZoneMonitor(rows, from_rest=self.from_rest)
 
@@ -216,12 +216,12 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
                 *provenance.motion(model, self.human),
                 *(entered(phases, SupportPhase()) if asks else ()),
                 *(_stated(row) for row in table.rows),
-                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured, model, self.human),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(
                 "angles that the table has no row for",
-                *((ACCURACY_NOTE,) if self.error() is not None else ()),
+                *((ACCURACY_NOTE,) if self.error(model) is not None else ()),
             ),
         )
 

@@ -132,6 +132,9 @@ class Captured:
     """Number of frames in ``frames``."""
     calibration: tuple[CaptureFrame, ...] = ()
     """Calibration poses that the file contains."""
+    joints_known: bool = True
+    """Whether its convention says where its joints are in a body; else only its pose of rest, or a
+    calibration, tells how somebody leans."""
     rest: CaptureFrame | None = None
     """A skeleton's pose when nothing is turned, in any axes; None where turns do not tell how it moves."""
     placed: bool = True

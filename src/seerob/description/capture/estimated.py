@@ -134,7 +134,20 @@ def bare(observed: Collection[str], placed: Collection[str], turns: Collection[T
     )
 
 
-def undetermined(turns: Collection[Turn]) -> frozenset[tuple[str, int]]:
+_LEANING = frozenset(
+    (angle, side)
+    for angle, sides in (
+        ("trunk_flexion", 1),
+        ("neck_flexion", 1),
+        ("shoulder_flexion", 2),
+        ("shoulder_elevation", 2),
+    )
+    for side in range(sides)
+)
+"""Angles that are off with where a device has the joints of the trunk."""
+
+
+def undetermined(turns: Collection[Turn], *, leaning: bool = False) -> frozenset[tuple[str, int]]:
     """Angles of `humans.angles` that nothing tells, each with its side: 0 right or none, 1 left.
 
     A wrist bends forward or sideways only to somebody who knows how the forearm is turned about itself: by
@@ -142,6 +155,7 @@ def undetermined(turns: Collection[Turn]) -> frozenset[tuple[str, int]]:
 
     Args:
         turns: Of `turned`.
+        leaning: Whether somebody who stands upright may lean by what a device sees.
     """
     neck = (("neck_side_bend", 0), ("neck_twist", 1), ("neck_flexion", 2))
     found = {(angle, 0) for angle, axis in neck if ("head", axis) not in turns}
@@ -152,7 +166,7 @@ def undetermined(turns: Collection[Turn]) -> frozenset[tuple[str, int]]:
         for angle, axis in (("wrist_deviation", 0), ("wrist_flexion", 2)):
             if not rolled or (hand, axis) not in turns:
                 found.add((angle, k))
-    return frozenset(found)
+    return frozenset(found | _LEANING) if leaning else frozenset(found)
 
 
 def swing(bone: str, q: Array, lower: Array, upper: Array) -> float:

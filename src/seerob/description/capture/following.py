@@ -181,6 +181,8 @@ class _Device:
     """Bone → when a place of it was last seen that says where the person stands."""
     turned: dict[Turn, float] = field(default_factory=dict)
     """Bone and axis → when it was last seen how it is turned about it."""
+    leaning: dict[str, float] = field(default_factory=dict)
+    """Bone → when it was last seen by joints that may lean while the person does not."""
     smoother: Smoother = field(default_factory=Smoother)
     frozen: Frozen = field(default_factory=Frozen)
 
@@ -298,6 +300,7 @@ class Following:
         turns = self._seen(t, lambda device: device.turned)
         open_ends = ENDS & observed.keys() - aimed(turns)
         unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}
+        leaning = bool(self._seen(t, lambda device: device.leaning))
         reason = "; ".join(reasons[:4])
         bones = bare(observed, placed, turns)
         anchored = self._seen(t, lambda device: device.anchored)
@@ -315,7 +318,8 @@ class Following:
         # Wherever the twin waited, nobody knows how a person who is seen for the first time came.
         anew = last is None or elsewhere
         return Followed(
-            t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed, undetermined(turns),
+            t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed,
+            undetermined(turns, leaning=leaning),
             unplaced, displaced, slack,
         )  # fmt: skip
 
@@ -344,7 +348,10 @@ class Following:
         reason = sample.invalid_reason(name)
         if sample.quality is Quality.INVALID:
             return _DeviceReading([], reason)
-        return self._believed(device, points, instant, reason, placed=sample.placed)
+        reading = self._believed(device, points, instant, reason, placed=sample.placed)
+        if not sample.upright:
+            device.leaning |= {point.bone: instant for point in reading.points}
+        return reading
 
     def _believed(
         self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str, *, placed: bool

@@ -27,7 +27,7 @@ from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, SIDES, bone_poses, without_side
 
 AXIS = np.cos(np.radians(20.0))
-"""Up and right are axes of the file when the way along them has this share of the way."""
+"""Up is an axis of the file when the way along it has this share of the way; right is, when it has."""
 LEANING, HANGING, ASIDE, BENT = np.radians([25.0, 35.0, 30.0, 30.0])
 """What still stands: a trunk off the vertical, thighs and shanks off it, arms out of the frontal plane or
 above the horizontal, elbows. Choices; the skeletons of the CMU library lean by 16° and spread legs by 20°."""
@@ -69,11 +69,11 @@ def by_rest_pose(
     orientation: float = 1.0,
     bones: Mapping[str, float] | None = None,
     mapped: Collection[str] = (),
-) -> tuple[Observer, tuple[Finding, ...]]:
+) -> tuple[Observer, tuple[Finding, ...], bool]:
     """Bind a skeleton's segments by the pose in which nothing is turned.
 
     Args:
-        rest: That pose, in any axes.
+        rest: That pose, in any axes; or somebody who stands in a pose of calibration.
         layout: Of the device, with parents.
         observer: Its joints bound to bones.
         description: The person.
@@ -83,33 +83,31 @@ def by_rest_pose(
         mapped: Names that the user gave a bone.
 
     Returns:
-        The observer as it was where nobody stands in that pose, with a warning that says why.
+        The observer, what was found, and whether somebody stands in that pose: else the observer is as it
+        was, and a warning says why.
     """
     joints = {row.bone: rest.positions[row.index] for row in observer.rows if not row.at.any()}
     axes, why = _axes(joints)
     body = _Body(joints, axes)
     why = why or _not_standing(body)
+    pose = f"pose of {rest.pose or 'calibration'}"
     if why:
-        text = (
-            f"its pose of rest is not that of somebody who stands ({why}), so how its segments are turned is "
-            "not used; joints alone, whose places differ between programs, tell trunk and neck to some 20°: "
-            "give accuracy, or a calibration"
-        )
-        return observer, (Finding(level="warning", subject=subject, text=text),)
+        text = f"its {pose} is not that of somebody who stands ({why}), so turns are not used"
+        return observer, (Finding(level="warning", subject=subject, text=text),), False
     turned, rolled = _turned(body, observer, rest, description)
     weighed = {bone: orientation * _weight(bone) * (bones or {}).get(bone, 1.0) for bone in BONES}
     chest = _chest(layout, observer, mapped)
     rows = tuple(_rows((*observer.rows, *chest), chest, rest, body, turned, rolled, weighed, description))
     unrolled = [side for side in SIDES if not rolled[side]]
     text = (
-        f"segments are turned against the pose of rest, in which somebody stands with arms "
+        f"segments are turned against the {pose}, in which somebody stands with arms "
         f"{np.degrees(_raised(body)):.0f}° from hanging"
     )
     said = [Finding(level="assumed", subject=subject, text=text)]
     if unrolled:
         text = f"no thumb shows how palms are turned in it: not assessed of {' and '.join(unrolled)}"
         said.append(Finding(level="note", subject=subject, text=text))
-    return replace(observer, rows=rows), tuple(said)
+    return replace(observer, rows=rows), tuple(said), True
 
 
 def _axes(joints: Mapping[str, Array]) -> tuple[Array, str]:
@@ -121,13 +119,19 @@ def _axes(joints: Mapping[str, Array]) -> tuple[Array, str]:
         return np.eye(3), f"no joint for {missing[0]}"
     right = sum(joints[f"right_{bone}"] - joints[f"left_{bone}"] for bone in ("thigh", "upper_arm"))
     up = joints["head"] - 0.5 * (joints["right_foot"] + joints["left_foot"])
-    found = [_axis(np.asarray(way)) for way in (up, right)]
-    if found[0] is None or found[1] is None or found[0] @ found[1] != 0:
-        return np.eye(3), "feet to head and left to right are along no axes of the file"
-    return np.stack([np.cross(found[0], found[1]), found[0], found[1]], axis=1), ""
+    vertical = _axis(np.asarray(up))
+    if vertical is None:
+        return np.eye(3), "from feet to head is along no axis of the file"
+    level = np.asarray(right - vertical * (vertical @ right))
+    if not np.linalg.norm(level) > AXIS * np.linalg.norm(right):
+        return np.eye(3), "left and right are above each other"
+    aside = _axis(level)
+    aside = level / np.linalg.norm(level) if aside is None else aside
+    return np.stack([np.cross(vertical, aside), vertical, aside], axis=1), ""
 
 
 def _axis(way: Array) -> Array | None:
+    """The axis of the file that a way is along, with its sign; None when it is along none."""
     size, axis = float(np.linalg.norm(way)), int(np.abs(way).argmax())
     if not size > 0 or abs(way[axis]) < AXIS * size:
         return None

@@ -27,6 +27,7 @@ from seerob.description.capture.rest_pose import by_rest_pose
 from seerob.devices.capture.options import (
     Calibration,
     CutOff,
+    Error,
     Instant,
     Mapped,
     Weights,
@@ -35,10 +36,12 @@ from seerob.devices.capture.options import (
     observer,
     person,
     placed_only,
+    posture_error,
+    unknown_error,
 )
 from seerob.files.motion_capture.markers import MarkerReading
 from seerob.files.motion_capture.upright import Up
-from seerob.workstation.source import Opened, Source, Target
+from seerob.workstation.source import Opened, PostureError, Source, Target
 
 
 class Length(StrEnum):
@@ -59,6 +62,8 @@ class CaptureFile(Source, frozen=True, kw_only=True):
 
     shares: ClassVar[bool] = True
     captured: ClassVar[str] = "file"
+    known_error: ClassVar[PostureError | None] = None
+    """How far angles of a posture may be off, as somebody found."""
 
     human: str
     """The person it drives; several devices may drive the same one."""
@@ -76,6 +81,8 @@ class CaptureFile(Source, frozen=True, kw_only=True):
     """Cut-off frequency of a low-pass filter against the device's noise [Hz]; no filter when not given."""
     weights: Weights = Weights()
     """How much it counts beside other devices."""
+    accuracy: Error | None = None
+    """How far each angle of a posture may be off [rad]; what is known of the device when not given."""
     convention: str = ""
     """Whose names they are (``xsens``, ``azure_kinect`` …); what the file says, or found by the names."""
     mapping: dict[str, str | Mapped] = field(default_factory=dict)
@@ -88,6 +95,10 @@ class CaptureFile(Source, frozen=True, kw_only=True):
     def target(self) -> str:
         """The person."""
         return self.human
+
+    def posture_error(self) -> PostureError | None:
+        """What the file gives, else what is known of the device."""
+        return posture_error(self.accuracy, self.known_error)
 
     def read(self, path: Path) -> Captured:
         """What the file holds of the person `subject`.
@@ -119,13 +130,16 @@ class CaptureFile(Source, frozen=True, kw_only=True):
         duration, checked = _check(
             BodySamples(self, captured, bound), len(captured.layout.names), subject, self.file
         )
+        stands = captured.joints_known
+        rest = captured.rest
         if self.calibration.pose is not CalibrationPose.NONE:
-            window = self._window(captured)
+            window = list(self._window(captured))
             bound, calibration = calibrated(self, window, captured.layout, bound, description)
             findings = (*findings, *calibration.findings)
-        elif captured.rest is not None:
-            bound, found = by_rest_pose(
-                captured.rest,
+            rest = window[len(window) // 2]
+        if not stands and rest is not None:
+            bound, found, stands = by_rest_pose(
+                rest,
                 captured.layout,
                 bound,
                 description,
@@ -138,8 +152,16 @@ class CaptureFile(Source, frozen=True, kw_only=True):
         world_from_root = np.eye(4) if target is None else np.array(target.world_from_base or np.eye(4))
         bound, fit = registered(captured, bound, description, world_from_root, subject)
         bound, left_out = placed_only(bound, subject, "no frame shows where")
-        findings = (*findings, *fit, *left_out)
-        samples = BodySamples(self, captured, bound)
+        unknown = unknown_error(self.posture_error(), self.file, subject)
+        findings = (*findings, *fit, *left_out, *unknown)
+        upright = stands or self.accuracy is not None
+        if not upright:
+            text = (
+                "flexion of trunk, neck and upper arms is not assessed: programs have joints of a trunk in "
+                "different places, and who stands upright may lean by 20°; give a calibration, or accuracy"
+            )
+            findings = (*findings, Finding(level="warning", subject=subject, text=text))
+        samples = BodySamples(self, captured, bound, upright=upright)
         return Opened(
             samples=samples,
             duration=duration,
@@ -191,6 +213,7 @@ class BodySamples:
     source: CaptureFile
     captured: Captured
     observer: Observer
+    upright: bool = True
 
     def __iter__(self) -> Iterator[BodySample]:
         source = self.source
@@ -218,6 +241,7 @@ class BodySamples:
                 hold=source.hold,
                 smoothing=source.smoothing or 0.0,
                 placed=self.captured.placed,
+                upright=self.upright,
                 quality=Quality.GOOD,
             )
             seq += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Protocol
 
@@ -22,7 +23,7 @@ from seerob.description.capture.observing import Observer, bind, with_mounts, wi
 from seerob.description.capture.smoothing import HIGHEST, LOWEST, group_delay
 from seerob.description.description import Description
 from seerob.description.humans.skeleton import BONES
-from seerob.workstation.source import Target
+from seerob.workstation.source import PostureError, Target
 
 Weight = Annotated[float, Meta(ge=0, le=1e6)]
 Instant = Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
@@ -62,6 +63,45 @@ class Calibration(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Begin of that time, from the first frame [s]."""
     duration: Seconds = 1.0
     """Its length [s]."""
+
+
+Error = Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"}, extra_json_schema={"x-unit": "rad"})]
+
+_NINE, _TWELVE, _FIFTEEN = math.radians(9.0), math.radians(12.0), math.radians(15.0)
+XSENS = PostureError(
+    angles=_NINE,
+    joints=dict.fromkeys(("clavicle", "shoulder", "elbow", "forearm", "wrist"), _FIFTEEN),
+    source=(
+        "Mavor et al. 2020 (Sensors 20, 4280), Xsens against optical markers in walking, running, kneeling: "
+        "root mean square below 9° (legs), 15° (arms); of trunk and neck none was found, that of legs holds"
+    ),
+)
+AZURE_KINECT = PostureError(
+    angles=_FIFTEEN,
+    joints={"knee": _TWELVE},
+    source=(
+        "Ma et al. 2020 (APSIPA), two Azure Kinects against Vicon in walking: root mean square 11.9° "
+        "(knees), 15.1° (hips); of other joints none was found, that of hips is taken"
+    ),
+)
+
+
+def posture_error(given: float | None, known: PostureError | None) -> PostureError | None:
+    """What the workstation file gives [rad], else what is known of the device."""
+    if given is None:
+        return known
+    return PostureError(angles=given, given=True, source="workstation file")
+
+
+def unknown_error(known: PostureError | None, device: str, subject: str) -> tuple[Finding, ...]:
+    """What is to be said where nobody knows how far angles may be off."""
+    if known is not None:
+        return ()
+    text = (
+        f"how far angles of a posture may be off that {device} captures nobody says: scores are those of the "
+        "angles as they are; give its accuracy"
+    )
+    return (Finding(level="assumed", subject=subject, text=text),)
 
 
 CutOff = Annotated[

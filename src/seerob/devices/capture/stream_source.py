@@ -22,6 +22,7 @@ from seerob.description.humans import manikin
 from seerob.devices.capture.options import (
     Calibration,
     CutOff,
+    Error,
     Instant,
     Mapped,
     Weights,
@@ -30,9 +31,11 @@ from seerob.devices.capture.options import (
     observer,
     person,
     placed_only,
+    posture_error,
+    unknown_error,
 )
 from seerob.devices.live.listening import LiveSource, say_once
-from seerob.workstation.source import Target
+from seerob.workstation.source import PostureError, Target
 
 _log = logging.getLogger(__name__)
 
@@ -46,6 +49,8 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
 
     shares: ClassVar[bool] = True
     captured: ClassVar[str] = "live"
+    known_error: ClassVar[PostureError | None] = None
+    """How far angles of a posture may be off, as somebody found."""
 
     human: str
     """The person it drives; several devices may drive the same one."""
@@ -61,6 +66,8 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
     """Cut-off frequency of a low-pass filter against the device's noise [Hz]; no filter when not given."""
     weights: Weights = Weights()
     """How much it counts beside other devices."""
+    accuracy: Error | None = None
+    """How far each angle of a posture may be off [rad]; what is known of the device when not given."""
     convention: str = ""
     """Whose names they are (``xsens``, ``azure_kinect`` …); what the device says, or found by the names."""
     mapping: dict[str, str | Mapped] = field(default_factory=dict)
@@ -71,6 +78,10 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
     def target(self) -> str:
         """The person."""
         return self.human
+
+    def posture_error(self) -> PostureError | None:
+        """What the file gives, else what is known of the device."""
+        return posture_error(self.accuracy, self.known_error)
 
     def behind(self) -> float:
         """Delay behind the world that it needs [s]; latency and filter come on top of the period."""
@@ -148,7 +159,7 @@ class _Hearing:
                 self._observer, findings = observer(
                     source, layout, self._description, file=source.name or "stream"
                 )
-                _say(findings)
+                _say((*findings, *unknown_error(source.posture_error(), source.name, source.human)))
                 if self._calibrated:
                     self._drop_unplaced()
         return self._observer

@@ -495,6 +495,7 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
         rate=1 / found.period,
         count=int(found.whole().sum()),
         placed=placed,
+        joints_known=False,
         rest=None if shifting(found) else _rest(found, METRES[unit], up),
         lengths=_lengths(found, METRES[unit]),
         findings=tuple(said),

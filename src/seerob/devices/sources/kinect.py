@@ -23,13 +23,13 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import CaptureFrame, Layout
-from seerob.devices.capture.options import placement
+from seerob.devices.capture.options import AZURE_KINECT, placement
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.listening import Contact, contact_of
 from seerob.files.motion_capture.persons import Follower, numbers
 from seerob.files.motion_capture.upright import camera_upright, upright_rotation
 from seerob.protocols.tracking.kinect import LAYOUT, PORT, Body, Picture, from_datagrams, from_websocket
-from seerob.workstation.source import Opened, Target
+from seerob.workstation.source import Opened, PostureError, Target
 from seerob.workstation.workstation import Pose
 
 _log = logging.getLogger(__name__)
@@ -51,6 +51,8 @@ class Link(StrEnum):
 
 class Kinect(CaptureStream, frozen=True, kw_only=True):
     """A depth camera that tracks bodies (Azure Kinect, Orbbec Femto), live, from a sender on its PC."""
+
+    known_error: ClassVar[PostureError | None] = AZURE_KINECT
 
     loads: ClassVar[tuple[str, ...]] = ("websockets.asyncio.client",)
     asks: ClassVar[str] = (

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Captured
 from seerob.devices.capture.file_source import CaptureFile
+from seerob.devices.capture.options import AZURE_KINECT
 from seerob.files.motion_capture import kinect_recording, ros_bag
 from seerob.files.motion_capture.frame_arrays import about
 from seerob.files.motion_capture.kinect_recording import Reading
 from seerob.files.tables.mapping import LengthUnit, TimeUnit
+from seerob.workstation.source import PostureError
 from seerob.workstation.workstation import Pose
 
 BAGS = (".bag", ".db3", ".mcap")
@@ -20,6 +23,8 @@ TEXTS = (".csv", ".txt", ".tsv")
 
 class KinectRecording(CaptureFile, frozen=True, kw_only=True):
     """A recording of a depth camera that tracks bodies (JSON, ROS bag, text)."""
+
+    known_error: ClassVar[PostureError | None] = AZURE_KINECT
 
     topic: str = ""
     """Topic that is read, of a bag with several topics of skeletons."""

@@ -17,7 +17,7 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -25,6 +25,7 @@ from msgspec import Meta
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
+from seerob.devices.capture.options import XSENS
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.capture.xsens import anatomical, differences
 from seerob.devices.live.listening import say_once
@@ -44,6 +45,7 @@ from seerob.protocols.tracking.mvn_pose import (
     pose,
     unit_of,
 )
+from seerob.workstation.source import PostureError
 
 _log = logging.getLogger(__name__)
 
@@ -261,6 +263,8 @@ class Transport(StrEnum):
 
 class Mvn(CaptureStream, frozen=True, kw_only=True):
     """A person in an Xsens suit, live, through MVN's network streamer."""
+
+    known_error: ClassVar[PostureError | None] = XSENS
 
     bind: str = "127.0.0.1"
     """Own address on the network of the computer with MVN; when not given, only this machine is heard."""

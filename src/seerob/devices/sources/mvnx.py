@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, ClassVar
 from xml.etree.ElementTree import ParseError
 
 import numpy as np
@@ -28,8 +28,10 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, product
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.devices.capture.file_source import CaptureFile
+from seerob.devices.capture.options import XSENS
 from seerob.devices.capture.xsens import FROM_ANATOMICAL, anatomical, beside_arms, correction, differences
 from seerob.protocols.tracking.mvn_pose import JOINTS, METRES, PARENTS, SEGMENTS, unit_of
+from seerob.workstation.source import PostureError
 
 CHUNK = 1 << 16
 LONGEST = 1 << 20
@@ -638,6 +640,8 @@ def _every(q: Array, turn: Array | None) -> Array:
 
 class Mvnx(CaptureFile, frozen=True, kw_only=True):
     """A person moved by a recording of Xsens MVN (MVNX 3 or 4)."""
+
+    known_error: ClassVar[PostureError | None] = XSENS
 
     def read(self, path: Path) -> Captured:
         """The file's 23 segments, and its calibration poses."""

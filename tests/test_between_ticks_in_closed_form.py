@@ -19,7 +19,19 @@ from seerob.criteria.between_ticks import FEW, MOST, least_margin, watched
 from seerob.criteria.criterion import Criterion, Follows, Moment
 from seerob.criteria.question import bound_to
 from seerob.session.run import Judge, engine_of, pump, ticks
-from seerob.twin.spans import ROUNDING, AllFalls, Fall, Points, Span, approaching, speeding
+from seerob.twin.attachments import Attachments
+from seerob.twin.spans import (
+    ROUNDING,
+    AllFalls,
+    Fall,
+    Path,
+    Points,
+    Span,
+    Turning,
+    approaching,
+    coupling_of,
+    speeding,
+)
 
 
 def test_the_falls_of_all_in_one_call_are_those_of_each_by_itself():
@@ -43,6 +55,28 @@ def test_the_falls_of_all_in_one_call_are_those_of_each_by_itself():
         assert found[every[1]] == Fall(*fast)
     span.fast[rows[0][0]] = np.nan
     assert np.isnan(AllFalls(every).of(span)[every[0]].fall)
+
+
+def test_how_jacobians_change_is_told_in_that_call_too(tmp_path):
+    two = TWO_R + TWO_R.replace('"arm"', '"other"').replace(
+        "[[robots]]", "[[robots]]\nbase = { position = [3, 0, 0] }"
+    )
+    model = made(tmp_path, two, {"arm.urdf": two_r()}).model
+    points, rng = Points(model), np.random.default_rng(3)
+    ends = [(m, m.mj_bodies[-1]) for m in model.mechanisms.values()]
+    every = [
+        Turning(points, points.add(body, np.array([far, 0.0, 0.2])), coupling_of(model, mechanism))
+        for mechanism, body in ends
+        for far in (0.1, 1.0)
+    ]
+    path = Path(np.array([0.0, 0.004, 0.01]), rng.random((3, model.mj.nq)), rng.random((3, model.mj.nv)))
+    span = points.span(path, 0.0, 0.01, Attachments(model).ids, model.mj)
+    found = AllFalls([*every[:3], speeding([0]), None, every[3]]).of(span)
+    for each in every:
+        assert found[each].fall == pytest.approx(each(span, 0.0).fall, rel=1e-12)
+        assert found[each].fall > 1e-3
+        assert found[each].bend == np.inf
+    assert len({found[each].fall for each in every}) == 4
 
 
 @pytest.mark.parametrize("kind", [float, lambda x: np.array([x, 9.0]), lambda x: np.array([9.0, x])])

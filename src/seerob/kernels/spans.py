@@ -219,48 +219,6 @@ def greatest(values: Array, rows: Indices) -> float:
 
 
 @njit(
-    f"void({_ROW}, {_ROW}, {_ROW}, f8, f8, i8[::1], i8[::1], b1[::1], {_ROW}, {_ROW})",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def all_falls(
-    fast: Array,
-    quick: Array,
-    bend: Array,
-    T: float,
-    rounding: float,
-    start: Indices,
-    rows: Indices,
-    nears: Flags,
-    fall: Array,
-    below: Array,
-) -> None:
-    """How far distances and speeds of sets of points can fall within a span; writes the last two arguments.
-
-    Args:
-        fast: Of points, from `point_bounds`, as the next two, shape (p,).
-        quick: Likewise.
-        bend: Likewise.
-        T: Length of the span [s].
-        rounding: Added to each bound.
-        start: Where the points of each set begin, shape (2 n + 1,): two sets for each figure, of which the
-            second is that of whom a distance is to.
-        rows: The points of all sets.
-        nears: Whether each is a distance; otherwise a speed, shape (n,).
-        fall: From any instant to any other [m or m/s], shape (n,).
-        below: Below the lesser of both ends, shape (n,); infinite where no more is known.
-    """
-    for i in range(len(fall)):
-        first, second = rows[start[2 * i] : start[2 * i + 1]], rows[start[2 * i + 1] : start[2 * i + 2]]
-        if nears[i]:
-            one, other = greatest(fast, first) * T + rounding, greatest(fast, second) * T + rounding
-            fall[i], below[i] = one + other, np.inf
-        else:
-            fall[i], below[i] = greatest(quick, first) * T + rounding, greatest(bend, first) + rounding
-
-
-@njit(
     f"void(i8[::1], b1[::1], {_ROW}, {_ROW}, {_ROW}, b1[::1], {_ROWS}, {_ROW})",
     cache=True,
     nogil=True,
@@ -307,3 +265,75 @@ def column_changes(
         if moves[joints[i]]:
             for c in range(len(found)):
                 found[c] += change * shares[joints[i], c]
+
+
+@njit(
+    f"void({', '.join([_ROW] * 5)}, f8, f8, i8[::1], i8[::1], b1[::1], "
+    f"i8[::1], i8[::1], i8[::1], b1[::1], {_ROW}, b1[:,::1], f8[:,:,::1], {_ROWS})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def all_falls(
+    fast: Array,
+    quick: Array,
+    bend: Array,
+    qd: Array,
+    away: Array,
+    T: float,
+    rounding: float,
+    start: Indices,
+    rows: Indices,
+    nears: Flags,
+    points: Indices,
+    chains: Indices,
+    joints: Indices,
+    turns: Flags,
+    lengths: Array,
+    moves: Flags,
+    shares: Array,
+    falls: Array,
+) -> None:
+    """How far figures can fall within a span; writes the last argument.
+
+    Those are distances and speeds of sets of points, and after them singular values of Jacobians.
+
+    Args:
+        fast: Of points, from `point_bounds`, as the next two, shape (p,).
+        quick: Likewise.
+        bend: Likewise.
+        qd: Largest speeds of all joints [rad/s or m/s], shape (nv,).
+        away: Their largest ways from the model's pose, shape (nv,).
+        T: Length of the span [s].
+        rounding: Added to each bound.
+        start: Where the points of each set begin, shape (2 n + 1,): two sets for each distance or speed, of
+            which the second is that of whom a distance is to.
+        rows: The points of all sets.
+        nears: Whether each is a distance; otherwise a speed, shape (n,).
+        points: Of which m Jacobians are, shape (m,).
+        chains: Where the joints of each point begin, see `point_bounds`, as the next three, shape (p + 1,).
+        joints: Likewise.
+        turns: Likewise.
+        lengths: Likewise [m].
+        moves: As of `column_changes`, shape (m, nv).
+        shares: Likewise, 0 in columns that there are not, shape (m, nv, c).
+        falls: From any instant to any other [m, m/s or m/rad], and below the lesser of both ends, infinite
+            where no more is known, shape (2, n + m).
+    """
+    fall, below = falls[0], falls[1]
+    n, found = len(nears), np.empty(shares.shape[2])
+    for i in range(n):
+        first, second = rows[start[2 * i] : start[2 * i + 1]], rows[start[2 * i + 1] : start[2 * i + 2]]
+        if nears[i]:
+            one, other = greatest(fast, first) * T + rounding, greatest(fast, second) * T + rounding
+            fall[i], below[i] = one + other, np.inf
+        else:
+            fall[i], below[i] = greatest(quick, first) * T + rounding, greatest(bend, first) + rounding
+    for i in range(len(moves)):
+        # Singular values change by no more than the norm of how much the matrix does.
+        a, b = chains[points[i]], chains[points[i] + 1]
+        column_changes(joints[a:b], turns[a:b], lengths[a:b], qd, away, moves[i], shares[i], found)
+        square = 0.0
+        for change in found:
+            square += change * change
+        fall[n + i], below[n + i] = np.sqrt(square) * T, np.inf

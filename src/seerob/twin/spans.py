@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, overload
 
 import mujoco
@@ -214,6 +215,8 @@ class Fall(NamedTuple):
     """Below the lesser margin of both ends."""
 
 
+_FALL = partial(tuple.__new__, Fall)
+"""Makes one of a pair, without a call of Python for each."""
 UNBOUNDED = Fall(np.inf)
 """The fall within a span of which nothing is known."""
 
@@ -343,6 +346,11 @@ class Points:
         self._away[rows] += np.minimum(away, faster * lasts / 2)
         self._speed[rows] += faster
         self._change[rows] = np.maximum(self._change[rows], most)
+
+    @property
+    def every_chain(self) -> tuple[Indices, Indices, NDArray[np.bool_], Array]:
+        """Where the joints of each point begin, and `chain` of one after the other."""
+        return self._start, self._joints, self._turns, self._lengths
 
     def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
         """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
@@ -619,6 +627,22 @@ class Speeding:
         return Fall(faster + ROUNDING, greatest(span.bend, self.rows) + ROUNDING)
 
 
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """Bounds the change of singular values of a point's linear Jacobian, by the norm of its own change."""
+
+    points: Points
+    point: int
+    """See `Points.add`."""
+    coupling: Coupling
+    """Whose columns."""
+
+    def __call__(self, span: Span, _: Array | float) -> Fall:
+        """How far they can fall within a span [m/rad or 1]."""
+        moved = self.points.column_changes(self.point, span, self.coupling)
+        return Fall(math.sqrt(float(moved @ moved)) * span.T)
+
+
 def approaching(a: Iterable[int], b: Iterable[int]) -> Approaching:
     """Bound the change of a distance between two sets of points by the ways of both."""
     return Approaching(rows_of(a), rows_of(b))
@@ -629,31 +653,47 @@ def speeding(points: Iterable[int]) -> Speeding:
     return Speeding(rows_of(points))
 
 
+NO_CHAINS = np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_), np.zeros(0)
+
+
 class AllFalls:
-    """Bounds what `approaching` and `speeding` do, of many figures in one compiled call.
+    """Bounds what `Approaching`, `Speeding` and `Turning` do, of many figures in one compiled call.
 
     Args:
         falls: Of every figure; others than those are left out.
     """
 
     def __init__(self, falls: Iterable[Falls | None]) -> None:
-        self._own = [each for each in falls if isinstance(each, Approaching | Speeding)]
+        every = [each for each in falls if isinstance(each, Approaching | Speeding | Turning)]
+        own = [each for each in every if not isinstance(each, Turning)]
+        self._turning = [each for each in every if isinstance(each, Turning)]
+        self._own = (*own, *self._turning)
         sets = [
             rows
-            for each in self._own
+            for each in own
             for rows in (
                 (each.first, each.second) if isinstance(each, Approaching) else (each.rows, each.rows[:0])
             )
         ]
-        self._nears = np.array([isinstance(each, Approaching) for each in self._own], bool)
+        self._nears = np.array([isinstance(each, Approaching) for each in own], bool)
         self._start = np.cumsum([0, *map(len, sets)])
         self._rows = np.concatenate([np.zeros(0, np.int64), *sets])
+        self._points = np.array([each.point for each in self._turning], np.int64)
+        couplings = [each.coupling for each in self._turning]
+        joints, columns = (max((each.shares.shape[k] for each in couplings), default=0) for k in (0, 1))
+        self._moves = np.zeros((len(couplings), joints), bool)
+        self._shares = np.zeros((len(couplings), joints, columns))
+        for moves, shares, each in zip(self._moves, self._shares, couplings, strict=True):
+            moves[:], shares[:, : each.shares.shape[1]] = each
+        self._found = np.empty((2, len(self._own)))
 
     def of(self, span: Span) -> dict[Falls, Fall]:
         """What each says of a span."""
-        falls, below = np.empty((2, len(self._own)))
+        start, joints, turns, lengths = self._turning[0].points.every_chain if self._turning else NO_CHAINS
         all_falls(
-            span.fast, span.quick, span.bend, span.T, ROUNDING,
-            self._start, self._rows, self._nears, falls, below,
+            span.fast, span.quick, span.bend, span.qd, span.away, span.T, ROUNDING,
+            self._start, self._rows, self._nears,
+            self._points, start, joints, turns, lengths, self._moves, self._shares, self._found,
         )  # fmt: skip
-        return dict(zip(self._own, map(Fall, falls.tolist(), below.tolist()), strict=True))
+        falls, below = self._found.tolist()
+        return dict(zip(self._own, map(_FALL, zip(falls, below, strict=True)), strict=True))

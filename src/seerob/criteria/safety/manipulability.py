@@ -18,7 +18,7 @@ from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.twin.spans import Fall, Falls, Points, Span, coupling_of
+from seerob.twin.spans import Falls, Points, Turning, coupling_of
 from seerob.twin.state import State
 
 STEP = math.radians(1)
@@ -157,13 +157,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         mechanism = model.carrier(frame)
         local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
         point = points.add(frame.mj, local)
-        coupling = coupling_of(model, mechanism)
-
-        def falls(span: Span, _: Array | float) -> Fall:
-            moved = points.column_changes(point, span, coupling)
-            return Fall(math.sqrt(float(moved @ moved)) * span.T)
-
-        return falls
+        return Turning(points, point, coupling_of(model, mechanism))
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

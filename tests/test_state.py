@@ -353,6 +353,12 @@ def test_what_is_drawn_later_is_where_it_was_and_is_worked_out_once(cell):
     assert state.drawn_point(frame, offset.copy())() is point()
     with pytest.raises(ValueError, match="read-only"):
         point()[0] = 0.0
+    before = point()
+    state.data.qpos[0] += 0.5
+    state.refresh(1.0)
+    rotation, position = state.pose(frame)
+    close(state.drawn_point(frame, offset)(), position + rotation @ offset)
+    assert np.abs(state.drawn_point(frame, offset)() - before).max() > 0.01
 
 
 def test_poses_are_seven_float32_per_body(cell):

@@ -74,17 +74,23 @@ class _Point(NamedTuple):
     wxyz: list[float]
 
 
+Local = tuple[Frame, int, float, float, float]
+"""A frame, MuJoCo's body that it is on, and a point of it as that body has it [m]."""
+
+
 class _DrawnPoints:
     """Where MuJoCo's bodies were at one tick, for what is drawn later.
 
     Args:
         xmat: World from body, row by row, shape (m, 9).
         xpos: [m], shape (m, 3).
+        local: What of the points that are drawn is the same at all ticks.
     """
 
-    def __init__(self, xmat: Array, xpos: Array) -> None:
+    def __init__(self, xmat: Array, xpos: Array, local: dict[tuple[int, bytes], Local]) -> None:
         # MuJoCo writes through its own at the next tick.
         self._xmat, self._xpos = xmat.copy(), xpos.copy()
+        self._local = local
         self._points: dict[tuple[int, bytes], tuple[Frame, Array]] = {}
 
     def point(self, frame: Frame, offset: Array) -> Array:
@@ -92,11 +98,19 @@ class _DrawnPoints:
         key = id(frame), offset.tobytes()
         kept = self._points.get(key)
         if kept is None:
-            ox, oy, oz = offset.tolist()
-            x, y, z = (a * ox + b * oy + c * oz + d for a, b, c, d in frame.body_from_frame[:3].tolist())
-            turned, at = self._xmat[frame.mj].tolist(), self._xpos[frame.mj].tolist()
-            rows = zip(at, turned[0::3], turned[1::3], turned[2::3], strict=True)
-            found = np.array([p + (a * x + b * y + c * z) for p, a, b, c in rows])
+            bound = self._local.get(key)
+            if bound is None or bound[0] is not frame:
+                ox, oy, oz = offset.tolist()
+                x, y, z = (a * ox + b * oy + c * oz + d for a, b, c, d in frame.body_from_frame[:3].tolist())
+                if len(self._local) >= MOST_PLACES:
+                    self._local.clear()
+                bound = self._local[key] = frame, frame.mj, x, y, z
+            _, body, x, y, z = bound
+            a, b, c, d, e, f, g, h, i = self._xmat[body].tolist()
+            px, py, pz = self._xpos[body].tolist()
+            found = np.array(
+                (px + (a * x + b * y + c * z), py + (d * x + e * y + f * z), pz + (g * x + h * y + i * z))
+            )
             found.setflags(write=False)
             # With the frame itself: another one may get the id of one that is forgotten.
             kept = self._points[key] = frame, found
@@ -140,6 +154,8 @@ class State(Validity):
         self._wanted: mujoco.MjData | None = None
         """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
+        self._drawn: dict[tuple[int, bytes], Local] = {}
+        """Points that are drawn."""
         self._points: dict[tuple[Hashable, ...], tuple[Frame, int, Indices, NDArray[np.bool_], Array]] = {}
         """Points of which Jacobians are asked: what of them is the same at all ticks."""
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
@@ -679,7 +695,7 @@ class State(Validity):
         self._require_frame(frame)
         placed = self._cache.get("placed once")
         if placed is None:
-            placed = self._cache["placed once"] = _DrawnPoints(self._xmat, self._xpos)
+            placed = self._cache["placed once"] = _DrawnPoints(self._xmat, self._xpos, self._drawn)
         return partial(placed.point, frame, offset)
 
     def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:

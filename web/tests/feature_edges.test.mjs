@@ -6,7 +6,7 @@ import { BoxGeometry, CylinderGeometry, IcosahedronGeometry, SphereGeometry, Vec
 import { ConvexGeometry } from "three/addons/geometries/ConvexGeometry.js";
 import { load } from "./source.mjs";
 
-const { featureEdges } = await load("scene/feature_edges");
+const { featureEdges, turnOutward } = await load("scene/feature_edges");
 const edges = (surface) => (featureEdges(surface).lines.getAttribute("position")?.count ?? 0) / 2;
 
 /** Sums of some of these vectors: a force polytope is such a zonotope. */
@@ -41,6 +41,26 @@ test("what is round is drawn by its rim, without a net of edges", () => {
   for (const surface of [new IcosahedronGeometry(1, 1), stretched, bumpy]) {
     assert.deepEqual([edges(surface), featureEdges(surface).smooth], [0, true]);
   }
+});
+
+test("a closed surface is turned outward, with its normals", () => {
+  const inward = new SphereGeometry(1, 12, 8).scale(1, 1, -1);
+  turnOutward(inward);
+  const [at, index, normal] = [
+    inward.getAttribute("position"),
+    inward.getIndex(),
+    inward.getAttribute("normal"),
+  ];
+  for (let k = 0; k < index.count; k += 3) {
+    const [a, b, c] = [0, 1, 2].map((i) => new Vector3().fromBufferAttribute(at, index.getX(k + i)));
+    const across = b.clone().sub(a).cross(c.clone().sub(a));
+    assert.ok(across.dot(a.add(b).add(c)) > -1e-9);
+  }
+  const outward = new SphereGeometry(1, 12, 8);
+  const before = [...outward.getIndex().array];
+  turnOutward(outward);
+  assert.deepEqual([...outward.getIndex().array], before);
+  assert.equal(normal.count, at.count);
 });
 
 test("a barrel keeps its two rims", () => {

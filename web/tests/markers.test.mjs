@@ -43,13 +43,13 @@ const drawn = () =>
   );
 
 /** Pixels that the markers of a criterion change around a point of the world, with and without them. */
-async function changed(criterion, point) {
+async function changed(criterion, point, around = AROUND_PX) {
   const [x, y] = await page.evaluate((p) => window.seerob.project(p), point);
   const clip = {
-    x: Math.round(x) - AROUND_PX,
-    y: Math.round(y) - AROUND_PX,
-    width: 2 * AROUND_PX,
-    height: 2 * AROUND_PX,
+    x: Math.round(x) - around,
+    y: Math.round(y) - around,
+    width: 2 * around,
+    height: 2 * around,
   };
   const key = String(Object.keys(results).indexOf(criterion) + 1);
   await drawn();
@@ -101,6 +101,21 @@ test("an area in the colour of a verdict can be seen through", async () => {
   assert.ok(pairs.length > 200, `${pairs.length} pixels changed`);
   const solid = pairs.filter(([shown]) => distance(shown, COLORS.within) < 60);
   assert.ok(solid.length < 0.2 * pairs.length, `${solid.length} of ${pairs.length} pixels are opaque`);
+});
+
+test("what is inside a volume is not covered by it", async () => {
+  const { poses } = await served.tell(`snapshot ${await settled(page)}`);
+  const { center, size } = marker("work area", "box");
+  const inside = Object.entries(poses).filter(
+    ([name, at]) =>
+      name.startsWith("ur10/") && at.slice(0, 3).every((x, i) => Math.abs(x - center[i]) < 0.4 * size[i]),
+  );
+  assert.ok(inside.length > 0);
+  for (const [name, at] of inside) {
+    const pairs = await changed("work area", at.slice(0, 3), 3);
+    // An edge of the box may cross it.
+    assert.ok(pairs.length < 0.4 * 6 ** 2, `${pairs.length} pixels changed on ${name}`);
+  }
 });
 
 test("an arrow, on its shaft", async () => {

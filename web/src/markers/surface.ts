@@ -1,6 +1,7 @@
 // A translucent closed surface with its outline drawn, so that it reads against any background.
 
 import { type BufferGeometry, Group, LineSegments, Mesh } from "three";
+import { turnOutward } from "../scene/feature_edges";
 import { lineMaterial, markerMaterial } from "../scene/materials";
 import { veilMaterial } from "../scene/veil";
 import type { Verdict } from "../wire";
@@ -19,7 +20,7 @@ export class Surface {
   }
 
   color(verdict: Verdict | null): void {
-    this.fill.material = this.smooth ? veilMaterial(verdict) : markerMaterial("fill", verdict);
+    this.fill.material = this.smooth ? veilMaterial(verdict) : markerMaterial("volume", verdict);
     this.lines.material = lineMaterial(verdict);
   }
 
@@ -31,6 +32,7 @@ export class Surface {
   reshape(fill: BufferGeometry, lines: BufferGeometry, smooth = false): void {
     this.free();
     this.smooth = smooth;
+    turnOutward(fill);
     this.fill.geometry = fill;
     this.lines.geometry = lines;
   }

@@ -6,7 +6,7 @@ import { type Doubts, doubtOf } from "../doubts";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
 import { drawnBySoftware } from "./effort";
-import { featureEdges } from "./feature_edges";
+import { featureEdges, turnOutward } from "./feature_edges";
 import {
   bodyMaterial,
   doubtMaterial,
@@ -79,6 +79,7 @@ export class Body {
 
   // An area is room, not matter: one sees and clicks through it.
   private enclose(part: Mesh): void {
+    turnOutward(part.geometry);
     const { lines, smooth } = featureEdges(part.geometry);
     const edges = new LineSegments(lines);
     if (smooth && !part.geometry.hasAttribute("normal")) part.geometry.computeVertexNormals();
@@ -126,7 +127,7 @@ export class Body {
   private repaint(): void {
     for (const { fill, edges, smooth } of this.enclosed) {
       const verdict = this.doubted ? "undecided" : (this.painted ?? null);
-      fill.material = smooth ? veilMaterial(verdict) : markerMaterial("fill", verdict);
+      fill.material = smooth ? veilMaterial(verdict) : markerMaterial("volume", verdict);
       edges.material = lineMaterial(verdict);
     }
     for (const { mesh, own } of this.dressed) {

@@ -30,6 +30,29 @@ export function featureEdges(surface: BufferGeometry): FeatureEdges {
   return { lines: new BufferGeometry(), smooth };
 }
 
+/** Turn the triangles of a closed surface, all of which are turned one way, so that they face outward. */
+export function turnOutward(surface: BufferGeometry): void {
+  const at = surface.getAttribute("position");
+  const index = surface.getIndex();
+  const corner = (k: number): number => (index ? index.getX(k) : k);
+  const corners = index ? index.count : at.count;
+  let volume = 0;
+  for (let k = 0; k + 2 < corners; k += 3) {
+    const [a, b, c] = [corner(k), corner(k + 1), corner(k + 2)];
+    volume +=
+      at.getX(a) * (at.getY(b) * at.getZ(c) - at.getZ(b) * at.getY(c)) +
+      at.getY(a) * (at.getZ(b) * at.getX(c) - at.getX(b) * at.getZ(c)) +
+      at.getZ(a) * (at.getX(b) * at.getY(c) - at.getY(b) * at.getX(c));
+  }
+  if (volume >= 0) return;
+  const turned = Array.from({ length: corners }, (_, k) => corner(k - (k % 3) + 2 - (k % 3)));
+  surface.setIndex(turned);
+  const normal = surface.getAttribute("normal");
+  if (normal)
+    for (let k = 0; k < normal.count; k += 1)
+      normal.setXYZ(k, -normal.getX(k), -normal.getY(k), -normal.getZ(k));
+}
+
 function count(edges: BufferGeometry): number {
   return edges.getAttribute("position").count / 2;
 }

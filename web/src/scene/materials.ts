@@ -1,6 +1,7 @@
 // Materials that carry a meaning: their colours are what the legend says, whatever the light.
 
 import {
+  BackSide,
   Color,
   DoubleSide,
   LineBasicMaterial,
@@ -94,12 +95,14 @@ export function glow(material: Material, color: number): void {
   else if (material.userData.glow instanceof Color) material.userData.glow.setHex(color);
 }
 
-type Kind = "line" | "ghost" | "fill";
+/** `volume` is the far side of a closed surface alone, so that it covers nothing that is inside. */
+type Kind = "line" | "ghost" | "fill" | "volume";
 
 const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: boolean }> = {
   line: { opacity: 1, depthTest: true, depthWrite: true },
   ghost: { opacity: 0.35, depthTest: false, depthWrite: false },
   fill: { opacity: 0.15, depthTest: true, depthWrite: false },
+  volume: { opacity: 0.18, depthTest: true, depthWrite: false },
 };
 
 const made = new Map<string, Material>();
@@ -121,7 +124,7 @@ export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
     const hatched = tone === "undecided";
     const material = new MeshBasicMaterial({
       color: colorOf(tone),
-      side: DoubleSide,
+      side: kind === "volume" ? BackSide : DoubleSide,
       toneMapped: false,
       transparent: LOOK[kind].opacity < 1 || hatched,
       ...LOOK[kind],

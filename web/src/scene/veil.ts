@@ -1,7 +1,7 @@
-// A veil: a closed surface that is clear where one looks through it and denser toward its rim, so that a
-// smooth volume shows its shape without a line and without hiding what is inside.
+// A veil: the far side of a closed surface, denser toward its rim, so that a smooth volume shows its shape
+// without a line and covers nothing that is inside.
 
-import { Color, DoubleSide, type Material, ShaderMaterial } from "three";
+import { BackSide, Color, type Material, ShaderMaterial } from "three";
 import type { Verdict } from "../wire";
 import { colorOf, once, type Tone } from "./materials";
 
@@ -37,7 +37,7 @@ export function veilMaterial(verdict: Verdict | null): Material {
       uniforms: { tone: { value: new Color(colorOf(tone)) }, hatched: { value: tone === "undecided" } },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
-      side: DoubleSide,
+      side: BackSide,
       transparent: true,
       depthWrite: false,
       toneMapped: false,

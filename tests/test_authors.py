@@ -32,6 +32,7 @@ from seerob.core.snapshot import Basis, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):
     '''A rule of one's own.'''
+    unit = "m"
     of: str = "arm"
     limit: float = 100.0
     def subjects(self): return (self.of,)

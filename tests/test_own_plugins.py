@@ -165,6 +165,7 @@ def test_a_sink_of_ones_own_writes_each_change_once(tmp_path):
 LIVE = '[[sources]]\nkind = "KIND"\nrobot = "arm"\nport = 9\n'
 FILE = '[[sources]]\nkind = "KIND"\nrobot = "arm"\nfile = "motion.jsonl"\n'
 SINK = '[[sinks]]\nkind = "KIND"\n'
+HEIGHT = '[[safety]]\nkind = "KIND"\nrobot = "arm"\n'
 LOADED = """
 [[humans]]
 name = "op"
@@ -201,6 +202,29 @@ FORGOTTEN = {
         "has no open: define it as Source describes it",
     ),
     "no sink": ("verdict_changes", "def open(", "def begin(", SINK, "has no open: define it as Sink"),
+    "no target": (
+        "cell_controller",
+        "def target(",
+        "def robot_name(",
+        LIVE,
+        "drives nobody: define target, which returns the name of its robot",
+    ),
+    "no target of a file": ("joint_lines", "def target(", "def robot_name(", FILE, "drives nobody: define"),
+    "no close": (
+        "verdict_changes",
+        "    def close(",
+        "    def __del__(self): self._file.close()\n    def finish(",
+        SINK,
+        "gives _Table, which has no close: define it, to finish what it writes",
+    ),
+    "no unit": ("work_height", 'unit: ClassVar[str] = "m"', "", HEIGHT, "has no unit: define unit: ClassVar"),
+    "no unit of a rule": (
+        "bent_load",
+        'unit: ClassVar[str] = "points"',
+        "",
+        LOADED,
+        "has no unit: define unit: ClassVar",
+    ),
     "no write": (
         "verdict_changes",
         "def write(",

@@ -19,7 +19,7 @@ from seerob.session.reading import BASES, read
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
 HEAD = "from seerob.criteria.criterion import Criterion\n"
-RULE = "class {0}(Criterion, frozen=True, kw_only=True):\n    '''A rule.'''\n    robot: str\n"
+RULE = "class {0}(Criterion, frozen=True, kw_only=True):\n    '''A rule.'''\n    unit = 'm'\n    robot: str\n"
 
 
 @pytest.fixture

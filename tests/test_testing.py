@@ -172,6 +172,7 @@ from seerob.core.snapshot import Basis, Label, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):
     '''A rule of one's own.'''
+    unit = "m"
     def basis(self, model): return Basis(formula="as below", source="ACME")
     def subjects(self): return ("arm",)
     def bind(self, model):
@@ -289,6 +290,7 @@ from seerob.api import Basis, Model, Result, Rule, State, Undecided, Verdict, be
 
 class Own(Rule, frozen=True, kw_only=True):
     '''Points of a posture.'''
+    unit = "m"
     limit: float = 2.5
     def basis(self, model): return Basis(formula="as below", source="ACME")
     def bind(self, model):

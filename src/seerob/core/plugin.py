@@ -20,7 +20,7 @@ from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import TypeVar, cast
+from typing import Protocol, TypeVar, cast, runtime_checkable
 
 from seerob.core.errors import SeerobError, UnknownName
 
@@ -62,6 +62,15 @@ def _kind_of(package: str, module: str, name: str) -> str:
         if found is None or found.__qualname__ == name:
             return kind
     return module
+
+
+@runtime_checkable
+class Complete(Protocol):
+    """A base that knows what classes of one's own must define although there is a default."""
+
+    @classmethod
+    def undefined(cls) -> str:
+        """What a class leaves out for which no default may stand, and what to define; empty when nothing."""
 
 
 @cache
@@ -124,6 +133,8 @@ def load(
         described = next(c.__name__ for c in found.__mro__ if left[0] in vars(c))
         whose = f"{found.__name__} of {found.__module__}"
         raise PluginError(f"{whose} has no {', no '.join(left)}: define it as {described} describes it")
+    if text := found.undefined() if issubclass(found, Complete) else "":
+        raise PluginError(f"{found.__name__} of {found.__module__} {text}")
     return found
 
 

@@ -129,6 +129,13 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             for name in GIVEN_A_MODEL & vars(cls).keys():
                 setattr(cls, name, _own_model(vars(cls)[name]))
 
+    @classmethod
+    def undefined(cls) -> str:
+        """What a class leaves out for which no default may stand, and what to define; empty when nothing."""
+        if next(base for base in cls.__mro__ if "unit" in vars(base)) is Criterion:
+            return 'has no unit: define unit: ClassVar[str] = "m" or whatever its figures are in, "" for none'
+        return ""
+
     def compute(self, model: Model) -> Compute:
         """Resolve every name once and return the function that computes the figure of an instant.
 

@@ -30,7 +30,7 @@ from seerob.model.mounting.in_place import implausible
 from seerob.model.mounting.things import MadeArea
 from seerob.outputs.notebook import criteria_html
 from seerob.outputs.sentences import counted
-from seerob.outputs.sink import Sink, Writer
+from seerob.outputs.sink import Closing, Sink, Writer
 from seerob.recording.format import SOURCES, source_files
 from seerob.recording.recording import Recording
 from seerob.session import run as road
@@ -221,6 +221,12 @@ class Station:
                     raise PluginError(
                         f"open of {type(sink).__module__} gives {type(opened[-1]).__name__}, which has no "
                         f"{', no '.join(lacks)}: derive it from seerob.api.Closing, with a write"
+                    )
+                own = type(opened[-1])
+                if getattr(own, "close", None) is Closing.close and not own.__module__.startswith("seerob."):
+                    raise PluginError(
+                        f"open of {type(sink).__module__} gives {own.__name__}, which has no close: define "
+                        "it, to finish what it writes, or to do nothing"
                     )
         except BaseException:
             for writer in opened:

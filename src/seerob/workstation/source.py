@@ -130,6 +130,16 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """How far angles of a posture may be off that it captured; None when nobody knows."""
         return None
 
+    @classmethod
+    def undefined(cls) -> str:
+        """What a class leaves out for which no default may stand, and what to define; empty when nothing."""
+        if cls.target is Source.target and not cls.reads_variables:
+            return (
+                "drives nobody: define target, which returns the name of its robot or human, or "
+                "reads_variables = True where it says values of machines"
+            )
+        return ""
+
     def coarse(self, folder: Path) -> str:
         """Why what it says is too coarse for energies and forces; empty when it is not.
 

@@ -175,7 +175,7 @@ def inset(image: NDArray[np.uint8], canvas: Canvas, small: NDArray[np.uint8]) ->
     return result
 
 
-SIZE = (1000, 640)
+SIZE = (800, 512)
 """Width and height [px]."""
 
 _CLEAREST, _LIT = 0.14, 0.3
@@ -331,7 +331,7 @@ class Stage:
         if result is None:
             return pixels
         camera = canvas.camera
-        height = max(12, round(camera.height / 38))
+        height = max(12, round(camera.height / 26))
         taken: list[tuple[float, float, float]] = []
         for marker in result.markers:
             text, at = label_of(marker)

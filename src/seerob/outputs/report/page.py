@@ -41,7 +41,10 @@ thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var
 tbody th {{ font-weight: 600; min-width: 7rem; }}
 .instants tbody th {{ min-width: 0; }}
 td {{ min-width: 4.6rem; }}
-.overview tbody th {{ min-width: 9.5rem; }}
+.overview {{ font-size: .8rem; }}
+.overview th, .overview td {{ padding: .32rem .4rem; }}
+.overview tbody th {{ min-width: 8rem; }}
+.overview td {{ min-width: 0; }}
 .overview td:last-child {{ min-width: 9rem; }}
 .overview a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
 code {{ font-family: ui-monospace, Consolas, "DejaVu Sans Mono", monospace; font-size: .85em; }}
@@ -104,11 +107,11 @@ h2 + .cover dl {{ display: grid; grid-template-columns: max-content 1fr; gap: .1
 .contents ol {{ columns: 2; margin: .4rem 0; padding-left: 1.4rem; font-size: .88rem; }}
 section.criterion {{ border-top: none; margin-top: 0; }}
 @media print, (min-width: 56rem) {{
-  .evidence {{ display: grid; grid-template-columns: 4fr 6fr; gap: 1rem; align-items: center; }}
+  .evidence {{ display: grid; grid-template-columns: 4fr 5fr; gap: 1rem; align-items: center; }}
   .evidence > :only-child {{ grid-column: 1 / -1; }}
 }}
 @media print, (min-width: 56rem) {{
-  .evidence {{ display: grid; grid-template-columns: 4fr 6fr; gap: 1rem; align-items: center; }}
+  .evidence {{ display: grid; grid-template-columns: 4fr 5fr; gap: 1rem; align-items: center; }}
   .evidence > :only-child {{ grid-column: 1 / -1; }}
 }}
 @media screen and (max-width: 56rem) {{
@@ -127,6 +130,7 @@ section.criterion {{ border-top: none; margin-top: 0; }}
   table {{ font-size: 7.5pt; line-height: 1.3; margin: .3rem 0; }}
   th, td {{ padding: .1rem .4rem; }}
   section.criterion {{ margin-top: .6rem; }}
+  .evidence {{ grid-template-columns: 4fr 6fr; }}
   .lanes {{ width: 80%; }}
   .lead {{ margin: .1rem 0 .3rem; font-size: 8pt; }}
   .parts {{ font-size: 6.8pt; }}

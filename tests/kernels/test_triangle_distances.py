@@ -3,7 +3,16 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from seerob.kernels.primitives import nearest_edge, segment_segment, segment_triangle, triangle_triangle
+from seerob.kernels.primitives import (
+    FLAT,
+    LINE,
+    nearest_edge,
+    on_edges,
+    over_face,
+    segment_segment,
+    segment_triangle,
+)
+from seerob.kernels.primitives import triangles as nearest_of_triangles
 from seerob.kernels.tree import triangle_rows
 
 RNG = np.random.default_rng(1)
@@ -22,6 +31,13 @@ def triangles(n: int, scale: float = 1.0) -> np.ndarray:
 
 def rows(made: np.ndarray) -> np.ndarray:
     return triangle_rows(made.reshape(-1, 3), np.arange(made.shape[0] * 3, dtype=np.int32).reshape(-1, 3))
+
+
+def triangle_triangle(A: np.ndarray, i: int, B: np.ndarray, j: int, cut: float, W: np.ndarray) -> float:
+    """Squared distance of two triangles; their points to ``W[:6]``."""
+    d2, s, t, both = nearest_of_triangles(A, i, B, j, cut, W)
+    on_edges(A, i, B, j, s, t, both, W)
+    return d2
 
 
 def gap(a: np.ndarray, b: np.ndarray, p: np.ndarray, q: np.ndarray) -> float:
@@ -94,6 +110,58 @@ def test_three_edges_at_once_are_the_three_one_by_one_bit_for_bit():
         least = min(range(3), key=lambda c: one_by_one[c][0])
         found = nearest_edge(*a, *d, rt, k)
         assert found == (*one_by_one[least], least)
+
+
+def over(a: list[float], b: list[float]) -> float:
+    """Least squared distance of corners of b, and of where its edges meet the plane, over the face of a."""
+    v, e, f, n, n2 = a[:3], a[3:6], a[6:9], a[9:12], a[9] * a[9] + a[10] * a[10] + a[11] * a[11]
+    r, p, q = [x - y for x, y in zip(b[:3], v, strict=True)], b[3:6], b[6:9]
+    h0 = r[0] * n[0] + r[1] * n[1] + r[2] * n[2]
+    h1, h2 = (h0 + g[0] * n[0] + g[1] * n[1] + g[2] * n[2] for g in (p, q))
+    weights = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
+    if h0 * h1 < 0:
+        weights.append((h0 / (h0 - h1), 0.0))
+    if h0 * h2 < 0:
+        weights.append((0.0, h0 / (h0 - h2)))
+    if h1 * h2 < 0:
+        weights.append((1.0 - h1 / (h1 - h2), h1 / (h1 - h2)))
+    least = np.inf
+    for s, t in weights if a[12] != LINE else ():
+        x = [i + s * j + t * k for i, j, k in zip(r, p, q, strict=True)]
+        u, w = over_face(*x, *e, *f, *n, n2)
+        if u >= 0:
+            y = [u * i + w * j for i, j in zip(e, f, strict=True)]
+            g = [i - j for i, j in zip(x, y, strict=True)]
+            least = min(least, g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    return least
+
+
+def test_what_is_skipped_of_two_triangles_changes_no_bit_of_their_distance():
+    # Above one another, far away above, and of edges that are parallel: what lies over a face is looked for.
+    n = 3000
+    T = triangles(n) * 10.0 ** RNG.uniform(-4, 0, (n, 1, 1))
+    S = T @ np.linalg.qr(RNG.normal(size=(n, 3, 3)))[0]
+    S[::2] = T[::2]
+    away = np.cross(T[:, 1] - T[:, 0], T[:, 2] - T[:, 0])
+    away /= np.linalg.norm(away, axis=1, keepdims=True) + 1e-300
+    S += (away * 10.0 ** RNG.uniform(-5, 1, (n, 1)) + 0.3 * (T[:, 1] - T[:, 0]) * RNG.normal(size=(n, 1)))[
+        :, None
+    ]
+    ra, rb, W = rows(T), rows(S), np.zeros(12)
+    faces = 0
+    for k, (a, b) in enumerate(zip(ra.tolist(), rb.tolist(), strict=True)):
+        edges = [
+            [(row[:3], row[3:6]), (row[:3], row[6:9]), ([*map(sum, zip(row[:3], row[3:6], strict=True))],
+             [y - x for x, y in zip(row[3:6], row[6:9], strict=True)])]
+            for row in (a, b)
+        ]  # fmt: skip
+        edge = min(segment_segment(*o, *d, *p, *e)[0] for o, d in edges[0] for p, e in edges[1])
+        face = min(over(a, b), over(b, a))
+        least = min(face, edge)
+        faces += face < edge
+        assert triangle_triangle(ra, k, rb, k, np.inf, W) == (0.0 if least < 1e-24 else least), k
+    assert faces > n / 10
+    assert (ra[:, 12] < FLAT).any()
 
 
 def exact_square(a, d, b, e) -> float:

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from seerob.kernels.primitives import segment_triangle, triangle_triangle
+from seerob.kernels.primitives import segment_triangle, triangles
 from seerob.kernels.search import row_in
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.wide import NONE, STACK, nearest_of_meshes, nearest_to_segment
@@ -85,7 +85,7 @@ def test_nearest_of_two_meshes_is_the_first_of_all_pairs(ball, scratch, away):
         values = np.empty((m, len(T) - m))
         for b in range(len(T) - m):
             row_in(T, m + b, R, t, row)
-            values[:, b] = [triangle_triangle(T, a, row, 0, np.inf, W) for a in range(m)]
+            values[:, b] = [triangles(T, a, row, 0, np.inf, W)[0] for a in range(m)]
         k, least = first_least(values.ravel().tolist())
         pair = k // values.shape[1], m + k % values.shape[1]
         for first in ((-1, -1), (int(rng.integers(m)), m)):

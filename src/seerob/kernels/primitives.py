@@ -31,39 +31,59 @@ _EDGES = ir.VectorType(ir.DoubleType(), 4)
 _INDEX = ir.IntType(32)
 
 
-def _formula(a: list[Lanes], d: list[Lanes], b: list[Lanes], e: list[Lanes]) -> tuple[Any, list[Lanes]]:
-    """Where lanes settle it, and squared distance, s and t of ``a + s·d`` and ``b + t·e``."""
+_Points = list[Lanes]
+"""By coordinate."""
 
-    def dot(u: list[Lanes], v: list[Lanes]) -> Lanes:
-        return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
-    def within(x: Lanes) -> Lanes:
-        return x.at_least(0.0).at_most(1.0)
+def _dot(u: _Points, v: _Points) -> Lanes:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
+
+def _within(x: Lanes) -> Lanes:
+    return x.at_least(0.0).at_most(1.0)
+
+
+def _inside(a: _Points, d: _Points, b: _Points, e: _Points) -> tuple[list[Lanes], Any, Any]:
+    """Squared distance, s and t of ``a + s·d`` and ``b + t·e``; which are parallel, and which no points."""
     r = [x - y for x, y in zip(a, b, strict=True)]
-    dd, ee, f, c, de = dot(d, d), dot(e, e), dot(e, r), dot(d, r), dot(d, e)
+    dd, ee, f, c, de = _dot(d, d), _dot(e, e), _dot(e, r), _dot(d, r), _dot(d, e)
     den = dd * ee - de * de
-    s = within((de * f - c * ee) / den)
+    s = _within((de * f - c * ee) / den)
+    s = s.or_else(den.compared("<=", 0.0), 0.0)
     t = (de * s + f) / ee
     before, after = t.compared("<", 0.0), t.compared(">", 1.0)
-    s = s.or_else(before, within(c.negative() / dd)).or_else(after, within((de - c) / dd))
+    s = s.or_else(before, _within(c.negative() / dd)).or_else(after, _within((de - c) / dd))
     t = t.or_else(before, 0.0).or_else(after, 1.0)
     x = [u + s * v - t * w for u, v, w in zip(r, d, e, strict=True)]
-    builder = den.builder
-    settled = builder.and_(
-        den.compared(">=", dd * 1e-8 * ee),
-        builder.and_(dd.compared(">=", 1e-30), ee.compared(">=", 1e-30)),
-    )
-    return settled, [dot(x, x), s, t]
+    parallel = den.compared("<", dd * 1e-8 * ee)
+    long = den.builder.and_(dd.compared(">=", 1e-30), ee.compared(">=", 1e-30))
+    long = den.builder.and_(long, den.compared("==", den))
+    return [_dot(x, x), s, t], parallel, long
 
 
-@intrinsic
-def _nearest_in_lanes(
-    _typing: Any, ax: Any, ay: Any, az: Any, dx: Any, dy: Any, dz: Any, T: Any, k: Any
-) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        rows = context.make_array(signature.args[6])(context, builder, values[6]).data
-        index = context.cast(builder, values[7], signature.args[7], types.intp)
+def _with_ends(
+    found: list[Lanes], parallel: Any, a: _Points, d: _Points, b: _Points, e: _Points
+) -> list[Lanes]:
+    """What is found of two segments, and of those that are parallel also by their four ends."""
+    dd, ee = _dot(d, d), _dot(e, e)
+    for end in (0.0, 1.0):
+        for swapped, o, g, gg, p, q in ((False, b, e, ee, a, d), (True, a, d, dd, b, e)):
+            r = [(x + y if end else x) - z for x, y, z in zip(p, q, o, strict=True)]
+            w = _within(_dot(r, g) / gg)
+            r = [x - w * y for x, y in zip(r, g, strict=True)]
+            d2 = _dot(r, r)
+            nearer = d2.builder.and_(parallel, d2.compared("<", found[0]))
+            s, t = (w, end) if swapped else (end, w)
+            found = [x.or_else(nearer, y) for x, y in zip(found, (d2, s, t), strict=True)]
+    return found
+
+
+class _Triangle:
+    """A row of triangles while formulas of it are written."""
+
+    def __init__(self, context: Any, builder: Any, kinds: tuple[Any, Any], values: tuple[Any, Any]) -> None:
+        rows = context.make_array(kinds[0])(context, builder, values[0]).data
+        index = context.cast(builder, values[1], kinds[1], types.intp)
         row = builder.gep(rows, [builder.mul(index, context.get_constant(types.intp, 13))])
         v, p, q = (
             [builder.load(builder.gep(row, [context.get_constant(types.intp, 3 * n + c)])) for c in range(3)]
@@ -71,31 +91,102 @@ def _nearest_in_lanes(
         )
         corner = [builder.fadd(v[c], p[c]) for c in range(3)]
         third = [builder.fsub(q[c], p[c]) for c in range(3)]
+        self.starts, self.edges = [v, v, corner], [p, q, third]
 
-        def lanes(*four: Any) -> Lanes:
-            value = ir.Constant(_EDGES, ir.Undefined)
-            for n in range(4):
-                value = builder.insert_element(value, four[n], ir.Constant(_INDEX, n))
-            return Lanes(builder, value)
+    def in_lanes(self, builder: Any) -> tuple[list[Lanes], list[Lanes]]:
+        """Where its edges begin, and they, by coordinate; the fourth lane is the first again."""
+        return tuple(  # type: ignore[return-value]
+            [_lanes(builder, [each[n][c] for n in (0, 1, 2, 0)]) for c in range(3)]
+            for each in (self.starts, self.edges)
+        )
 
-        a, d = ([lanes(*[one] * 4) for one in values[n : n + 3]] for n in (0, 3))
-        b = [lanes(v[c], v[c], corner[c], v[c]) for c in range(3)]
-        e = [lanes(p[c], q[c], third[c], p[c]) for c in range(3)]
-        settled, found = _formula(a, d, b, e)
-        four = ir.IntType(4)
-        every = builder.icmp_signed("==", builder.bitcast(settled, four), ir.Constant(four, -1))
-        best = [builder.extract_element(one.value, ir.Constant(_INDEX, 0)) for one in found]
-        edge = context.get_constant(types.intp, 0)
-        for n in (1, 2):
-            other = [builder.extract_element(one.value, ir.Constant(_INDEX, n)) for one in found]
-            less = builder.fcmp_ordered("<", other[0], best[0])
-            best = [builder.select(less, x, y) for x, y in zip(other, best, strict=True)]
-            edge = builder.select(less, context.get_constant(types.intp, n), edge)
-        return context.make_tuple(builder, signature.return_type, [every, *best, edge])
 
-    kind = types.Tuple([types.boolean, types.float64, types.float64, types.float64, types.intp])  # type: ignore[no-untyped-call]
+def _lanes(builder: Any, four: list[Any]) -> Lanes:
+    value = ir.Constant(_EDGES, ir.Undefined)
+    for n in range(4):
+        value = builder.insert_element(value, four[n], ir.Constant(_INDEX, n))
+    return Lanes(builder, value)
+
+
+def _nearest_of(
+    context: Any, builder: Any, kind: Any, segments: list[tuple[list[Any], list[Any]]], other: _Triangle
+) -> Any:
+    """Squared distance of segments to the nearest edge of a triangle: settled, d², s, t, which.
+
+    Of equal ones the first: by segment, then by edge.
+    """
+    b, e = other.in_lanes(builder)
+    lines = [tuple([_lanes(builder, [one] * 4) for one in each] for each in segment) for segment in segments]
+    begun = [_inside(a, d, b, e) for a, d in lines]
+    four = ir.IntType(4)
+    none, every = ir.Constant(four, 0), ir.Constant(four, -1)
+    settled = every
+    turned = none
+    for _, parallel, long in begun:
+        settled = builder.and_(settled, builder.bitcast(long, four))
+        turned = builder.or_(turned, builder.bitcast(parallel, four))
+    before = builder.block
+    with builder.if_then(builder.icmp_signed("!=", turned, none), likely=False):
+        more = [
+            _with_ends(found, parallel, a, d, b, e)
+            for (found, parallel, _), (a, d) in zip(begun, lines, strict=True)
+        ]
+        within = builder.block
+    either = [
+        [_either(builder, (x, before), (y, within)) for x, y in zip(found, ends, strict=True)]
+        for (found, _, _), ends in zip(begun, more, strict=True)
+    ]
+    best: list[Lanes] = []
+    for n, found in enumerate(either):
+        found.append(Lanes(builder, ir.Constant(_EDGES, [3.0 * n, 3.0 * n + 1, 3.0 * n + 2, 3.0 * n])))
+        less = found[0].compared("<", best[0]) if best else None
+        best = [x.or_else(less, y) for x, y in zip(best, found, strict=True)] if best else found
+    least = [builder.extract_element(one.value, ir.Constant(_INDEX, 0)) for one in best]
+    for c in (1, 2):
+        beside = [builder.extract_element(one.value, ir.Constant(_INDEX, c)) for one in best]
+        tie = builder.and_(
+            builder.fcmp_ordered("==", beside[0], least[0]), builder.fcmp_ordered("<", beside[3], least[3])
+        )
+        less = builder.or_(builder.fcmp_ordered("<", beside[0], least[0]), tie)
+        least = [builder.select(less, x, y) for x, y in zip(beside, least, strict=True)]
+    which = builder.fptosi(least[3], context.get_value_type(types.intp))
+    known = builder.icmp_signed("==", settled, every)
+    return context.make_tuple(builder, kind, [known, *least[:3], which])
+
+
+def _either(builder: Any, *found: tuple[Lanes, Any]) -> Lanes:
+    """What was found in the block that was gone through."""
+    phi = builder.phi(_EDGES)
+    for lanes, block in found:
+        phi.add_incoming(lanes.value, block)
+    return Lanes(builder, phi)
+
+
+_FOUND = types.Tuple([types.boolean, types.float64, types.float64, types.float64, types.intp])  # type: ignore[no-untyped-call]
+
+
+@intrinsic
+def _nearest_in_lanes(
+    _typing: Any, ax: Any, ay: Any, az: Any, dx: Any, dy: Any, dz: Any, T: Any, k: Any
+) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        other = _Triangle(context, builder, signature.args[6:], values[6:])
+        return _nearest_of(context, builder, _FOUND, [(values[:3], values[3:6])], other)
+
     points = [types.float64] * 6
-    return kind(*points, T, k), generate
+    return _FOUND(*points, T, k), generate
+
+
+@intrinsic
+def _edges_in_lanes(_typing: Any, A: Any, i: Any, B: Any, j: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        one, other = (
+            _Triangle(context, builder, signature.args[n : n + 2], values[n : n + 2]) for n in (0, 2)
+        )
+        segments = list(zip(one.starts, one.edges, strict=True))
+        return _nearest_of(context, builder, _FOUND, segments, other)
+
+    return _FOUND(A, i, B, j), generate
 
 
 nearest_in_lanes: Any = _nearest_in_lanes
@@ -103,6 +194,11 @@ nearest_in_lanes: Any = _nearest_in_lanes
 
 Edges are those from the first corner and, last, that from the second corner to the third; the first of
 equal ones is told. ``T`` is contiguous, of shape (n, 13); no index is checked.
+"""
+edges_in_lanes: Any = _edges_in_lanes
+"""Squared distance of the edges of ``A[i]`` to those of ``B[j]``: settled, d², s, t, and which.
+
+That is three times the edge of A plus that of B.
 """
 
 
@@ -332,16 +428,56 @@ def segment_triangle(
     return (0.0 if best < TOUCH else best), bs, px, py, pz
 
 
+BESIDE, OVER, BEYOND = range(3)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, W: Array) -> float:
+def _side(A: Array, i: int, B: Array, j: int, cut: float) -> int:
+    """Where ``B[j]`` is seen from the face of ``A[i]``.
+
+    `BEYOND` when the plane shows that it is farther than ``cut``; `BESIDE` when nothing of it lies over the
+    face, because all of it is beyond one of its three lines; else `OVER`, where something may.
+    """
+    if A[i, 12] == LINE:
+        return BESIDE
+    e0x, e0y, e0z = A[i, 3], A[i, 4], A[i, 5]
+    e1x, e1y, e1z = A[i, 6], A[i, 7], A[i, 8]
+    nx, ny, nz = A[i, 9], A[i, 10], A[i, 11]
+    nn = nx * nx + ny * ny + nz * nz
+    r0, r1, r2 = B[j, 0] - A[i, 0], B[j, 1] - A[i, 1], B[j, 2] - A[i, 2]
+    h0 = r0 * nx + r1 * ny + r2 * nz
+    h1 = h0 + B[j, 3] * nx + B[j, 4] * ny + B[j, 5] * nz
+    h2 = h0 + B[j, 6] * nx + B[j, 7] * ny + B[j, 8] * nz
+    low = max(min(h0, h1, h2), -max(h0, h1, h2))
+    if A[i, 12] == FLAT and low > 0.0 and low * low > cut * nn:
+        return BEYOND
+    # Barycentric coordinates of the corners, times nn.
+    px, py, pz = e1y * nz - e1z * ny, e1z * nx - e1x * nz, e1x * ny - e1y * nx
+    qx, qy, qz = e0z * ny - e0y * nz, e0x * nz - e0z * nx, e0y * nx - e0x * ny
+    u0 = r0 * px + r1 * py + r2 * pz
+    v0 = r0 * qx + r1 * qy + r2 * qz
+    u1 = u0 + B[j, 3] * px + B[j, 4] * py + B[j, 5] * pz
+    v1 = v0 + B[j, 3] * qx + B[j, 4] * qy + B[j, 5] * qz
+    u2 = u0 + B[j, 6] * px + B[j, 7] * py + B[j, 8] * pz
+    v2 = v0 + B[j, 6] * qx + B[j, 7] * qy + B[j, 8] * qz
+    # More than rounding can take of these and of `over_face`, which multiplies in another order.
+    size = abs(r0) + abs(r1) + abs(r2)
+    for c in range(3, 9):
+        size += abs(B[j, c])
+    turned = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz)
+    away = 1e-6 * nn + 1e-14 * size * turned
+    most = min(max(u0, u1, u2), max(v0, v1, v2), nn - min(u0 + v0, u1 + v1, u2 + v2))
+    return BESIDE if most < -away else OVER
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, on_b: int, W: Array) -> float:
     """Corners of ``B[j]`` over the face of ``A[i]`` and edges of ``B[j]`` through it.
 
-    Returns the least squared distance, or -1 when the plane of ``A[i]`` shows that it exceeds
-    ``cut``; writes the point on A to ``W`` from ``on_a`` on, 0 or 3, and that on B beside it.
+    Returns the least squared distance; writes the point on A to ``W`` from ``on_a`` on, that on B from
+    ``on_b`` on.
     """
     best = np.inf
-    if A[i, 12] == LINE:
-        return best
     nx = A[i, 9]
     ny = A[i, 10]
     nz = A[i, 11]
@@ -352,12 +488,7 @@ def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, W:
     h0 = r0 * nx + r1 * ny + r2 * nz
     h1 = h0 + B[j, 3] * nx + B[j, 4] * ny + B[j, 5] * nz
     h2 = h0 + B[j, 6] * nx + B[j, 7] * ny + B[j, 8] * nz
-    one_side = (h0 > 0.0 and h1 > 0.0 and h2 > 0.0) or (h0 < 0.0 and h1 < 0.0 and h2 < 0.0)
     reject = A[i, 12] == FLAT
-    if reject and one_side:
-        low = min(abs(h0), abs(h1), abs(h2))
-        if low * low > cut * nn:
-            return -1.0
     for c in range(6):
         # Weights of B's two edges at the candidate: a corner, or where an edge meets the plane.
         if c == 0:
@@ -367,8 +498,6 @@ def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, W:
         elif c == 2:
             p, q, h = 0.0, 1.0, h2
         else:
-            if one_side:
-                break
             h = 0.0
             if c == 3 and h0 * h1 < 0.0:
                 p, q = h0 / (h0 - h1), 0.0
@@ -392,7 +521,6 @@ def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, W:
             g = (x - fx) ** 2 + (y - fy) ** 2 + (z - fz) ** 2
             if g < best:
                 best = g
-                on_b = 3 - on_a
                 W[on_a] = A[i, 0] + fx
                 W[on_a + 1] = A[i, 1] + fy
                 W[on_a + 2] = A[i, 2] + fz
@@ -403,29 +531,41 @@ def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, W:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def triangle_triangle(A: Array, i: int, B: Array, j: int, cut: float, W: Array) -> float:
-    """Squared distance of triangles ``A[i]`` and ``B[j]`` in one frame; their points to ``W[:6]``.
+def triangles(A: Array, i: int, B: Array, j: int, cut: float, W: Array) -> tuple[float, float, float, int]:
+    """Squared distance of triangles ``A[i]`` and ``B[j]`` in one frame; infinity when beyond ``cut``.
 
-    Infinity when it is found to exceed ``cut``. ``W[6:]`` is scratch.
+    With it, where on which edges their points are, for `on_edges`; -1 where those are in ``W[:6]``.
+    ``W[6:]`` is scratch, shape (12,).
     """
-    best = _edges_through(A, i, B, j, cut, index(0), W)
-    if best < 0.0:
-        return np.inf
-    other = W[6:]
-    g = _edges_through(B, j, A, i, cut, index(3), other)
-    if g < 0.0:
-        return np.inf
-    if g < best:
-        best = g
-        for c in range(6):
-            W[c] = other[c]
-    for a in range(3):
-        ax, ay, az, dx, dy, dz = _edge(A, i, a)
-        g, s, t, c = nearest_edge(ax, ay, az, dx, dy, dz, B, j)
+    best, s, t, both = np.inf, 0.0, 0.0, -1
+    of_a, of_b = _side(A, i, B, j, cut), _side(B, j, A, i, cut)
+    if max(of_a, of_b) == BEYOND:
+        return best, s, t, both
+    if of_a == OVER:
+        best = _edges_through(A, i, B, j, cut, index(0), index(3), W)
+    if of_b == OVER:
+        g = _edges_through(B, j, A, i, cut, index(9), index(6), W)
         if g < best:
             best = g
-            W[0] = ax + s * dx
-            W[1] = ay + s * dy
-            W[2] = az + s * dz
-            W[3], W[4], W[5] = _on_edge(B, j, c, t)
-    return 0.0 if best < TOUCH else best
+            for c in range(6):
+                W[c] = W[6 + c]
+    settled, g, p, q, which = edges_in_lanes(A, i, B, j)
+    if not settled:
+        g = np.inf
+        for edges in range(9):
+            ax, ay, az, dx, dy, dz = _edge(A, i, edges // 3)
+            bx, by, bz, ex, ey, ez = _edge(B, j, edges % 3)
+            h, x, y = segment_segment(ax, ay, az, dx, dy, dz, bx, by, bz, ex, ey, ez)
+            if h < g:
+                g, p, q, which = h, x, y, edges
+    if g < best:
+        best, s, t, both = g, p, q, which
+    return (0.0 if best < TOUCH else best), s, t, both
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def on_edges(A: Array, i: int, B: Array, j: int, s: float, t: float, both: int, W: Array) -> None:
+    """Write the points that `triangles` found to ``W[:6]``, where it did not."""
+    if both >= 0:
+        W[0], W[1], W[2] = _on_edge(A, i, both // 3, s)
+        W[3], W[4], W[5] = _on_edge(B, j, both % 3, t)

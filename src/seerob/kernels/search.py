@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.boxes import box_box, segment_box
-from seerob.kernels.primitives import index, segment_triangle, triangle_triangle
+from seerob.kernels.primitives import index, on_edges, segment_triangle, triangles
 
 Links = NDArray[np.int32]
 
@@ -149,7 +149,9 @@ def first_crossing(
             for a in range(LA[i, 0], LA[i, 0] + LA[i, 1]):
                 for b in range(LB[j, 0], LB[j, 0] + LB[j, 1]):
                     row_in(TB, b, R, t, row)
-                    if triangle_triangle(TA, a, row, index(0), cut, W) == 0.0:
+                    d2, s, v, both = triangles(TA, a, row, index(0), cut, W)
+                    if d2 == 0.0:
+                        on_edges(TA, a, row, index(0), s, v, both, W)
                         return a, b
             continue
         if LB[j, 1] > 0 or (LA[i, 1] == 0 and A[i, 19] > B[j, 19]):

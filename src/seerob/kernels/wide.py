@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from seerob.core.transforms import Array
 from seerob.kernels.boxes import fit_box
 from seerob.kernels.lanes import HUGE, WIDTH, Lanes, first_lane, of_rows
-from seerob.kernels.primitives import index, segment_triangle, triangle_triangle
+from seerob.kernels.primitives import index, on_edges, segment_triangle, triangles
 from seerob.kernels.search import cut_of, row_in
 
 Boxes = NDArray[np.float32]
@@ -445,12 +445,13 @@ def nearest_of_meshes(
             if gap > 0.0 and gap * gap > cut * (1.0 + 1e-6):
                 continue
         begun = True
-        g = triangle_triangle(T, a, row, index(0), cut, points)
+        g, s, v, both = triangles(T, a, row, index(0), cut, points)
         if g <= cut and (g < best or (g == best and (a < ka or (a == ka and b < kb)))):
             best = g
             cut = min(cut, cut_of(best))
             ka = a
             kb = b
+            on_edges(T, a, row, index(0), s, v, both, points)
             for c in range(6):
                 W[c] = points[c]
             over = 1.0 / math.sqrt(best) if best > coarse else 0.0

@@ -14,6 +14,8 @@ from seerob.description.capture.mapping import Place, choose, conventions, place
 from seerob.description.capture.observing import bind, stature
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.options import observer
+from seerob.devices.sources.bvh import Bvh
 
 XSENS = (
     "Pelvis",
@@ -195,6 +197,40 @@ def test_names_tell_whose_they_are_and_sides_keep_apart(names, whose):
             assert not bone.startswith("left_"), (name, bone)
 
 
+SETS = {
+    "opensim_gait": "R.ASIS L.ASIS V.Sacral R.Shoulder L.Shoulder R.Elbow R.Wrist R.Knee R.Ankle R.Toe",
+    "rajagopal": "RACR C7 CLAV RASI LASI RPSI RLFC RMFC RLMAL RMMAL RCAL RTOE RMT5 RUA1 RLEL RMEL RFAradius",
+    "cast": "L_IAS R_IAS L_IPS R_IPS R_FTC R_FLE R_FME R_FAL R_TAM R_FCC R_FM1 R_FM2 R_FM5 CV7 R_HLE R_RSP",
+    "motive_markers": "WaistLFront WaistRBack BackTop Chest HeadTop LShoulderTop LElbowOut LWristOut",
+    "markers": "LFHD C7 T10 CLAV STRN LSHO LELB LWRA LWRB LFIN LASI RASI LPSI LTHI LKNE LTIB LANK LHEE LTOE",
+}
+
+
+@pytest.mark.parametrize("whose", SETS)
+def test_marker_sets_are_told_by_their_names_and_what_is_not_documented_is_left_out(whose):
+    layout = Layout(Seen.MARKERS, tuple(SETS[whose].split()))
+    convention, _ = choose(layout, "p")
+    assert convention is not None
+    assert convention.name == whose
+    left_out = {n for n in layout.names if plain(n) not in convention.places}
+    assert left_out <= {"R.Wrist", "RUA1", "R_FTC", "LWristOut"}
+
+
+def test_points_on_the_skin_are_never_taken_for_joints():
+    """A marker beside the elbow is 5 cm from its centre, under the same name."""
+    names = ("RHip", "RKnee", "RAnkle", "RShoulder", "RElbow", "RWrist", "Neck", "Head")
+    convention, findings = choose(Layout(Seen.JOINTS, names), "p")
+    assert convention is not None
+    assert convention.seen == "joints"
+    convention, findings = choose(Layout(Seen.MARKERS, names), "p")
+    assert convention is None
+    assert 'give convention = "biovision" if they are not' in findings[0].text
+    with pytest.raises(InputError, match="not read as those of biovision, joints"):
+        observer(Bvh(human="op", file="x"), Layout(Seen.MARKERS, names), PERSON, file="x")
+    convention, _ = choose(Layout(Seen.MARKERS, names), "p", convention="biovision")
+    assert convention is not None
+
+
 def test_every_convention_covers_the_limbs_and_is_symmetric():
     for name, convention in conventions().items():
         if name.endswith("_arm"):
@@ -202,7 +238,8 @@ def test_every_convention_covers_the_limbs_and_is_symmetric():
         bones = {place.bone for place in convention.places.values()}
         mirrored = {b.replace("left", "?").replace("right", "left").replace("?", "right") for b in bones}
         assert bones == mirrored, name
-        assert {"pelvis", "head", "right_hand", "left_foot"} <= bones, name
+        ends = {"thorax", "right_upper_arm"} if convention.seen == Seen.MARKERS else {"head", "right_hand"}
+        assert {"pelvis", "left_foot"} | ends <= bones, name
         assert convention.axes @ convention.axes.T == pytest.approx(np.eye(3))
 
 

@@ -22,7 +22,7 @@ from seerob.core.files.toml_file import loads
 from seerob.core.printable import printable_table
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.description.capture.captured import Layout
+from seerob.description.capture.captured import Layout, Seen
 from seerob.description.humans.anthropometry import table
 from seerob.description.humans.skeleton import BONES, SIDES
 
@@ -72,6 +72,8 @@ class Convention:
     """Rotation of a segment in the rest posture of a person who faces x with z up, shape (3, 3)."""
     source: str
     """Where this is from."""
+    seen: str = ""
+    """What the names are of (`seerob.description.capture.captured.Seen`); anything when empty."""
 
 
 def plain(name: str) -> str:
@@ -135,11 +137,23 @@ def choose(
         return known[stated], []
     names = {plain(name) for name in layout.names}
     hits = {key: len(names & each.places.keys()) for key, each in known.items()}
-    best = max(hits, key=lambda key: hits[key], default="")
+    # An elbow's marker is beside its joint: points on the skin are in no table of joints.
+    fitting = [key for key in hits if not _other(known[key], layout)]
+    best = max(hits, key=lambda key: (hits[key], key in fitting), default="")
     if not best or hits[best] < min(FEWEST, len(names)) or not hits[best]:
         return None, []
+    if best not in fitting:
+        text = (
+            f"names are not read as those of {best}, {known[best].seen}, although it has {hits[best]} of "
+            f'{len(layout.names)}: these are {layout.seen}; give convention = "{best}" if they are not'
+        )
+        return None, [Finding(level="warning", subject=subject, text=text)]
     text = f"names are read as those of {best}: it explains {hits[best]} of {len(layout.names)}"
     return known[best], [Finding(level="assumed", subject=subject, text=text)]
+
+
+def _other(convention: Convention, layout: Layout) -> bool:
+    return layout.seen is Seen.MARKERS and convention.seen not in ("", Seen.MARKERS)
 
 
 def places(
@@ -212,7 +226,17 @@ def _convention(name: str, entry: Mapping[str, Any], file: str, problems: list[P
     if not (rest is None or isinstance(rest, str)):
         problems.append(Problem(file, f"{name}.rest", f"{rest!r} is no posture", "give the name of one"))
         rest = None
-    return Convention(name, every, rest, axes, str(entry.get("source", file)))
+    return Convention(
+        name, every, rest, axes, str(entry.get("source", file)), _seen(entry, name, file, problems)
+    )
+
+
+def _seen(entry: Mapping[str, Any], name: str, file: str, problems: list[Problem]) -> str:
+    seen = entry.get("seen", "")
+    if seen not in ("", *Seen):
+        problems.append(Problem(file, f"{name}.seen", f"{str(seen)[:40]!r}", f"one of {', '.join(Seen)}"))
+        return ""
+    return str(seen)
 
 
 def _weight(value: Any, where: str, file: str, problems: list[Problem]) -> float:

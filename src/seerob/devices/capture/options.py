@@ -195,7 +195,12 @@ def observer(
             problems.append(Problem(file, f"weights.bones.{bone}", "no such bone", suggestion(bone, BONES)))
     if problems:
         raise InputError(problems)
-    places = names.places(layout, convention, given, file=file)
+    try:
+        places = names.places(layout, convention, given, file=file)
+    except InputError as error:
+        if convention is not None or not findings:
+            raise
+        raise InputError.at(file, "convention", findings[0].text) from error
     bound = bind(
         layout,
         places,

@@ -36,11 +36,17 @@ const marker = (criterion, type) => results[criterion].markers.find((m) => m.typ
 const plus = (a, b, share = 1) => a.map((x, i) => x + share * b[i]);
 
 /** Wait until the room has drawn what was asked for. */
-const drawn = () =>
-  page.evaluate(
+const drawn = async () => {
+  await page.evaluate(
     () =>
       new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 100)))),
   );
+  // As sharp as the screen, which is a moment later where pictures come slowly.
+  await page.waitForFunction(() => {
+    const { width, clientWidth } = document.querySelector(".room canvas");
+    return width >= clientWidth;
+  });
+};
 
 /** Pixels that the markers of a criterion change around a point of the world, with and without them. */
 async function changed(criterion, point, around = AROUND_PX) {
@@ -195,6 +201,28 @@ test("a label is written, as text whatever it says", async () => {
   const bright = pairs.filter(([shown]) => Math.min(...shown) > 150).length;
   assert.ok(bright > 30 && bright < 600, `${bright} pixels of letters`);
   assert.equal(await page.evaluate(() => globalThis.hacked), undefined);
+});
+
+test("figures are written at the sides of the room; in its middle there are only lines to them", async () => {
+  const labels = async (on) => {
+    await page.getByRole("button", { name: "Overlays" }).click();
+    await page.getByLabel("Labels of the worst three").setChecked(on);
+    await page.getByRole("button", { name: "Overlays" }).click();
+    await drawn();
+    return pixels(page, room);
+  };
+  const room = await page.locator(".room").boundingBox();
+  const [without, written] = [await labels(false), await labels(true)];
+  await labels(false);
+  const [width, height] = [Math.round(room.width), Math.round(room.height)];
+  const counts = [0, 0, 0];
+  for (let i = 0; i < written.length; i += 4) {
+    const differs = distance(written.slice(i, i + 3), without.slice(i, i + 3)) > 12;
+    if (differs) counts[Math.floor((3 * ((i / 4) % width)) / width)] += 1;
+  }
+  const [left, middle, right] = counts;
+  assert.ok(left + right > 2000, `${counts}`);
+  assert.ok(middle < 0.02 * ((width * height) / 3), `${middle} pixels in the middle`);
 });
 
 test("markers vanish while nothing is known", async () => {

@@ -1,7 +1,15 @@
 // Text in the room: a plate with an icon of the verdict, always upright, always readable, never in the way
 // of a click. It is painted on a canvas, so whatever the text says stays text.
 
-import { CanvasTexture, LinearFilter, Sprite, SpriteMaterial, SRGBColorSpace, Vector3 } from "three";
+import {
+  CanvasTexture,
+  LinearFilter,
+  type PerspectiveCamera,
+  Sprite,
+  SpriteMaterial,
+  SRGBColorSpace,
+  Vector3,
+} from "three";
 import { shortened } from "../format";
 import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
 import type { Verdict } from "../wire";
@@ -18,12 +26,17 @@ const FAMILY = 'system-ui, "Segoe UI", "Noto Sans", sans-serif';
 /** A figure, or only the name of a place. */
 export type Size = "figure" | "name";
 
-const SIZES: Record<Size, { font: string; height: number }> = {
-  figure: { font: `600 ${12 * SHARPNESS}px ${FAMILY}`, height: 21 },
-  name: { font: `500 ${11 * SHARPNESS}px ${FAMILY}`, height: 17 },
+const SIZES: Record<Size, { font: string; height: number; line: number }> = {
+  figure: { font: `600 ${12 * SHARPNESS}px ${FAMILY}`, height: 21, line: 15 },
+  name: { font: `500 ${11 * SHARPNESS}px ${FAMILY}`, height: 17, line: 13 },
 };
 
 const at = new Vector3();
+
+/** How far an object is before the eye, along the line of sight [m]: what it is drawn smaller by. */
+export function depthOf(object: Sprite, camera: PerspectiveCamera): number {
+  return Math.max(-object.getWorldPosition(at).applyMatrix4(camera.matrixWorldInverse).z, 0.05);
+}
 
 export class Caption {
   readonly object: Sprite;
@@ -31,8 +44,12 @@ export class Caption {
   private readonly material: SpriteMaterial;
   private texture: CanvasTexture | null = null;
   private shown = "";
-  /** How much higher than where it belongs it is, negative for lower [px]. */
+  private lines: readonly string[] = [];
+  /** How much higher than where it belongs it is, negative for lower; and how much further right [px]. */
   liftedPx = 0;
+  rightPx = 0;
+  /** Side of the room where it is; 0 before it was at any. */
+  side: -1 | 0 | 1 = 0;
 
   constructor(private readonly size: Size = "figure") {
     this.material = new SpriteMaterial({
@@ -52,12 +69,20 @@ export class Caption {
     const key = `${verdict} ${short}`;
     if (key === this.shown) return;
     this.shown = key;
-    this.paint(verdict ? `${STATE_ICONS[verdict]}  ${short}` : short, verdict);
+    // Whose figure it is, and below it the figure: a narrow plate covers less.
+    const [, owner, figure] = (this.aside && /^(.+?): (.+)$/s.exec(short)) || ["", short, ""];
+    const head = verdict ? `${STATE_ICONS[verdict]}  ${owner}` : owner!;
+    this.lines = figure ? [head, figure] : [head];
+    this.paint(verdict);
   }
 
-  face(view: View): void {
-    const { camera, pixel } = view;
-    const size = pixel * Math.max(this.object.getWorldPosition(at).distanceTo(camera.position), 0.05);
+  /** Whether it belongs at a side of the room: a name only says what stands there. */
+  get aside(): boolean {
+    return this.size === "figure";
+  }
+
+  face({ camera, pixel }: View): void {
+    const size = pixel * depthOf(this.object, camera);
     this.object.scale.set((this.canvas.width / SHARPNESS) * size, (this.canvas.height / SHARPNESS) * size, 1);
   }
 
@@ -66,7 +91,8 @@ export class Caption {
   }
 
   get heightPx(): number {
-    return SIZES[this.size].height;
+    const { height, line } = SIZES[this.size];
+    return height + (this.lines.length > 1 ? line : 0);
   }
 
   /** Its lower edge above where it belongs [px]. */
@@ -77,6 +103,7 @@ export class Caption {
   /** Draw it so much higher on the screen than where it belongs, and so much further right [px]. */
   lift(px: number, rightPx = 0): void {
     this.liftedPx = px;
+    this.rightPx = rightPx;
     this.object.center.set(0.5 - rightPx / Math.max(this.widthPx, 1), -this.bottomPx / this.heightPx);
   }
 
@@ -85,11 +112,12 @@ export class Caption {
     this.material.dispose();
   }
 
-  private paint(text: string, verdict: Verdict | null): void {
+  private paint(verdict: Verdict | null): void {
     const brush = this.canvas.getContext("2d")!;
-    const { font } = SIZES[this.size];
+    const { font, line } = SIZES[this.size];
     brush.font = font;
-    const width = Math.ceil(brush.measureText(text).width) + 2 * PAD_PX * SHARPNESS;
+    const widest = Math.max(...this.lines.map((text) => brush.measureText(text).width));
+    const width = Math.ceil(widest) + 2 * PAD_PX * SHARPNESS;
     const height = this.heightPx * SHARPNESS;
     // A texture cannot change its size once it is on the graphics card.
     if (width !== this.canvas.width || height !== this.canvas.height || !this.texture) {
@@ -117,7 +145,9 @@ export class Caption {
     brush.font = font;
     brush.fillStyle = color;
     brush.textBaseline = "middle";
-    brush.fillText(text, PAD_PX * SHARPNESS, height / 2 + 1);
+    const first = height / 2 + 1 - ((this.lines.length - 1) * line * SHARPNESS) / 2;
+    for (const [k, text] of this.lines.entries())
+      brush.fillText(text, PAD_PX * SHARPNESS, first + k * line * SHARPNESS);
     this.texture.needsUpdate = true;
   }
 }

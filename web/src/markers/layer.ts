@@ -8,7 +8,7 @@ import { Caption } from "./caption";
 import type { Drawn } from "./drawn";
 import { makeDrawn } from "./index";
 import { Leaders } from "./leaders";
-import { stackCaptions } from "./stacking";
+import { placeCaptions } from "./placing";
 import type { View } from "./view";
 
 interface Slot {
@@ -17,8 +17,6 @@ interface Slot {
   caption: Caption | null;
 }
 
-/** Labels of how many results are written into the room: more would hide what they are about. */
-const CAPTIONED_RESULTS = 3;
 /** Labels of one result, unless it is selected. */
 const LABELS_OF_ONE = 2;
 
@@ -37,18 +35,18 @@ export class MarkerLayer {
    * Draw the markers of these results.
    *
    * @param muted Criteria whose markers are not drawn.
-   * @param selected Criterion whose labels are always written, beside the worst three.
-   * @param captions Whether labels are written at all.
+   * @param selected Criterion whose labels are written beside those of the worst.
+   * @param captions Of how many results labels are written: more would hide what they are about.
    */
   update(
     results: readonly Result[],
     muted: ReadonlySet<string>,
     selected: string | null,
-    captions: boolean,
+    captions: number,
   ): void {
     this.painted.clear();
-    const captioned = captions ? worst(results, muted) : new Set<string>();
-    if (captions && selected) captioned.add(selected);
+    const captioned = worst(results, muted, captions);
+    if (captions > 0 && selected) captioned.add(selected);
     for (const name of this.slots.keys()) {
       if (!results.some((r) => r.name === name)) this.drop(name, 0);
     }
@@ -73,7 +71,7 @@ export class MarkerLayer {
     }
     for (const caption of others) caption.face(view);
     const all = [...others, ...this.captions()];
-    stackCaptions(all, view);
+    placeCaptions(all, view);
     this.leaders.update(all, view);
   }
 
@@ -149,13 +147,13 @@ export class MarkerLayer {
   }
 }
 
-function worst(results: readonly Result[], muted: ReadonlySet<string>): Set<string> {
+function worst(results: readonly Result[], muted: ReadonlySet<string>, count: number): Set<string> {
   const rank = (r: Result): number => STATE_ORDER.indexOf(stateOf(r));
   const shown = results.filter((r) => !muted.has(r.name) && r.markers.length > 0);
   return new Set(
     shown
       .sort((a, b) => rank(a) - rank(b))
-      .slice(0, CAPTIONED_RESULTS)
+      .slice(0, count)
       .map((r) => r.name),
   );
 }

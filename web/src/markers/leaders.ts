@@ -1,4 +1,4 @@
-// Lines from captions that were lifted to where they belong.
+// Lines from captions to where they belong.
 
 import {
   BufferGeometry,
@@ -9,7 +9,7 @@ import {
   Vector3,
 } from "three";
 import { NEUTRAL_COLOR } from "../verdicts";
-import type { Caption } from "./caption";
+import { type Caption, depthOf } from "./caption";
 import type { View } from "./view";
 
 /** Captions nearer to their point than this need none [px]. */
@@ -22,6 +22,7 @@ export class Leaders {
   private readonly places = new Float32BufferAttribute(new Float32Array(MOST * 6), 3);
   private readonly from = new Vector3();
   private readonly to = new Vector3();
+  private readonly up = new Vector3();
 
   constructor() {
     this.places.setUsage(DynamicDrawUsage);
@@ -40,15 +41,20 @@ export class Leaders {
     this.object.raycast = () => {};
   }
 
-  /** Draw them for these captions, after they were stacked. */
+  /** Draw them for these captions, after they were placed. */
   update(captions: Iterable<Caption>, { camera, pixel }: View): void {
     let count = 0;
     for (const caption of captions) {
-      if (Math.abs(caption.liftedPx) < LEAST_PX || count === MOST) continue;
+      const { widthPx, heightPx, bottomPx, rightPx } = caption;
+      // The point of the plate that is nearest to where it belongs.
+      const right = rightPx - Math.sign(rightPx) * Math.min(Math.abs(rightPx), widthPx / 2);
+      const up = Math.min(Math.max(bottomPx, 0), bottomPx + heightPx);
+      if (Math.hypot(right, up) < LEAST_PX || count === MOST) continue;
+      const depth = depthOf(caption.object, camera);
       caption.object.getWorldPosition(this.from);
-      const depth = this.to.copy(this.from).sub(camera.position).length();
-      this.to.setFromMatrixColumn(camera.matrixWorld, 1).multiplyScalar(caption.bottomPx * pixel * depth);
-      this.to.add(this.from);
+      this.to.setFromMatrixColumn(camera.matrixWorld, 0).multiplyScalar(right * pixel * depth);
+      this.up.setFromMatrixColumn(camera.matrixWorld, 1).multiplyScalar(up * pixel * depth);
+      this.to.add(this.up).add(this.from);
       for (const point of [this.from, this.to]) this.object.parent?.worldToLocal(point);
       this.places.setXYZ(2 * count, this.from.x, this.from.y, this.from.z);
       this.places.setXYZ(2 * count + 1, this.to.x, this.to.y, this.to.z);

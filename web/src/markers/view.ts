@@ -4,6 +4,8 @@ import type { PerspectiveCamera } from "three";
 
 export interface View {
   camera: PerspectiveCamera;
-  /** World size of a pixel at one metre from the eye [m]. */
+  /** World size of a pixel at one metre before the eye [m]. */
   pixel: number;
+  /** Whether figures may go to the sides of the picture; in a headset there are none. */
+  margins: boolean;
 }

@@ -86,9 +86,10 @@ export class Stage {
         return;
       }
       // What comes after a picture waits for it.
-      if (this.drawnAt === this.tickedAt) this.sharpness.take(time - this.drawnAt, time);
+      const following = this.drawnAt === this.tickedAt;
+      if (following) this.sharpness.take(time - this.drawnAt, time);
       this.tickedAt = time;
-      if (this.dirty) this.draw(this.sharpness.ratio, time);
+      if (this.dirty) this.draw(following ? this.sharpness.ratio : this.sharpest, time);
       else if (time - this.drawnAt > STILL_MS && this.renderer.getPixelRatio() < this.sharpest)
         this.draw(this.sharpest, time);
     });

@@ -18,6 +18,10 @@ import { pickOnClick } from "./picking";
 import { Stage } from "./stage";
 import { Viewpoint } from "./viewpoint";
 
+/** Criteria that are labelled in the room, and a room that has space for one. */
+const LABELLED = 3;
+const NARROW_PX = 520;
+
 export const showCaptions = signal(true);
 export const showGrid = signal(true);
 /** Nodes whose mesh could not be fetched: they are there, but not to be seen. */
@@ -45,7 +49,7 @@ export class Viewer {
     this.stage = new Stage(element);
     this.stage.world.add(this.bodies.root, this.markers.root, this.doubts.root);
     this.viewpoint = new Viewpoint(this.stage, this.bodies);
-    this.view = { camera: this.stage.camera, pixel: 0 };
+    this.view = { camera: this.stage.camera, pixel: 0, margins: true };
     pickOnClick(this.stage, this.bodies, (name) => select(name === null ? null : { kind: "node", name }));
     this.follow();
     new ResizeObserver(() => this.stage.invalidate()).observe(element);
@@ -58,7 +62,7 @@ export class Viewer {
     this.coming = null;
     this.glide.clear();
     this.dressed = false;
-    this.markers.update([], new Set(), null, false);
+    this.markers.update([], new Set(), null, 0);
     unseen.value = await this.bodies.load(scene);
     if (feed !== this.feed) return;
     this.bodies.hide(hidden.peek());
@@ -94,6 +98,8 @@ export class Viewer {
     this.viewpoint.update();
     const { camera, element } = this.stage;
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
+    this.view.margins = !this.stage.renderer.xr.isPresenting;
+    camera.updateWorldMatrix(true, false);
     this.markers.face(this.view, [...this.doubts.shown()]);
   }
 
@@ -121,13 +127,18 @@ export class Viewer {
     this.draw();
   }
 
+  // On a phone there is no margin for more, and the table is right below.
+  private labelled(): number {
+    return this.stage.element.clientWidth < NARROW_PX ? 1 : LABELLED;
+  }
+
   private draw(): void {
     const chosen = selection.peek();
     this.markers.update(
       this.frame?.results ?? [],
       mutedCriteria.peek(),
       chosen?.kind === "criterion" ? chosen.name : null,
-      showCaptions.peek(),
+      showCaptions.peek() ? this.labelled() : 0,
     );
     this.paint();
     this.bodies.wear(this.frame?.looks ?? {});

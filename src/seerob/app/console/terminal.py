@@ -226,7 +226,9 @@ def tell(findings: Iterable[Finding], *, verbose: bool = False) -> None:
     for one in shown:
         line(one.level, f"{one.subject}: {one.text}", "yellow" if one.level == "warning" else "dim")
     if len(shown) < len(found):
-        line("", f"and {len(found) - len(shown)} more assumptions; --verbose, check-file, the report", "dim")
+        line(
+            "", f"and {len(found) - len(shown)} more assumptions, which check-file and the report list", "dim"
+        )
 
 
 def tell_results(summary: Summary) -> None:

@@ -53,6 +53,12 @@ def test_every_criterion_for_one_robot_and_one_person_live_and_over_a_recording(
     assert said.count("x real time") == 2
 
 
+def test_a_way_beside_a_person_is_found_by_seerob_and_by_ompl_with_coal(smoke):
+    said = smoke("planning")
+    assert ", 0 differ" in said
+    assert said.count("1 of 1 found") == 3
+
+
 def test_seerob_coal_and_fcl_agree_on_a_ur10_tick_by_tick(smoke):
     said = smoke("distances")
     assert "person" in said

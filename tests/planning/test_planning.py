@@ -81,6 +81,29 @@ def test_a_way_that_is_called_clear_is_clear_everywhere_on_it(model):
     assert {clear for clear, _ in told} == {True, False}
 
 
+def test_what_is_asked_by_whether_is_what_distances_say(model):
+    """One posture, and many in one call."""
+    clearance = Clearance(model, model.robot("arm"), np.array([-1.2, 0.0]))
+    postures = np.random.default_rng(2).uniform(-2, 2, (200, 2))
+    clear = [clearance.is_clear(q, 0.03) for q in postures]
+    assert clear == [not clearance.fault(q, 0.03) for q in postures]
+    assert set(clear) == {True, False}
+    for a, b in pairwise(postures):
+        looked = [a + x * (b - a) for x in np.linspace(0, 1, 400)]
+        if not clearance.sampled(a, b, 0.03) or not all(clearance.is_clear(q, 0.03) for q in looked):
+            assert not clearance.clear(a, b, 0.03)
+
+
+def test_what_is_clear_at_postures_only_is_searched_again_by_proven_ways(model, monkeypatch):
+    """Somebody who looks at the ends of ways alone goes straight through the post."""
+    monkeypatch.setattr("seerob.session.planning.clearance.SPACING", 100.0)
+    clearance = Clearance(model, model.robot("arm"), np.array([-1.2, 0.0]))
+    assert clearance.sampled(np.array([-1.2, 0.0]), np.array([1.2, 0.0]), 0.03)
+    found = plan(model, "arm", [[1.2, 0.0]], margin=0.03, seed=3)
+    assert len(found.q) > 2
+    assert 0.03 <= found.least <= dense(clearance, found.q) + 1e-9
+
+
 def test_the_path_goes_around_keeps_the_margin_and_is_the_same_again(model):
     found = plan(model, "arm", [[1.2, 0.0]], margin=0.03, seed=3)
     assert len(found.q) > 2

@@ -285,18 +285,21 @@ class Survey:
         return self._run(rotations, positions, (), self._memory, self._caps)
 
     def within(self, rotations: ArrayLike, positions: ArrayLike, caps: Array) -> Closests:
-        """Answers for one set of poses up to other caps, one after the other in the order of the questions.
+        """Answers up to other caps, one after the other in the order of the questions.
 
         Args:
-            rotations: As of `Query.minimum`.
+            rotations: As of `Query.minimum`, for one set of poses or, shape (N, n, 3, 3), for many.
             positions: Likewise.
             caps: Of every answer [m]; -infinity where none is asked for.
         """
+        many = np.shape(rotations)[:-3]
         if len(self._columns) == 1:
-            return self._run(rotations, positions, (), self._memory, np.ascontiguousarray(caps, float))
+            return self._run(rotations, positions, many, self._memory, np.ascontiguousarray(caps, float))
         own = np.empty_like(self._caps)
         own[self._in_turn] = caps
-        return self._run(rotations, positions, (), self._memory, own).of(self._in_turn)
+        return self._run(rotations, positions, many, self._memory, own).of(
+            *[slice(None)] * len(many), self._in_turn
+        )
 
     def batch(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
         """Answers for many samples, in the order of the questions; see `Query.batch`."""

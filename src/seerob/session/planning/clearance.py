@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -19,12 +20,14 @@ import numpy as np
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.figures import against
 from seerob.core.transforms import Array
-from seerob.distance.least import Per, Query, Survey
+from seerob.distance.least import DistanceKind, Per, Query, Survey
 from seerob.model.model import Mechanism, Model
 from seerob.session.permissible.moving_joints import KinematicChain, chains_of
 
 RESOLUTION = 1e-3
 """A span on which no point moves farther and that is not clear is given up [m]."""
+SPACING = 0.04
+"""No point moves farther between two postures that are looked at where nothing is proven yet [m]."""
 OWN_MARGIN = 0.002
 """Of the robot's own bodies from each other, whatever the margin to others is [m]."""
 WATCHED = ("robot", "tool", "workpiece", "part", "machine", "human")
@@ -55,6 +58,11 @@ class _Pairs:
     def need(self, margin: float) -> float:
         """Distance that is enough, given the margin to others [m]."""
         return OWN_MARGIN if self.own else margin
+
+    @property
+    def count(self) -> int:
+        """Pairs of bodies."""
+        return len(self.query.a) * len(self.query.b)
 
 
 class Clearance:
@@ -128,6 +136,13 @@ class Clearance:
             raise InputError.at("workstation", robot.name, "there is nothing to keep away from")
         asked = [(pairs.query, Per.PAIR if pairs.own else Per.BODY) for pairs in self._pairs]
         self._survey = Survey(model.shapes, asked)
+        self._whether = Survey(model.shapes, [(pairs.query, Per.WHETHER) for pairs in self._pairs])
+        # Of each pair of bodies the row of the weights: those of a body of the robot with all others are one.
+        self._weights = np.concatenate(
+            [p.weight if p.own else np.tile(p.weight, (len(p.query.a), 1)) for p in self._pairs]
+        )
+        self._deviations = np.concatenate([np.full(p.count, p.deviation) for p in self._pairs])
+        self._own = np.concatenate([np.full(p.count, p.own) for p in self._pairs])
 
     def nearest(self, q: Array, *, own: bool = False) -> Nearest | None:
         """Where the robot is nearest to others, or to itself, at joint positions (n,); None without any."""
@@ -156,42 +171,79 @@ class Clearance:
             b: Likewise.
             margin: [m], 0 or more.
         """
-        change = np.abs(b - a)
-        moved = [pairs.weight @ change for pairs in self._pairs]
-        needs = [pairs.need(margin) for pairs in self._pairs]
-        longest = max(float(m.max(initial=0.0)) for m in moved)
+        moved = self._weights @ np.abs(b - a)
+        need = self._needs(margin)
+        longest = float(moved.max(initial=0.0))
         spans = deque([(0.0, 1.0)])
         while spans:
             low, high = spans.popleft()  # what is not clear is met the sooner
             half = (high - low) / 2
-            distances = self._distances(a + (low + half) * (b - a))
-            if any(d.min() < need for d, need in zip(distances, needs, strict=True)):
-                return False
-            if all((d - m * half >= n).all() for d, m, n in zip(distances, moved, needs, strict=True)):
+            poses = self._poses(a + (low + half) * (b - a))
+            if not self._is_nearer(poses, need + moved * half):
                 continue
-            if longest * half < RESOLUTION / 2:
+            if self._is_nearer(poses, need) or longest * half < RESOLUTION / 2:
                 return False
             spans += [(low, low + half), (low + half, high)]
         return True
 
-    def least(self, a: Array, b: Array, tolerance: float = 5e-3) -> float:
-        """A bound from below on the distance to others on the straight way [m], within a tolerance."""
-        if not any(not pairs.own for pairs in self._pairs):
+    def sampled(self, a: Array, b: Array, margin: float) -> bool:
+        """Whether postures of the straight way from ``a`` to ``b``, `SPACING` apart, keep a margin [m].
+
+        No proof: what is between them is not looked at.
+        """
+        need = self._needs(margin)
+        longest = float((self._weights @ np.abs(b - a)).max(initial=0.0))
+        steps = max(1, int(np.ceil(longest / SPACING)))
+        waiting = _middle_first(steps)  # what is not clear is met the sooner
+        asked = 4
+        while waiting:
+            poses = [self._poses(a + k / steps * (b - a)) for k in waiting[:asked]]
+            R, x = (np.array([pose[i] for pose in poses]) for i in (0, 1))
+            if self._is_nearer((R, x), need):
+                return False
+            waiting, asked = waiting[asked:], 2 * asked
+        return True
+
+    def is_clear(self, q: Array, margin: float) -> bool:
+        """Whether a posture (n,) keeps a margin [m]."""
+        return not self._is_nearer(self._poses(q), self._needs(margin))
+
+    def _needs(self, margin: float) -> Array:
+        """Of each pair of bodies the distance between its shapes that is enough [m]."""
+        needs: Array = np.where(self._own, OWN_MARGIN, margin) + self._deviations
+        return needs
+
+    def _is_nearer(self, poses: tuple[Array, Array], caps: Array) -> bool:
+        """Whether any pair of bodies is nearer than its cap [m], in any of the postures."""
+        self.asked += len(poses[0]) if poses[0].ndim > 3 else 1
+        found = self._whether.within(*poses, caps)
+        return bool((found.kind != DistanceKind.BEYOND_CAP).any())
+
+    def least(self, *path: Array, tolerance: float = 5e-3) -> float:
+        """A bound from below on the distance to others on the straight ways between postures.
+
+        Args:
+            path: Joint positions, shape (n,) each.
+            tolerance: By how much it may be too small [m].
+
+        Returns:
+            [m]; infinite without others.
+        """
+        if self._pairs[0].own:
             return np.inf
-        moved = next(pairs for pairs in self._pairs if not pairs.own).weight @ np.abs(b - a)
-        met, bound = np.inf, np.inf
-        spans = [(0.0, 1.0)]
-        while spans:
-            low, high = spans.pop()
-            half = (high - low) / 2
-            distance = self._distances(a + (low + half) * (b - a))[0]
-            met = min(met, float(distance.min()))
-            least = float((distance - moved * half).min())
-            if least >= met - tolerance:
-                bound = min(bound, least)
-            else:
-                spans += [(low, low + half), (low + half, high)]
-        return bound
+        met = min(float(self._distances(q)[0].min()) for q in path)
+        for a, b in pairwise(path):
+            moved = self._weights @ np.abs(b - a)
+            spans = [(0.0, 1.0)]
+            while spans:
+                low, high = spans.pop()
+                half = (high - low) / 2
+                middle = a + (low + half) * (b - a)
+                enough = np.where(self._own, -np.inf, met - tolerance + moved * half + self._deviations)
+                if self._is_nearer(self._poses(middle), enough):
+                    met = min(met, float(self._distances(middle)[0].min()))
+                    spans += [(low, low + half), (low + half, high)]
+        return met - tolerance * (len(path) > 1)
 
     def _poses(self, q: Array) -> tuple[Array, Array]:
         robot, data = self.robot, self._data
@@ -250,6 +302,18 @@ class Clearance:
     def _deviation(self, a: Iterable[int], b: Iterable[int]) -> float:
         bodies = self._model.bodies
         return sum(max((bodies[i].deviation for i in side), default=0.0) for side in (a, b))
+
+
+def _middle_first(steps: int) -> list[int]:
+    """0 … steps, each half of what is left after the one before."""
+    found, spans = [0, steps], deque([(0, steps)])
+    while spans:
+        low, high = spans.popleft()
+        if high - low > 1:
+            middle = (low + high) // 2
+            found.append(middle)
+            spans += [(low, middle), (middle, high)]
+    return found
 
 
 def _areas(

@@ -1,7 +1,8 @@
 """A plan: postures to go through, the way between two by OMPL ([Sucan2012]_), and what is known of it.
 
-Every straight way of it is proven to be clear. RRT-Connect ([Kuffner2000]_) finds it, partial short cuts make
-it shorter. OMPL asks `Clearance` about whole ways, not about samples of them. Its generator of random numbers
+Every straight way of it is proven to be clear. RRT-Connect ([Kuffner2000]_) finds it by postures along its
+ways, partial short cuts make it shorter; then it is proven, and where that fails searched again by ways that
+are. OMPL's generator of random numbers
 is one for the whole process: it is seeded anew for every search, so that the same seed gives the same path
 whatever was searched before.
 """
@@ -155,7 +156,7 @@ def plan(
             remedy = "give a posture in between, more seconds, another seed, or a smaller margin"
             raise NoPath(f"from {first} to {second}: {error}; {remedy}") from error
         at.append(len(path) - 1)
-    least = min((clearance.least(a, b) for a, b in pairwise(path)), default=np.inf)
+    least = clearance.least(*path)
     near = [found for q in path if (found := clearance.nearest(q)) is not None]
     return Plan(
         robot=robot,
@@ -225,6 +226,9 @@ def _wrong(robot: Mechanism, name: str, ways: Array) -> Iterator[Problem]:
 STRIDE = 0.6
 """Largest step of a tree in joint space [rad or m]."""
 
+ROOM = 0.005
+"""What is made shorter keeps so much more than the margin [m]: along the margin a proof takes small steps."""
+
 _ONE_AT_A_TIME = Lock()
 
 
@@ -264,37 +268,72 @@ def search(
         NoPath: None was found within ``most`` or ``seconds``.
         Stopped: ``say`` said so.
     """
-    base, geometric, util = _ompl()
+    modules = _ompl()
     if clearance.clear(start, goal, margin):
         return [start, goal]
     patience = _Patience(most, seconds, say)
-    with _ONE_AT_A_TIME, _quiet(util):
-        util.RNG.setSeed(seed % (2**32 - 1) + 1)
-        space = _space(base, clearance, start, goal)
-        setup = geometric.SimpleSetup(space)
-        information = setup.getSpaceInformation()
-        setup.setStateValidityChecker(lambda state: not clearance.fault(_posture(state, len(start)), margin))
-        information.setMotionValidator(_validator(base, information, clearance, margin, patience))
-        setup.setStartAndGoalStates(_state(space, start), _state(space, goal))
-        planner = geometric.RRTConnect(information)
-        planner.setRange(STRIDE)
-        setup.setPlanner(planner)
-        setup.solve(base.PlannerTerminationCondition(patience))
-        if not setup.haveExactSolutionPath():
-            raise patience.end()
-        path = setup.getSolutionPath()
-        found = [_posture(state, len(start)) for state in path.getStates()]
-        if not patience.over():
-            simplifier = geometric.PathSimplifier(information)
-            simplifier.ropeShortcutPath(path)
-            simplifier.partialShortcutPath(path, 60, 30)
-            simplifier.reduceVertices(path)
-            shorter = [_posture(state, len(start)) for state in path.getStates()]
-            found = _plain(clearance, shorter, margin)
+    with _ONE_AT_A_TIME, _quiet(modules[2]):
+        found = _searched(modules, clearance, clearance.sampled, start, goal, margin, seed, patience)
+        # Only what is kept is proven; what is clear at postures and not between them is searched again.
+        path = [start]
+        for a, b in pairwise(found):
+            if clearance.clear(a, b, margin):
+                path.append(b)
+                continue
+            way = _searched(modules, clearance, clearance.clear, a, b, margin, seed, patience)
+            if not all(clearance.clear(x, y, margin) for x, y in pairwise(way)):
+                raise NoPath("the path that was found could not be proven")
+            path += way[1:]
     if patience.stopped:
         raise patience.end()
-    if not all(clearance.clear(a, b, margin) for a, b in pairwise(found)):
-        raise NoPath("the path that was found could not be proven")
+    return path
+
+
+IsClear = Callable[[Array, Array, float], bool]
+"""Whether a straight way keeps a margin, as far as somebody looks."""
+
+
+def _searched(
+    modules: tuple[ModuleType, ModuleType, ModuleType],
+    clearance: Clearance,
+    is_clear: IsClear,
+    start: Array,
+    goal: Array,
+    margin: float,
+    seed: int,
+    patience: _Patience,
+) -> list[Array]:
+    """Postures between which ``is_clear`` says yes, without detours that it can do without.
+
+    Raises:
+        NoPath: None was found in time.
+        Stopped: Nobody wants to wait.
+    """
+    base, geometric, util = modules
+    util.RNG.setSeed(seed % (2**32 - 1) + 1)
+    space = _space(base, clearance, start, goal)
+    setup = geometric.SimpleSetup(space)
+    information = setup.getSpaceInformation()
+    n = len(start)
+    setup.setStateValidityChecker(lambda state: clearance.is_clear(_posture(state, n), margin))
+    ways = _validator(base, information, n, is_clear, margin, patience)
+    information.setMotionValidator(ways)
+    setup.setStartAndGoalStates(_state(space, start), _state(space, goal))
+    planner = geometric.RRTConnect(information)
+    planner.setRange(STRIDE)
+    setup.setPlanner(planner)
+    setup.solve(base.PlannerTerminationCondition(patience))
+    if not setup.haveExactSolutionPath():
+        raise patience.end()
+    path = setup.getSolutionPath()
+    found = [_posture(state, n) for state in path.getStates()]
+    if not patience.over():
+        ways.margin = margin + ROOM
+        simplifier = geometric.PathSimplifier(information)
+        simplifier.ropeShortcutPath(path)
+        simplifier.partialShortcutPath(path, 60, 30)
+        simplifier.reduceVertices(path)
+        found = _plain(is_clear, [_posture(state, n) for state in path.getStates()], ways.margin)
     return found
 
 
@@ -364,15 +403,19 @@ def _space(base: ModuleType, clearance: Clearance, start: Array, goal: Array) ->
     return space
 
 
-def _validator(base: Any, information: Any, clearance: Clearance, margin: float, patience: _Patience) -> Any:
-    n = len(clearance.robot.joints)
+def _validator(
+    base: Any, information: Any, n: int, is_clear: IsClear, margin: float, patience: _Patience
+) -> Any:
+    class Ways(base.MotionValidator):  # type: ignore[misc]
+        margin: float
 
-    class Proven(base.MotionValidator):  # type: ignore[misc]
         def checkMotion(self, a: Any, b: Any) -> bool:
             # OMPL asks whether to end between its steps only, each of which may be long.
-            return not patience.over() and clearance.clear(_posture(a, n), _posture(b, n), margin)
+            return not patience.over() and is_clear(_posture(a, n), _posture(b, n), self.margin)
 
-    return Proven(information)
+    ways = Ways(information)
+    ways.margin = margin
+    return ways
 
 
 def _posture(state: Any, n: int) -> Array:
@@ -386,12 +429,12 @@ def _state(space: Any, q: Array) -> Any:
     return state
 
 
-def _plain(clearance: Clearance, way: list[Array], margin: float) -> list[Array]:
+def _plain(is_clear: IsClear, way: list[Array], margin: float) -> list[Array]:
     """Without postures that can be left out."""
     k = 1
     while k < len(way) - 1:
         same = np.abs(way[k] - way[k - 1]).max() < 1e-9
-        if same or clearance.clear(way[k - 1], way[k + 1], margin):
+        if same or is_clear(way[k - 1], way[k + 1], margin):
             del way[k]
         else:
             k += 1

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { assertShown, open, settled } from "./expect.mjs";
+import { assertShown, open, settled, show } from "./expect.mjs";
 
 const HOSTILE = "<img src=x onerror=window.hacked=1>";
 let opened;
@@ -94,6 +94,43 @@ test("a row opens to its basis: formula, source, inputs with origin, what is not
   }
   await row.getByRole("button", { expanded: true }).click();
   assert.equal(await details.count(), 0);
+});
+
+test("a page that comes late has the whole past, in lanes and plots on one axis with one cursor", async () => {
+  await page.waitForFunction(() => window.seerob.t > 4);
+  const late = await browser.context.newPage();
+  await late.setViewportSize({ width: 1280, height: 800 });
+  await show(late, served.url);
+  const joined = await late.evaluate(() => window.seerob.t);
+  const axis = () =>
+    late.locator(".strip").evaluate((strip) => [strip.ariaValueMin, strip.ariaValueMax].map(Number));
+  await late.waitForFunction(() => Number(document.querySelector(".strip").ariaValueMin) < 0.5);
+  assert.ok(joined > 4);
+  // A lane has its colour where the page was not there yet, and the plot beside it has a line.
+  await late.waitForFunction((t) => {
+    const strip = document.querySelector(".strip");
+    const [first, last] = [strip.ariaValueMin, strip.ariaValueMax].map(Number);
+    const x = Math.round((strip.width * (t - first)) / (last - first));
+    const [r, g, b] = strip
+      .getContext("2d")
+      .getImageData(x, (7 * strip.height) / strip.clientHeight, 1, 1).data;
+    return Math.abs(r - 0x1a) + Math.abs(g - 0x22) + Math.abs(b - 0x2d) > 12;
+  }, joined / 2);
+  await late.getByRole("button", { name: "10 s", exact: true }).click();
+  await late.waitForFunction(() => {
+    const { ariaValueMin, ariaValueMax } = document.querySelector(".strip");
+    return Math.abs(ariaValueMax - ariaValueMin - 10) < 1e-6;
+  });
+  await late.waitForFunction((t) => window.seerob.t > t + 2, joined);
+  await late.keyboard.press("Space");
+  await late.waitForSelector(".behind");
+  const held = await settled(late);
+  const [first, last] = await axis();
+  const over = await late.locator(".plot .u-over").first().boundingBox();
+  const share = (held - 1 - first) / (last - first);
+  await late.mouse.click(over.x + over.width * share, over.y + over.height / 2);
+  await late.waitForFunction((t) => Math.abs(window.seerob.t - t) < 0.15, held - 1);
+  await late.close();
 });
 
 test("a live run that falls silent is said to be silent, and nothing stays green", async () => {

@@ -1,42 +1,15 @@
 // A few criteria over time, side by side, under one time cursor.
 
-import { effect, signal } from "@preact/signals";
+import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { against, steady, withUnit } from "../figures";
-import {
-  isLive,
-  lookingAt,
-  now,
-  type Row,
-  reach,
-  rows,
-  scene,
-  select,
-  selection,
-  stale,
-  traces,
-  tracesRevision,
-} from "../page_state";
-import { Chart, type ChartView } from "../plots/chart";
+import { now, type Row, rows, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
+import { shownRange, WIDTHS, width } from "../plots/axis";
+import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
-
-/** Widths of the time window [s]; null for the whole recording. */
-const WINDOWS: readonly [number | null, string][] = [
-  [10, "10 s"],
-  [30, "30 s"],
-  [120, "2 min"],
-  [null, "All"],
-];
-
-const chosenWindow = signal<number | null | undefined>(undefined);
-
-function windowWidth(): number | null {
-  const chosen = chosenWindow.value;
-  return chosen === undefined ? (isLive.value ? 30 : null) : chosen;
-}
 
 export function Plots({ count }: { count: number }) {
   const names = plotted(count);
@@ -44,14 +17,14 @@ export function Plots({ count }: { count: number }) {
     <section class="plots" aria-label="Plots">
       <fieldset class="windows">
         <legend class="visually-hidden">Time window</legend>
-        {WINDOWS.map(([seconds, title]) => (
+        {WIDTHS.map((title) => (
           <button
             key={title}
             type="button"
-            aria-pressed={windowWidth() === seconds}
-            class={windowWidth() === seconds ? "on" : ""}
+            aria-pressed={width.value === title}
+            class={width.value === title ? "on" : ""}
             onClick={() => {
-              chosenWindow.value = seconds;
+              width.value = title;
             }}
           >
             {title}
@@ -86,10 +59,10 @@ function Plot({ name }: { name: string }) {
     const draw = (): void => {
       timer = null;
       const trace = traces.get(name);
-      if (trace) chart.show(trace, viewNow());
+      if (trace) chart.show(trace, { ...untracked(shownRange), now: now.peek() });
     };
     const stop = effect(() => {
-      void [tracesRevision.value, now.value, chosenWindow.value, reach.value];
+      void [tracesRevision.value, now.value, shownRange()];
       timer ??= setTimeout(draw, redrawEveryMs());
     });
     return () => {
@@ -122,28 +95,4 @@ function Plot({ name }: { name: string }) {
 function figureOf({ info, result }: Row): string {
   const { value } = against(result?.value ?? null, result?.limit ?? null, info.unit, info.at_most);
   return withUnit(steady(value, info.unit), info.unit);
-}
-
-// Live: the newest at the right edge. Looking back or replaying: the cursor in the middle, inside what there is.
-function viewNow(): ChartView {
-  const width = windowWidth();
-  const at = now.peek();
-  const { start, end } = reach.peek();
-  if (isLive.peek()) {
-    const first = firstTime();
-    const span = width ?? Math.max(end - first, 10);
-    const newest = Math.max(end, first + span);
-    const right =
-      lookingAt.peek() === null ? newest : Math.min(Math.max(at + span / 2, first + span), newest);
-    return { start: right - span, end: right, now: at };
-  }
-  if (width === null || width >= end - start) return { start, end: Math.max(end, start + 1e-3), now: at };
-  const left = Math.min(Math.max(at - width / 2, start), end - width);
-  return { start: left, end: left + width, now: at };
-}
-
-function firstTime(): number {
-  let first = Number.POSITIVE_INFINITY;
-  for (const trace of traces.values()) if (trace.length > 0) first = Math.min(first, trace.t[0]!);
-  return Number.isFinite(first) ? first : 0;
 }

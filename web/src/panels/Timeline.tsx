@@ -1,16 +1,14 @@
 // Time as a strip: a lane per criterion with a limit, coloured where it is exceeded or undecided.
 
-import { effect } from "@preact/signals";
+import { effect, untracked } from "@preact/signals";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { formatTime } from "../format";
-import { isLive, now, reach, scene, select, selection, stale, tracesRevision } from "../page_state";
-import { drawLanes, LANE_PX, type TimeRange, timeAt } from "../plots/lanes";
+import { now, scene, select, selection, stale, tracesRevision } from "../page_state";
+import { held, shownRange, timeAt } from "../plots/axis";
+import { drawLanes, LANE_PX } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
 import { useActions } from "./app_context";
-
-/** A live run's strip shows at least so much [s], so that it does not race at the start. */
-const LIVE_LEAST_S = 60;
 
 export function Timeline() {
   const { time } = useActions();
@@ -25,13 +23,13 @@ export function Timeline() {
     const target = canvas.current;
     if (!target) return;
     const draw = (): void =>
-      drawLanes(target, key === "" ? [] : key.split("\n"), stripRange(), now.peek(), stale.peek());
+      drawLanes(target, key === "" ? [] : key.split("\n"), untracked(shownRange), now.peek(), stale.peek());
     draw();
     const resized = new ResizeObserver(draw);
     resized.observe(target);
     let waiting: ReturnType<typeof setTimeout> | null = null;
     const stop = effect(() => {
-      void [tracesRevision.value, now.value, reach.value, stale.value];
+      void [tracesRevision.value, now.value, shownRange(), stale.value];
       waiting ??= setTimeout(() => {
         waiting = null;
         draw();
@@ -46,9 +44,9 @@ export function Timeline() {
 
   const seekTo = (event: PointerEvent): void => {
     const box = canvas.current!.getBoundingClientRect();
-    time.seek(timeAt(stripRange(), (event.clientX - box.left) / box.width));
+    time.seek(timeAt(shownRange(), (event.clientX - box.left) / box.width));
   };
-  const { start, end } = stripRange();
+  const { start, end } = shownRange();
   return (
     <div class="timeline">
       <div class="lanes scroll">
@@ -79,7 +77,11 @@ export function Timeline() {
           aria-valuetext={formatTime(now.value)}
           onPointerDown={(event) => {
             event.currentTarget.setPointerCapture(event.pointerId);
+            held.value = shownRange();
             seekTo(event);
+          }}
+          onLostPointerCapture={() => {
+            held.value = null;
           }}
           onPointerMove={(event) => {
             if (event.buttons & 1) seekTo(event);
@@ -92,11 +94,4 @@ export function Timeline() {
       </div>
     </div>
   );
-}
-
-function stripRange(): TimeRange {
-  const { start, end } = reach.value;
-  if (!isLive.value) return { start, end: Math.max(end, start + 1e-3) };
-  const from = Number.isFinite(start) ? start : 0;
-  return { start: from, end: Math.max(end, from + LIVE_LEAST_S) };
 }

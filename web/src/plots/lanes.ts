@@ -2,19 +2,10 @@
 
 import { traces } from "../page_state";
 import { VERDICT_COLORS } from "../verdicts";
+import type { TimeRange } from "./axis";
 import { hatchPattern } from "./hatch";
 
 export const LANE_PX = 15;
-
-export interface TimeRange {
-  start: number;
-  end: number;
-}
-
-/** Run time at a share of the strip's width [s]. */
-export function timeAt({ start, end }: TimeRange, share: number): number {
-  return start + Math.min(1, Math.max(0, share)) * (end - start);
-}
 
 export function drawLanes(
   canvas: HTMLCanvasElement,

@@ -1,0 +1,56 @@
+// The one time axis of plots and lanes: what of the run they show, and where the cursor is.
+
+import { signal } from "@preact/signals";
+import { isLive, lookingAt, now, reach, traces, tracesRevision } from "../page_state";
+import { remembered } from "../remembered";
+
+export interface TimeRange {
+  start: number;
+  end: number;
+}
+
+/** Widths of the axis. */
+export const WIDTHS = ["10 s", "30 s", "2 min", "All"] as const;
+export type Width = (typeof WIDTHS)[number];
+
+const SECONDS: Record<Width, number | null> = { "10 s": 10, "30 s": 30, "2 min": 120, All: null };
+/** A live run's axis shows at least so much [s], so that it does not race at the start. */
+const LIVE_LEAST_S = 60;
+
+export const width = remembered<Width>("time axis", WIDTHS, "All");
+
+/** What the axis shows while somebody drags on it: it must not run away below the pointer. */
+export const held = signal<TimeRange | null>(null);
+
+/** What is shown; read inside a component or an effect, it is kept up to date. */
+export function shownRange(): TimeRange {
+  if (held.value) return held.value;
+  const seconds = SECONDS[width.value];
+  const { start, end } = reach.value;
+  const at = now.value;
+  if (isLive.value) {
+    const first = firstTime();
+    const span = seconds ?? Math.max(end - first, LIVE_LEAST_S);
+    const newest = Math.max(end, first + span);
+    const back = lookingAt.value !== null;
+    const right = back ? Math.min(Math.max(at + span / 2, first + span), newest) : newest;
+    return { start: right - span, end: right };
+  }
+  if (seconds === null || seconds >= end - start) return { start, end: Math.max(end, start + 1e-3) };
+  const middle = Number.isFinite(at) ? at : start;
+  const left = Math.min(Math.max(middle - seconds / 2, start), end - seconds);
+  return { start: left, end: left + seconds };
+}
+
+// A page that came late was told what happened before.
+function firstTime(): number {
+  void tracesRevision.value;
+  let first = Number.POSITIVE_INFINITY;
+  for (const trace of traces.values()) if (trace.length > 0) first = Math.min(first, trace.t[0]!);
+  return Number.isFinite(first) ? first : 0;
+}
+
+/** Run time at a share of the axis [s]. */
+export function timeAt({ start, end }: TimeRange, share: number): number {
+  return start + Math.min(1, Math.max(0, share)) * (end - start);
+}

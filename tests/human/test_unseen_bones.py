@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Verdict
 from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.safety.velocity import Velocity
 from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.capture.estimated import estimated
 from seerob.description.humans.skeleton import BONES, PARENTS
@@ -127,6 +128,14 @@ def test_the_waist_alone_tells_no_trunk_and_five_trackers_no_person():
     assert result.verdict is Verdict.UNDECIDED
     with pytest.raises(Undecided, match="no device sees lumbar, thorax, neck, head"):
         state.require("operator")
+
+
+@pytest.mark.parametrize("physics", [True, False])
+def test_the_speed_of_a_bone_needs_that_bone_alone(physics):
+    criteria = [Velocity(name=at, at=f"operator/{at}", limit=9.0) for at in ("pelvis", "left_hand", "head")]
+    _, results = seen_only(TRACKERS, ticks=3, physics=physics, criteria=criteria)
+    pelvis, hand, head = (result.verdict for result in results)
+    assert (pelvis, hand, head) == (Verdict.WITHIN, Verdict.WITHIN, Verdict.UNDECIDED)
 
 
 def test_what_is_seen_exceeds_by_itself():

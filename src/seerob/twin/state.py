@@ -475,7 +475,10 @@ class State(Validity):
             Three standard deviations, and between two samples how far they are from the velocities that these
             say [rad/s or m/s], shape (n,); None where nobody says that they do.
         """
-        self.require(mechanism.name)
+        if mechanism.role == "human":  # of whom a bone may be known, and others not
+            self.hearing(mechanism.name)
+        else:
+            self.require(mechanism.name)
         return self._every_speed_error().get(mechanism.name)
 
     @property
@@ -721,17 +724,28 @@ class State(Validity):
         Args:
             frame: The frame.
             mechanism: Whose joints the columns are.
-            offset: The point in the frame [m], shape (3,); its origin when not given.
+            offset: The point in the frame [m], shape (3,); its origin when not given. Of a person the bone of
+                the frame alone must be known.
         """
-        self.require(mechanism.name)
+        self._require_point(frame, mechanism)
         return self._point(frame, mechanism, offset).jacobian
+
+    def _require_point(self, frame: Frame, mechanism: Mechanism) -> None:
+        """Raise `Undecided` unless a point is where the twin shows it: of a person, by its bone."""
+        bones: tuple[int, ...] = ()
+        if mechanism.role == "human":
+            bones = tuple(i for i in mechanism.bodies if self._model.bodies[i].mj == frame.mj)
+        if bones:
+            self.require_bodies(bones)
+        else:
+            self.require(mechanism.name)
 
     def velocity(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
         """Velocity that the joints of a mechanism give a point, linear before angular, (6,) [m/s, rad/s].
 
-        Arguments as of `jacobian`.
+        Arguments as of `jacobian`; of a person the bone of the frame alone must be known.
         """
-        self.require(mechanism.name)
+        self._require_point(frame, mechanism)
         self.speeds_asked.add(mechanism.name)
         return self._point(frame, mechanism, offset).velocity
 

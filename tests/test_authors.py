@@ -485,7 +485,10 @@ def test_what_a_criterion_writes_into_arrays_changes_no_other_and_no_motion(own,
 @pytest.mark.parametrize("method", sorted(GIVEN_A_MODEL))
 def test_every_method_of_ones_own_is_given_a_model_of_its_own(own, method):
     """Also before a run: what it writes there is in nobody else's figures, shipped or not."""
-    spoil = "model.mj.body_mass[:] = 0; [body.corners.fill(0) for body in model.bodies]"
+    spoil = (
+        "model.mj.body_mass[:] = 0; [body.corners.fill(0) for body in model.bodies]; "
+        "[array.fill(0) for array in model.shapes.arrays()]; model._gaps.update({((0,), (1,)): None})"
+    )
     head, text = HEAD, BIND.format("return self.result(1.0)")
     if method == "bind":
         text = text.replace("        arm,", f"        {spoil}\n        arm,")
@@ -498,10 +501,14 @@ def test_every_method_of_ones_own_is_given_a_model_of_its_own(own, method):
     station = own(text, head=head)
     (rule,) = station.workstation.safety
     kept = station.model.mj.body_mass.copy(), [body.corners.copy() for body in station.model.bodies]
+    shapes = station.model.shapes.copied()
     getattr(rule, method)(station.model, *([None] if method in ("falls", "lowest", "follows") else []))
     np.testing.assert_array_equal(station.model.mj.body_mass, kept[0])
     for body, corners in zip(station.model.bodies, kept[1], strict=True):
         np.testing.assert_array_equal(body.corners, corners)
+    for array, before in zip(station.model.shapes.arrays(), shapes.arrays(), strict=True):
+        np.testing.assert_array_equal(array, before)
+    assert None not in station.model._gaps.values()
 
 
 def test_every_method_that_takes_a_model_gives_ones_own_its_own():

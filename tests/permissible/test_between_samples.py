@@ -10,7 +10,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError, Undecided, UnknownName
-from seerob.session.permissible.between_samples import BetweenSamples
+from seerob.session.permissible.between_samples import BetweenSamples, wanted_bounds
 from seerob.session.permissible.moving_joints import MovingJoints, chains_of
 from seerob.session.permissible.path import GivenMotion
 
@@ -153,3 +153,56 @@ def test_assess_prints_and_reports_them(tmp_path, capsys):
     cli.main(words)
     assert "at every instant from 0.000 s to 0.450 s" in capsys.readouterr().out
     assert "Between the samples" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+
+
+SLIDE = (
+    '<robot name="slide"><link name="base"><collision><origin xyz="0 0 1"/><geometry>'
+    '<box size="0.2 0.2 0.2"/></geometry></collision></link><link name="cart"><collision><geometry>'
+    '<box size="0.2 0.2 0.2"/></geometry></collision></link>'
+    '<joint name="j1" type="prismatic"><parent link="base"/><child link="cart"/>'
+    '<axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="1" velocity="9"/></joint></robot>'
+)
+BEAM = '[[parts]]\nname = "beam"\nshape = { box = [0.2, 9, 9] }\nat = { position = [1.5, 0, 0] }\n'
+
+
+def slide(folder, *more):
+    """A base that stands and a cart that slides toward a beam; two of them when ``more`` says so."""
+    return made(folder, FLOATING + TWO_R + "".join(more) + BEAM, {"arm.urdf": SLIDE}).model
+
+
+def cubic(name, t, q, qd, good=True):
+    t, q, qd = (np.array(each, float) for each in (t, q, qd))
+    return GivenMotion(name, t, q[:, None], qd[:, None], np.broadcast_to(good, t.shape))
+
+
+def test_one_look_bounds_an_even_acceleration_exactly(tmp_path):
+    """From rest at 2 m/s² for 1 s: 0.3 m are left at its end, where 2 m/s are reached."""
+    between = BetweenSamples(slide(tmp_path), {"arm": cubic("arm", [0, 1], [0, 1], [0, 2])})
+    distance = between.distance("arm", "beam", tolerance=9)
+    assert distance.asked == 1
+    assert distance.found == pytest.approx(1.3 - 0.25)
+    assert distance.value == pytest.approx(1.3 - 1.0, abs=1e-6)
+    assert distance.value < 1.3 - 1.0
+    speed = between.speed("arm", tolerance=9)
+    assert (speed.asked, speed.found) == (1, pytest.approx(1.0))
+    assert speed.value == pytest.approx(2.0, abs=1e-6)
+    evenly = BetweenSamples(slide(tmp_path), {"arm": cubic("arm", [0, 1], [0, 0.5], [0.5, 0.5])})
+    even, left = evenly.speed("arm"), evenly.distance("arm", "beam", tolerance=9)
+    assert even.found < even.value < even.found + 1e-6
+    assert left.value == pytest.approx(1.3 - 0.5, abs=1e-6)
+    assert evenly.distance("arm", "beam").found < 0.81
+    assert evenly.distance("arm", "beam").value == pytest.approx(0.8, abs=2e-3)
+    assert (left.unit, even.unit) == ("m", "m/s")
+
+
+def test_bounds_speak_of_the_time_that_all_motions_have_and_say_which_are_doubtful(tmp_path):
+    model = slide(tmp_path, TWO_R.replace('"arm"', '"other"') + "base = { position = [0, 3, 0] }\n")
+    long, late = cubic("arm", [0, 3], [0, 0.3], [0.1, 0.1]), cubic("other", [1, 2], [0, 0], [0, 0])
+    bounds = wanted_bounds(model, {"arm": long, "other": late}, most=9)
+    assert {(b.start, b.end) for b in bounds} == {(1.0, 2.0)}
+    assert {b.note for b in bounds} == {""}
+    with pytest.raises(InputError, match="no time in common"):
+        BetweenSamples(model, {"arm": cubic("arm", [0, 1], [0, 0], [0, 0]), "other": late})
+    alone = wanted_bounds(model, {"arm": cubic("arm", [0, 1, 2], [0, 0, 0], [0, 0, 0], [1, 0, 1])}, most=9)
+    assert [b.what for b in alone if b.what.startswith("speed")] == ["speed of arm"]  # the other one stands
+    assert all("does not vouch for count too (arm)" in b.note for b in alone)

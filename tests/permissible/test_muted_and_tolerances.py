@@ -40,8 +40,11 @@ def test_a_criterion_limits_nothing_where_it_is_muted_and_is_open_where_nobody_k
     assert (always.share[late] < 1).any()
     np.testing.assert_allclose(some.share[early], always.share[early], rtol=1e-12)
     assert (some.share[late] >= 1).all()
+    assert {c.surface.partition(":")[0] for of in always.ceilings for c in of} == {"arm/l2"}  # is nearest
     told = {c.reason for k in np.flatnonzero(late) for c in some.ceilings[k]}
     assert told == {"not asked: gate/open is false"}
+    assert not any(c.asked for k in np.flatnonzero(late) for c in some.ceilings[k])
+    assert all(c.asked for k in np.flatnonzero(early) for c in some.ceilings[k])
     np.testing.assert_allclose(lost.share[early], always.share[early], rtol=1e-12)
     assert np.isnan(lost.share[late]).all()
 
@@ -54,6 +57,15 @@ def test_a_method_that_is_not_asked_is_not_enough_by_itself(by, expected):
     ]
     found = governing(ceilings, by)
     assert (1.0 if found is None else found.share) == expected
+
+
+@pytest.mark.parametrize("unknown", ["arm/l1", "arm/l2"])
+def test_where_one_part_has_edges_that_nobody_knows_no_speed_is_permitted(tmp_path, unknown):
+    known = PFL.replace(f'"{unknown}" = 1e-4', "").replace("{ ,", "{").replace(",  }", " }")
+    found = maps(cell(tmp_path, known + KEPT_OUT + "horizon = 4.0\n", x=2.3), By.PFL)[By.PFL]
+    ceilings = [c for k in range(len(found.t)) for c in found.ceilings[k]]
+    assert len({c.region for c in ceilings}) > 5
+    assert {(c.undecided, c.surface) for c in ceilings} == {(True, unknown)}
 
 
 def test_what_a_stop_may_be_off_by_counts_in_full(tmp_path):

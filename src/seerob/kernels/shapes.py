@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,6 +93,10 @@ class Shapes:
             probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in made)]),
         )
         return shapes
+
+    def copied(self) -> Shapes:
+        """Shapes in arrays of their own."""
+        return deepcopy(self)
 
     def arrays(self) -> Solids:
         """The arrays as kernels take them."""

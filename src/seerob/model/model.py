@@ -205,7 +205,8 @@ class Gap:
         return *self.a, *self.b
 
 
-Owned = tuple[mujoco.MjModel, tuple[Body, ...], dict[str, Frame], dict[str, Mechanism]]
+Gaps = dict[tuple[tuple[int, ...], tuple[int, ...]], "Gap"]
+Owned = tuple[mujoco.MjModel, Shapes, Gaps, tuple[Body, ...], dict[str, Frame], dict[str, Mechanism]]
 """What of a `Model` can be written to, copied."""
 
 
@@ -230,7 +231,7 @@ class Model:
     """Variables of controllers and machines by their names here."""
     cache: Path | None = None
     """Folder that keeps what takes long to make between starts."""
-    _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
+    _gaps: Gaps = field(default_factory=dict)
     _owned: dict[str, Owned] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -240,18 +241,20 @@ class Model:
     def own_of(self, author: str) -> Model:
         """The copy that a criterion of one's own is given, by its name.
 
-        Whatever it writes into MuJoCo's model, masses or shapes of bodies, joints and frames changes nothing
-        for anybody else. Distances are asked of the one geometry.
+        Whatever it writes into MuJoCo's model, masses or shapes of bodies, joints and frames, or into the
+        geometry that distances are asked of, changes nothing for anybody else.
         """
         if author not in self._owned:
-            self._owned[author] = copy(self.mj), *deepcopy((self.bodies, self.frames, self.mechanisms))
-        mj, bodies, frames, mechanisms = self._owned[author]
+            bodies, frames, mechanisms = deepcopy((self.bodies, self.frames, self.mechanisms))
+            self._owned[author] = copy(self.mj), self.shapes.copied(), {}, bodies, frames, mechanisms
+        mj, shapes, gaps, bodies, frames, mechanisms = self._owned[author]
         if any(piece.rest is not None for piece in self.workstation.workpieces):
             mj = copy(self.mj)  # what is picked up changes masses from tick to tick
         dictionary = {**self.dictionary}
         return replace(
-            self, mj=mj, bodies=bodies, frames=frames, mechanisms=mechanisms, dictionary=dictionary
-        )
+            self, mj=mj, bodies=bodies, frames=frames, mechanisms=mechanisms, dictionary=dictionary,
+            shapes=shapes, _gaps=gaps,
+        )  # fmt: skip
 
     @property
     def estimate_uncertainty(self) -> dict[str, float]:

@@ -122,7 +122,7 @@ ANYWHERE = 1e3
 """Horizon within which everybody is [m]: a method that permits a speed by itself has to judge everybody."""
 
 
-def contact(criterion: PowerAndForce, model: Model, *, anywhere: bool = False) -> Answer:
+def contact(criterion: PowerAndForce, model: Model, *, anywhere: bool) -> Answer:
     """How to ask for the shares, one for each body region that something could hit.
 
     Args:

@@ -56,17 +56,36 @@ const STATES = {
 };
 
 for (const [name, go] of Object.entries(STATES)) {
-  test(`${name}: no fault, at a desk and on a phone held either way`, async () => {
+  test(`${name}: no fault, at a desk and on a phone held either way, dark and light`, async () => {
     await page.setViewportSize({ width: SIZES.desk[0], height: SIZES.desk[1] });
     await go();
     const found = [];
-    for (const [size, [width, height]] of Object.entries(SIZES)) {
-      await page.setViewportSize({ width, height });
-      found.push(...(await faults()).map((fault) => `${size}: ${fault}`));
+    for (const colorScheme of ["dark", "light"]) {
+      await page.emulateMedia({ colorScheme });
+      await page.waitForFunction((theme) => document.documentElement.dataset.theme === theme, colorScheme);
+      for (const [size, [width, height]] of Object.entries(SIZES)) {
+        await page.setViewportSize({ width, height });
+        found.push(...(await faults()).map((fault) => `${colorScheme}, ${size}: ${fault}`));
+      }
     }
     assert.deepEqual(found, []);
   });
 }
+
+test("dark or light is the system's choice until one is made here, which is kept", async () => {
+  await page.keyboard.press("Escape");
+  await page.emulateMedia({ colorScheme: "dark" });
+  await page.waitForFunction(() => document.documentElement.dataset.theme === "dark");
+  const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const dark = await ground();
+  await page.getByLabel("Look").selectOption("light");
+  await page.waitForFunction((before) => getComputedStyle(document.body).backgroundColor !== before, dark);
+  await page.reload();
+  await page.waitForSelector("tr[data-criterion]");
+  assert.notEqual(await ground(), dark);
+  await page.getByLabel("Look").selectOption("system");
+  await page.waitForFunction((before) => getComputedStyle(document.body).backgroundColor === before, dark);
+});
 
 test("Tab goes from the top bar to the scene, the room, the verdicts and the time, in that order", async () => {
   await page.keyboard.press("Escape");

@@ -54,17 +54,21 @@ test("nothing but WITHIN looks within, and the worst counts", () => {
 
 test("text on panels has a contrast of at least 4.5", () => {
   const css = fs.readFileSync(new URL("../src/look/base.css", import.meta.url), "utf8");
-  const color = Object.fromEntries(
-    [...css.matchAll(/--([\w-]+):\s*(#[0-9a-f]{6})/g)].map((m) => [m[1], m[2]]),
-  );
+  const [dark, light] = css
+    .split('data-theme="light"')
+    .map((part) =>
+      Object.fromEntries([...part.matchAll(/--([\w-]+):\s*(#[0-9a-f]{6})/g)].map((m) => [m[1], m[2]])),
+    );
   const texts = ["text", "text-2", "text-3", "within-text", "exceeded-text", "undecided-text", "off-text"];
-  for (const ground of ["ground", "panel", "raised"]) {
-    for (const text of texts) {
-      assert.ok(contrast(color[text], color[ground]) >= 4.5, `${text} on ${ground}`);
+  for (const color of [dark, light]) {
+    for (const ground of ["ground", "panel", "raised"]) {
+      for (const text of texts) {
+        assert.ok(contrast(color[text], color[ground]) >= 4.5, `${text} on ${ground}`);
+      }
     }
+    assert.ok(contrast("#ffffff", color.exceeded) >= 4.5);
   }
-  for (const text of Object.values(VERDICT_TEXT)) assert.ok(contrast(text, color.ground) >= 4.5, text);
-  assert.ok(contrast("#ffffff", color.exceeded) >= 4.5);
+  for (const text of Object.values(VERDICT_TEXT)) assert.ok(contrast(text, dark.ground) >= 4.5, text);
 });
 
 function luminance(hex) {

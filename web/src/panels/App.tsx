@@ -6,6 +6,7 @@ import { scene } from "../page_state";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
 import { Legend } from "./Legend";
+import { PageTools } from "./PageTools";
 import { Plots } from "./Plots";
 import { Properties } from "./Properties";
 import { RightSide } from "./RightSide";
@@ -44,7 +45,10 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <RightSide />
       <footer class="bottom">
         <Plots count={usePlotCount()} />
-        <TransportBar />
+        <div class="time-row">
+          <TransportBar />
+          <PageTools />
+        </div>
         <Timeline />
       </footer>
       <Keys />

@@ -8,6 +8,7 @@ import { shownRange, WIDTHS, width } from "../plots/axis";
 import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
+import { theme } from "../theme";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
 
@@ -62,7 +63,7 @@ function Plot({ name }: { name: string }) {
       if (trace) chart.show(trace, { ...untracked(shownRange), now: now.peek() });
     };
     const stop = effect(() => {
-      void [tracesRevision.value, now.value, shownRange()];
+      void [tracesRevision.value, now.value, shownRange(), theme.value];
       timer ??= setTimeout(draw, redrawEveryMs());
     });
     return () => {

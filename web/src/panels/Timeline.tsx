@@ -8,6 +8,7 @@ import { held, shownRange, timeAt } from "../plots/axis";
 import { drawLanes, LANE_PX } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
+import { theme } from "../theme";
 import { useActions } from "./app_context";
 
 export function Timeline() {
@@ -29,7 +30,7 @@ export function Timeline() {
     resized.observe(target);
     let waiting: ReturnType<typeof setTimeout> | null = null;
     const stop = effect(() => {
-      void [tracesRevision.value, now.value, shownRange(), stale.value];
+      void [tracesRevision.value, now.value, shownRange(), stale.value, theme.value];
       waiting ??= setTimeout(() => {
         waiting = null;
         draw();

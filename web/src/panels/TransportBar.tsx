@@ -5,7 +5,6 @@ import { isLive, lookingAt, mayControl, now, reach, scene, stale, transport } fr
 import { SPEEDS } from "../time_control";
 import { useActions } from "./app_context";
 import { Icon, type IconName } from "./Icon";
-import { keysShown } from "./Keys";
 
 export function TransportBar() {
   const { time } = useActions();
@@ -68,16 +67,6 @@ export function TransportBar() {
       {lookingAt.value !== null && (
         <span class="behind">{formatTime(reach.value.end - lookingAt.value)} behind live</span>
       )}
-      <button
-        type="button"
-        class="keys-button"
-        title="What the keys do (?)"
-        onClick={() => {
-          keysShown.value = true;
-        }}
-      >
-        Keys <kbd>?</kbd>
-      </button>
       {scene.value && <span class="tick">tick {Math.round(scene.value.period * 1e5) / 100} ms</span>}
     </div>
   );

@@ -17,7 +17,7 @@ const SECONDS: Record<Width, number | null> = { "10 s": 10, "30 s": 30, "2 min":
 /** A live run's axis shows at least so much [s], so that it does not race at the start. */
 const LIVE_LEAST_S = 60;
 
-export const width = remembered<Width>("time axis", WIDTHS, "All");
+export const width = remembered<Width>("seerob.axis", WIDTHS, "All");
 
 /** What the axis shows while somebody drags on it: it must not run away below the pointer. */
 export const held = signal<TimeRange | null>(null);

@@ -2,12 +2,11 @@
 
 import uPlot from "uplot";
 import { formatNumber, formatTime } from "../format";
+import { colorOf } from "../theme";
 import type { Trace } from "../traces";
 import { hatchPattern } from "./hatch";
 import { windowOf } from "./window";
 
-const GRID = "#222c39";
-const TEXT = "#9aa8ba";
 const SYNC = "time";
 
 export interface ChartView {
@@ -59,8 +58,8 @@ export class Chart {
 
   private options(): uPlot.Options {
     const axis = {
-      stroke: TEXT,
-      grid: { stroke: GRID, width: 1 },
+      stroke: () => colorOf("--text-3"),
+      grid: { stroke: () => colorOf("--line-2"), width: 1 },
       ticks: { show: false },
       font: "11px system-ui",
     };
@@ -83,8 +82,8 @@ export class Chart {
       ],
       series: [
         {},
-        { stroke: "#dbe3ee", width: 1.5, points: { show: false } },
-        { stroke: "#ff8fa6", width: 1.5, dash: [6, 4], points: { show: false } },
+        { stroke: () => colorOf("--curve"), width: 1.5, points: { show: false } },
+        { stroke: () => colorOf("--exceeded-text"), width: 1.5, dash: [6, 4], points: { show: false } },
       ],
       hooks: { drawClear: [(plot) => this.shade(plot)], draw: [(plot) => this.cursor(plot)] },
     };
@@ -112,7 +111,7 @@ export class Chart {
     if (!(now >= start && now <= end)) return;
     const { ctx, bbox } = plot;
     ctx.save();
-    ctx.fillStyle = "#ffffff";
+    ctx.fillStyle = colorOf("--cursor");
     ctx.fillRect(Math.round(plot.valToPos(now, "x", true)) - 1, bbox.top, 2, bbox.height);
     ctx.restore();
   }

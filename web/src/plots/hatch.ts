@@ -1,21 +1,30 @@
 // The hatch of what is undecided, for canvases.
 
+import { colorOf } from "../theme";
+
 const TILE = 8;
-let tile: HTMLCanvasElement | null = null;
+const tiles = new Map<string, HTMLCanvasElement>();
 
 export function hatchPattern(brush: CanvasRenderingContext2D): CanvasPattern {
-  tile ??= paintTile();
+  const color = colorOf("--undecided");
+  let tile = tiles.get(color);
+  if (!tile) {
+    tile = paintTile(color);
+    tiles.set(color, tile);
+  }
   return brush.createPattern(tile, "repeat")!;
 }
 
-function paintTile(): HTMLCanvasElement {
+function paintTile(color: string): HTMLCanvasElement {
   const canvas = document.createElement("canvas");
   canvas.width = TILE;
   canvas.height = TILE;
   const brush = canvas.getContext("2d")!;
-  brush.fillStyle = "rgba(252, 234, 146, 0.28)";
+  brush.fillStyle = color;
+  brush.globalAlpha = 0.28;
   brush.fillRect(0, 0, TILE, TILE);
-  brush.strokeStyle = "#fcea92";
+  brush.globalAlpha = 1;
+  brush.strokeStyle = color;
   brush.lineWidth = 2;
   for (const shift of [-TILE, 0, TILE]) {
     brush.beginPath();

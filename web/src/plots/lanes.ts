@@ -1,6 +1,7 @@
 // Painting of the timeline's lanes.
 
 import { traces } from "../page_state";
+import { colorOf } from "../theme";
 import { VERDICT_COLORS } from "../verdicts";
 import type { TimeRange } from "./axis";
 import { hatchPattern } from "./hatch";
@@ -26,13 +27,13 @@ export function drawLanes(
   names.forEach((name, lane) => {
     const top = lane * LANE_PX + 2;
     const tall = LANE_PX - 4;
-    brush.fillStyle = "#1a222d";
+    brush.fillStyle = colorOf("--lane");
     brush.fillRect(0, top, width, tall);
     const trace = traces.get(name);
     if (!trace || trace.length === 0) return;
     const from = Math.max(0, x(trace.t[0]!));
     // What never was within only informs: it is grey where nothing was undecided.
-    brush.fillStyle = trace.kept ? "#17414a" : "#343f4e";
+    brush.fillStyle = colorOf(trace.kept ? "--lane-within" : "--lane-none");
     brush.fillRect(from, top, Math.min(width, x(trace.t[trace.length - 1]!)) - from, tall);
     for (const verdict of ["undecided", "exceeded"] as const) {
       brush.fillStyle = verdict === "exceeded" ? css(VERDICT_COLORS.exceeded) : hatchPattern(brush);
@@ -46,7 +47,7 @@ export function drawLanes(
   });
   brush.globalAlpha = 1;
   if (Number.isFinite(now)) {
-    brush.fillStyle = "#ffffff";
+    brush.fillStyle = colorOf("--cursor");
     brush.fillRect(Math.round(x(now)) - 1, 0, 2, height);
   }
 }

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from oracles.pinocchio_oracle import pinocchio_model
-from seerob.app.emulators.rtde import ControllerState
+from seerob.app.emulation.ur_fields import ControllerState
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Finding, Verdict
 from seerob.core.transforms import rotation_from_rpy

@@ -223,9 +223,9 @@ def test_a_client_that_wants_to_write_is_told_that_it_cannot():
     with RtdeServer(MOTION) as server, socket.create_connection(("127.0.0.1", server.port)) as client:
         client.sendall(pack(Kind.VERSION, b"\0\2") + pack(Kind.INPUTS, b"speed_slider_mask"))
         data = b""
-        while len(data) < 4 + 10:
+        while len(data) < 4 + 13:
             data += client.recv(100)
-    assert data == YES + pack(Kind.INPUTS, b"\0IN_USE")
+    assert data == YES + pack(Kind.INPUTS, b"\0NOT_FOUND")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has a whole network of loopback addresses")

@@ -1,8 +1,9 @@
 """An RTDE server that plays a motion: what a Universal Robots controller sends, over a real socket.
 
-It speaks for a robot that is switched on and does what the motion says, and says of itself where its tool
-centre point is, how fast that moves, and what hangs at its flange. Fields that would need physics (currents,
-forces) it does not have, as an old controller does not. It moves nothing and takes no inputs.
+It speaks for a robot that is switched on and does what the motion says. Where its arm is described it has all
+fields of the interface: where its tool and its elbow are, what torques the motion needs by the masses of its
+links, and plausible values of what no motion tells (`seerob.app.emulation.ur_fields`). A client may write its
+inputs: registers and digital outputs are said again, and the speed slider slows its motion down.
 """
 
 from __future__ import annotations
@@ -16,23 +17,21 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
+from seerob.app.emulation.ur_fields import INPUTS, MADE_UP, OUTPUTS, ControllerState, defaults
 from seerob.core.errors import InputError
-from seerob.core.transforms import transform, wxyz_from_rotation
-from seerob.description.description import Description
-from seerob.files.waypoints.arm import Arm
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.robots.rtde import (
+    IN_USE,
     NOT_FOUND,
     Accepted,
     ControllerRequest,
     ControllerVersion,
     Data,
+    InputsReply,
     InputsRequest,
     Kind,
     Level,
@@ -51,13 +50,12 @@ from seerob.protocols.robots.rtde import (
     VersionRequest,
     decode_request,
     encode_reply,
-    pack,
 )
 from seerob.protocols.robots.ur_primary import Kinematics, encode_state
 
 _log = logging.getLogger(__name__)
 
-TYPES = {
+BASIC = {
     "timestamp": "DOUBLE",
     "target_q": "VECTOR6D",
     "target_qd": "VECTOR6D",
@@ -74,48 +72,22 @@ TYPES = {
     "robot_status_bits": "UINT32",
     "safety_status_bits": "UINT32",
 }
-CONTROLLER_STATE = {"actual_TCP_pose": "VECTOR6D", "actual_TCP_speed": "VECTOR6D", "payload": "DOUBLE"}
-TURNED = np.diag([-1.0, -1.0, 1.0])
-"""Half a turn about z: between the base that a controller speaks of and the ``base_link`` of descriptions."""
+"""Outputs of a controller of whose arm nothing is known but the motion."""
 E_SERIES = ControllerVersion(5, 12, 4, 0)
-PLAYING = 2
+PLAYING, PAUSED = 2, 4
 MAX_CLIENTS = 8
 MAX_RECIPES = 16
 FULL = 1 << 16
 """Bytes that wait for a client who does not read; then the connection is closed."""
 PRIMARY_SENDS = 100
 """Packages of the primary interface to one client."""
+PROTECTIVE = "protective stop"
+STEP = 1e-3
+"""Within which speeds are compared for an acceleration [s]."""
+DIGITAL = {"standard_digital_output": 0, "configurable_digital_output": 8, "tool_digital_output": 16}
+"""Inputs that set digital outputs, and the first of their bits."""
 LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
-
-
-class ControllerState:
-    """What a controller says of its arm, beside the joints.
-
-    Args:
-        description: The arm.
-        tcp: How far its tool centre point is ahead of the flange [m].
-        payload: What hangs at the flange, as somebody told the controller [kg].
-    """
-
-    def __init__(self, description: Description, *, tcp: float = 0.0, payload: float = 0.0) -> None:
-        self._arm = Arm(description, link_from_tcp=transform(position=(0.0, 0.0, tcp)))
-        self._payload = payload
-        still = (0.0,) * self._arm.n
-        self(still, still)  # the first is slow, and would be late
-
-    def __call__(self, q: tuple[float, ...], qd: tuple[float, ...]) -> dict[str, Value]:
-        """Its fields at joint positions [rad] and speeds [rad/s]; the tool in the controller's base."""
-        posture = self._arm.posture(q)
-        w, *axis = wxyz_from_rotation(TURNED @ posture.rotation).tolist()
-        length = math.hypot(*axis)
-        turn = 2 * math.atan2(length, w) / length if length > 0 else 0.0
-        v, omega = (posture.jacobian() @ qd).reshape(2, 3)
-        return {
-            "actual_TCP_pose": (*(TURNED @ posture.position).tolist(), *(turn * x for x in axis)),
-            "actual_TCP_speed": (*(TURNED @ v).tolist(), *(TURNED @ omega).tolist()),
-            "payload": self._payload,
-        }
 
 
 class RtdeServer(LoopEmulator):
@@ -133,6 +105,7 @@ class RtdeServer(LoopEmulator):
         messages: Said to every client that connects, before anything else.
         kinematics: What the primary interface says of how it was built; there is none when not given.
         primary_port: Of that interface; 0 is any free one.
+        holds: When it holds by itself, by why it does (`hold`) [s]; never where that is None.
     """
 
     def __init__(
@@ -149,14 +122,23 @@ class RtdeServer(LoopEmulator):
         messages: tuple[str, ...] = (),
         kinematics: Kinematics | None = None,
         primary_port: int = 0,
+        holds: Mapping[str, float | None] | None = None,
     ) -> None:
         super().__init__()
         self.host, self.port = host, port
         self.motion, self.controller, self.version, self.messages = motion, controller, version, messages
         self.kinematics, self.primary_port = kinematics, primary_port
         self.controller_state = controller_state
-        every = TYPES | (CONTROLLER_STATE if controller_state is not None else {})
+        every = OUTPUTS if controller_state is not None else BASIC
         self.types = {name: kind for name, kind in every.items() if name not in without}
+        self.inputs: dict[str, Value] = {}
+        """What clients wrote, by name."""
+        self.writers: dict[str, object] = {}
+        """Which client writes an input."""
+        self._rest = defaults(self.types)
+        self._clock, self._pace = (0.0, 0.0), 1.0
+        self._held = ""
+        self._holds = sorted((t, why) for why, t in (holds or {}).items() if t is not None)
         self.values = dict(values or {})
         """May be changed while it runs."""
         self.rate = 125.0 if controller.major < 5 else 500.0
@@ -167,26 +149,79 @@ class RtdeServer(LoopEmulator):
 
     def at(self, t: float) -> dict[str, Value]:
         """Every field at a time since the start [s]."""
-        q, qd = self.motion(t)
+        moved, pace = self._motion_time(t), self._pace
+        q, qd = self.motion(moved)
+        qd = tuple(pace * v for v in qd)
+        stopped = self._held == PROTECTIVE
+        safety = int(SafetyStatus.PROTECTIVE_STOP if stopped else SafetyStatus.NORMAL)
+        more: dict[str, Value] = {}
+        if self.controller_state is not None:
+            after = self.motion(moved + STEP)[1], self.motion(moved - STEP)[1]
+            qdd = tuple(pace**2 * (b - a) / (2 * STEP) for b, a in zip(*after, strict=True))
+            more = self._rest | self.controller_state(q, qd, qdd) | self._said_again()
         return {
+            "actual_digital_output_bits": 0,
+            **more,
             "timestamp": t,
             "target_q": q,
             "target_qd": qd,
             "actual_q": q,
             "actual_qd": qd,
             "robot_mode": int(RobotMode.RUNNING),
-            "safety_mode": int(SafetyStatus.NORMAL),
-            "safety_status": int(SafetyStatus.NORMAL),
-            "runtime_state": PLAYING,
-            "speed_scaling": 1.0,
-            "target_speed_fraction": 1.0,
+            "safety_mode": safety,
+            "safety_status": safety,
+            "runtime_state": PAUSED if self._held else PLAYING,
+            "speed_scaling": pace,
+            "target_speed_fraction": self._slider(),
             "actual_digital_input_bits": 0,
-            "actual_digital_output_bits": 0,
-            "robot_status_bits": 0b11,
-            "safety_status_bits": 0b1,
-            **(self.controller_state(q, qd) if self.controller_state is not None else {}),
+            "robot_status_bits": 0b01 if self._held else 0b11,
+            "safety_status_bits": 0b100 if stopped else 0b1,
             **self.values,
         }
+
+    def hold(self, why: str = "paused") -> None:
+        """Stand still from now on: as a program that pauses, or for a protective stop; at once, unlike arms.
+
+        Args:
+            why: ``paused`` or `PROTECTIVE`.
+        """
+        self._held = why
+        self._set_pace()
+
+    def release(self) -> None:
+        """Go on."""
+        self._held = ""
+        self._set_pace()
+
+    def write(self, said: Mapping[str, Value]) -> None:
+        """Take inputs."""
+        self.inputs.update(said)
+        self._set_pace()
+
+    def _slider(self) -> float:
+        """Where the speed slider is, 0…1."""
+        if not int(self.inputs.get("speed_slider_mask", 0)) & 1:  # type: ignore[arg-type]
+            return 1.0
+        return min(max(float(self.inputs.get("speed_slider_fraction", 1.0)), 0.0), 1.0)  # type: ignore[arg-type]
+
+    def _set_pace(self) -> None:
+        now = self.now() if self._begun else 0.0
+        self._clock = now, self._motion_time(now)
+        self._pace = 0.0 if self._held else self._slider()
+
+    def _motion_time(self, t: float) -> float:
+        """How far the motion has come at a time since the start [s]."""
+        since, moved = self._clock
+        return moved + self._pace * (t - since)
+
+    def _said_again(self) -> dict[str, Value]:
+        """Outputs that inputs set: registers, and digital outputs under their masks."""
+        found = {name: value for name, value in self.inputs.items() if name in self.types}
+        bits = 0
+        for name, first in DIGITAL.items():
+            mask = int(self.inputs.get(f"{name}_mask", 0))  # type: ignore[arg-type]
+            bits |= (int(self.inputs.get(name, 0)) & mask) << first  # type: ignore[arg-type]
+        return found | {"actual_digital_output_bits": bits}
 
     def now(self) -> float:
         """Time since the start [s]."""
@@ -202,6 +237,9 @@ class RtdeServer(LoopEmulator):
                 primary = tcp_server(self._say_kinematics, self.host, self.primary_port)
                 self.primary_port = (await both.enter_async_context(primary)).sockets[0].getsockname()[1]
             ready()
+            loop = asyncio.get_running_loop()
+            for t, why in self._holds:
+                loop.call_later(t, self.hold, why)
             await over.wait()
         # What is left, the clients' tasks, asyncio.run cancels.
 
@@ -237,6 +275,7 @@ class _Client:
         self._server, self._writer = server, writer
         self._version = 1
         self._recipes: list[tuple[Recipe, float]] = []
+        self._written: dict[int, Recipe] = {}
         self._sending: list[asyncio.Task[None]] = []
 
     async def serve(self, reader: asyncio.StreamReader) -> None:
@@ -250,6 +289,8 @@ class _Client:
                 await self._writer.drain()
         finally:
             self._pause()
+            for name in [name for name, who in self._server.writers.items() if who is self]:
+                del self._server.writers[name]
 
     def _say(self, reply: Reply) -> None:
         # The version that is asked for is granted in the version before it: both look the same.
@@ -267,9 +308,11 @@ class _Client:
             case OutputsRequest():
                 return [self._outputs(request)]
             case InputsRequest():
-                self._writer.write(
-                    pack(Kind.INPUTS, b"\0" + ",".join("IN_USE" for _ in request.fields).encode())
-                )
+                return [self._inputs(request)]
+            case Data():
+                recipe = self._written.get(request.recipe)
+                if recipe is not None:
+                    self._server.write(recipe.unpack(request.values))
                 return []
             case StartRequest():
                 self._pause()
@@ -278,6 +321,21 @@ class _Client:
             case PauseRequest():
                 self._pause()
                 return [Accepted(Kind.PAUSE, accepted=True)]
+
+    def _inputs(self, request: InputsRequest) -> InputsReply:
+        """Let it write, where each of them is an input that nobody else writes."""
+        server = self._server
+        known = INPUTS if server.controller_state is not None else {}
+        types = tuple(
+            IN_USE if server.writers.get(name, self) is not self else known.get(name, NOT_FOUND)
+            for name in request.fields
+        )
+        number = len(self._written) + 1
+        if not types or {IN_USE, NOT_FOUND} & set(types) or number > MAX_RECIPES:
+            return InputsReply(0, types)
+        self._written[number] = Recipe(request.fields, types, number)
+        server.writers.update(dict.fromkeys(request.fields, self))
+        return InputsReply(number, types)
 
     def _outputs(self, request: OutputsRequest) -> OutputsReply:
         types = tuple(self._server.types.get(name, NOT_FOUND) for name in request.fields)
@@ -326,6 +384,8 @@ class Rtde(RobotOptions, frozen=True, kw_only=True):
         float, option("how far its tool centre point is ahead of the flange", "m", ge=-2, le=2)
     ] = 0.0
     payload: Annotated[float, option("what it was told that hangs at its flange", "kg", ge=0, le=100)] = 0.0
+    pause_at: Annotated[float, option("its program pauses then", "s", ge=0)] | None = None
+    protective_stop_at: Annotated[float, option("it stops protectively then", "s", ge=0)] | None = None
     calibration: Annotated[str, option("kinematics it says it has: a file of seerob probe")] | None = None
     primary_port: Annotated[int, port("port where it says them; 0 is any free one")] = 30011
 
@@ -343,8 +403,10 @@ class Rtde(RobotOptions, frozen=True, kw_only=True):
             port=self.port,
             kinematics=None if self.calibration is None else _kinematics(Path(self.calibration)),
             primary_port=self.primary_port,
+            holds={"paused": self.pause_at, PROTECTIVE: self.protective_stop_at},
         )
-        return Ready(server, f"{target.name}, {what}", f"{self.host}:{self.port}")
+        made_up = f"; made up: {', '.join(MADE_UP)}, and currents" if words is not None else ""
+        return Ready(server, f"{target.name}, {what}{made_up}", f"{self.host}:{self.port}")
 
 
 def _kinematics(path: Path) -> Kinematics:

@@ -40,6 +40,8 @@ _FORMATS = {
 }
 NOT_FOUND = "NOT_FOUND"
 """Instead of a type: this controller has no such field."""
+IN_USE = "IN_USE"
+"""Instead of a type: another client writes this input."""
 
 
 class Kind(IntEnum):
@@ -157,8 +159,19 @@ class Data:
     values: bytes
 
 
-Request = VersionRequest | ControllerRequest | OutputsRequest | InputsRequest | StartRequest | PauseRequest
-Reply = Accepted | ControllerVersion | OutputsReply | TextMessage | Data
+@dataclass(frozen=True, slots=True)
+class InputsReply:
+    """Types of inputs that a client wants to write, `NOT_FOUND` and `IN_USE` for those that it may not."""
+
+    recipe: int
+    """Number that its data will carry; 0 where it may not write."""
+    types: tuple[str, ...]
+
+
+Request = (
+    VersionRequest | ControllerRequest | OutputsRequest | InputsRequest | StartRequest | PauseRequest | Data
+)
+Reply = Accepted | ControllerVersion | OutputsReply | InputsReply | TextMessage | Data
 Value = bool | int | float | tuple[int, ...] | tuple[float, ...]
 
 
@@ -228,6 +241,8 @@ def encode_request(message: Request, version: int) -> bytes:
             return pack(Kind.START)
         case PauseRequest():
             return pack(Kind.PAUSE)
+        case Data():
+            return pack(Kind.DATA, bytes([message.recipe]) + message.values)
 
 
 def decode_request(package: Package, version: int) -> Request:
@@ -256,6 +271,8 @@ def decode_request(package: Package, version: int) -> Request:
             return StartRequest()
         case Kind.PAUSE:
             return PauseRequest()
+        case Kind.DATA:
+            return Data(_first(payload), payload[1:])
     raise ProtocolError(f"package of kind {package.kind} is no request")
 
 
@@ -278,6 +295,8 @@ def encode_reply(message: Reply, version: int) -> bytes:
         case OutputsReply():
             types = ",".join(message.types).encode("ascii")
             return pack(Kind.OUTPUTS, types if version == 1 else bytes([message.recipe]) + types)
+        case InputsReply():
+            return pack(Kind.INPUTS, bytes([message.recipe]) + ",".join(message.types).encode("ascii"))
         case TextMessage():
             text = message.text.encode("utf-8")
             if version == 1:

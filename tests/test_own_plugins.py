@@ -1,6 +1,7 @@
 """Source, live source and sink of a company, as docs/extending.md shows them, beside its criteria."""
 
 import asyncio
+import contextlib
 import csv
 import json
 import math
@@ -109,17 +110,17 @@ class Controller:
         self._ready.set()
         await self._over.wait()
         await close_server(server)
-        await asyncio.sleep(0.1)  # those who speak see that it is over
 
     async def _speak(self, _, writer):
         begun = time.monotonic()
-        while not self._over.is_set():
-            t = time.monotonic() - begun
-            q, qd = [0.3 * math.sin(2 * t), *UP[1:]], [0.6 * math.cos(2 * t), *[0.0] * 5]
-            if not self.silent.is_set():
-                writer.write((json.dumps({"t": t, "q": q, "qd": qd}) + "\n").encode())
-            await asyncio.sleep(0.008)
-        writer.close()
+        with contextlib.suppress(asyncio.CancelledError):  # the loop may end first
+            while not self._over.is_set():
+                t = time.monotonic() - begun
+                q, qd = [0.3 * math.sin(2 * t), *UP[1:]], [0.6 * math.cos(2 * t), *[0.0] * 5]
+                if not self.silent.is_set():
+                    writer.write((json.dumps({"t": t, "q": q, "qd": qd}) + "\n").encode())
+                await asyncio.sleep(0.008)
+        writer.transport.abort()
 
     def stop(self):
         self._loop.call_soon_threadsafe(self._over.set)

@@ -174,7 +174,7 @@ WRONG = {
         OPERATOR.replace("= 75", "= 0"),
         {},
         "workstation.toml: humans[0].mass",
-        ">= 30 [kg]",
+        ">= 10 [kg]",
     ),
     # Meshes.
     "empty file": (PART + MESH, {"it.stl": b""}, "it.stl: parts[0]", "export it again"),

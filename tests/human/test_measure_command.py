@@ -27,6 +27,9 @@ NAMES = {
 }  # fmt: skip
 
 
+JOINTS = ["--set", "convention=biovision"]
+
+
 def written(file):
     """Joint centres of a walk as OpenSim's TRC, y up."""
     t, q = walking()
@@ -50,7 +53,11 @@ def written(file):
 def test_a_recording_becomes_a_person_of_that_size(tmp_path, capsys):
     file = tmp_path / "walk.trc"
     written(file)
-    assert main(["measure", "trc", str(file), "--mass", "75", "--sex", "male", "--stature", "1.75"]) == 0
+    who = ["--mass", "75", "--sex", "male", "--stature", "1.75"]
+    # Joint centres among files of markers: nobody is taken for the other without a word.
+    assert main(["measure", "trc", str(file), *who]) == 3
+    assert 'give convention = "biovision"' in " ".join(capsys.readouterr().err.split())
+    assert main(["measure", "trc", str(file), *who, *JOINTS]) == 0
     out = capsys.readouterr().out
     assert "measured: thigh" in out
     table = tomllib.loads(out[out.index("[[humans]]") :])
@@ -84,7 +91,7 @@ def test_any_name_and_any_word_become_toml(tmp_path, capsys):
     file, name = tmp_path / "walk.trc", 'a "b" \\ c]'
     written(file)
     who = ["--mass", "75", "--sex", "male", "--stature", "1.75", "--name", name]
-    assert main(["measure", "trc", str(file), *who]) == 0
+    assert main(["measure", "trc", str(file), *who, *JOINTS]) == 0
     out = capsys.readouterr().out
     assert tomllib.loads(out[out.index("[[humans]]") :])["humans"][0]["name"] == name
     assert options_of(["a=m", "b=1\nc = 2", 'd={ x = "y" }']) == {"a": "m", "b": "1\nc = 2", "d": {"x": "y"}}

@@ -100,6 +100,8 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     by_shape: ClassVar[bool] = True
     """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
     worse; False only where no distance, area, volume or point of a surface is in it."""
+    adults: ClassVar[bool] = False
+    """Whether its limits and tables are of adults, so that nothing of a child or adolescent is within."""
     heavier_is_worse: ClassVar[bool] = False
     """Whether more mass of a robot is never better, so that what the known masses exceed is exceeded."""
     whole: ClassVar[bool] = True
@@ -270,6 +272,13 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def unshaped(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
         return model.unshaped(self.depends(model)) if self.by_shape else ""
+
+
+def not_adult(model: Model, name: str) -> str:
+    """Why tables of adults say nothing of a person; empty where they do."""
+    if all(human.adult for human in model.workstation.humans if human.name == name):
+        return ""
+    return f"{name} is no adult: outside the tables of the method"
 
 
 def _own_model(method: Callable[..., Any]) -> Callable[..., Any]:

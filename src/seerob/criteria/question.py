@@ -13,7 +13,7 @@ from seerob.core.errors import SeerobError, UnknownName
 from seerob.core.plugin import PluginError
 from seerob.core.snapshot import Basis, Finding, Result
 from seerob.criteria.between_ticks import Watch
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.criterion import Criterion, Evaluate, not_adult
 from seerob.criteria.figure import Twin
 from seerob.criteria.scoring.phases import entered_for, turns
 from seerob.model.model import Model
@@ -175,6 +175,10 @@ def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str
     reasons = [criterion.unshaped(model)]
     subjects = criterion.subjects()
     bodies = {i for name in subjects for i in _meant(model, name)}
+    if criterion.adults:
+        every = {human.name for human in model.workstation.humans}
+        people = every.intersection(subjects) or every.intersection(criterion.depends(model))
+        reasons += [not_adult(model, name) for name in sorted(people)]
     for finding in findings:
         if any(
             name in ("*", criterion.name, *subjects) or not bodies.isdisjoint(_meant(model, name))

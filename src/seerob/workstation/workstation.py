@@ -334,10 +334,13 @@ class Human(_Table, frozen=True, kw_only=True):
 
     name: Name
     """Its name, by which criteria and sources ask for it."""
-    stature: Annotated[float, unit("m", ge=1.2, le=2.3)] | Percentile
-    """[m], or a percentile of a published population: ``"germany P50"``."""
-    mass: Annotated[float, unit("kg", ge=30, le=250)]
-    """[kg]"""
+    stature: Annotated[float, unit("m", ge=0.8, le=2.3)] | Percentile
+    """[m], at least 1.2 of an adult, or a percentile of a published population: ``"germany P50"``."""
+    mass: Annotated[float, unit("kg", ge=10, le=250)]
+    """[kg], at least 30 of an adult."""
+    adult: bool = True
+    """Whether tables of adults hold. Of a child or adolescent distances and speeds are judged, with an
+    adult's proportions; postures and lifts are not, and no contact is within its limits."""
     sex: Literal["male", "female"]
     """Which anthropometric tables are used."""
     hand: Literal["right", "left"] = "right"
@@ -358,6 +361,12 @@ class Human(_Table, frozen=True, kw_only=True):
     """Named posture when no source moves the person."""
     joints: dict[str, Radian] = {}
     """Joint angles on top of the posture [rad]; ``joints_deg`` for degrees."""
+
+    def __post_init__(self) -> None:
+        small = not isinstance(self.stature, str) and self.stature < 1.2
+        if self.adult and (small or self.mass < 30):
+            what = f"stature {self.stature:g} m" if small else f"mass {self.mass:g} kg"
+            raise ValueError(f"{what} is not an adult's: say adult = false of a child or adolescent")
 
 
 class Contact(_Table, frozen=True, kw_only=True):

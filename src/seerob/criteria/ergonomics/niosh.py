@@ -289,6 +289,7 @@ class Niosh(Criterion, frozen=True, kw_only=True):
     """Lifting index of the revised NIOSH equation, composite when there are several lifts."""
 
     instants: ClassVar[str] = "accepted: lifts are entered, and what is entered does not change during a run"
+    adults: ClassVar[bool] = True
     whole: ClassVar[bool] = False  # lifts are entered, whoever is seen
 
     human: str

@@ -79,6 +79,7 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
     """Forces of contacts on a person, as the physics calculates them: an estimate, never within."""
 
     unit: ClassVar[str] = "N"
+    adults: ClassVar[bool] = True
     whole: ClassVar[bool] = False  # where the twin is stopped is what is asked
 
     human: str

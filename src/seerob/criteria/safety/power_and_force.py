@@ -66,6 +66,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m/s"
     heavier_is_worse: ClassVar[bool] = True
+    adults: ClassVar[bool] = True
     whole: ClassVar[bool] = False
 
     robot: str

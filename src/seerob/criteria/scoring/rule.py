@@ -11,11 +11,11 @@ from typing import Annotated, ClassVar, cast
 import numpy as np
 from msgspec import Meta
 
-from seerob.core.errors import InputError, UnknownName
+from seerob.core.errors import InputError, Undecided, UnknownName
 from seerob.core.snapshot import Basis, Input, Level
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
-from seerob.criteria.criterion import Criterion
+from seerob.criteria.criterion import Criterion, not_adult
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import (
     ACCURACY_NOTE,
@@ -58,12 +58,15 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
         UnknownName: No such human or bone.
     """
     human = model.human(name)
+    outside = not_adult(model, name)
     for bone in unmeasured:
         if bone not in BONES:
             raise UnknownName("bone", bone, BONES)
     bones = tuple(bone_rows(model, human))
 
     def read(state: Twin) -> Angles:
+        if outside:
+            raise Undecided(outside)
         if state.many:
             # Of whom more is known than where they are is asked instant by instant.
             R, x = state.captured(human.name, bones)

@@ -66,6 +66,8 @@ STATURE_RANGE = (1.2, 2.3)
 """Statures that are believed [m]; the tables are of adults."""
 MASS_RANGE = (30.0, 250.0)
 """Body masses that are believed [kg]."""
+SMALL_RANGES = (0.8, 2.3), (10.0, 250.0)
+"""The same of children and adolescents, whom no table here describes [m, kg]."""
 BODY_MASS_INDEX_RANGE = (15.0, 45.0)
 """[kg/m²] outside, proportions of the tables are far from the person: a warning."""
 
@@ -183,16 +185,19 @@ def body(
     masses: str = "deleva",
     own_lengths: Mapping[str, float] | None = None,
     own_masses: Mapping[str, float] | None = None,
+    adult: bool = True,
 ) -> Body:
     """The body of a person of that stature [m], body mass [kg] and sex.
 
     ``own_lengths`` [m] (`seerob.description.humans.anthropometry.LENGTHS`) and ``own_masses`` [kg], by bone,
     replace the tables'; the other lengths and masses make up for it, so that stature and body mass stay.
+    Who is no ``adult`` has an adult's proportions, which a finding says.
 
     Raises:
         InputError: A value is not a plausible adult's, or not one of the choices; all are named.
     """
-    _check(name, stature, mass, {"sex": sex, "lengths": lengths, "masses": masses})
+    ranges = (STATURE_RANGE, MASS_RANGE) if adult else SMALL_RANGES
+    _check(name, (stature, mass), ranges, {"sex": sex, "lengths": lengths, "masses": masses})
     chosen, kind, by = Sex(sex), Lengths(lengths), Masses(masses)
     length, findings = _lengths(name, stature, chosen, kind)
     if own_lengths:
@@ -200,9 +205,15 @@ def body(
         shown = ", ".join(f"{key} {value * 1e3:.0f} mm" for key, value in own_lengths.items())
         text = f"given by hand: {shown}; the other lengths up to the vertex make up for it"
         findings.append(Finding(level="note", subject=name, text=text))
+    if not adult:
+        text = (
+            "no adult, and proportions are an adult's: children have larger heads and shorter legs; give "
+            "lengths, and an uncertainty of distances"
+        )
+        findings.append(Finding(level="warning", subject=name, text=text))
     index = mass / stature**2
     low, high = BODY_MASS_INDEX_RANGE
-    if not low <= index <= high:
+    if adult and not low <= index <= high:
         text = f"body mass index {index:.1f} kg/m² is outside {low:g}…{high:g}: the tables fit badly"
         findings.append(Finding(level="warning", subject=name, text=text))
     share = _shares(chosen, by, mass, stature)
@@ -238,15 +249,17 @@ def unfit(name: str, mass: float, stature: float) -> InputError:
 CHOICES: dict[str, type[StrEnum]] = {"sex": Sex, "lengths": Lengths, "masses": Masses}
 
 
-def _check(name: str, stature: float, mass: float, chosen: dict[str, str]) -> None:
+def _check(
+    name: str,
+    sizes: tuple[float, float],
+    ranges: tuple[tuple[float, float], tuple[float, float]],
+    chosen: dict[str, str],
+) -> None:
     problems = []
-    for key, value, (low, high), unit in (
-        ("stature", stature, STATURE_RANGE, "m"),
-        ("mass", mass, MASS_RANGE, "kg"),
-    ):
+    for key, unit, value, (low, high) in zip(("stature", "mass"), ("m", "kg"), sizes, ranges, strict=True):
         if not low <= value <= high:  # false for NaN too
             problems.append(
-                Problem(name, key, f"{value:g} {unit} is not an adult's", f"give {low:g}…{high:g} {unit}")
+                Problem(name, key, f"{value:g} {unit} is not a person's", f"give {low:g}…{high:g} {unit}")
             )
     for key, text in chosen.items():
         choices = tuple(CHOICES[key])

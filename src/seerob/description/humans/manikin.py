@@ -218,6 +218,7 @@ def build(
     hand: str = "right",
     own_lengths: Mapping[str, float] | None = None,
     own_masses: Mapping[str, float] | None = None,
+    adult: bool = True,
 ) -> Description:
     """A standing person: 21 bones, 47 joint axes and six of the waist.
 
@@ -231,18 +232,19 @@ def build(
         own_lengths: Lengths by hand [m], names of `seerob.description.humans.anthropometry.LENGTHS`.
         own_masses: Masses by hand [kg], by bone, or without side for both.
         hand: Dominant side, ``right`` or ``left``; its hand is the description's tip.
+        adult: Whether the tables are meant for the person; else proportions are an adult's all the same.
 
     Returns:
         Root link on the floor, then the 21 bones in the order of `seerob.description.humans.skeleton.BONES`.
         Foot to vertex is the stature and the bones weigh the body mass, exactly.
 
     Raises:
-        InputError: A value is not a plausible adult's, or not one of the choices.
+        InputError: A value is not a plausible person's, or not one of the choices.
     """
     if hand not in SIDES:
         raise InputError.at(name, "hand", f"{hand!r} is not a side", "give right or left")
     own = tuple(None if each is None else tuple(each.items()) for each in (own_lengths, own_masses))
-    return _built(name, stature, mass, sex, lengths, masses, hand, *own)
+    return _built(name, stature, mass, sex, lengths, masses, hand, *own, adult)
 
 
 @lru_cache(maxsize=64)  # the same person stands in cell after cell, and nobody changes one
@@ -256,6 +258,7 @@ def _built(
     hand: str,
     own_lengths: tuple[tuple[str, float], ...] | None,
     own_masses: tuple[tuple[str, float], ...] | None,
+    adult: bool,
 ) -> Description:
     person = body(
         name=name,
@@ -266,6 +269,7 @@ def _built(
         masses=masses,
         own_lengths=None if own_lengths is None else dict(own_lengths),
         own_masses=None if own_masses is None else dict(own_masses),
+        adult=adult,
     )
     solids = skin(person)
     mass_properties = inertials(person)

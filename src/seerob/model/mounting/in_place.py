@@ -272,7 +272,7 @@ def _people(model: Model) -> Iterator[Quantity]:
     """Stature where a population tells it, and mass over its square."""
     for i, human in enumerate(model.workstation.humans):
         stature = human.stature
-        if isinstance(stature, float | int):
+        if isinstance(stature, float | int) and human.adult:
             bmi = human.mass / stature**2
             said = f"{human.mass:g} kg, {stature:g} m"
             yield Quantity(f"humans[{i}].bmi", "humans.bmi", "kg/m²", (bmi,), (human.name,), said, human.name)

@@ -49,6 +49,7 @@ def describe(human: Human, *, touches: bool) -> tuple[Description, tuple[Finding
         own_lengths=None if isinstance(human.lengths, str) else human.lengths,
         own_masses=None if isinstance(human.masses, str) else human.masses,
         hand=human.hand,
+        adult=human.adult,
     )
     return description, findings
 
@@ -62,6 +63,7 @@ def size(human: Human) -> Body:
         sex=human.sex,
         lengths=human.lengths if isinstance(human.lengths, str) else "drillis",
         own_lengths=None if isinstance(human.lengths, str) else human.lengths,
+        adult=human.adult,
     )
 
 

@@ -67,13 +67,16 @@ def listed(entries: Entries, engine: Engine) -> Iterator[Quantity]:
     """Every quantity that somebody typed."""
     for group in LISTS:
         for i, table in entries.get(group, {}).items():
-            yield from quantities(
+            of_adults = {f"{group}[{i}].stature", f"{group}[{i}].mass"} if group == "humans" else set()
+            for quantity in quantities(
                 table,
                 key=f"{group}[{i}]",
                 kind=group,
                 about=resting(group, table, entries),
                 of=name_of(table),
-            )
+            ):
+                if quantity.key not in of_adults or table.adult:
+                    yield quantity
     for group in PLUGINS:
         for i, table in entries.get(group, {}).items():
             kind = f"{group}.{type(table).__module__.rsplit('.', 1)[-1]}"

@@ -11,7 +11,7 @@ from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError, Undecided, UnknownName
 from seerob.session.permissible.between_samples import BetweenSamples, wanted_bounds
-from seerob.session.permissible.moving_joints import MovingJoints, chains_of
+from seerob.session.permissible.moving_joints import KinematicChain, MovingJoints, chains_of
 from seerob.session.permissible.path import GivenMotion
 
 POST = '[[parts]]\nname = "post"\nshape = {{ box = [0.2, 0.3, 0.2] }}\nat = {{ position = [{x}, 0.4, 0] }}\n'
@@ -206,3 +206,19 @@ def test_bounds_speak_of_the_time_that_all_motions_have_and_say_which_are_doubtf
     alone = wanted_bounds(model, {"arm": cubic("arm", [0, 1, 2], [0, 0, 0], [0, 0, 0], [1, 0, 1])}, most=9)
     assert [b.what for b in alone if b.what.startswith("speed")] == ["speed of arm"]  # the other one stands
     assert all("does not vouch for count too (arm)" in b.note for b in alone)
+
+
+def test_the_bound_on_an_acceleration_is_the_sum_of_its_terms():
+    """Of a turn, a slide and two turns, term by term as it is derived; of a slide that others turn, twice."""
+    rng, turns = np.random.default_rng(2), np.array([True, False, True, True])
+    w = np.where(turns, [3.0, 1.0, 0.7, 0.2], 1.0)
+    qd, qdd = rng.uniform(0.1, 2, (2, 5, 6))
+    dofs = np.array([0, 2, 3, 5])
+    found = KinematicChain(dofs, turns, w).agility(qd, qdd)
+    for v, a, bound in zip(qd[:, dofs], qdd[:, dofs], found, strict=True):
+        total = 0.0
+        for j in range(4):
+            before = sum(v[i] for i in range(j) if turns[i])
+            onward = sum(v[i] * w[i] for i in range(j, 4)) if turns[j] else 0.0
+            total += a[j] * w[j] + v[j] * (2 * before * w[j] + onward)
+        assert bound == pytest.approx(total, rel=1e-12)

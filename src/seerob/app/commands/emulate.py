@@ -9,18 +9,17 @@ import argparse
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
+
+from msgspec.structs import replace
 
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import Exit, Parser, line
+from seerob.app.emulation.options import EmulatorOptions, Ready
+from seerob.app.emulation.wire import FaultyWire
 from seerob.core.errors import InputError, Problem, suggestion
-from seerob.core.plugin import kinds, load
-
-if TYPE_CHECKING:
-    from seerob.app.emulation.options import EmulatorOptions
-
-
 from seerob.core.host_name import is_loopback
+from seerob.core.plugin import kinds, load
 
 HELP = "be a controller or a device without the hardware: a real server that plays a motion"
 EXAMPLE = "seerob emulate rtde --robot ur10 --file motion.csv"
@@ -134,7 +133,7 @@ def run(options: argparse.Namespace) -> int:
     from seerob.devices.live.listening import because
 
     asked = options_of(options.kind, options.options)
-    made = asked.ready()
+    made = with_faults(asked) if asked.faults().any else asked.ready()
     server, where = made.server, made.where
     stopped = Stopped()
     try:
@@ -156,6 +155,67 @@ def run(options: argparse.Namespace) -> int:
     finally:
         server.stop()
     return Exit.WITHIN
+
+
+class _Behind:
+    """An emulator and the bad network before it."""
+
+    def __init__(self, asked: EmulatorOptions) -> None:
+        self._asked, self._sends = asked, sends(asked)
+        self.to: tuple[str, int] | None = None
+        if self._sends:
+            self.to = asked.to, asked.port  # type: ignore[attr-defined]
+            self._wire = FaultyWire(
+                asked.faults(), at=("127.0.0.1", 0), to=self.to, device_listens=False
+            ).start()
+            self.made = replace(asked, to="127.0.0.1", port=self._wire.port).ready()
+        else:
+            self.made = replace(asked, host="127.0.0.1", port=0).ready()
+        self.host, self.port = asked.host, getattr(asked, "port", 0)
+
+    def start(self) -> None:
+        """Begin both.
+
+        Raises:
+            OSError: The address cannot be listened on.
+        """
+        self.made.server.start()
+        if not self._sends:
+            inner = "127.0.0.1", getattr(self.made.server, "port", 0)
+            at = self.host, self.port
+            self._wire = FaultyWire(self._asked.faults(), at=at, to=inner, device_listens=True)
+            try:
+                self.port = self._wire.start().port
+            except OSError:
+                self.made.server.stop()
+                raise
+
+    def stop(self) -> None:
+        """End both."""
+        self._wire.stop()
+        self.made.server.stop()
+
+
+def sends(asked: EmulatorOptions) -> bool:
+    """Whether it sends to somebody by itself, instead of listening."""
+    return hasattr(asked, "to") and not getattr(asked, "websocket", False)
+
+
+def with_faults(asked: EmulatorOptions) -> Ready:
+    """The device that the options ask for, behind a bad network.
+
+    Raises:
+        InputError: What it shall play is missing or wrong.
+        OSError: The network cannot be had.
+    """
+    behind = _Behind(asked)
+    faults = asked.faults()
+    said = (
+        f"{faults.drop:.3g} of its packets lost, {faults.garble:.3g} damaged, late by {faults.delay:g} s "
+        f"and up to {faults.jitter:g} s more"
+    )
+    where = f"{asked.host}:{getattr(asked, 'port', 0)}"
+    return behind.made._replace(server=behind, what=f"{behind.made.what}; {said}", where=where)
 
 
 # -- what to type to hear it ----------------------------------------------------------------------

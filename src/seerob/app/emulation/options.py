@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
 
 from msgspec import Meta, Struct
 
+from seerob.app.emulation.wire import Faults
 from seerob.core.errors import InputError
 from seerob.core.host_name import check_host
 
@@ -79,6 +80,15 @@ class EmulatorOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
     host: Annotated[str, option("address to listen on")] = "127.0.0.1"
     seconds: Annotated[float, option("end after this time", "s", gt=0)] | None = None
+    drop: Annotated[float, option("share of its packets that are lost", ge=0, le=1)] = 0.0
+    delay: Annotated[float, option("by which all it says comes late", "s", ge=0, le=60)] = 0.0
+    jitter: Annotated[float, option("by up to which each packet comes later", "s", ge=0, le=60)] = 0.0
+    garble: Annotated[float, option("share of its packets in which a bit is flipped", ge=0, le=1)] = 0.0
+    seed: Annotated[int, option("of which packets these are", ge=0)] = 1
+
+    def faults(self) -> Faults:
+        """What happens on the way to whoever hears it."""
+        return Faults(self.drop, self.delay, self.jitter, self.garble, self.seed)
 
     def __post_init__(self) -> None:
         for key in HOSTS:

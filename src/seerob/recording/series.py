@@ -114,9 +114,10 @@ class Column:
 
     def append(self, *numbers: float) -> None:
         """Add a row."""
-        self._newest += self._pack(*numbers)
+        newest = self._newest
+        newest += self._pack(*numbers)
         self._count += 1
-        if len(self._newest) == self._size:
+        if len(newest) == self._size:
             with self._spill.lock:
                 data = bytes(self._newest)
                 begin = self._spill.write(data)
@@ -140,6 +141,7 @@ CODES: dict[Verdict | None, int] = {
 }
 """Verdict → the byte that stands for it in arrays, as in `snapshot.Trace`."""
 
+_UNKNOWN = CODES[Verdict.UNDECIDED]
 _COLUMNS = np.dtype([("t", "f8"), ("value", "f8"), ("limit", "f8"), ("reason", "i4"), ("verdict", "u1")])
 _ROW = "=dddiB"
 """What is kept of an instant, packed: the reason by its number, the verdict by its code."""
@@ -306,6 +308,7 @@ class Series:
         self._tracker = tracker
         self._spill = spill = Spill() if spill is None else spill
         self._rows = Column(_ROW, spill)
+        self._append = self._rows.append
         self._reason_of: dict[str, int] = {"": 0}
         self._parts: dict[str, Series] = {}
         self._whole = whole
@@ -389,11 +392,12 @@ class Series:
 
     def append(self, result: Result, t: float) -> None:
         """Add what the criterion said in the snapshot at run time ``t`` [s]."""
-        verdict, value, limit = result.verdict, result.value, result.limit
+        verdict, value, limit, reason = result.verdict, result.value, result.limit, 0
         self._last_t, self._last_verdict = result.t, verdict
-        reason = self._reason_of.get(result.reason, -1)
-        if reason < 0 and len(self._reason_of) < MAX_REASONS:
-            reason = self._reason_of[result.reason] = len(self._reason_of)
+        if text := result.reason:
+            reason = self._reason_of.get(text, -1)
+            if reason < 0 and len(self._reason_of) < MAX_REASONS:
+                reason = self._reason_of[text] = len(self._reason_of)
         for part in result.parts:
             series = self._parts.get(part.name)
             if series is None:
@@ -402,16 +406,18 @@ class Series:
                 )
                 self._parts[part.name] = series
             series.append(part, t)
-        if verdict is Verdict.UNDECIDED:
+        code = CODES[verdict]
+        if code == _UNKNOWN:
             said = {part.name for part in result.parts}
             for name, series in self._parts.items():
                 series._passed_over = series._passed_over or name not in said
-        code = CODES[verdict]
-        self._said.add(code)
-        self._has_limit = self._has_limit or limit is not None
-        self._rows.append(
-            t, math.nan if value is None else value, math.nan if limit is None else limit, reason, code
-        )
+        if code not in self._said:
+            self._said.add(code)
+        if limit is None:
+            limit = math.nan
+        else:
+            self._has_limit = True
+        self._append(t, math.nan if value is None else value, limit, reason, code)
 
     def __len__(self) -> int:
         return len(self._rows)

@@ -149,19 +149,17 @@ Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Polyline | Prism | 
 class _Drawn(Sequence[Marker]):
     """Markers that are made when somebody looks."""
 
-    __slots__ = "_kept", "_make"
+    __slots__ = ("_held",)
 
     def __init__(self, make: Callable[[], Sequence[Marker]]) -> None:
-        self._make: Callable[[], Sequence[Marker]] | None = make
-        self._kept: tuple[Marker, ...] = ()
+        self._held: Callable[[], Sequence[Marker]] | tuple[Marker, ...] = make
 
     def made(self) -> tuple[Marker, ...]:
         """All of them."""
-        make = self._make
-        if make is not None:  # twice, should two threads look at once, to one result
-            self._kept = tuple(make())
-            self._make = None
-        return self._kept
+        held = self._held
+        if not isinstance(held, tuple):  # twice, should two threads look at once, to one result
+            held = self._held = tuple(held())
+        return held
 
     def __len__(self) -> int:
         return len(self.made())

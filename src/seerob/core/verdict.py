@@ -64,7 +64,10 @@ def judge_interval(
         if math.isnan(low) or math.isnan(high):
             return _UNDECIDED
         last = admitted(limit, at_most=at_most)
-        kept, also = (low <= last, high <= last) if at_most else (low >= last, high >= last)
+        if at_most:
+            kept, also = low <= last, high <= last
+        else:
+            kept, also = low >= last, high >= last
         return _UNDECIDED if kept is not also else _WITHIN if kept else _EXCEEDED
     verdict = judge(low, limit, at_most=at_most)
     return verdict if verdict is judge(high, limit, at_most=at_most) else _UNDECIDED

@@ -12,10 +12,12 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import repeat
+from math import isinf, isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from msgspec import Struct, structs
+from numpy import ndarray
 from numpy.typing import NDArray
 
 from seerob.core.markers import Marker, drawn
@@ -135,16 +137,19 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     """Verdict of a figure of one instant, and of its parts, which is written into these."""
     if figure.parts is not None:
         return _verdict_of_parts(figure, figure.parts, at_most=at_most)
-    limit, value = figure.limit, figure.value
-    assert not isinstance(limit, np.ndarray)
+    limit, value, interval = figure.limit, figure.value, figure.interval
+    assert not isinstance(limit, ndarray)
     if figure.nothing:
         return None
     if limit is not None and (figure.exceeded or figure.undecided):
         return _UNDECIDED if figure.undecided else _EXCEEDED
-    known = value is not None and not math.isnan(value)
-    if figure.interval is not None:
-        low, high = figure.interval
-        low, high = low if type(low) is int else float(low), high if type(high) is int else float(high)
+    known = value is not None and not isnan(value)
+    if interval is not None:
+        low, high = interval
+        if type(low) is not float and type(low) is not int:
+            low = float(low)
+        if type(high) is not float and type(high) is not int:
+            high = float(high)
         verdict = judge_interval((low, high), limit, at_most=at_most)
         if not known:  # wherever it lies in there
             informs = verdict is None and not figure.open
@@ -154,8 +159,9 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     else:
         verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
     # Nothing could exceed a limit without end.
-    endless = limit is not None and math.isinf(limit)
-    return _UNDECIDED if verdict is _WITHIN and (figure.open or endless) else verdict
+    if verdict is _WITHIN and (figure.open or limit is None or isinf(limit)):
+        return _UNDECIDED
+    return verdict
 
 
 def _verdict_of_parts(figure: Figure, parts: Parts, *, at_most: bool) -> Verdict | None:
@@ -199,7 +205,7 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         shown: What is said and drawn of it.
         result: What is the same at all instants: name, unit, side of the limit.
     """
-    value, limit, parts = figure.value, figure.limit, shown.parts
+    value, limit, parts, nothing = figure.value, figure.limit, shown.parts, figure.nothing
     interval: tuple[float, float] | None = None
     if value is not None and type(value) is not int:
         value = float(value)
@@ -207,28 +213,30 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         low, high = figure.interval
         if type(low) is type(high) is int:
             interval = (low, high)
-        else:
-            interval = (float(low), float(high)) if -math.inf < low < high < math.inf else None
+        elif -math.inf < low < high < math.inf:
+            interval = (float(low), float(high))
     if figure.parts is not None:
         told = _part_results(figure.parts, shown, result)
         parts = (*told, *parts)
         if figure.parts.whole:
             governs = told[figure.parts.governs]
             value, limit, interval = governs.value, governs.limit, governs.interval
-    known = None if value is None or math.isinf(value) else value
-    # Where a value lies informs, too.
-    silent = known is None and (value is not None or interval is None)
-    assert not isinstance(limit, np.ndarray)
+    if value is None:
+        # Where a value lies informs, too.
+        nothing = nothing or (verdict is None and interval is None)
+    elif isinf(value):
+        value, nothing = None, nothing or verdict is None
+    assert not isinstance(limit, ndarray)
     return Result(
         name=result.name,
-        value=known,
+        value=value,
         unit=result.unit,
         limit=limit,
         at_most=result.at_most,
         verdict=verdict,
         reason=shown.reason,
         interval=interval,
-        nothing=bool(figure.nothing) or (verdict is None and silent),
+        nothing=bool(nothing),
         parts=parts,
         rows=shown.rows,
         markers=() if shown.draw is None else drawn(shown.draw),

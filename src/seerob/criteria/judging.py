@@ -219,22 +219,22 @@ class Judge:
             self._holds = self._holds or holds  # and stays so for what was said meanwhile
 
     def _one(self, question: Question, state: State) -> Result:
-        kept = question.kept
+        criterion, kept = question.criterion, question.kept
         passed_over = question.turns is not None and question.passed_over(state.t)
-        if question.criterion.active is not None and (pulse := question.pulse(state)):
+        if criterion.active is not None and (pulse := question.pulse(state)):
             question.kept = None
-            return _unknown(question.criterion, pulse)
+            return _unknown(criterion, pulse)
         if kept is not None and self._lasts(kept, question, state):
             if self._holds:  # also what was found out since it was asked
                 question.why = question.held_for(kept.asked)
             return kept.result
-        says = self._says if question.criterion.active is None else self._now
+        says = self._says if criterion.active is None else self._now
         result = says(question, question.bound.evaluate, state)
         if passed_over and not result.muted:
             result = undecided(result, passed_over)
         if self._holds:
             question.why = question.held_for(state.asked)
-        if (every := question.criterion.every) is not None:
+        if (every := criterion.every) is not None:
             result = replace(result, t=state.t)
             asked = tuple(sorted(state.asked))
             question.kept = Kept(result, state.t, state.t + every, result.muted, asked)
@@ -294,7 +294,7 @@ class Judge:
             state.require(*question.names)
         if question.bodies:
             state.require_bodies(question.bodies)
-        result = _asked_alone(bound, evaluate, state) if bound.own else evaluate(state)
+        result = _asked_alone(bound, evaluate, state) if question.own else evaluate(state)
         if question.undeclared or not state.asked <= question.declared:
             self._rely_on_undeclared(question, state)
         if type(result) is not Result:
@@ -316,7 +316,7 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
-        if bound.own and question.moves and state.late_reason(state.asked):
+        if question.own and question.moves and state.late_reason(state.asked):
             # What it says where it applies is so where it does not. Of those that ship none is greener by it.
             late = state.late_reason(state.asked - {question.muted_by})
             result = undecided(result, late) if late else result
@@ -324,7 +324,7 @@ class Judge:
             for said in question.undecided_reasons(state):
                 if said:
                     return undecided(result, str(said))
-        if not criterion.by_speed and state.speed_errors:
+        if question.shaken and state.speed_errors:
             return self._shaken(question, result, state)
         return result
 

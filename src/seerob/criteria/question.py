@@ -269,8 +269,15 @@ class Question:
     before."""
     why: str = ""
     """Why nothing that it said last is within."""
+    own: bool = field(init=False)
+    """See `Bound.own`."""
+    shaken: bool = field(init=False)
+    """Whether the judge finds out what errors of speeds would change (`Criterion.by_speed`)."""
     held_names: Mapping[str, str] = field(default_factory=dict)
     """By name that findings hold, why nothing that depends on it is within."""
+
+    def __post_init__(self) -> None:
+        self.own, self.shaken = self.bound.own, not self.criterion.by_speed
 
     def hold(self, model: Model, findings: Iterable[Finding], names: Mapping[str, str]) -> bool:
         """Take note of what is held by findings, and by shapes that are missing; whether anything is.

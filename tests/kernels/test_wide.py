@@ -26,7 +26,7 @@ def ball():
 @pytest.fixture(scope="module")
 def scratch():
     singles = np.empty(STACK, np.float32), np.empty(16, np.float32), np.empty(8, np.float32)
-    return np.empty((STACK, 2), np.int32), *singles, np.empty(12)
+    return np.empty((STACK, 2), np.int32), *singles, np.empty((1, 13)), np.empty(36)
 
 
 def first_least(values):
@@ -35,7 +35,7 @@ def first_least(values):
 
 @pytest.mark.parametrize("away", [0.0, 0.301, 0.5, 3.0, 1e3, 1e7, 1e25, 1e60])
 def test_nearest_to_a_segment_is_the_first_of_all_triangles(ball, scratch, away):
-    stack, bounds, given, low, W = scratch
+    stack, bounds, given, low, _, W = scratch
     rng = np.random.default_rng(1)
     for n in range(12):
         direction = rng.normal(size=3)

@@ -256,7 +256,7 @@ class Survey:
         members = [self.questions[k][0].members(self.questions[k][1]) for k in order]
         rows = np.concatenate([found.rows for found in members])
         pair_of, pair = np.unique(rows[:, :2], axis=0, return_inverse=True)
-        members_of = np.column_stack([pair.ravel(), rows[:, 2]])
+        members_of, swapped_of = pair.ravel().astype(np.int32), rows[:, 2] == 1
         bodies_of = np.concatenate([*(found.bodies for found in members), [[-1, -1]]])
         offsets = np.cumsum([0, *(len(found.rows) for found in members)])
         starts = [found.start[:-1] + offset for found, offset in zip(members, offsets, strict=False)]
@@ -270,7 +270,9 @@ class Survey:
         """Where the answers to each question are among all of them."""
         self._columns = [columns[k] for k in range(len(order))]
         self._in_turn = np.concatenate([np.arange(len(self._caps))[part] for part in self._columns])
-        self._asked = kernel.Questions(np.unique(pair_of), pair_of, starts_of, members_of, bodies_of, whether)
+        self._asked = kernel.Questions(
+            np.unique(pair_of), pair_of, starts_of, members_of, swapped_of, bodies_of, whether
+        )
         self._memory = self._forget()
 
     def ask(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:

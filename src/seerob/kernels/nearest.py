@@ -41,6 +41,7 @@ from seerob.kernels.pairs import (
 )
 
 Indices = NDArray[np.int64]
+Links = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
 MARGIN = 1e-9
@@ -57,8 +58,10 @@ class Questions(NamedTuple):
     """Solids of each pair, meshes first, shape (m, 2)."""
     start: Indices
     """Where the pairs of each group begin in ``members``, shape (g + 1,)."""
-    members: Indices
-    """By group, a pair, and 1 where its first solid belongs to the second set, shape (k, 2)."""
+    members: Links
+    """Pairs by group, shape (k,)."""
+    swapped: Flags
+    """Whether the first solid of each belongs to the second set, shape (k,)."""
     bodies: Indices
     """Of the first and of the second set, of each member and of none, shape (k + 1, 2)."""
     whether: Flags
@@ -98,16 +101,21 @@ class Memory(NamedTuple):
     """Work: whether the overlap is at least as deep as the value."""
     asked: Flags
     """Work: whether any group asks for the pair."""
+    near: Links
+    """Work: members of a group that may be nearest, shape (k,)."""
 
 
 _FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
-QUESTIONS = Layout(Questions, [(_WHOLE, 1), (_WHOLE, 2), (_WHOLE, 1), (_WHOLE, 2), (_WHOLE, 2), (_FLAG, 1)])
+QUESTIONS = Layout(
+    Questions,
+    [(_WHOLE, 1), (_WHOLE, 2), (_WHOLE, 1), (np.int32, 1), (_FLAG, 1), (_WHOLE, 2), (_FLAG, 1)],
+)
 MEMORY = Layout(
     Memory,
     [
         (_FLOAT, 3), (_FLOAT, 1), (_FLOAT, 1), (_WHOLE, 2), (_WHOLE, 1),
         (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 1), (np.int8, 1), (_WHOLE, 1), (_FLAG, 1), (_FLOAT, 1),
-        (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1),
+        (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1), (np.int32, 1),
     ],
 )  # fmt: skip
 LAYOUTS = SOLIDS, QUESTIONS, MEMORY, SCRATCH
@@ -127,6 +135,7 @@ class Bound:
             np.full((m, 2), -1, np.int64), np.full(g, -1, np.int64),
             np.zeros((ns, 12)), np.zeros((ns, 3)), np.zeros(ns), np.zeros(m, np.int8), np.empty(m, np.int64),
             np.zeros(m, bool), np.empty(m), np.empty((m, 6)), np.zeros(m, bool), np.zeros(m, bool),
+            np.empty(len(questions.members), np.int32),
         )  # fmt: skip
         self._kept: tuple[Solids, Questions, Memory, Scratch] = solids, questions, memory, scratch()
         rows = [layout.rows(given) for layout, given in zip(LAYOUTS, self._kept, strict=True)]
@@ -168,9 +177,10 @@ def nearest(
     """
     solids = _solids_in(table, 0)
     work = _scratch_in(table, _SCRATCH_AT)
-    used, pair, start, members, bodies, whether = _questions_in(table, _QUESTIONS_AT)
+    used, pair, start, members, swapped, bodies, whether = _questions_in(table, _QUESTIONS_AT)
     (
-        at, low, high, first, last, world, centre, moved, state, beyond, within, value, found, deep, asked
+        at, low, high, first, last, world, centre, moved, state, beyond, within, value, found, deep, asked,
+        near,
     ) = _memory_in(table, _MEMORY_AT)  # fmt: skip
     which, ball, radius, W = solids.which, solids.ball, solids.radius, work.W
     m = len(pair)
@@ -183,7 +193,7 @@ def nearest(
     for g in range(groups):
         if cap[g] > -np.inf:
             for e in range(start[g], start[g + 1]):
-                asked[members[e, 0]] = True
+                asked[members[e]] = True
     for n in range(samples):
         body = place(rotations, positions, n * step, solids, used, world, centre, at, moved)
         if body >= 0:
@@ -226,29 +236,38 @@ def nearest(
                 figures[0, k], winners[0, k], winners[1, k] = best, -1, -1
                 continue
             for e in range(start[g], start[g + 1]):
-                q = members[e, 0]
+                q = members[e]
                 if state[q] == 2 and value[q] < best:
                     best = value[q]
                     winning = e
                 elif whether[g] and high[q] < best - MARGIN:
                     winning = e
             guess = -1 if whether[g] else last[g]
+            count = -1
             while not (whether[g] and winning >= 0):
                 chosen = -1
-                if guess >= 0 and state[members[guess, 0]] < 2:
+                if guess >= 0 and state[members[guess]] < 2:
                     chosen = guess
-                    state[members[chosen, 0]] = 1
+                    state[members[chosen]] = 1
                 else:
-                    least = best + MARGIN
-                    for e in range(start[g], start[g + 1]):
-                        q = members[e, 0]
-                        if state[q] < 2 and low[q] <= least and beyond[q] != g:
-                            least = low[q]
-                            chosen = e
+                    # Bounds only rise and the best only falls: who cannot be nearest never can be again.
+                    most = least = best + MARGIN
+                    before = start[g + 1] - start[g] if count < 0 else count
+                    first_look = count < 0
+                    count = 0
+                    for k_near in range(before):
+                        e = start[g] + k_near if first_look else near[k_near]
+                        q = members[e]
+                        if state[q] < 2 and low[q] <= most and beyond[q] != g:
+                            near[count] = e
+                            count += 1
+                            if low[q] <= least:
+                                least = low[q]
+                                chosen = e
                     if chosen < 0:
                         break
                 guess = -1
-                p = members[chosen, 0]
+                p = members[chosen]
                 i = pair[p, 0]
                 j = pair[p, 1]
                 r = radius[i] + radius[j]
@@ -286,9 +305,9 @@ def nearest(
                     status[k] = WITHIN_CAP
                     winning = -1  # by which pair depends on what was asked before
             elif winning >= 0:
-                p = members[winning, 0]
+                p = members[winning]
                 status[k] = DEPTH_AT_LEAST if deep[p] else EXACT
-                swap = 3 * members[winning, 1]
+                swap = 3 if swapped[winning] else 0
                 for c in range(3):
                     point_a[k, c] = found[p, c + swap]
                     point_b[k, c] = found[p, 3 + c - swap]

@@ -66,8 +66,9 @@ class Scratch(NamedTuple):
     low: Boxes
     R: Array
     t: Array
+    row: Array
     W: Array
-    """Receives the points on both, shape (12,)."""
+    """Receives the points on both, shape (36,)."""
 
 
 _FLOAT, _SINGLE, _INT, _WHOLE = np.float64, np.float32, np.int32, np.int64
@@ -80,7 +81,16 @@ SOLIDS = Layout(
 )  # fmt: skip
 SCRATCH = Layout(
     Scratch,
-    [(_INT, 2), (_SINGLE, 1), (_SINGLE, 1), (_SINGLE, 1), (_FLOAT, 1), (_FLOAT, 1), (_FLOAT, 1)],
+    [
+        (_INT, 2),
+        (_SINGLE, 1),
+        (_SINGLE, 1),
+        (_SINGLE, 1),
+        (_FLOAT, 1),
+        (_FLOAT, 1),
+        (_FLOAT, 2),
+        (_FLOAT, 1),
+    ],
 )
 
 
@@ -88,7 +98,7 @@ def scratch() -> Scratch:
     """Room for one search at a time."""
     return Scratch(
         np.empty((STACK, 2), np.int32), np.empty(STACK, np.float32), np.empty(16, np.float32),
-        np.empty(WIDTH, np.float32), np.empty(9), np.empty(3), np.empty(12),
+        np.empty(WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty(36),
     )  # fmt: skip
 
 
@@ -234,7 +244,7 @@ def core_distance(
     which, nodes, links, T, boxes, kids = (
         solids.which, solids.nodes, solids.links, solids.T, solids.boxes, solids.kids,
     )  # fmt: skip
-    stack, bounds, given, low, R, t, W = scratch
+    stack, bounds, given, low, R, t, row, W = scratch
     if not which[i, MESH]:
         a = at[i]
         b = at[j]
@@ -250,7 +260,7 @@ def core_distance(
         _relative(world, i, j, R, t)
         wa, wb = which[i, WIDE], which[j, WIDE]
         d2, ka, kb = nearest_of_meshes(
-            boxes, kids, T, wa, wb, R, t, limit, first[0], first[1], stack, bounds, given, low, W
+            boxes, kids, T, wa, wb, R, t, limit, first[0], first[1], stack, bounds, given, low, row, W
         )
         if d2 == 0.0:
             a = which[i, TRIANGLE]
@@ -262,7 +272,7 @@ def core_distance(
                 nodes[which[j, NODE] : which[j, NODE_END]],
                 links[which[j, NODE] : which[j, NODE_END]],
                 T[b : which[j, TRIANGLE_END]],
-                R, t, stack, W,
+                R, t, stack, row, W,
             )  # fmt: skip
             ka += a
             kb += b

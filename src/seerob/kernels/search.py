@@ -120,7 +120,17 @@ def row_in(T: Array, k: int, R: Array, t: Array, row: Array) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def first_crossing(
-    A: Array, LA: Links, TA: Array, B: Array, LB: Links, TB: Array, R: Array, t: Array, pairs: Links, W: Array
+    A: Array,
+    LA: Links,
+    TA: Array,
+    B: Array,
+    LB: Links,
+    TB: Array,
+    R: Array,
+    t: Array,
+    pairs: Links,
+    row: Array,
+    W: Array,
 ) -> tuple[int, int]:
     """The first two triangles that touch, down two trees, of meshes that do; -1, -1 where none does.
 
@@ -134,9 +144,9 @@ def first_crossing(
         R: Rotation a_from_b, shape (9,).
         t: Position a_from_b [m], shape (3,).
         pairs: Scratch, shape (256, 2).
+        row: Scratch, shape (1, 13).
         W: Receives the point on each in the frame of the first, shape (12,), of which 6 are scratch.
     """
-    row = np.empty((1, 13))
     cut = cut_of(0.0)
     pairs[0, 0] = 0
     pairs[0, 1] = 0

@@ -338,6 +338,7 @@ def nearest_of_meshes(
     bounds: Boxes,
     given: Boxes,
     low: Boxes,
+    row: Array,
     W: Array,
 ) -> tuple[float, int, int]:
     """Nearest points of two meshes, in the frame of the first.
@@ -357,17 +358,15 @@ def nearest_of_meshes(
         bounds: Scratch, shape (`STACK`,).
         given: Scratch, shape (16,).
         low: Scratch, shape (8,).
-        W: Receives the points, shape (12,), of which 6 are scratch.
+        row: Scratch, shape (1, 13).
+        W: Receives the points, shape (36,), of which 30 are scratch.
 
     Returns:
         Squared distance and the two triangles; infinity and -1 when all exceed ``limit``.
         Stops at an intersection, which depends on ``limit`` and ``first``: `first_crossing` has *the*
         first one.
     """
-    row = np.empty((1, 13))
-    points = np.empty(12)
-    Q = np.empty(9)
-    p = np.empty(3)
+    points, Q, p = W[12:24], W[24:33], W[33:36]
     for c in range(3):
         p[c] = 0.0
         for d in range(3):
@@ -382,7 +381,7 @@ def nearest_of_meshes(
     ka = kb = -1
     ux = uy = uz = 0.0
     a, b = first_a, first_b
-    moved = -1
+    moved = posed = -1
     pairs[0, 0] = 8 * root_a
     pairs[0, 1] = 8 * root_b
     bounds[0] = 0.0
@@ -401,12 +400,15 @@ def nearest_of_meshes(
             nb = kids[rb >> 3, rb & 7]
             if na >= 0 or nb >= 0:
                 split_a = nb < 0 or (na >= 0 and _radius(boxes, ra) > _radius(boxes, rb))
+                # Where the box is in the other frame is mostly known: its partner's parts come one by one.
                 if split_a:
-                    _box_in(boxes, rb, R, t, given)
-                    i = na
+                    if posed != 2 * rb:
+                        _box_in(boxes, rb, R, t, given)
+                    i, posed = na, 2 * rb
                 else:
-                    _box_in(boxes, ra, Q, p, given)
-                    i = nb
+                    if posed != 2 * ra + 1:
+                        _box_in(boxes, ra, Q, p, given)
+                    i, posed = nb, 2 * ra + 1
                 hits = _to_box(boxes, i, given, cut, low)
                 base = depth
                 while hits:

@@ -222,3 +222,11 @@ def test_the_bound_on_an_acceleration_is_the_sum_of_its_terms():
             onward = sum(v[i] * w[i] for i in range(j, 4)) if turns[j] else 0.0
             total += a[j] * w[j] + v[j] * (2 * before * w[j] + onward)
         assert bound == pytest.approx(total, rel=1e-12)
+
+
+def test_who_has_no_motion_stands_where_the_file_says_with_what_follows_its_joints(tmp_path):
+    urdf = two_r(mimic='<mimic joint="j1" multiplier="0.5" offset="0.3"/>')
+    model = made(tmp_path, FLOATING + TWO_R + "q = [0.2]\n", {"arm.urdf": urdf}).model
+    qpos, qvel = MovingJoints(model, {}).at(0.0)
+    assert qpos.tolist() == pytest.approx([0.2, 0.4])
+    assert not qvel.any()

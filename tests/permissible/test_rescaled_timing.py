@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from seerob.core.errors import InputError
 from seerob.session.permissible.joint_limits import JointLimits
-from seerob.session.permissible.path import GivenMotion, largest_hermite, largest_on, path_of
+from seerob.session.permissible.path import STEP, GivenMotion, _dense, largest_hermite, largest_on, path_of
 from seerob.session.permissible.timing import Parabolas, Profile, timed
 
 
@@ -118,6 +119,23 @@ def test_the_path_is_nowhere_farther_than_it_says(noise):
     for t in np.linspace(0, 1.5, 151):
         q, _ = given.at(np.array([t]))
         assert np.abs(dense - q).max(axis=1).min() <= path.deviation.max() + 2e-4
+
+
+def test_a_path_of_pieces_is_as_far_off_as_the_farthest_of_them():
+    path = path_of(wave(), tolerance=5e-4)
+    (piece,) = path.pieces
+    off = np.array([[1e-4, 4e-4, 2e-4], [3e-4, 1e-4, 2e-4]])
+    two = replace(path, pieces=tuple(replace(piece, deviation=each) for each in off))
+    np.testing.assert_array_equal(two.deviation, [3e-4, 4e-4, 2e-4])
+
+
+@pytest.mark.parametrize("speeds", [(2.0, 0.0), (0.0, 2.0), (1.0, 1.0), (-3.0, -3.0)])
+def test_a_spline_is_compared_at_steps_that_no_joint_exceeds(speeds):
+    """Wherever between two samples it is fastest."""
+    t, q, _ = _dense(motion([0.0, 1.0], [0.0, 1.0], speeds))
+    assert np.abs(np.diff(q, axis=0)).max() <= STEP * (1 + 1e-9)
+    assert (np.diff(t) > 0).all()
+    assert (t[0], t[-1]) == (0.0, 1.0)
 
 
 def test_stands_and_turns_cut_the_path_and_stands_are_kept():

@@ -260,6 +260,25 @@ def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkey
     assert writer.findings()[0].level == "warning"
 
 
+def test_what_a_disk_never_comes_to_is_lost_and_nothing_computed_again_is_within(tmp_path, monkeypatch):
+    """Not more than `_BACKLOG` queues wait, so that memory does not grow for hours."""
+    from seerob.outputs.mcap import McapTape
+
+    gate, tick = Event(), McapTape.tick
+    monkeypatch.setattr(McapTape, "tick", lambda *a: (gate.wait(), tick(*a))[1])
+    writer = Recorder(queue=1).open(made_run.scene(), {}, {}, tmp_path)
+    for k in range(60):
+        writer.write(made_run.snapshot(k), made_run.samples(k))
+    gate.set()
+    writer.close()
+    recording = Recording.open(tmp_path / "run.mcap")
+    kept = len(list(recording.ticks()))
+    assert 20 <= kept <= 40  # a queue's worth may have been taken before the disk was asked
+    assert writer.lost == 60 - kept
+    (short,) = (f for f in recording.findings if f.holds)
+    assert (short.text.split(" ticks")[0], short.holds) == (str(60 - kept), ("*",))
+
+
 def test_an_interrupt_while_the_thread_begins_leaves_none_and_a_whole_file(tmp_path, monkeypatch):
     begun, start = [], Thread.start
 
@@ -281,7 +300,7 @@ def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
 
     tick = McapTape.tick
     monkeypatch.setattr(McapTape, "tick", lambda *a: (time.sleep(1e-3), tick(*a))[1])
-    with Recorder(queue=2, lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
+    with Recorder(queue=1, lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
         for k in range(60):
             writer.write(made_run.snapshot(k), ())
     assert len(list(Recording.open(tmp_path / "run.mcap").snapshots())) == 60
@@ -297,9 +316,13 @@ def test_a_disk_that_refuses_stops_the_recording_not_the_run(tmp_path, monkeypat
     writer = Recorder().open(made_run.scene(), {}, {}, tmp_path)
     for k in range(20):
         writer.write(made_run.snapshot(k), ())
+    writer._thread.join(60)  # it ends by itself
+    assert writer.lost == 20
+    for k in range(20, 23):
+        writer.write(made_run.snapshot(k), ())
     with pytest.raises(SeerobError, match="No space left"):
         writer.close()
-    assert writer.lost == 20
+    assert writer.lost == 23
     assert "No space left" in writer.findings()[-1].text
     assert Recording.open(tmp_path / "run.mcap").scene == made_run.scene()
 
@@ -322,9 +345,14 @@ def test_time_that_stands_still_or_turns_back_is_left_out(tmp_path):
     with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
         for k in (0, 1, 1, 0, 2):
             writer.write(made_run.snapshot(k), ())
+        now, later = made_run.snapshot(2), made_run.snapshot(3)
+        writer.write(msgspec.structs.replace(later, seq=now.seq), ())  # the number stands still
+        writer.write(msgspec.structs.replace(later, t=now.t), ())  # and the time does
+        writer.write(msgspec.structs.replace(later, t=float("nan")), ())
+        writer.write(later, ())
     recording = Recording.open(tmp_path / "run.mcap")
-    assert [s.seq for s in recording.snapshots()] == [0, 1, 2]
-    assert "2 ticks were left out" in recording.findings[0].text
+    assert [s.seq for s in recording.snapshots()] == [0, 1, 2, 3]
+    assert "5 ticks were left out" in recording.findings[0].text
 
 
 def test_numbers_of_numpy_are_recorded_as_numbers(tmp_path):

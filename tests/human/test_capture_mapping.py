@@ -216,6 +216,29 @@ def test_marker_sets_are_told_by_their_names_and_what_is_not_documented_is_left_
     assert left_out <= {"R.Wrist", "RUA1", "R_FTC", "LWristOut"}
 
 
+def test_a_leg_is_a_thigh_or_a_shank_by_the_names_beside_it():
+    arms = [
+        f"{side}{bone}"
+        for side in ("Left", "Right")
+        for bone in ("Shoulder", "Arm", "ForeArm", "Hand", "Foot")
+    ]
+    for legs, whose in (
+        (("UpLeg", "Leg", "ToeBase"), "mixamo"),
+        (("Thigh", "Shin", "Toe"), "thigh_and_shin"),
+    ):
+        names = (
+            "Hips",
+            "Neck",
+            "Head",
+            *arms,
+            *(f"{side}{leg}" for side in ("Left", "Right") for leg in legs),
+        )
+        convention, _ = choose(Layout(Seen.JOINTS, names), "p")
+        assert convention is not None
+        assert convention.name == whose
+        assert convention.places[plain(f"Left{legs[1]}")].bone == "left_shank"
+
+
 def test_points_on_the_skin_are_never_taken_for_joints():
     """A marker beside the elbow is 5 cm from its centre, under the same name."""
     names = ("RHip", "RKnee", "RAnkle", "RShoulder", "RElbow", "RWrist", "Neck", "Head")

@@ -11,7 +11,7 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.session.permissible.joint_limits import JointLimits
 from seerob.session.permissible.path import STEP, GivenMotion, _dense, largest_hermite, largest_on, path_of
-from seerob.session.permissible.timing import Parabolas, Profile, timed
+from seerob.session.permissible.timing import CHECK, Parabolas, Profile, Use, timed
 
 
 def motion(t, q, qd):
@@ -84,6 +84,34 @@ def test_no_limit_is_exceeded_at_any_millisecond():
 @cache
 def wave_in_time():
     return timed(path_of(wave(), tolerance=5e-4).pieces[0], free, limits(2.0, 8.0, 80.0, 3))
+
+
+def test_each_limit_is_used_by_its_worst_joint_to_either_side():
+    found, top = wave_in_time(), limits(2.0, 8.0, 80.0, 3)
+    t = found.instants()
+    use = found.use(t, free, top)
+    for used, of, most in zip(
+        (use.velocity, use.acceleration, use.jerk), found.at(t)[1:], (2, 8, 80), strict=True
+    ):
+        np.testing.assert_allclose(used, np.maximum(of, -of) / most)
+        assert (of < 0).any()
+    worst = np.array([[0.2, 0.1], [0.1, 0.9], [0.1, 0.1], [0.1, 0.1]])
+    one = Use(
+        np.array([0.3, 0.1, 0.1, 0.1]), worst, np.roll(worst, 1, axis=0) ** 2, np.roll(worst, 2, axis=0) ** 3
+    )
+    np.testing.assert_allclose(one.stretch, [0.3, 0.9, 0.9, 0.9])
+
+
+def test_limits_are_checked_every_half_millisecond_and_on_both_sides_of_every_jump_of_the_jerk():
+    found = wave_in_time()
+    t = found.instants()
+    assert (t[0], t[-1]) == (0.0, found.duration)
+    assert 0 < np.diff(t).max() <= CHECK / 2 + 1e-12
+    breaks = found.profile.breaks()
+    inner = breaks[(breaks > 1e-3) & (breaks < found.duration - 1e-3)]
+    assert len(inner) > 3
+    for shift in (-1e-5, -1e-9, 1e-9, 1e-5):
+        assert np.abs(t[:, None] - (inner + shift)).min(axis=0).max() < 1e-12
 
 
 def test_derivatives_are_those_of_the_positions():

@@ -102,6 +102,18 @@ def test_each_limit_is_used_by_its_worst_joint_to_either_side():
     np.testing.assert_allclose(one.stretch, [0.3, 0.9, 0.9, 0.9])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_stretched_in_time_no_limit_is_exceeded_where_it_is_looked_at_then(seed):
+    """Of these motions, by up to 1.5e-6 of a limit after they were stretched once."""
+    rng, top, t = np.random.default_rng(seed), limits(2.0, 8.0, 80.0, 3), np.arange(0, 1 + 1e-9, 0.01)
+    f, begun, wide = rng.uniform(2, 9, 3), rng.uniform(0, 6, 3), rng.uniform(0.1, 0.5, 3)
+    at = f * t[:, None] + begun
+    given = motion(t, wide * np.sin(at), wide * f * np.cos(at))
+    found = timed(path_of(given, tolerance=5e-4).pieces[0], free, top)
+    for when in (found.instants(), np.arange(0, found.duration, 1e-4)):
+        assert found.use(when, free, top).stretch.max() <= 1.0
+
+
 def test_limits_are_checked_every_half_millisecond_and_on_both_sides_of_every_jump_of_the_jerk():
     found = wave_in_time()
     t = found.instants()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.description.humans import anthropometry
-from seerob.description.humans.body_areas import AREAS, area_in, body_area, words
+from seerob.description.humans.body_areas import AREAS, area_in, body_area, in_front, outer_shoulder, words
 from seerob.description.humans.skeleton import BONES
 from seerob.description.humans.skin import body_region, edges, skin
 from seerob.description.norms.body_limits import shipped
@@ -41,6 +41,21 @@ def test_all_29_areas_are_on_the_skin_and_in_their_region(sex, hand):
             assert body_region(bone, point, body=body) == region_of[area.number], (bone, point, area)
             found.add(area.number)
     assert found == set(region_of) == set(range(1, 30))
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_shoulder_girdle_is_divided_by_its_own_line_and_across_its_middle(side):
+    body = anthropometry.body(name="p", stature=1.7, mass=70, sex="female")
+    along = body.offset[f"{side}_upper_arm"]
+    halfway, cross = along / 2, np.cross(along, [0.0, 1.0, 0.0])
+    for far in (-0.1, 0.1):
+        beyond = halfway + 0.01 * far * along + cross
+        assert outer_shoulder(f"{side}_clavicle", beyond, body) is (far > 0)
+        across = (
+            np.array([1.0, 0.0, 0.0]) - along[0] / (along @ along) * along
+        )  # perpendicular to it, forward
+        for point in (0.2 * along + far * across, 0.9 * along + far * across):
+            assert in_front(f"{side}_clavicle", tuple(point.tolist()), body) is (far > 0)
 
 
 def test_names_are_those_of_the_table():

@@ -12,8 +12,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from seerob.core.transforms import Array
 from seerob.description.humans.anthropometry import Body
 from seerob.description.humans.skeleton import without_side
@@ -94,8 +92,8 @@ def in_front(bone: str, point: Array | Sequence[float], body: Body) -> bool:
     """
     if without_side(bone) != "clavicle":
         return bool(point[0] > 0)
-    along = body.offset[bone.replace("clavicle", "upper_arm")]
-    return bool(point[0] > np.dot(point, along) / (along @ along) * along[0])
+    share, along = _along_clavicle(bone, point, body)
+    return bool(point[0] > share * along)
 
 
 def outer_shoulder(bone: str, point: Array | Sequence[float], body: Body) -> bool:
@@ -106,8 +104,14 @@ def outer_shoulder(bone: str, point: Array | Sequence[float], body: Body) -> boo
         point: In the bone's frame [m], shape (3,).
         body: The person.
     """
-    along = body.offset[bone.replace("clavicle", "upper_arm")]
-    return bool(np.dot(point, along) > 0.5 * along @ along)
+    return _along_clavicle(bone, point, body)[0] > 0.5
+
+
+def _along_clavicle(bone: str, point: Array | Sequence[float], body: Body) -> tuple[float, float]:
+    """Share of the way from sternum to shoulder joint that a point is beside, and x of all that way [m]."""
+    a, b, c = body.offset[bone.replace("clavicle", "upper_arm")].tolist()
+    x, y, z = map(float, point)
+    return (x * a + y * b + z * c) / (a * a + b * b + c * c), a
 
 
 def body_area(bone: str, point: Array | Sequence[float], *, body: Body, hand: str) -> SkinArea | None:

@@ -533,13 +533,14 @@ def test_a_time_out_of_a_variable_is_looked_at(
 
 
 OWN = '''
-from typing import Annotated
+from typing import Annotated, ClassVar
 from msgspec import Meta
 from seerob.criteria.criterion import Criterion
 from seerob.core.snapshot import Basis, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):
     """Always within."""
+    unit: ClassVar[str] = "m"
     robot: str
     reach: Annotated[float, Meta(extra={"unit": "m"})]
     def bind(self, model):

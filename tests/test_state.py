@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import metadata
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -283,6 +284,21 @@ def moved(cell, h):
         q, qd = rng.uniform(0.5 * low, 0.5 * high), rng.normal(size=len(low))
         motion[name] = (q + h * qd, qd)
     return state_at(cell, **motion)
+
+
+@pytest.mark.parametrize("name", ["arm", "op"])
+def test_a_mass_matrix_has_what_mujoco_has_of_all_joints_bit_for_bit(cell, name):
+    # Arms and legs of a person do not move each other: nothing is kept of them.
+    state, mechanism = moved(cell, 0.0), cell.model.mechanisms[name]
+    full = np.zeros((cell.model.mj.nv, cell.model.mj.nv))
+    mujoco.mj_makeM(cell.model.mj, state.data)
+    mujoco.mj_fullM(cell.model.mj, state.data, full)
+    block = full[np.ix_(mechanism.v_address, mechanism.v_address)]
+    found = state.columns[name].of_mass_matrix(state.data.M)
+    if state.columns[name].coupling is not None:
+        block = mechanism.coupling.T @ block @ mechanism.coupling
+    assert found.tobytes() == block.tobytes()
+    assert (block == 0).any() == (name == "op")
 
 
 def test_velocities_are_finite_differences_of_positions(cell):

@@ -71,6 +71,10 @@ class Columns:
     all_v: Indices | slice
     coupling: Array | None
     """None where every joint is commanded itself."""
+    entries: Indices
+    """Where ``MjData.M`` has the mass matrix of ``all_v``, shape (n, n); -1 where it has nothing."""
+    apart: NDArray[np.bool_] | None
+    """Where it has nothing: joints that do not move each other; None where all do."""
     joints: Indices
     """MuJoCo's, in the order of ``all_v``."""
     bodies: Indices
@@ -90,6 +94,8 @@ class Columns:
             v[mechanism.own],
             slice(int(v[0]), int(v[0]) + n) if in_turn else v,
             None if np.array_equal(mechanism.coupling, np.eye(n)) else mechanism.coupling,
+            entries := _entries(mj, v.tolist()),
+            (entries < 0) if (entries < 0).any() else None,
             joints := mj.dof_jntid[v].astype(np.int64),
             bodies := mj.jnt_bodyid[joints].astype(np.int64),
             mj.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE,
@@ -101,10 +107,25 @@ class Columns:
         own = every[..., self.all_v]
         return own.copy() if self.coupling is None else own @ self.coupling
 
-    def of_matrix(self, every: Array) -> Array:
-        """Block of the commanded joints, (nv, nv) to (n, n)."""
-        own = every[self.all_v][:, self.all_v]
-        return own.copy() if self.coupling is None else self.coupling.T @ own @ self.coupling
+    def of_mass_matrix(self, M: Array) -> Array:
+        """Mass matrix of the commanded joints from ``MjData.M``, shape (n, n)."""
+        own = M.take(self.entries)
+        if self.apart is not None:
+            own[self.apart] = 0.0
+        return own if self.coupling is None else np.asarray(self.coupling.T @ own @ self.coupling)
+
+
+def _entries(mj: mujoco.MjModel, dofs: list[int]) -> Indices:
+    """Where ``MjData.M``, whose rows have what is left of the diagonal, has these columns; -1 for nothing."""
+    at = {dof: k for k, dof in enumerate(dofs)}
+    found = np.full((len(dofs), len(dofs)), -1, np.int64)
+    for k, dof in enumerate(dofs):
+        first = int(mj.M_rowadr[dof])
+        for address in range(first, first + int(mj.M_rownnz[dof])):
+            column = at.get(int(mj.M_colind[address]))
+            if column is not None:
+                found[k, column] = found[column, k] = address
+    return found
 
 
 def moving_dofs(mj: mujoco.MjModel, body: int) -> NDArray[np.bool_]:

@@ -170,7 +170,7 @@ class State(Validity):
         self._table = PLACED.rows(self._placed)
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
-        self._cvel, self._qpos = data.cvel, data.qpos
+        self._cvel, self._qpos, self._sparse_mass_matrix = data.cvel, data.qpos, data.M
         self._corners = by_coordinate([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
@@ -656,11 +656,11 @@ class State(Validity):
         if key not in self._cache:
             if "M" not in self._cache:
                 mujoco.mj_makeM(self._model.mj, self._data)
-                mujoco.mj_fullM(self._model.mj, self._data, self._full_mass_matrix)
-                self._cache["M"] = self._full_mass_matrix
+                self._cache["M"] = True
             if len(mechanisms) == 1:
-                M = self.columns[mechanisms[0].name].of_matrix(self._full_mass_matrix)
+                M = self.columns[mechanisms[0].name].of_mass_matrix(self._sparse_mass_matrix)
             else:
+                mujoco.mj_fullM(self._model.mj, self._data, self._full_mass_matrix)
                 every = np.eye(self._model.mj.nv)
                 C = np.hstack([self.columns[mechanism.name].of_rows(every) for mechanism in mechanisms])
                 M = C.T @ self._full_mass_matrix @ C

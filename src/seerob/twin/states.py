@@ -178,14 +178,13 @@ class Bench:
     def masses(self, motion: Motion, mechanism: Mechanism) -> Array:
         """Joint-space mass matrices as MuJoCo has them, shape (N, n, n)."""
         mj, data, columns = self.mj, self.data, self.columns[mechanism.name]
-        M, found = np.zeros((mj.nv, mj.nv)), np.empty((len(motion.t), len(mechanism.own), len(mechanism.own)))
+        M, found = data.M, np.empty((len(motion.t), len(mechanism.own), len(mechanism.own)))
         for k in range(len(found)):
             data.qpos[:] = motion.q[k]
             mujoco.mj_kinematics(mj, data)
             mujoco.mj_comPos(mj, data)
             mujoco.mj_makeM(mj, data)
-            mujoco.mj_fullM(mj, data, M)
-            found[k] = columns.of_matrix(M)
+            found[k] = columns.of_mass_matrix(M)
         return found
 
 

@@ -81,6 +81,12 @@ def test_a_run_is_within_only_where_it_was_asked_bounded_or_accepted(rows, betwe
         assert (log["v"].gap() in worst.reason) or verdict is E
 
 
+def test_what_has_a_limit_and_never_judged_by_it_decided_nothing():
+    assert told([(0, None), (4, None)]).decided == 0.0
+    assert told([(0, W), (4, W)]).decided == 1.0
+    assert told([(0, "idle"), (4, "idle")]).decided is None
+
+
 def test_what_has_no_limit_informs_and_holds_nobody():
     log = told([(0, None), (4, None)], UNBOUNDED, limit=None)
     assert (log.verdict, log["v"].times().nothing) == (None, 1.0)

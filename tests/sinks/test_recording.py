@@ -25,7 +25,7 @@ from seerob.outputs.mcap import McapTape
 from seerob.outputs.sinks import recorder as recorder_module
 from seerob.outputs.sinks.recorder import FLUSH_PERIOD, Recorder
 from seerob.recording.format import SAMPLES, SCENE, SNAPSHOT, nanoseconds
-from seerob.recording.recording import Recording
+from seerob.recording.recording import AFTER_HOLE, Recording
 
 N = 150
 
@@ -353,6 +353,21 @@ def test_time_that_stands_still_or_turns_back_is_left_out(tmp_path):
     recording = Recording.open(tmp_path / "run.mcap")
     assert [s.seq for s in recording.snapshots()] == [0, 1, 2, 3]
     assert "5 ticks were left out" in recording.findings[0].text
+
+
+@pytest.mark.parametrize("missing", [(0,), (2,), (0, 1, 4)])
+def test_ticks_that_are_missing_are_silence_also_at_the_beginning(tmp_path, missing):
+    """What comes after them is not relied on: on the way there nobody was heard."""
+    said = made_run.samples(3)
+    assert said
+    assert not any(sample.reason for sample in said)
+    with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
+        for k in sorted(set(range(6)) - set(missing)):
+            writer.write(made_run.snapshot(k), said)
+    heard = list(Recording.open(tmp_path / "run.mcap").heard())
+    assert [k for k, samples in enumerate(heard) if not samples] == list(missing)
+    for k in set(range(6)) - set(missing):
+        assert {sample.reason for sample in heard[k]} == {AFTER_HOLE if k - 1 in missing else ""}
 
 
 def test_numbers_of_numpy_are_recorded_as_numbers(tmp_path):

@@ -270,7 +270,7 @@ class Question:
     why: str = ""
     """Why nothing that it said last is within."""
     own: bool = field(init=False)
-    """See `Bound.own`."""
+    """Whether it is one of the user's, which does not ship."""
     shaken: bool = field(init=False)
     """Whether the judge finds out what errors of speeds would change (`Criterion.by_speed`)."""
     held_names: Mapping[str, str] = field(default_factory=dict)

@@ -633,7 +633,7 @@ class Turning:
 
     points: Points
     point: int
-    """See `Points.add`."""
+    """Index of the point, as `Points.add` returns it."""
     coupling: Coupling
     """Whose columns."""
 

@@ -20,7 +20,7 @@ from seerob.protocols.links.tcp_server import tcp_server
 AGAIN = 0.2
 """After which what a stream lost is sent again [s]: as Linux does at the earliest."""
 LARGEST = 1 << 16
-"""Of what is passed on at once [byte]."""
+"""Most that is passed on at once [byte]."""
 
 
 class Faults(NamedTuple):

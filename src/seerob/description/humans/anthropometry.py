@@ -67,7 +67,7 @@ STATURE_RANGE = (1.2, 2.3)
 MASS_RANGE = (30.0, 250.0)
 """Body masses that are believed [kg]."""
 SMALL_RANGES = (0.8, 2.3), (10.0, 250.0)
-"""The same of children and adolescents, whom no table here describes [m, kg]."""
+"""Statures and body masses of children and adolescents that are believed [m, kg]; no table here is theirs."""
 BODY_MASS_INDEX_RANGE = (15.0, 45.0)
 """[kg/m²] outside, proportions of the tables are far from the person: a warning."""
 

@@ -45,9 +45,13 @@ def naive(data: bytes) -> tuple[Any, list[Any]]:
 
 
 def person(k: int) -> Pose:
-    """Somebody whose segments stand above one another and turn."""
+    """Somebody whose segments stand above one another and turn, with arms to the sides."""
     positions = np.array([[0.01 * np.sin(k / 60 + n), 0.0, 0.9 + 0.08 * n] for n in range(len(SEGMENTS))])
     half = 0.5 * np.sin(k / 60 + np.arange(len(SEGMENTS)))
+    for side, outward in (("Right", -1), ("Left", 1)):
+        for n, part in enumerate(("UpperArm", "ForeArm", "Hand")):
+            at = SEGMENTS.index(f"{side}{part}")
+            positions[at], half[at] = (0.0, outward * (0.2 + 0.3 * n), 1.4), 0.0
     zero = np.zeros(len(SEGMENTS))
     return Pose(positions, np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1))
 

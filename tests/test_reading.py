@@ -91,7 +91,7 @@ WRONG = {
     "below a range": (
         HUMAN.replace("1.75", "0.5"),
         "humans[0].stature",
-        "0.5 is wrong; expected a number >= 1.2 [m]",
+        "0.5 is wrong; expected a number >= 0.8 [m]",
     ),
     "no choice": (HUMAN.replace("male", "other"), "humans[0].sex", "one of: male, female"),
     "missing": ("[[humans]]\nname='h'\nmass=75\nsex='male'", "humans[0].stature", "missing; give it [m]"),

@@ -88,6 +88,7 @@ def test_the_type_of_the_file_names_every_table_once():
         "zones",
         "allow_writing",
         "engine",
+        "report",
         "folder",
         "outside",
         "files",

@@ -11,6 +11,8 @@ from test_dossier import Page
 import seerob as sr
 from seerob.core.errors import InputError
 from seerob.outputs.report import printing
+from seerob.outputs.report.page import STYLE
+from seerob.outputs.report.report import ReportSection
 from seerob.outputs.sinks.dossier import Dossier
 
 DEMO = Path(__file__).parents[2] / "workstations" / "ur10_assembly"
@@ -57,6 +59,21 @@ def test_what_is_no_small_picture_is_no_logo(tmp_path, logo):
     files = {"workstation.toml": COVER} | ({} if logo is None else {"logo.png": logo})
     page = written(tmp_path, files)
     assert "logo.png is no PNG or JPEG file of at most 1 MB: no logo." in page.text
+
+
+def test_sections_of_one_title_are_all_there(tmp_path):
+    with Dossier().open(made_run.scene(), made_run.MESHES, {}, tmp_path) as writer:
+        writer.write(made_run.snapshot(0), made_run.samples(0))
+        writer.sections += [
+            ReportSection("Permissible speed", (text,)) for text in ("of the left", "of the right")
+        ]
+    page = Page((tmp_path / "report.html").read_text())
+    assert all(text in page.text for text in ("of the left", "of the right"))
+
+
+def test_no_rule_of_the_style_stands_twice(tmp_path):
+    rules = re.findall(r"^[^\s@}].*{.*}$", STYLE, re.MULTILINE)
+    assert len(rules) == len(set(rules)) > 20
 
 
 def test_without_a_browser_nothing_begins(tmp_path, monkeypatch):

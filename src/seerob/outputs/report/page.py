@@ -72,18 +72,6 @@ figcaption {{ font-size: .84rem; color: var(--soft); margin-top: .3rem; }}
   font-size: .88rem; }}
 .cover dt {{ color: var(--soft); }}
 .cover dd {{ margin: 0; }}
-.inputs {{ table-layout: fixed; }}
-.inputs th:nth-child(2) {{ width: 12%; }}
-.inputs th:nth-child(3) {{ width: 10%; }}
-.inputs th:last-child {{ width: 42%; }}
-.inputs tbody th {{ font-weight: normal; }}
-.logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
-.contents a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
-.contents ol {{ columns: 2; margin: .4rem 0; padding-left: 1.4rem; font-size: .88rem; }}
-.cover dl {{ display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; margin: .8rem 0;
-  font-size: .88rem; }}
-.cover dt {{ color: var(--soft); }}
-.cover dd {{ margin: 0; }}
 .cover ol {{ columns: 2; margin: .4rem 0; font-size: .88rem; }}
 .cover a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
 .inputs {{ table-layout: fixed; }}
@@ -93,23 +81,7 @@ figcaption {{ font-size: .84rem; color: var(--soft); margin-top: .3rem; }}
 .inputs tbody th {{ font-weight: normal; }}
 .logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
 section.criterion {{ border-top: 1px solid var(--rule); padding-top: .2rem; margin-top: 1.6rem; }}
-h2 + .cover dl {{ display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; margin: .8rem 0;
-  font-size: .88rem; }}
-.cover dt {{ color: var(--soft); }}
-.cover dd {{ margin: 0; }}
-.inputs {{ table-layout: fixed; }}
-.inputs th:nth-child(2) {{ width: 12%; }}
-.inputs th:nth-child(3) {{ width: 10%; }}
-.inputs th:last-child {{ width: 42%; }}
-.inputs tbody th {{ font-weight: normal; }}
-.logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
-.contents a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
-.contents ol {{ columns: 2; margin: .4rem 0; padding-left: 1.4rem; font-size: .88rem; }}
-section.criterion {{ border-top: none; margin-top: 0; }}
-@media print, (min-width: 56rem) {{
-  .evidence {{ display: grid; grid-template-columns: 4fr 5fr; gap: 1rem; align-items: center; }}
-  .evidence > :only-child {{ grid-column: 1 / -1; }}
-}}
+h2 + section.criterion {{ border-top: none; margin-top: 0; }}
 @media print, (min-width: 56rem) {{
   .evidence {{ display: grid; grid-template-columns: 4fr 5fr; gap: 1rem; align-items: center; }}
   .evidence > :only-child {{ grid-column: 1 / -1; }}
@@ -193,36 +165,25 @@ def page(report: Report) -> str:
         tag("title", title),
         tag("style", Html(STYLE)),
     )
-    sections = {
-        "Verdicts": _verdicts(report),
-        "Criterion by criterion": _criteria(report),
-        "Posture against safety": posture_safety_section(report.scene, report.log),
-        **{section.title: _section(section) for section in report.sections},
-        "What is not covered and must be measured": not_covered(report),
-        "What was assumed, and by whom": assumed(report),
-        "Where the figures come from": _origins(report),
-        "What was evaluated": evaluated(report),
-    }
-    written = {name: content for name, content in sections.items() if content}
-    sections = {
-        "Verdicts": _verdicts(report),
-        "Criterion by criterion": _criteria(report),
-        "Posture against safety": posture_safety_section(scene, report.log),
-        **{section.title: _section(section) for section in report.sections},
-        "What is not covered and must be measured": not_covered(report),
-        "What was assumed, and by whom": assumed(report),
-        "Where the figures come from": _origins(report),
-        "What was evaluated": evaluated(report),
-    }
-    written = {name: content for name, content in sections.items() if content}
+    sections = [
+        ("Verdicts", _verdicts(report)),
+        ("Criterion by criterion", _criteria(report)),
+        ("Posture against safety", posture_safety_section(scene, report.log)),
+        *((section.title, _section(section)) for section in report.sections),
+        ("What is not covered and must be measured", not_covered(report)),
+        ("What was assumed, and by whom", assumed(report)),
+        ("Where the figures come from", _origins(report)),
+        ("What was evaluated", evaluated(report)),
+    ]
+    written = [(name, content) for name, content in sections if content]
     body = tag(
         "body",
-        _cover(report, title, list(written)),
+        _cover(report, title, [name for name, _ in written]),
         [
             tag(
                 "div", tag("h2", name, id=_place(k)), content, class_="appendix" if name in APPENDIX else None
             )
-            for k, (name, content) in enumerate(written.items())
+            for k, (name, content) in enumerate(written)
         ],
     )
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en") + "\n"

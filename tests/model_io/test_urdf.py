@@ -253,6 +253,8 @@ def test_what_only_the_eye_needs_is_left_out_and_said(tmp_path, shape, words):
     (said,) = [f for f in made.findings if "left out of pictures" in f.text]
     assert words in said.text
     assert said.level == "warning"
+    # It may stand out of what distances see: nobody is within by it.
+    assert said.holds == ("robot",)
     # Where it is the only shape, distances need it.
     assert any(words in str(problem) for problem in problems(tmp_path, arm(INERTIAL + visual)))
 

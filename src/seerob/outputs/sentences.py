@@ -28,14 +28,17 @@ _NUMBERS = (
 )
 
 _LEVELS = ("warning", "assumed", "note")
-_ABOUT = 6
-"""Names before a finding."""
 _LISTED = 15
 """Names in a sentence."""
 
 
-def grouped(findings: Iterable[Finding]) -> list[Finding]:
-    """What was found, equal texts as one that names everything it is about; what holds a verdict first."""
+def grouped(findings: Iterable[Finding], most: int | None = None) -> list[Finding]:
+    """What was found, equal texts as one that names what it is about; what holds a verdict first.
+
+    Args:
+        findings: In any order.
+        most: So many names at most; all of them when not given.
+    """
     about: dict[tuple[str, str, bool], list[str]] = {}
     for one in findings:
         about.setdefault((one.level, one.text, bool(one.holds)), []).append(one.subject)
@@ -43,8 +46,8 @@ def grouped(findings: Iterable[Finding]) -> list[Finding]:
     found = []
     for level, text, holds in order:
         subjects = list(dict.fromkeys(about[level, text, holds]))
-        more = f" and {len(subjects) - _ABOUT} more" if len(subjects) > _ABOUT else ""
-        who = f"{', '.join(subjects[:_ABOUT])}{more}"
+        more = f" and {len(subjects) - most} more" if most is not None and len(subjects) > most else ""
+        who = f"{', '.join(subjects[:most])}{more}"
         found.append(Finding(level=level, subject=who, text=text, holds=("*",) * holds))
     return found
 

@@ -211,6 +211,8 @@ def describe(station: Station) -> None:
 
 MOST_FINDINGS = 10
 """Lines at the start, where nobody asks for more."""
+_ABOUT = 6
+"""Names before a finding there."""
 
 
 def tell(findings: Iterable[Finding], *, verbose: bool = False) -> None:
@@ -220,7 +222,7 @@ def tell(findings: Iterable[Finding], *, verbose: bool = False) -> None:
     """
     from seerob.outputs.sentences import grouped
 
-    found = [one for one in grouped(findings) if verbose or one.level != "note"]
+    found = [one for one in grouped(findings, None if verbose else _ABOUT) if verbose or one.level != "note"]
     least = sum(one.level == "warning" or bool(one.holds) for one in found)
     shown = found if verbose or len(found) <= MOST_FINDINGS else found[: max(least, MOST_FINDINGS - 1)]
     for one in shown:

@@ -17,7 +17,7 @@ import numpy as np
 
 from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.shapes import Mesh, Solid, capsule
-from seerob.core.snapshot import Origin
+from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array, apply
 from seerob.description import lint
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
@@ -54,16 +54,20 @@ class Shapes:
     def shown(self, link: Element, name: str) -> tuple[Mesh, ...]:
         """What can be read of the link's ``<visual>`` elements where others are there for distances.
 
-        What cannot is left out of the pictures, with a finding.
+        What cannot is left out of the pictures. How far it stands out of what distances see is unknown then,
+        so a finding holds the robot.
         """
         problems = self.reader.problems
         before = len(problems)
         found = self.visual(link, name)
         for problem in problems[before:]:
-            text = f"{problem.key.partition('.')[2]} is left out of pictures: {problem.what}"
-            self.reader.finding(
-                "warning", name, f"{text}; how far it stands out of the collision shape is unknown"
+            text = (
+                f"{problem.key.partition('.')[2]} is left out of pictures ({problem.what}), and how far it "
+                "stands out of the collision shape is unknown: mend it, or take it out of the description"
             )
+            about = f"{self.reader.robot}/{name}"
+            held = Finding(level="warning", subject=about, text=text, holds=(self.reader.robot,))
+            self.reader.findings.append(held)
         del problems[before:]
         return found
 

@@ -17,6 +17,7 @@ import seerob as sr
 from seerob import api
 from seerob.app.cli import main
 from seerob.protocols.links.tcp_server import close_server
+from seerob.recording.recording import Recording
 from seerob.recording.series import CODES
 from seerob.testing import sources_never_within
 
@@ -285,6 +286,51 @@ def test_a_plug_in_that_fails_is_no_verdict(tmp_path, monkeypatch, capfd):
     said = capfd.readouterr().err
     assert "AttributeError" in said
     assert said.endswith("seerob: a fault of the program or of a plug-in, see above; nothing is judged\n")
+
+
+ENDS = """
+import sys
+
+import acme.work_height as shipped
+
+
+class Ends(shipped.WorkHeight, frozen=True, kw_only=True):
+    def compute(self, model):
+        height = super().compute(model)
+
+        def compute(twin):
+            if float(twin.t) > 0.3:
+                sys.exit(0)
+            return height(twin)
+
+        return compute
+"""
+
+
+def test_a_plug_in_that_ends_the_program_gives_it_no_exit_code(tmp_path, monkeypatch, capfd):
+    """That of ``sys.exit()`` means within, that of ``sys.exit(1)`` exceeded: nobody judged either."""
+    package = tmp_path / "path" / "own_ending"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    (package / "asked.py").write_text(ENDS)
+    (package / "imported.py").write_text("import sys\n\nsys.exit(0)\n")
+    monkeypatch.syspath_prepend(str(tmp_path / "path"))
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    swing(folder)
+    rule = '[[safety]]\nkind = "own_ending.KIND"\nname = "h"\nat = "arm"\nlimit = 9\n'
+    cell(folder, FROM_FILE + rule.replace("KIND", "asked"))
+    out = tmp_path / "out"
+    assert main(["assess", str(folder), "--allow-plugins", "-o", str(out)]) == 3
+    assert "end of the program (SystemExit: 0)" in capfd.readouterr().err
+    assert 'class="verdict within"' not in (out / "report.html").read_text()
+    assert main(["report", str(out / "run.mcap"), "-o", str(tmp_path / "again"), "--allow-plugins"]) != 0
+    recording = Recording.open(out / "run.mcap")
+    assert [f.holds for f in recording.check() if "end of the program" in f.text] == [("*",)]
+    cell(folder, FROM_FILE + rule.replace("KIND", "imported"))
+    assert main(["assess", str(folder), "--allow-plugins", "-o", str(out)]) == 3
+    assert "own_ending.imported' fails when it is imported: SystemExit: 0" in capfd.readouterr().err
 
 
 def test_the_page_shows_each_file_as_it_is():

@@ -13,7 +13,7 @@ from importlib.metadata import version
 
 from seerob.app.console.interruption import Interrupts
 from seerob.app.console.terminal import Exit, Parser, PrintableLines
-from seerob.core.errors import SeerobError
+from seerob.core.errors import SeerobError, ended_by
 from seerob.core.interrupted import stopped
 from seerob.core.printable import printable
 
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with interrupts:
             words = sys.argv[1:] if arguments is None else arguments
             options = parser(*words[:1]).parse_args(words)
-            code = int(options.run(options))
+            code = _asked(options)
             sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -88,6 +88,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if interrupts.came:
             return stopped()
         return _failed(error)
+
+
+def _asked(options: argparse.Namespace) -> int:
+    """Exit code of the command that was asked.
+
+    Raises:
+        RuntimeError: A plug-in or a library would end the program, with a code that is no verdict of it.
+    """
+    try:
+        return int(options.run(options))
+    except (Exception, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise RuntimeError(ended_by(error)) from error
 
 
 def _failed(error: Exception) -> Exit:

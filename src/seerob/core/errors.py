@@ -69,6 +69,13 @@ class SimulationDiverged(SeerobError):
     """The physics gave up, or produced a number that is not finite; the message names body and time."""
 
 
+def ended_by(error: BaseException) -> str:
+    """What ended a run or a command before it was over, in words."""
+    if isinstance(error, Exception):
+        return str(error) or type(error).__name__
+    return f"something called for the end of the program ({type(error).__name__}: {error})"
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``did you mean 'ur10'? known: …`` for a wrong name, with at most a dozen of the known ones."""
     known = tuple(known)

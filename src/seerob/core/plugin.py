@@ -154,7 +154,7 @@ def _imported(package: str, kind: str, name: str) -> ModuleType:
             f"no module {name!r} for this kind; install it or put its folder on PYTHONPATH, "
             f"or take one of: {', '.join(kinds(package)) or 'none'}"
         ) from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a script, too, ends with what it is called by
         what = f"{type(error).__name__}: {error}"
         raise PluginError(f"the module of kind {kind!r} fails when it is imported: {what}") from error
 

@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
 
-from seerob.core.errors import InputError, Problem, SeerobError
+from seerob.core.errors import InputError, Problem, SeerobError, ended_by
 from seerob.core.samples import Sample, printable_sample
 from seerob.core.snapshot import Result, Scene, Snapshot, SourceLine, Verdict
 from seerob.criteria.between_ticks import watched
@@ -393,8 +393,10 @@ def run(
                     break
                 if clock is not None:
                     clock.wait(t + model.workstation.engine.tick)
-        except Exception as error:
-            log.break_off(f"the run broke off after {t:.4g} s: {error}")
+        except KeyboardInterrupt:  # somebody has seen enough
+            raise
+        except BaseException as error:
+            log.break_off(f"the run broke off after {t:.4g} s: {ended_by(error)}")
             raise
         for writer in writers:
             if isinstance(writer, BeginsAtEnd):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from msgspec import Meta
 
-from seerob.core.errors import InputError, SeerobError
+from seerob.core.errors import InputError, SeerobError, ended_by
 from seerob.core.printable import printable
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
@@ -149,8 +149,8 @@ class RecorderWriter(Closing):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if isinstance(error, Exception):
-            self._broken_off = printable(str(error) or type(error).__name__)[:MAX_REASON]
+        if error is not None and not isinstance(error, KeyboardInterrupt):
+            self._broken_off = printable(ended_by(error))[:MAX_REASON]
         super().__exit__(kind, error, trace)
 
     def close(self) -> None:

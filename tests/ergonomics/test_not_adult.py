@@ -2,7 +2,7 @@
 
 import pytest
 
-from made_cell import made, results_at
+from made_cell import made, person, results_at
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
 from seerob.description.humans.anthropometry import body
@@ -65,3 +65,19 @@ def test_who_is_small_is_asked_whether_tables_hold(tmp_path):
             station(tmp_path, **options, more="")
     with pytest.raises(InputError, match=r"0\.5 m is not a person's"):
         body(name="op", stature=0.5, mass=18, sex="female", adult=False)
+
+
+def test_limits_of_contact_hold_for_no_child_beside_the_adult_who_is_named(tmp_path):
+    """Everybody in the workstation can be hit: hands of a child within reach were within limits of adults."""
+    contact = (
+        '[[safety]]\nkind = "power_and_force"\nname = "named"\nrobot = "arm"\nhuman = "op"\n'
+        'excluded = ["Skull and forehead", "Face"]\nhorizon = 0.9\ncontact_area = { arm = 1e-4 }\n'
+    )
+    q = [0, -1.5, 1.4, -1.5, -1.5, 0]
+    arm = f'[[robots]]\nname = "arm"\nmodel = "library:ur5e"\nq = {q}\n'
+    adult, kid = person("op", 3, 0, 0), person("kid", 0.6, 1.1, 0)
+    small = kid.replace("1.75", "1.05\nadult = false").replace("75\n", "18\n")
+    for other, expected in ((kid, Verdict.WITHIN), (small, Verdict.UNDECIDED)):
+        cell = made(tmp_path, arm + adult + other + contact)
+        found = results_at(cell, arm=(q, [0.001] * 6))["named"]
+        assert found.verdict is expected

@@ -177,7 +177,7 @@ def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str
     bodies = {i for name in subjects for i in _meant(model, name)}
     if criterion.adults:
         every = {human.name for human in model.workstation.humans}
-        people = every.intersection(subjects) or every.intersection(criterion.depends(model))
+        people = every.intersection((*subjects, *criterion.depends(model)))
         reasons += [not_adult(model, name) for name in sorted(people)]
     for finding in findings:
         if any(

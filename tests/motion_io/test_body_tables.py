@@ -22,6 +22,8 @@ READING = MarkerReading(file="r.csv")
         ("head.qw", Column("head", "orientation", 0)),
         ("Left Hand rotation Z", Column("Left Hand", "orientation", 3)),
         ("wrist confidence", Column("wrist", "confidence")),
+        ("Left Foot TrackingState", Column("Left Foot", "level")),
+        ("tracking_state", Column("", "level")),
         ("timestamp_usec", Column("", "time", unit="us")),
         ("Time (ms)", Column("", "time", unit="ms")),
         ("body_id", Column("", "person")),
@@ -101,6 +103,47 @@ def test_a_table_with_a_row_per_point_is_the_same(tmp_path):
     frames = list(captured.frames)
     np.testing.assert_allclose([f.positions for f in frames], values(), atol=1e-6)
     np.testing.assert_allclose([f.orientations for f in frames], np.tile([1.0, 0, 0, 0], (12, 3, 1)))
+
+
+def by_point(more="", header="", every=lambda k, name: ""):
+    rows = [f"t [s];marker;x [m];y [m];z [m]{header}"]
+    for k, row in enumerate(values()):
+        rows += [
+            ";".join([str(k / 10), name, *(f"{x:.4f}" for x in point)]) + every(k, name)
+            for name, point in zip(NAMES, row, strict=True)
+        ]
+    return "\n".join(rows) + more
+
+
+@pytest.mark.parametrize(
+    ("header", "said", "shares"),
+    [
+        ("confidence", (0, 1, 2, 3), (0, 0, 1, 1)),
+        ("confidence", (0, 0.4, 1, 1), (0, 0.4, 1, 1)),
+        ("tracking_state", (0, 1, 1, 1), (0, 0, 0, 0)),
+        ("tracking_state", (0, 1, 2, 2), (0, 0, 1, 1)),
+    ],
+)
+def test_a_joint_that_a_tracker_only_predicts_is_not_seen(tmp_path, header, said, shares):
+    """A level of 1 was a whole share: fully seen."""
+    content = by_point(header=f";{header}", every=lambda k, name: f";{said[k % 4]}")
+    found = [frame.confidence.tolist() for frame in read(tmp_path, content).frames]
+    assert found == [[shares[k % 4]] * 3 for k in range(12)]
+
+
+@pytest.mark.parametrize("largest", [100, 1.5, 4])
+def test_confidences_that_are_neither_shares_nor_levels_are_refused(tmp_path, largest):
+    content = by_point(header=";confidence", every=lambda k, name: f";{largest if k else 1}")
+    with pytest.raises(InputError, match=f"confidences up to {largest}; give shares from 0 to 1"):
+        read(tmp_path, content)
+
+
+def test_two_rows_for_one_point_of_one_instant_are_refused(tmp_path):
+    """The last one won without a word: of two people without a column for them, the second."""
+    twice = f"\n0.5;pelvis;{';'.join(f'{x:.4f}' for x in values()[5, 2])}"
+    assert read(tmp_path, by_point(more=twice)).count == 12
+    with pytest.raises(InputError, match="1 rows of an instant that has another of the same point: pelvis"):
+        read(tmp_path, by_point(more="\n0.5;pelvis;0.2;0.1;0.9"))
 
 
 def test_incomplete_coordinates_are_named(tmp_path):

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import Captured, Seen
 from seerob.files.motion_capture.frame_arrays import MAX_VALUES, check_size
@@ -100,9 +101,11 @@ def read_person(path: Path, reading: MarkerReading, *, seen: Seen, time_unit: st
         rows = np.array([p == chosen for p in table.persons])
         reading = replace(reading, subject="")
     order = np.flatnonzero(rows)
-    confidence = table.values[order, :, 7] if "confidence" in table.has else None
-    if confidence is not None:
-        confidence = np.clip(confidence, 0.0, 1.0)
+    confidence: Array | None = None
+    notes: tuple[Finding, ...] = ()
+    if "confidence" in table.has:
+        confidence, notes = _shares(table, reading.file)
+        confidence = confidence[order]
     points = Points(
         names=table.names,
         t=table.t[order],
@@ -111,7 +114,27 @@ def read_person(path: Path, reading: MarkerReading, *, seen: Seen, time_unit: st
         wxyz=table.values[order, :, 3:7] if "orientation" in table.has else None,
         confidence=confidence,
     )
-    return recording(points, reading, seen=seen)
+    return recording(points, reading, seen=seen, notes=notes)
+
+
+def _shares(table: BodyTable, file: str) -> tuple[Array, tuple[Finding, ...]]:
+    """Confidences from 0 to 1, shape (n, k), and what is to be said of them.
+
+    A tracker's level 1 is of a joint that it predicts behind something else, and no share.
+
+    Raises:
+        InputError: They are neither shares nor levels.
+    """
+    said = table.values[..., 7]
+    largest = float(np.nanmax(said, initial=0.0))
+    if "level" not in table.has and largest <= 1.0:
+        return np.maximum(said, 0.0), ()
+    known = said[~np.isnan(said)]
+    if largest > HIGHEST_LEVEL or (known != np.floor(known)).any():
+        remedy = f"give shares from 0 to 1, or a tracker's levels 0 to {HIGHEST_LEVEL}"
+        raise InputError.at(file, "confidence", f"confidences up to {largest:g}", remedy)
+    text = f"{file}: confidences are levels of a tracker: from 2 on a joint is seen, below it is predicted"
+    return np.where(said >= 2.0, 1.0, 0.0), (Finding(level="assumed", subject="", text=text),)
 
 
 def _chosen_person(persons: tuple[str, ...], reading: MarkerReading) -> str:
@@ -136,7 +159,9 @@ _PLACE = re.compile(
     rf"^(?P<name>.+?)(?:{_SPLIT}(?:pos|position|Position|Pos|loc|location|translation|coord))?"
     rf"{_SPLIT}(?P<axis>[xyzXYZ])$"
 )
-_SURE = re.compile(rf"^(?P<name>.+?){_SPLIT}(?:conf|confidence|Confidence|tracking_?state|quality)$")
+_SURE = re.compile(
+    rf"^(?P<name>.+?){_SPLIT}(?:conf|confidence|Confidence|(?P<state>[tT]racking_?[sS]tate)|quality)$"
+)
 UNITS = {"mm": "mm", "cm": "cm", "m": "m", "millimeter": "mm", "meter": "m", "millimetre": "mm", "metre": "m"}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 """Unit of time → seconds."""
@@ -148,7 +173,7 @@ class Column(NamedTuple):
     name: str
     """Name of the point, as the file has it; empty in a table with a row per point."""
     what: str
-    """``position``, ``orientation``, ``confidence``, ``time``, ``person`` or ``point``."""
+    """``position``, ``orientation``, ``confidence``, ``level``, ``time``, ``person`` or ``point``."""
     axis: int = 0
     """0…2 for x, y, z; 0…3 for w, x, y, z."""
     unit: str = ""
@@ -172,8 +197,10 @@ def column(header: str) -> Column | None:
         return Column("", "person")
     if plain in ("joint", "joint_name", "joint_id", "point", "marker", "segment", "bone", "name"):
         return Column("", "point")
-    if plain in ("confidence", "conf", "joint_confidence", "tracking_state"):
+    if plain in ("confidence", "conf", "joint_confidence"):
         return Column("", "confidence")
+    if plain in ("tracking_state", "trackingstate"):
+        return Column("", "level")
     return _of_a_point(text, plain, UNITS.get(unit, unit))
 
 
@@ -192,7 +219,7 @@ def _of_a_point(text: str, plain: str, unit: str) -> Column | None:
     if re.fullmatch(r"(?:q|quat|rot|ori|orientation)_?[wxyz]", plain):
         return Column("", "orientation", "wxyz".index(plain[-1]))
     if (match := _SURE.match(text)) is not None:
-        return Column(match["name"], "confidence")
+        return Column(match["name"], "level" if match["state"] else "confidence")
     if (match := _TURN.match(text)) is not None:
         return Column(match["name"], "orientation", "wxyz".index(match["axis"].lower()))
     if (match := _PLACE.match(text)) is not None:
@@ -203,9 +230,11 @@ def _of_a_point(text: str, plain: str, unit: str) -> Column | None:
 SEARCH = 60
 """Rows in which a header is looked for."""
 MAX_POINTS = 2000
-FIRST = {"position": 0, "orientation": 3, "confidence": 7}
+FIRST = {"position": 0, "orientation": 3, "confidence": 7, "level": 7}
 WIDTH = 8
 """x, y, z, then w, x, y, z, then confidence."""
+HIGHEST_LEVEL = 3
+"""Of what trackers say: 0 none, 1 predicted, 2 seen, and 3 where there is a high confidence."""
 _EMPTY = frozenset(["", "nan", "none", "null", "na", "n/a", "-"])
 
 
@@ -223,7 +252,8 @@ class BodyTable:
     unit: str
     """Unit of the positions; empty when no header says it."""
     has: frozenset[str]
-    """Which of ``position``, ``orientation``, ``confidence`` there are."""
+    """Which of ``position``, ``orientation``, ``confidence`` there are; ``level`` where a header says that
+    confidences are a tracker's levels."""
 
 
 def read(path: Path, *, file: str, time_unit: str = "") -> BodyTable:
@@ -264,7 +294,7 @@ def _check_columns(columns: dict[int, Column], file: str, row: int) -> None:
     problems: list[Problem] = []
     seen: dict[tuple[str, str, int], int] = {}
     for index, c in columns.items():
-        key = (c.name, c.what, c.axis)
+        key = (c.name, "confidence" if c.what == "level" else c.what, c.axis)
         if key in seen:
             what = f"columns {seen[key] + 1} and {index + 1} are both {c.name} {c.what} {c.axis}".replace(
                 "  ", " "
@@ -333,6 +363,11 @@ class _Numbers:
         self._commas.check()
 
 
+def _has(wanted: dict[int, Column]) -> frozenset[str]:
+    found = frozenset(c.what for c in wanted.values())
+    return found | {"confidence"} if "level" in found else found
+
+
 def _rows(grid: Grid, header: int) -> Iterator[tuple[int, Sequence[object]]]:
     for number, row in enumerate(grid.rows(), start=1):
         if number > header and any(str(cell).strip() for cell in row if cell is not None):
@@ -368,7 +403,7 @@ def _by_instant(grid: Grid, header: int, columns: dict[int, Column], scale: floa
         persons=tuple(persons),
         values=table.reshape(len(t), len(names), WIDTH),
         unit=_unit(columns, grid.file),
-        has=frozenset(c.what for c in wanted.values()),
+        has=_has(wanted),
     )
 
 
@@ -402,13 +437,21 @@ def _by_point(grid: Grid, header: int, columns: dict[int, Column], scale: float)
         given = np.full((len(which), WIDTH), np.nan)
         given[:, place] = np.frombuffer(flat, float).reshape(len(which), -1)
         table[which[:, 0], which[:, 1]] = given
+        kept = table[which[:, 0], which[:, 1]]
+        other = ((kept != given) & ~(np.isnan(kept) & np.isnan(given))).any(axis=1)
+        if other.any():
+            twice = [list(names)[at] for at in sorted(set(which[other, 1].tolist()))]
+            shown = ", ".join(twice)[:120]
+            what = f"{other.sum()} rows of an instant that has another of the same point: {shown}"
+            remedy = "name the person of each row in a column person, write times in full, or remove one"
+            raise InputError.at(grid.file, "", what, remedy)
     return BodyTable(
         names=tuple(names),
         t=np.array([t for t, _ in instants]),
         persons=tuple(person for _, person in instants),
         values=table,
         unit=_unit(columns, grid.file),
-        has=frozenset(c.what for c in wanted.values()),
+        has=_has(wanted),
     )
 
 

@@ -230,6 +230,20 @@ def test_subjects_are_a_tuple_of_names(own):
         ("return Result(name='own', limit=2.0, verdict=Verdict.WITHIN)", "it is within, and has no value"),
         ("return self.result(float('inf'))", "is inf, not a finite number"),
         (
+            "return Result(name='own', value=1.0, limit=float('nan'), verdict=Verdict.EXCEEDED)",
+            "its limit is nan, not a finite number",
+        ),
+        (
+            "return Result(name='own', value=3.0, limit=2.0, interval=(3.0, float('inf')),"
+            " verdict=Verdict.EXCEEDED)",
+            "an end of its interval is inf",
+        ),
+        (
+            "part = Result(name='a', value=1.0, limit=float('inf'), verdict=Verdict.WITHIN); "
+            "return Result(name='own', value=1.0, limit=2.0, verdict=Verdict.WITHIN, parts=(part,))",
+            "a: its limit is inf, not a finite number",
+        ),
+        (
             "return Result(name='own')",
             "says nothing, neither a figure nor a verdict: where there is nothing to",
         ),
@@ -326,6 +340,9 @@ def test_a_whole_is_no_greener_than_its_parts(own):
 NOBODY = "    def subjects(self): return ()\n"
 GAP = "t [s],j1 [rad],j2 [rad]\n" + "".join(
     f"{k / 100},{k / 1000},{k / 500}\n" for k in range(101) if not 30 < k < 95
+)
+STANDS_AT_LAST = "t [s],j1 [rad],j2 [rad]\n" + "".join(
+    f"{k / 100},{min(k, 20) / 1000},0\n" for k in range(31)
 )
 LOG = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
 
@@ -605,6 +622,15 @@ def test_what_is_written_into_arrays_of_many_instants_changes_no_other(own, spoi
     for name in one:
         assert one[name].note == ""
         np.testing.assert_array_equal(one[name].value, other[name].value, name)
+
+
+def test_no_author_accepts_what_nobody_knows_between_instants(own):
+    """The file does, in words, and a report shows these."""
+    text = BIND.format("return self.result(state.q(arm)[0])") + '    instants = "accepted: by its author"\n'
+    for accepted, verdict in (("", UNDECIDED), ('between_samples = "accepted: it is slow"\n', WITHIN)):
+        station = own(text, accepted + LOG)
+        Path(station.model.folder, "m.csv").write_text(STANDS_AT_LAST)
+        assert station.run().results["own"].verdict is verdict
 
 
 PARTLY = MANY.replace("    def batch", "    whole = False\n    def batch")

@@ -91,12 +91,27 @@ def _worse_part(result: Result) -> str:
     return next(filter(None, map(_worse_part, result.parts)), "") if nested else ""
 
 
+def _limit_of(criterion: Criterion) -> float | None:
+    """The limit that the file states; None where that is no number, or one without end."""
+    limit = getattr(criterion, "limit", None)
+    return limit if isinstance(limit, (int, float)) and math.isfinite(limit) else None
+
+
+def _endless(result: Result) -> str:
+    """Which number of a result, or of its parts, is not finite; empty where all are."""
+    ends = zip(("an end of its interval",) * 2, result.interval or (), strict=False)
+    for what, number in (("its value", result.value), ("its limit", result.limit), *ends):
+        if number is not None and not math.isfinite(number):
+            return f"{what} is {number}, not a finite number"
+    return next((f"{part.name}: {what}" for part in result.parts if (what := _endless(part))), "")
+
+
 def _unknown(criterion: Criterion, reason: str) -> Result:
     """What is said of a criterion that could not be asked."""
     return Result(
         name=criterion.name,
         unit=criterion.unit,
-        limit=getattr(criterion, "limit", None),
+        limit=_limit_of(criterion),
         at_most=criterion.at_most,
         verdict=_UNDECIDED,
         reason=reason,
@@ -316,6 +331,8 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
+        if question.own and (what := _endless(result)):
+            raise Undecided(what)
         if question.own and question.moves and state.late_reason(state.asked):
             # What it says where it applies is so where it does not. Of those that ship none is greener by it.
             late = state.late_reason(state.asked - {question.muted_by})
@@ -389,7 +406,7 @@ class Judge:
         return Result(
             name=criterion.name,
             unit=criterion.unit,
-            limit=getattr(criterion, "limit", None),
+            limit=_limit_of(criterion),
             at_most=criterion.at_most,
             reason=f"not asked: {criterion.active} is false",
             muted=True,

@@ -57,7 +57,7 @@ def judged(
             verdicts[i], rank = UNDECIDED, 1
         elif not kept:
             verdicts[i], rank = EXCEEDED, 2
-        elif open_:
+        elif open_ or math.isinf(last):  # nothing could exceed a limit without end
             verdicts[i], rank = UNDECIDED, 1
         else:
             verdicts[i], rank = WITHIN, 0

@@ -9,6 +9,8 @@ import pytest
 from test_dossier import Page
 
 import seerob as sr
+from seerob.app.console.progress import announced
+from seerob.app.console.sinks import tell_files
 from seerob.core.errors import InputError
 from seerob.outputs.report import printing
 from seerob.outputs.report.page import STYLE
@@ -85,5 +87,30 @@ def test_without_a_browser_nothing_begins(tmp_path, monkeypatch):
 
 def test_a_browser_that_prints_nothing_is_said(tmp_path, monkeypatch):
     monkeypatch.setenv("CHROMIUM", "/bin/false")
-    with pytest.raises(InputError, match="printed nothing"):
+    with pytest.raises(InputError, match="ended with 1 and no whole PDF"):
         printing.printed(b"<p>")
+
+
+@pytest.mark.parametrize("page", ["", "%PDF-1.4 and half of a page"])
+def test_half_of_a_pdf_is_none_and_the_report_is_there_all_the_same(tmp_path, monkeypatch, capsys, page):
+    """A browser that is killed while it prints leaves a beginning, which was taken for the report."""
+    killed = tmp_path / "browser"
+    killed.write_text(
+        f'#!/bin/sh\nfor a in "$@"; do case $a in --print-to-pdf=*) printf "%s" "{page}" '
+        '> "${a#--print-to-pdf=}";; esac; done\nexit 0\n'
+    )
+    killed.chmod(0o755)
+    monkeypatch.setenv("CHROMIUM", str(killed))
+    out = tmp_path / "out"
+    out.mkdir()
+    sink = Dossier(pdf=True, pictures=0)
+    (writer,) = announced(
+        [sink.open(made_run.scene(), {}, {}, out)], [sink.file], lambda text: None, outlived=True
+    )
+    with writer:
+        writer.write(made_run.snapshot(0), made_run.samples(0))
+    assert not tell_files([sink], out, [writer])
+    assert [path.name for path in out.iterdir()] == ["report.html"]
+    said = capsys.readouterr().out
+    assert f"wrote        {out / 'report.html'}\n" in said
+    assert f"not written  {out / 'report.pdf'}: report: pdf: " in said

@@ -96,12 +96,18 @@ def refuse_existing(sinks: list[Sink], folder: Path) -> None:
 def tell_files(sinks: list[Sink], folder: Path, writers: Sequence[Announced] = ()) -> bool:
     """One line per file that was written, or could not be; whether all of them are there."""
     failed = {writer.file: writer for writer in writers if writer.failure is not None}
+    missing = []
     for sink in sinks:
-        if file_of(sink) not in failed:
-            for name in files_of(sink):
+        names = files_of(sink)
+        for name in names:
+            # Of several the first may be there, whole, where the next could not be made of it.
+            if file_of(sink) not in failed or (len(names) > 1 and (folder / name).exists()):
                 line("wrote", str(folder / name))
-    for file, writer in failed.items():
-        line("not written", f"{folder / file}: {writer.failure}", "bold red")
+            else:
+                missing.append((name, failed[file_of(sink)]))
+    for name, writer in missing:
+        line("not written", f"{folder / name}: {writer.failure}", "bold red")
+    for writer in failed.values():
         if writer.elsewhere is not None:
             line("wrote", f"{writer.elsewhere}  (instead)", "yellow")
     return not failed

@@ -22,6 +22,8 @@ QUIETLY = (
     "--disable-component-update",
     "--no-pdf-header-footer",
 )
+_TAIL = 1024
+"""Of a file in which its end mark is [bytes]."""
 LONGEST = 180.0
 """After which a browser does not print any more [s]."""
 
@@ -68,10 +70,13 @@ def printed(page: bytes) -> bytes:
             )
         except subprocess.TimeoutExpired as error:
             what = f"{command[0]} did not print within {LONGEST:g} s"
-            raise InputError.at("report", "pdf", what, "print report.html from it by hand") from error
+            raise InputError.at("report", "pdf", what, "print the report from it by hand") from error
         made = folder / "report.pdf"
-        if not made.is_file() or not made.read_bytes().startswith(b"%PDF"):
+        pdf = made.read_bytes() if made.is_file() else b""
+        # One that is killed, or whose disk is full, leaves a beginning.
+        whole = pdf.startswith(b"%PDF") and b"%%EOF" in pdf[-_TAIL:] and not done.returncode
+        if not whole:
             said = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["without a word"]
-            what = f"{command[0]} printed nothing ({said[0][:200]})"
-            raise InputError.at("report", "pdf", what, "print report.html from it by hand")
-        return made.read_bytes()
+            what = f"{command[0]} ended with {done.returncode} and no whole PDF ({said[0][:200]})"
+            raise InputError.at("report", "pdf", what, "print the report from a browser by hand")
+        return pdf

@@ -57,8 +57,8 @@ class Dossier(Sink, frozen=True, kw_only=True):
             from seerob.outputs.report.printing import browser
 
             browser()
-        pdf = folder / self.printed if self.pdf else None
-        return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures, pdf=pdf)
+        path = folder / self.file
+        return DossierWriter(scene, meshes, files, path, pictures=self.pictures, pdf=self.pdf)
 
 
 class DossierWriter(AtEndWithResults):
@@ -75,7 +75,7 @@ class DossierWriter(AtEndWithResults):
         path: Path,
         *,
         pictures: int,
-        pdf: Path | None = None,
+        pdf: bool = False,
     ) -> None:
         """Use `Dossier.open`."""
         super().__init__(scene.criteria)
@@ -119,13 +119,13 @@ class DossierWriter(AtEndWithResults):
             command=command(),
             sections=tuple(self.sections),
         )
-        html, steps = page(report).encode(), len(pictures) + 1 + (self._pdf is not None)
+        html, steps = page(report).encode(), len(pictures) + 1 + self._pdf
         write_whole(self.path, html)
         self._tell(len(pictures) + 1, steps)
-        if self._pdf is not None:
+        if self._pdf:
             from seerob.outputs.report.printing import printed
 
-            write_whole(self._pdf, printed(html))
+            write_whole(self.path.with_suffix(".pdf"), printed(html))
             self._tell(steps, steps)
 
     def begin(self) -> None:
@@ -166,7 +166,7 @@ class DossierWriter(AtEndWithResults):
         try:
             for name, picture in self._being_drawn.items():
                 drawn[name] = picture.result()
-                self._tell(len(drawn), len(self._being_drawn) + 1 + (self._pdf is not None))
+                self._tell(len(drawn), len(self._being_drawn) + 1 + self._pdf)
         finally:
             self.abandon()
         return drawn

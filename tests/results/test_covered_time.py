@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
+from seerob.app.console.terminal import extreme, results_json
 from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
 from seerob.criteria.question import UNBOUNDED
 from seerob.outputs.notebook import results_html
-from seerob.outputs.sentences import summary
+from seerob.outputs.sentences import about, summary
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import INFORMS, STILL
@@ -227,7 +228,14 @@ def test_a_bound_covers_what_is_not_asked(tmp_path):
     """A speed is bounded from instant to instant, so that a long period decides all of it."""
     speed = '[[safety]]\nkind = "velocity"\nname = "v"\nat = "arm"\nlimit = 9\nevery = 4\n'
     found = made(tmp_path, FLOATING + TWO_R + ARM + speed, {"m.csv": ROWS, "arm.urdf": two_r()}).run()
-    assert (found.verdict, found.results["v"].times().decided) == (W, 1.0)
+    v = found.results["v"]
+    assert (found.verdict, v.times().decided) == (W, 1.0)
+    assert len(v) < found.ticks
+    said = f"sked at {len(v)} of {found.ticks} ticks"  # its largest figure is not that of the run
+    assert said in " ".join(about(v))
+    assert said in extreme(v)
+    (machines,) = json.loads(results_json(found))["criteria"]
+    assert machines["asked"] == len(v)
 
 
 def test_the_share_is_told_to_people_and_to_machines_and_the_exit_code_follows(tmp_path, heights):

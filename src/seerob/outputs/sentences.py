@@ -190,6 +190,8 @@ def about(series: Series) -> list[str]:
             f"In {percent(share)} of the evaluated ticks nothing can be said, "
             f"{_stretches(series, Verdict.UNDECIDED)}. {_reasons(series)}"
         )
+    if series.asked:
+        said.append(f"{series.asked[0].upper()}{series.asked[1:]}.")
     if gap := series.gap():
         said.append(f"{gap[0].upper()}{gap[1:]}.")
     if part := covered(series):

@@ -332,6 +332,12 @@ class Series:
         """Whether anything was heard."""
         return len(self._rows) > 0
 
+    @property
+    def asked(self) -> str:
+        """At how many ticks it was asked, which its figures are of; empty where it was at each."""
+        n, of = len(self), self._snapshots
+        return f"asked at {n} of {of} ticks, which its figures are of" if 0 < n < of else ""
+
     def repeats(self, result: Result) -> bool:
         """Whether this is the last result of a criterion with a period, shown again, and no worse since."""
         again = result.t is not None and result.t == self._last_t

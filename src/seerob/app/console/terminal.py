@@ -292,6 +292,8 @@ def extreme(series: Series) -> str:
     text = f"{what} {with_unit(shown.value, series.unit)} at {worst.t:.2f} s"
     if worst.limit is not None:
         text += f", limit {shown.limit}"
+    if series.asked:
+        text += f", {series.asked}"
     return text + (f" ({worst.reason})" if worst.reason else "")
 
 
@@ -323,6 +325,7 @@ def results_json(summary: Summary, **more: object) -> str:
                 "verdict": series.verdict,
                 "times": series.times()._asdict(),
                 "between": series.between,
+                "asked": len(series),
                 "unit": series.unit,
                 "worst": worst
                 and {

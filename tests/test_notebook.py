@@ -35,8 +35,9 @@ def station(tmp_path):
     return sr.load(tmp_path)
 
 
-def verdict_of(station):
-    return station.run().verdict, station.run().results["elsewhere"].max()
+def judged(station):
+    """What a worker hands back."""
+    return station.run(), station.batch()
 
 
 class Seen(Closing):
@@ -89,7 +90,10 @@ def test_tables_hold_every_criterion_and_no_markup_of_the_file(station, of):
 
 def test_a_station_is_judged_in_other_processes(station):
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        assert pool.submit(verdict_of, station).result() == verdict_of(station)
+        there = pool.submit(judged, station).result()
+    for one, other in zip(there, judged(station), strict=True):
+        assert repr(one) == repr(other)
+        assert one._repr_html_() == other._repr_html_()
 
 
 def test_criteria_that_were_added_come_along(station):

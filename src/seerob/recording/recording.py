@@ -17,7 +17,7 @@ from hashlib import sha256
 from itertools import repeat
 from pathlib import Path, PurePosixPath
 from threading import Lock
-from typing import BinaryIO, NamedTuple, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeVar, get_args
 
 import msgspec
 from msgspec.structs import replace
@@ -26,6 +26,7 @@ from seerob.core.errors import InputError
 from seerob.core.printable import printable, printable_record
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Aspect, Finding, Marker, Result, Row, Scene, Snapshot
+from seerob.recording import frames
 from seerob.recording.format import (
     BROKEN_OFF,
     DIGEST,
@@ -44,6 +45,11 @@ from seerob.recording.format import (
     content_hash,
     nanoseconds,
 )
+from seerob.recording.result_log import ResultLog, log_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 MAGIC = b"\x89MCAP0\r\n"
 MAX_CHUNK = 256 * 2**20
@@ -396,6 +402,9 @@ class Recording:
             )
         return cls(path, index)
 
+    def __repr__(self) -> str:
+        return f"<Recording {self.scene.title!r}: {self.path.name}, {self.duration:g} s>"
+
     # -- what it is -----------------------------------------------------------------------------
 
     start: float
@@ -530,6 +539,52 @@ class Recording:
         for snapshot in self.snapshots():
             return snapshot
         raise InputError.at(self.path, "", "holds no snapshot", "record at least one tick")
+
+    @cached_property
+    def results(self) -> ResultLog:
+        """What was said when it was recorded, nothing computed again; all of it is read for that.
+
+        Of a recording that is not whole, or not as it was written (`check`), nothing is within.
+        """
+        log = log_of(self.snapshots(), self.scene.criteria)
+        if lacks := [finding.text for finding in self.check() if finding.holds]:
+            log.break_off("; ".join(lacks))
+        return log
+
+    def to_pandas(self, form: frames.Form = "wide") -> pd.DataFrame:
+        """Results as a DataFrame, as of `ResultLog.to_pandas`; ``rows`` and ``aspects`` too.
+
+        Raises:
+            UnknownName: There is no such form.
+            MissingPackage: pandas is not installed.
+            InputError: A snapshot is not what it should be.
+        """
+        return self.results.table(form, self.snapshots()).to_pandas()
+
+    def to_arrow(self, form: frames.Form = "wide") -> pa.Table:
+        """Results as an Arrow table, as of `ResultLog.to_arrow`; ``rows`` and ``aspects`` too.
+
+        Raises:
+            UnknownName: There is no such form.
+            MissingPackage: pyarrow is not installed.
+            InputError: A snapshot is not what it should be, or a criterion of a wide table is called ``t``.
+        """
+        return self.results.table(form, self.snapshots()).to_arrow()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Where it is, and how large; who reads it back opens it again, if it is still that."""
+        return {"path": self.path, "size": self.path.stat().st_size, "metadata": self._index.metadata}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Open it again.
+
+        Raises:
+            InputError: It is another than it was, or not there any more.
+        """
+        path = state["path"]
+        self.__init__(path, scan(path))  # type: ignore[misc]
+        if (path.stat().st_size, self._index.metadata) != (state["size"], state["metadata"]):
+            raise InputError.at(path, "", "changed since it was pickled", "open it again in this process")
 
     def ticks(self) -> Iterator[Tick]:
         """What the engine consumed at each tick, in order: playing it back repeats the run exactly.

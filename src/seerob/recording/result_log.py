@@ -9,12 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import CriterionInfo, CriterionSoFar, History, Result, Snapshot, SoFar, Verdict
+from seerob.recording import frames
 from seerob.recording.bone_errors import BoneErrors
 from seerob.recording.series import Series, Spill, Spread, Worst, WorstTracker, worst_verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 __all__ = ["JointLog", "ResultLog", "Series", "Spread", "Worst"]
 
@@ -189,6 +194,62 @@ class ResultLog(Mapping[str, Series]):
         """The series, worst verdict first and, within one verdict, in their own order."""
         order = {Verdict.EXCEEDED: 0, Verdict.UNDECIDED: 1, Verdict.WITHIN: 2, None: 3}
         return tuple(sorted(self._series.values(), key=lambda s: order[s.verdict]))
+
+    def to_pandas(self, form: frames.Form = "wide") -> pd.DataFrame:
+        """Results as a DataFrame (extra ``data``).
+
+        Args:
+            form: ``wide`` has the instants [s] as its index and the columns ``value``, ``limit`` and
+                ``verdict`` of each criterion: ``frame["value"]["tcp speed"]``. ``long`` has a row per instant
+                and criterion, ``parts`` one per part, ``criteria`` one per criterion; see
+                `seerob.recording.frames.Form`.
+
+        Returns:
+            Units, limits and verdicts of the whole run are in ``frame.attrs``. A figure that there was not is
+            NaN; verdicts are ordered categories, and none where a criterion was not asked.
+
+        Raises:
+            UnknownName: These results have no such form.
+            MissingPackage: pandas is not installed.
+        """
+        return self.table(form).to_pandas()
+
+    def to_arrow(self, form: frames.Form = "wide") -> pa.Table:
+        """Results as an Arrow table (extra ``data``), for Parquet, Polars, DuckDB.
+
+        Args:
+            form: As of `to_pandas`; ``wide`` has the column ``t`` [s] and one per criterion, whose fields are
+                ``value``, ``limit`` and ``verdict``.
+
+        Returns:
+            Units, limits and verdicts of the whole run are in its metadata, as JSON below ``seerob``.
+
+        Raises:
+            UnknownName: These results have no such form.
+            InputError: A criterion of a wide table is called ``t``.
+            MissingPackage: pyarrow is not installed.
+        """
+        return self.table(form).to_arrow()
+
+    def table(self, form: frames.Form, snapshots: Iterable[Snapshot] | None = None) -> frames.Table:
+        """Results in one of the forms of `seerob.recording.frames`.
+
+        Args:
+            form: Of the table.
+            snapshots: What rows and aspects are in, of which a log keeps none.
+        """
+        every = tuple(self._series.values())
+        return frames.table(
+            form,
+            [frames.told_of(series) for series in every],
+            parts={s.name: [frames.told_of(part) for part in tuple(s.parts.values())] for s in every},
+            snapshots=snapshots,
+            criteria=frames.worst_columns(every),
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What was said so far, without the snapshot that was added last, whose drawings stay here."""
+        return {**self.__dict__, "_last": None}
 
     def history(self, max_points: int = 2000) -> History:
         """Every series thinned for a plot; no extremum and no exceedance is lost."""

@@ -49,6 +49,9 @@ class Spill:
         self._file: IO[bytes] | None = None
         self._full = False
 
+    def __reduce__(self) -> tuple[type[Spill], tuple[()]]:
+        return Spill, ()
+
     def write(self, data: bytes) -> int | None:
         """Append a block; call it with the lock held.
 
@@ -102,12 +105,30 @@ class Column:
 
     def __init__(self, form: str, spill: Spill) -> None:
         row = struct.Struct(form)
-        self._pack, self._width, self._spill = row.pack, row.size, spill
+        self._form, self._pack, self._spill = form, row.pack, spill
         self._blocks: list[int | bytes] = []
         """Full ones: where each begins in the file, or itself."""
         self._newest = bytearray()
         self._count = 0
         self._size = BLOCK * row.size
+
+    def __getstate__(self) -> dict[str, object]:
+        """All rows, and the file that others may write to as well, which is another where this is read."""
+        return {"form": self._form, "spill": self._spill, "rows": self.tobytes()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the rows, block by block."""
+        self.__init__(state["form"], state["spill"])  # type: ignore[misc]
+        rows: bytes = state["rows"]
+        self._count = len(rows) // struct.calcsize(self._form)
+        with self._spill.lock:
+            for begin in range(0, len(rows), self._size):
+                block = rows[begin : begin + self._size]
+                if len(block) < self._size:
+                    self._newest = bytearray(block)
+                else:
+                    at = self._spill.write(block)
+                    self._blocks.append(block if at is None else at)
 
     def __len__(self) -> int:
         return self._count
@@ -432,6 +453,16 @@ class Series:
         found = np.ascontiguousarray(np.frombuffer(self._rows.tobytes(), _COLUMNS)[name])
         found.setflags(write=False)
         return found
+
+    def instants(self) -> tuple[NDArray[Any], tuple[str, ...]]:
+        """All that is there now, of one moment also while it grows.
+
+        Returns:
+            A structured array, shape (n,), with ``t`` [s], ``value``, ``limit``, ``verdict`` as the
+            properties below have them and ``reason``, a number; and the reasons, whose places those are.
+        """
+        found = np.frombuffer(self._rows.tobytes(), _COLUMNS)
+        return found, (*self._reason_of, "…")
 
     @property
     def t(self) -> Array:

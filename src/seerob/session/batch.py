@@ -14,6 +14,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -27,6 +28,8 @@ from seerob.criteria.judging import Judge
 from seerob.criteria.question import Question, held_names, question_of, worded
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html
+from seerob.outputs.over_time import plotted
+from seerob.recording import frames
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, INFORMS, ONE_INSTANT
 from seerob.session.recorded_motion import hear, hearings_of
@@ -35,6 +38,11 @@ from seerob.twin.spans import Ways
 from seerob.twin.state import State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
 from seerob.twin.validity.hearing import SLACK, STANDS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+    from matplotlib.figure import Figure
 
 STRETCH, LONGEST = 256, 1024
 """Instants that are placed together, at least and at most: enough for the arrays to pay, few enough for the
@@ -106,6 +114,62 @@ class Batch(Mapping[str, Column]):
 
     def __repr__(self) -> str:
         return f"<Batch: {len(self)} criteria, {len(self.t)} instants>"
+
+    def to_pandas(self, form: frames.Form = "wide") -> pd.DataFrame:
+        """Answers as a DataFrame (extra ``data``), as `seerob.ResultLog.to_pandas` makes it.
+
+        Args:
+            form: ``wide``, ``long`` or ``criteria``; a batch keeps no parts.
+
+        Raises:
+            UnknownName: There is no such form of a batch.
+            MissingPackage: pandas is not installed.
+        """
+        return frames.table(form, self.told()).to_pandas()
+
+    def to_arrow(self, form: frames.Form = "wide") -> pa.Table:
+        """Answers as an Arrow table (extra ``data``), as `seerob.ResultLog.to_arrow` makes it.
+
+        Args:
+            form: ``wide``, ``long`` or ``criteria``; a batch keeps no parts.
+
+        Raises:
+            UnknownName: There is no such form of a batch.
+            InputError: A criterion of a wide table is called ``t``.
+            MissingPackage: pyarrow is not installed.
+        """
+        return frames.table(form, self.told()).to_arrow()
+
+    def told(self) -> list[frames.Told]:
+        """Each criterion, as tables and plots ask for it."""
+        return [
+            frames.Told(
+                name=c.name,
+                unit=c.unit,
+                at_most=c.at_most,
+                verdict=c.verdict,
+                t=self.t,
+                values=c.value,
+                limits=c.answers.limit,
+                codes=c.answers.verdict,
+                reasons=["" if why is None else str(why) for why in c.reasons],
+                why="" if c.between.startswith("accepted: ") else c.between,
+            )
+            for c in self.values()
+        ]
+
+    def plot(self, *criteria: str) -> Figure:
+        """Plot figures over the instants, as `seerob.Summary.plot` does.
+
+        Args:
+            criteria: Their names, in the order wanted; all of them when not given.
+
+        Raises:
+            UnknownName: There is none of that name.
+            MissingPackage: matplotlib is not installed (extra ``data``).
+        """
+        named = {one.name: one for one in self.told()}
+        return plotted([named[self[name].name] for name in criteria or self])
 
     def _repr_html_(self) -> str:
         return batch_html((c.name, c.verdict, c.answers.verdict, c.value, c.unit) for c in self.values())

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
+from typing import TYPE_CHECKING
 
 from seerob.core.errors import InputError, Problem, SeerobError, ended_by
 from seerob.core.samples import Sample, printable_sample
@@ -26,7 +27,9 @@ from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model
 from seerob.outputs.notebook import results_html
+from seerob.outputs.over_time import plotted
 from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
+from seerob.recording.frames import told_of
 from seerob.recording.result_log import ResultLog
 from seerob.session.opening import coarse, signal_timeouts, untimed
 from seerob.session.scene import Looks, invalid_reasons
@@ -34,6 +37,9 @@ from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
 from seerob.twin.state import State
 from seerob.workstation.source import Opened, Pump, Source
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Feed = Iterator[tuple[Sample, ...]]
 """For each tick, from t = 0 on, the samples that were heard for it; ends when the run does."""
@@ -328,6 +334,21 @@ class Summary:
 
     def _repr_html_(self) -> str:
         return results_html(self.results)
+
+    def plot(self, *criteria: str) -> Figure:
+        """Plot criteria over time: figure, limit, and where it is exceeded, undecided or not asked.
+
+        Args:
+            criteria: Their names, in the order wanted; all of them when not given.
+
+        Returns:
+            One axis each [criterion's unit over s]; a notebook shows it, ``savefig`` writes it.
+
+        Raises:
+            UnknownName: There is none of that name.
+            MissingPackage: matplotlib is not installed (extra ``data``).
+        """
+        return plotted([told_of(self.results[name]) for name in criteria or self.results])
 
 
 def run(

@@ -11,10 +11,11 @@ from msgspec.structs import replace
 
 from live_stream import Stream
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob.core.samples import PoseSample
+from seerob.core.samples import JointSample, PoseSample, SignalSample
 from seerob.core.snapshot import Basis
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Figure
+from seerob.devices.live.listening import Listener, LiveSource
 from seerob.session.station import Station
 from seerob.twin.control.unheard import QUICKEST, Unheard
 from seerob.twin.engine import Engine
@@ -50,6 +51,34 @@ def test_what_was_heard_and_replaced_before_a_tick_is_not_missing():
     assert missing(*times)[-1]
     assert not missing(*times, numbers=[*range(10), 19])[-1]
     assert missing(*times, numbers=[*range(10), 11])[-1]
+
+
+def test_what_is_heard_of_variables_makes_up_for_no_sample_of_the_robot():
+    """A hundred of them had the numbers of the positions that were missing: those counted as replaced."""
+    told = []
+    ears = Listener(Spoken(name="plc", delay=0.0), None, told.append)
+    for k in range(2000):
+        t = 10 + 0.001 * k
+        ears.take(SignalSample(source="", seq=0, t=t, values={"on": True}))
+        if k % 8 == 0 and not 1000 < k < 1300:
+            q = (0.001 * k,)
+            ears.take(JointSample(source="", seq=0, t=t, target="arm", q=q))
+    heard = [sample for sample in told if isinstance(sample, JointSample)]
+    found = missing(*(sample.t for sample in heard), numbers=[sample.seq for sample in heard])
+    assert [sample.t for sample, late in zip(heard, found, strict=True) if late] == [pytest.approx(11.304)]
+
+
+class Spoken(LiveSource, frozen=True, kw_only=True):
+    """A test speaks for it."""
+
+    def target(self):
+        return "arm"
+
+    def period(self):
+        return 0.008
+
+    def listen(self, target):
+        raise NotImplementedError
 
 
 def test_a_slow_source_misses_nothing_that_comes_when_it_usually_does():

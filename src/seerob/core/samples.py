@@ -50,7 +50,7 @@ class SampleBase(Struct, frozen=True, kw_only=True, tag=True):
     source: str
     """Name of the source."""
     seq: int
-    """Counts up by one per sample of this source; a gap is a loss."""
+    """Counts up by one per sample of this source about the same; a gap is a loss."""
     t: float
     """Instant the sample speaks of [s], on the run's clock."""
     t_device: float | None = None

@@ -393,7 +393,6 @@ class Listener:
         self._task: asyncio.Task[None] | None = None
         self._stopping = False
         self._up: bool | None = False if again else None
-        self._seq = 0
         self._word = ""
         """What it was when it was lost last, and why."""
         self._reason = ""
@@ -544,8 +543,10 @@ class Listener:
             if self._up is False:
                 _log.warning("%s: heard again", self.name)
             self._up = True
-        sample = self._posted[key(sample)] = replace(sample, seq=self._seq)
-        self._seq += 1
+        # Counted for what it is about alone: what is heard of variables meanwhile makes up for no sample
+        # of the robot that is missing.
+        last = self._posted.get(key(sample))
+        sample = self._posted[key(sample)] = replace(sample, seq=0 if last is None else last.seq + 1)
         self._post(sample)
 
     def _invalidate(self, what: tuple[str, ...], reason: str) -> None:
@@ -555,8 +556,7 @@ class Listener:
         if last.reason == reason:
             return
         quality = Quality.DEGRADED if last.quality is Quality.GOOD else last.quality
-        self._posted[what] = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=self._seq)
-        self._seq += 1
+        self._posted[what] = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=last.seq + 1)
         self._post(self._posted[what])
 
     def _distrust(self, reason: str) -> None:

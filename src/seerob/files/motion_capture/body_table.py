@@ -234,7 +234,7 @@ FIRST = {"position": 0, "orientation": 3, "confidence": 7, "level": 7}
 WIDTH = 8
 """x, y, z, then w, x, y, z, then confidence."""
 HIGHEST_LEVEL = 3
-"""Of what trackers say: 0 none, 1 predicted, 2 seen, and 3 where there is a high confidence."""
+"""Trackers say 0 for none, 1 for predicted, 2 for seen, and 3 where they are sure."""
 _EMPTY = frozenset(["", "nan", "none", "null", "na", "n/a", "-"])
 
 

@@ -9,7 +9,8 @@ the others within a tolerance. At its ends the robot stands.
 
 How far the piece is from the motion that was given is the largest distance in any joint between points
 with the same coordinate: an upper bound of the distance between the two curves. Between two neighbouring
-points it is exact, the largest value of a cubic.
+points it is exact, the largest value of a cubic. Every piece begins where the one before it ended; how far
+the given motion strays from there while it stands, until the next piece begins, counts as well.
 """
 
 from __future__ import annotations
@@ -87,11 +88,14 @@ class Path:
     """[rad or m]"""
     first: Array
     """Where it begins, shape (d,) [rad or m]."""
+    stray: Array
+    """Largest distance of the given motion, while it stands, from where it came to stand, per joint
+    [rad or m], shape (d,)."""
 
     @property
     def deviation(self) -> Array:
         """Largest distance from the given motion per joint [rad or m], shape (d,)."""
-        return np.asarray(np.max([piece.deviation for piece in self.pieces], axis=0))
+        return np.asarray(np.max([self.stray, *(piece.deviation for piece in self.pieces)], axis=0))
 
 
 def path_of(motion: GivenMotion, *, tolerance: float) -> Path:
@@ -107,17 +111,34 @@ def path_of(motion: GivenMotion, *, tolerance: float) -> Path:
     if not 0 < tolerance < np.inf:
         raise InputError.at("path", "tolerance", f"{tolerance} rad or m", "give more than 0")
     t, q, qd = _dense(motion)
-    pieces, stands, at = [], [], float(t[0])
-    for a, b in _stretches(t, q, tolerance):
-        stands.append(float(t[a]) - at)
-        part = slice(a, b + 1)
-        pieces.append(_piece(t[part], q[part], qd[part], tolerance))
-        at = float(t[b])
+    near = tolerance / 10
+    pieces, stands, stray, at, place = [], [], np.zeros(q.shape[1]), 0, q[0]
+
+    def stood(until: int) -> None:
+        part = slice(at, until + 1)
+        stands.append(float(t[until] - t[at]))
+        np.maximum(stray, _stray(t[part], q[part], qd[part], place), out=stray)
+
+    for begin, end in _stretches(t, q, near):
+        if np.abs(q[begin : end + 1] - place).max() <= near:
+            continue
+        for a, b in _smooth(q, begin, end):
+            stood(a)
+            part = slice(a, b + 1)
+            pieces.append(_piece(t[part], q[part], qd[part], place, tolerance))
+            at, place = b, q[b]
     if not pieces:
         what = f"never moves by more than {tolerance:g} rad or m"
         raise InputError.at("path", motion.target, what, "give a motion to scale")
-    stands.append(float(t[-1]) - at)
-    return Path(motion.target, tuple(pieces), np.array(stands), tolerance, q[0].copy())
+    stood(len(t) - 1)
+    return Path(motion.target, tuple(pieces), np.array(stands), tolerance, q[0].copy(), stray)
+
+
+def _stray(t: Array, q: Array, qd: Array, place: Array) -> Array:
+    """Largest distance from a place per joint, shape (d,)."""
+    T = np.diff(t)[:, None]
+    off = largest_hermite(q[:-1] - place, q[1:] - place, qd[:-1] * T, qd[1:] * T)
+    return np.asarray(off.max(axis=0, initial=0.0))
 
 
 def _dense(motion: GivenMotion) -> tuple[Array, Array, Array]:
@@ -134,20 +155,18 @@ def _dense(motion: GivenMotion) -> tuple[Array, Array, Array]:
     return t, *motion.at(t)
 
 
-def _stretches(t: Array, q: Array, tolerance: float) -> Iterator[tuple[int, int]]:
-    """First and last index of every smooth stretch in which it moves."""
-    still = _stands(t, q, tolerance)
+def _stretches(t: Array, q: Array, near: float) -> Iterator[tuple[int, int]]:
+    """First and last index of every stretch between two stands."""
     a = 0
-    for begin, end in [*still, (len(t) - 1, len(t) - 1)]:
+    for begin, end in [*_stands(t, q, near), (len(t) - 1, len(t) - 1)]:
         if begin > a:
-            yield from _smooth(q, a, begin)
+            yield a, begin
         a = end
 
 
-def _stands(t: Array, q: Array, tolerance: float) -> list[tuple[int, int]]:
-    """Stretches of at least `PAUSE` in which no joint leaves a tenth of the tolerance."""
+def _stands(t: Array, q: Array, near: float) -> list[tuple[int, int]]:
+    """Stretches of at least `PAUSE` in which no joint leaves a width."""
     found, a, n = [], 0, len(t)
-    near = tolerance / 10
     while a < n - 1:
         b = a
         low = high = q[a]
@@ -156,9 +175,11 @@ def _stands(t: Array, q: Array, tolerance: float) -> list[tuple[int, int]]:
             if (high_b - low_b).max() > near:
                 break
             low, high, b = low_b, high_b, b + 1
-        if t[b] - t[a] >= PAUSE:
+        stands = t[b] - t[a] >= PAUSE
+        if stands:
             found.append((a, b))
-        a = max(b, a + 1)
+        # Between two stands there is a way: of whoever creeps from one to the next none is lost.
+        a = b + 1 if stands else max(b, a + 1)
     return found
 
 
@@ -177,20 +198,30 @@ def _smooth(q: Array, a: int, b: int) -> Iterator[tuple[int, int]]:
     chords = np.diff(q[keep], axis=0)
     lengths = np.linalg.norm(chords, axis=1)
     if not (lengths > SAME).all():
+        yield a, b
         return
     cosines = (chords[1:] * chords[:-1]).sum(axis=1) / (lengths[1:] * lengths[:-1])
     ends = [a, *(keep[i + 1] for i in np.flatnonzero(cosines < CORNER)), b]
     yield from pairwise(ends)
 
 
-def _piece(t: Array, q: Array, qd: Array, tolerance: float) -> Piece:
+def _piece(t: Array, q: Array, qd: Array, place: Array, tolerance: float) -> Piece:
+    """From where the one before it ended, which is near the first of the positions."""
     need("toppra")  # which brings it
     from scipy.interpolate import CubicSpline
 
-    steps = np.linalg.norm(np.diff(q, axis=0), axis=1)
-    keep = np.concatenate([[True], steps > SAME])
-    keep[-1] = True
-    t, q, qd = t[keep], q[keep], qd[keep]
+    begun, q = np.abs(q[0] - place), np.concatenate([place[None], q[1:]])
+    way, T = np.diff(q, axis=0), np.diff(t)[:, None]
+    moves = np.linalg.norm(way, axis=1) > SAME
+    moves[-1] = True
+    before, after = qd[:-1] * T, qd[1:] * T
+    # Between two samples in one place it may go there and back: that adds to what the next ones are off.
+    there_and_back = np.where(moves[:, None], 0.0, largest_hermite(np.zeros_like(way), way, before, after))
+    before, after = before[moves], after[moves]
+    keep = np.concatenate([[0], np.flatnonzero(moves) + 1])
+    strays = np.add.reduceat(there_and_back, keep[:-1])
+    strays[0] += begun
+    t, q = t[keep], q[keep]
     s = np.concatenate([[0.0], np.cumsum(np.maximum(np.linalg.norm(np.diff(q, axis=0), axis=1), SAME))])
     chosen: NDArray[np.bool_] = np.zeros(len(s), bool)
     chosen[[0, -1]] = True
@@ -199,8 +230,9 @@ def _piece(t: Array, q: Array, qd: Array, tolerance: float) -> Piece:
         spline = CubicSpline(s[knots], q[knots], bc_type="natural")
         # Between two points both are cubics in the share of the way; so is their difference.
         off, slope = spline(s) - q, np.asarray(spline(s, 1))
-        T, S = np.diff(t)[:, None], np.diff(s)[:, None]
-        between = largest_hermite(off[:-1], off[1:], slope[:-1] * S - qd[:-1] * T, slope[1:] * S - qd[1:] * T)
+        S = np.diff(s)[:, None]
+        between = largest_hermite(off[:-1], off[1:], slope[:-1] * S - before, slope[1:] * S - after)
+        between += strays
         worst = between.max(axis=1)
         if worst.max() <= tolerance:
             break

@@ -128,8 +128,8 @@ PER_WAY = 0.005
 WINDOWS = (0.5, 1.0, 2.0)
 """Windows to try, as shares of the time in which the jerk limit reverses the acceleration limit."""
 FLATTENED = (0.0, 0.2)
-"""Peaks of the map narrower than these shares of a piece are also tried without: under a jerk limit a short
-peak can cost more than it gives."""
+"""Peaks of the map narrower than twice these shares of a piece are also tried without: under a jerk limit a
+short peak can cost more than it gives."""
 ROUNDS = 6
 MARGIN = 1e-9
 """Relative; rounding stays below it."""
@@ -188,7 +188,7 @@ class Timed:
         _, qd, qdd, qddd = self.at(t)
         moment = self.profile.at(t)
         with np.errstate(divide="ignore", invalid="ignore"):
-            of_map = np.where(moment.speed > 0, moment.speed / ceiling(moment.s), 0.0)
+            of_map = moment.speed / ceiling(moment.s)
         return Use(
             of_map,
             np.abs(qd) / limits.velocity,
@@ -223,11 +223,7 @@ def timed(piece: Piece, ceiling: Ceiling, limits: JointLimits) -> Timed:
     # Above what the joints can do the map says nothing.
     top = np.minimum(ceiling(s), reference_speed(piece, s, limits)[0])
     if not (top > 0).all():
-        i = int(np.argmin(np.where(np.isnan(top), -1.0, top)))
-        what = (
-            f"no speed is known to be permitted where the given motion is at {float(piece.when(s[i])):.3f} s"
-        )
-        raise InputError.at("permissible speed", "path", what, "change the path or the cell there")
+        raise _nowhere(piece, s[np.argmin(top > 0)])
     swing = float((limits.acceleration / limits.jerk).max())
     best: Timed | None = None
     for width in FLATTENED:
@@ -242,8 +238,14 @@ def timed(piece: Piece, ceiling: Ceiling, limits: JointLimits) -> Timed:
     return best
 
 
+def _nowhere(piece: Piece, s: float) -> InputError:
+    when = float(piece.when(np.array(s)))
+    what = f"no speed is known to be permitted where the given motion is at {when:.3f} s"
+    return InputError.at("permissible speed", "path", what, "change the path or the cell there")
+
+
 def _opened(top: Array, width: int) -> Array:
-    """Nowhere above ``top``, and without its peaks that are narrower than so many intervals."""
+    """Nowhere above ``top``, and without its peaks of up to twice so many neighbours."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     if width < 1:
@@ -260,21 +262,20 @@ def _with_window(
     for _ in range(ROUNDS):
         raw = Parabolas.of(s, fastest(piece, s, top * slower, limits))
         # A window that is longer than the motion would be all that one sees of it.
-        now = Timed(piece, Profile(raw, min(window, max(float(raw.t[-1]), 1e-3))))
+        now = Timed(piece, Profile(raw, min(window, float(raw.t[-1]))))
         t = now.instants()
         over = now.use(t, ceiling, limits).stretch
-        worst = max(float(over.max()), 1.0)
-        whole = Timed(piece, Profile(raw, now.profile.window, worst * (1 + MARGIN)))
-        for _ in range(ROUNDS):
-            # Stretched, it is looked at in other places.
-            more = float(whole.use(whole.instants(), ceiling, limits).stretch.max())
-            if more <= 1.0:
-                break
+        if not np.isfinite(over).all():
+            raise _nowhere(piece, now.profile.at(t).s[np.argmin(np.isfinite(over))])
+        whole, more = now, float(over.max())
+        # Stretched, it is looked at in other places, until none of them is beyond a limit.
+        while more > 1.0:
             stretch = whole.profile.stretch * more * (1 + MARGIN)
             whole = Timed(piece, Profile(raw, now.profile.window, stretch))
+            more = float(whole.use(whole.instants(), ceiling, limits).stretch.max())
         if best is None or whole.duration < best.duration:
             best = whole
-        if worst <= 1 + 1e-3:
+        if over.max() <= 1 + 1e-3:
             break
         slower = slower / _spread(s, now, t, over)
     assert best is not None
@@ -305,7 +306,7 @@ def fastest(piece: Piece, s: Array, top: Array, limits: JointLimits) -> Array:
         dof = property(lambda _: len(limits.velocity))
         path_interval = property(lambda _: np.array([s[0], s[-1]]))
 
-        def __call__(self, at: object, order: int = 0) -> Array:
+        def __call__(self, at: object, order: int) -> Array:
             return np.asarray(piece.spline(at, order))
 
     class Map(LinearConstraint):  # type: ignore[misc, unused-ignore]

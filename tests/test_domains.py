@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from seerob.core.domains import number, whole
 from seerob.core.errors import SeerobError
 from seerob.criteria.contact import collision
+from seerob.criteria.contact.limits import robot_masses
 from seerob.criteria.ergonomics import eaws_posture, niosh, owas, reba, rula
 from seerob.criteria.ergonomics.eaws_posture import PostureTime
 from seerob.criteria.safety.separation import separation_bound
@@ -268,6 +269,13 @@ CALLS = {
     "criteria.contact.measured.risen": {"force": TWO},
     "criteria.contact.limits.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
     "criteria.contact.shape.round_shape": {"radius": 0.01},
+    "criteria.contact.shape.patch_area": {"radii": TWO / 100, "indentation": 0.01, "cap": 1e-4},
+    "criteria.contact.shape.force_at_pressure": {
+        "radii": TWO / 100,
+        "pressure": 4e6,
+        "stiffness": 75e3,
+        "cap": 1e-4,
+    },
     "core.transforms.apply": {"a_from_b": POSE, "points_in_b": np.ones(3)},
     "core.transforms.cross": {"a": np.ones(3), "b": np.array([1.0, 2, 4])},
     "core.transforms.inverse": {"a_from_b": POSE},
@@ -306,8 +314,6 @@ ELSEWHERE = {
     "criteria.stopping.onset.by_speed": "of speeds that the twin has; `accelerated` checks T_r and a",
     "criteria.contact.clamping.getting_in": "of openings that shapes have, in a table that ships",
     "criteria.contact.measured.missing": "reasons in words, of records that `peaks` took",
-    "criteria.contact.shape.patch_area": "of radii that `body_shape` made",
-    "criteria.contact.shape.force_at_pressure": "of radii that `body_shape` made",
 }
 STRICT = {
     "criteria.scoring.measured.turned lever": "turns the direction to anywhere",
@@ -318,6 +324,10 @@ STRICT = {
     "criteria.contact.clamping.clamps speed": "clamps",
     "criteria.contact.clamping.clamps thickness": "clamps",
     "criteria.contact.collision.energy_limit printed": "was not printed: that of force and stiffness",
+    **{
+        f"criteria.contact.shape.force_at_pressure {x}": "no force"
+        for x in ("radii", "pressure", "stiffness")
+    },
     "criteria.contact.collision.permissible_speed v_P": "of an unknown area: the upper bound of the others",
 }
 """What is strictest, or right, where an argument is not a number."""
@@ -345,6 +355,8 @@ BELOW = {
     "criteria.contact.collision.speed_at_pressure": "k",
     "criteria.contact.limits.permissible_while_pushed": "F",
     "criteria.contact.shape.round_shape": "radius",
+    "criteria.contact.shape.patch_area": "radii indentation cap",
+    "criteria.contact.shape.force_at_pressure": "radii pressure stiffness cap",
 }
 """What is refused below 0."""
 
@@ -476,6 +488,19 @@ def test_what_is_infinite_makes_no_figure_smaller(name):
         told = figures(called(name, {**CALLS[name], argument: spoiled(CALLS[name][argument], math.inf)}))
         assert all(b >= a or math.isnan(b) for a, b in zip(good, told, strict=True)), argument
         assert not np.isfinite(told).all(), argument
+
+
+def test_words_and_directions_that_a_formula_does_not_have_are_refused():
+    """No mass is that of a word or of a longer direction that there is none of."""
+    with pytest.raises(ValueError, match="which is 'Larger', it is 'larger', 'simplified' or 'projected'"):
+        robot_masses("Larger", 10.0, TWO)
+    for none in (math.nan, -1.0):
+        with pytest.raises(ValueError, match="simplified is"):
+            robot_masses("larger", none, TWO)
+    assert robot_masses("larger", 1.5, np.array([1.0, 2.0, math.nan])).tolist() == [1.5, 2.0, 1.5]
+    along = "criteria.safety.effective_mass.projected_mass"
+    with pytest.raises(ValueError, match="length of u is 10, it is"):
+        called(along, {**CALLS[along], "u": np.array([10.0, 0, 0])})
 
 
 def test_scores_of_an_author_are_whole_numbers():

@@ -259,12 +259,17 @@ def robot_masses(which: str, simplified: float, projected: Array) -> Array:
         which: ``larger``, ``simplified`` or ``projected``.
         simplified: M/2 + m_L [kg].
         projected: Effective mass along the motion [kg]; NaN where it stands still, and hits nobody.
+
+    Raises:
+        ValueError: Another word, or a simplified mass that is none.
     """
+    number("simplified", simplified, 0.0, unit="kg")
     if which == "simplified":
         return np.full(len(projected), simplified)
-    if which == "larger":
-        return np.asarray(np.fmax(simplified, projected))
-    return np.where(np.isnan(projected), simplified, projected)
+    if which not in ("larger", "projected"):
+        raise ValueError(f"which is {which!r}, it is 'larger', 'simplified' or 'projected'")
+    known = np.maximum(simplified, projected) if which == "larger" else projected
+    return np.where(np.isnan(projected), simplified, known)
 
 
 class ContactEnds:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seerob.core import figures
-from seerob.core.domains import number
+from seerob.core.domains import at_least, number
 from seerob.core.errors import UnknownName
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
@@ -81,8 +81,8 @@ def patch_area(radii: ArrayLike, indentation: ArrayLike, cap: float) -> Array:
         indentation: Of the body [m], shape (...), F/k.
         cap: Largest area [m²].
     """
-    R = np.asarray(radii, float)
-    d = np.asarray(indentation, float)[..., None]
+    number("cap", cap, 0.0, unit="m²")
+    R, d = at_least("radii", radii, unit="m"), at_least("indentation", indentation, unit="m")[..., None]
     with np.errstate(invalid="ignore"):
         half = np.minimum(np.sqrt(R * np.minimum(R, d)), math.sqrt(cap / math.pi))
     return np.asarray(math.pi * half[..., 0] * half[..., 1])
@@ -105,8 +105,9 @@ def force_at_pressure(radii: ArrayLike, pressure: ArrayLike, stiffness: ArrayLik
         stiffness: k of the body [N/m], shape (...).
         cap: See `patch_area`.
     """
-    R = np.asarray(radii, float)
-    p, k = np.asarray(pressure, float), np.asarray(stiffness, float)
+    number("cap", cap, 0.0, unit="m²")
+    R = at_least("radii", radii, unit="m")
+    p, k = at_least("pressure", pressure, unit="Pa"), at_least("stiffness", stiffness, unit="N/m")
     end = math.sqrt(cap / math.pi)
     H = np.minimum(R, end)
     # Indentation at which a half axis ends; the flatter one ends first wherever both exceed the cap.

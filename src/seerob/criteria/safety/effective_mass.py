@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
-from seerob.core.domains import agree
+from seerob.core.domains import agree, number
 from seerob.core.markers import Marker
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result
@@ -69,7 +69,11 @@ def projected_mass(inverse: Array, u: Array) -> Array:
 
     Returns:
         Mass [kg], shape (...); inf where the point cannot be pushed that way.
+
+    Raises:
+        ValueError: A direction is not of length 1, to 10⁻⁶.
     """
+    number("length of u", np.linalg.norm(u[~np.isnan(u).any(axis=-1)], axis=-1), 1 - 1e-6, 1 + 1e-6)
     along = np.asarray((u[..., None, :] @ inverse @ u[..., :, None])[..., 0, 0])
     return reciprocals(along.reshape(-1)).reshape(along.shape)
 

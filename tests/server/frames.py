@@ -72,7 +72,14 @@ class Visitor:
     """A page without a screen: decodes what comes and, unless told otherwise, acknowledges frames."""
 
     _decoder = msgspec.msgpack.Decoder(
-        wire.Hello | wire.Scene | wire.History | wire.SoFar | wire.Transport | wire.Snapshot
+        wire.Hello
+        | wire.Scene
+        | wire.History
+        | wire.SoFar
+        | wire.Transport
+        | wire.Snapshot
+        | wire.Draft
+        | wire.Edited
     )
 
     def __init__(self, server, *, acknowledge=True, path="/ws", **options):

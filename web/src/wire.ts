@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "95cb98cbfa473aa9";
+export const SCHEMA = "cdbc8cbd92495770";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -461,15 +461,15 @@ export type Verdict =
 export interface Hello {
   type: "hello";
   server: string;
-  /** `live` or `replay`. */
+  /** `live`, `replay` or `edit` (no run: where everything is at its begin). */
   mode: string;
-  /** Length of the recording [s]; None when live. */
+  /** Length of the recording [s]; None when there is none. */
   duration: number | null;
   /** Hash of the message types; a page built for another one must be built anew. */
   schema: string;
   /**
    * What this page may do, as its token says: `view`, `track` (offer what a headset sees), `control`
-   * (play, pause, seek).
+   * (play, pause, seek), `edit` (change the workstation file).
    */
   may: string[];
 }
@@ -573,6 +573,61 @@ export interface Command {
   value?: number | null;
 }
 
+/** One change of the workstation file. */
+export interface Change {
+  /** `set` a key, `add` a table to a list, `remove` a key or an entry, or `copy` an entry. */
+  kind: string;
+  /** Keys and numbers of entries: `["robots", 0, "base", "position"]`; for `add` those of the list. */
+  path: (string | number)[];
+  /** `set`: the value; `add`: the table; `copy`: what is different in the copy. */
+  value: unknown;
+}
+
+/** What a page asks of the workstation file, all of it or nothing; only where editing is allowed. */
+export interface Edit {
+  type: "edit";
+  /** The page's own number, by which it knows the answer. */
+  id: number;
+  /** `change`, `undo`, `redo`, `save` or `discard`. */
+  action: string;
+  /** `Draft.revision` that the page saw. */
+  revision: number;
+  changes?: Change[];
+}
+
+/** One mistake that an edit would make, in the words of `seerob check-file`. */
+export interface Mistake {
+  /** The place: `robots[0].base.position`; empty for the whole file. */
+  key: string;
+  what: string;
+  remedy: string;
+}
+
+/** What became of a page's `Edit`. */
+export interface Edited {
+  type: "edited";
+  id: number;
+  accepted: boolean;
+  /** Of the draft now. */
+  revision: number;
+  /** Why it was refused; nothing is changed then. */
+  mistakes: Mistake[];
+}
+
+/** The workstation file as it is edited; sent on every change, to each page what it may take back. */
+export interface Draft {
+  type: "draft";
+  file: string;
+  revision: number;
+  /** What a save would change, as a unified diff; empty for nothing. */
+  diff: string;
+  /** The file as it is read. */
+  tables: Record<string, unknown>;
+  /** Whether this page has a change to take back. */
+  undo: boolean;
+  redo: boolean;
+}
+
 export const DEFAULTS = {
   snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {}, sources: {} },
 };
@@ -594,6 +649,6 @@ export const FIELDS = {
   highlight: ["type", "body", "verdict"],
 } as const;
 
-export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked;
+export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited;
 
-export type PageMessage = Command | Tracking;
+export type PageMessage = Command | Tracking | Edit;

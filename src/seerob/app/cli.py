@@ -21,6 +21,7 @@ COMMANDS = (
     "new",
     "inspect",
     "check_file",
+    "edit",
     "run",
     "assess",
     "replay",

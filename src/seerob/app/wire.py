@@ -34,9 +34,11 @@ FROM_SERVER = (
     snapshot.Transport,
     snapshot.Snapshot,
     snapshot.Tracked,
+    snapshot.Draft,
+    snapshot.Edited,
 )
 """Messages that a page receives."""
-FROM_PAGE = (snapshot.Command, snapshot.Tracking)
+FROM_PAGE = (snapshot.Command, snapshot.Tracking, snapshot.Edit)
 """Messages that a page sends; what has a default may be left out."""
 
 COMPLETED = (snapshot.Snapshot,)

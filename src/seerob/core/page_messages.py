@@ -12,14 +12,14 @@ class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
 
     server: str
     mode: str
-    """``live`` or ``replay``."""
+    """``live``, ``replay`` or ``edit`` (no run: where everything is at its begin)."""
     duration: float | None = None
-    """Length of the recording [s]; None when live."""
+    """Length of the recording [s]; None when there is none."""
     schema: str = ""
     """Hash of the message types; a page built for another one must be built anew."""
     may: tuple[str, ...] = ()
     """What this page may do, as its token says: ``view``, ``track`` (offer what a headset sees), ``control``
-    (play, pause, seek)."""
+    (play, pause, seek), ``edit`` (change the workstation file)."""
 
 
 class Trace(Struct, frozen=True, kw_only=True):
@@ -115,3 +115,60 @@ class Command(Struct, frozen=True, kw_only=True, tag="command"):
     value: float | None = None
     """``seek``: run time [s]; ``speed``: factor; ``step``: recorded snapshots forward or back;
     ``loop``: 1 or 0; ``ack``: `Snapshot.seq` that was received."""
+
+
+class Change(Struct, frozen=True, kw_only=True):
+    """One change of the workstation file."""
+
+    kind: str
+    """``set`` a key, ``add`` a table to a list, ``remove`` a key or an entry, or ``copy`` an entry."""
+    path: tuple[str | int, ...]
+    """Keys and numbers of entries: ``["robots", 0, "base", "position"]``; for ``add`` those of the list."""
+    value: object = None
+    """``set``: the value; ``add``: the table; ``copy``: what is different in the copy."""
+
+
+class Edit(Struct, frozen=True, kw_only=True, tag="edit"):
+    """What a page asks of the workstation file, all of it or nothing; only where editing is allowed."""
+
+    id: int
+    """The page's own number, by which it knows the answer."""
+    action: str
+    """``change``, ``undo``, ``redo``, ``save`` or ``discard``."""
+    revision: int
+    """`Draft.revision` that the page saw."""
+    changes: tuple[Change, ...] = ()
+
+
+class Mistake(Struct, frozen=True, kw_only=True):
+    """One mistake that an edit would make, in the words of ``seerob check-file``."""
+
+    key: str
+    """The place: ``robots[0].base.position``; empty for the whole file."""
+    what: str
+    remedy: str = ""
+
+
+class Edited(Struct, frozen=True, kw_only=True, tag="edited"):
+    """What became of a page's `Edit`."""
+
+    id: int
+    accepted: bool
+    revision: int
+    """Of the draft now."""
+    mistakes: tuple[Mistake, ...] = ()
+    """Why it was refused; nothing is changed then."""
+
+
+class Draft(Struct, frozen=True, kw_only=True, tag="draft"):
+    """The workstation file as it is edited; sent on every change, to each page what it may take back."""
+
+    file: str
+    revision: int
+    diff: str
+    """What a save would change, as a unified diff; empty for nothing."""
+    tables: dict[str, object]
+    """The file as it is read."""
+    undo: bool
+    """Whether this page has a change to take back."""
+    redo: bool

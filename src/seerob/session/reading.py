@@ -14,7 +14,7 @@ from msgspec import Struct
 from seerob.core import plugin
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.files.bounded import leads_outside
-from seerob.core.files.toml_file import read_toml
+from seerob.core.files.toml_file import parsed_toml, read_toml
 from seerob.criteria.criterion import Criterion
 from seerob.outputs.sink import Sink
 from seerob.workstation import naming
@@ -71,19 +71,20 @@ def read(path: Path | str, allowed: Allowed = NOTHING) -> Workstation:
     return with_entries(found.head, found.entries)
 
 
-def readable(path: Path | str, allowed: Allowed = NOTHING) -> Readable:
+def readable(path: Path | str, allowed: Allowed = NOTHING, raw: bytes | None = None) -> Readable:
     """What can be read of a file or of a folder that contains one, beside every mistake in it.
 
     Args:
         path: The file or the folder.
         allowed: What the file may do.
+        raw: What is to be read in place of the file.
 
     Raises:
         InputError: There is no such file, it is not TOML, or it names files outside its folder, which are
             not allowed; nothing is read then that it names.
     """
     file = locate(path)
-    table, raw = read_toml(file)
+    table, raw = read_toml(file) if raw is None else (parsed_toml(raw, file), raw)
     files = {file.name: raw}
     problems: list[Problem] = []
     for outside in _outside(table, file):

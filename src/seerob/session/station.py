@@ -165,6 +165,20 @@ class Station:
             fed=not with_sources,
         )
 
+    def first(self, scene: Scene) -> Snapshot:
+        """What a run begins with: everybody where the first samples of files have them, judged.
+
+        Args:
+            scene: Of this workstation; nothing that one of its findings holds is within.
+
+        Raises:
+            SimulationDiverged: The physics produced a number that is not finite.
+        """
+        feed = road.pump(self.sources, self.workstation.engine.tick, endless=True)
+        judge = road.Judge(self.bound, scene.findings)
+        snapshot, _ = next(road.ticks(road.engine_of(self.model), judge, feed))
+        return snapshot
+
     @cached_property
     def files(self) -> dict[str, bytes]:
         """The workstation file and every file it names, trajectories and tables of limits included."""

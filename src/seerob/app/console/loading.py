@@ -9,7 +9,7 @@ from __future__ import annotations
 import gc
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -170,7 +170,14 @@ def _texts(value: object) -> Iterator[str]:
             yield from _texts(item)
 
 
-def compiled(path: Path, allowed: Allowed = NOTHING, *, quiet: bool = False, sources: bool = True) -> Station:
+def compiled(
+    path: Path,
+    allowed: Allowed = NOTHING,
+    *,
+    quiet: bool = False,
+    sources: bool = True,
+    raw: bytes | None = None,
+) -> Station:
     """The workstation of a path: read, compiled, its criteria bound and its sources open.
 
     Args:
@@ -178,6 +185,7 @@ def compiled(path: Path, allowed: Allowed = NOTHING, *, quiet: bool = False, sou
         allowed: What the file may do.
         quiet: Show nothing meanwhile, not even on a terminal.
         sources: Whether its sources will be played.
+        raw: What is to be read in place of the file, while a page edits it.
 
     Raises:
         InputError: With every mistake in the file and in the files it names, those of criteria and
@@ -186,8 +194,9 @@ def compiled(path: Path, allowed: Allowed = NOTHING, *, quiet: bool = False, sou
     from seerob.workstation.workstation import locate
 
     file = locate(path)
-    with uncollected():
-        return _compiled(path, file, allowed, quiet=quiet, sources=sources)
+    # Drafts come and go: nothing that one of them made may be kept for good.
+    with uncollected() if raw is None else nullcontext():
+        return _compiled(path, file, allowed, quiet=quiet, sources=sources, raw=raw)
 
 
 @contextmanager
@@ -206,11 +215,13 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def _compiled(path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources: bool) -> Station:
+def _compiled(
+    path: Path, file: Path, allowed: Allowed, *, quiet: bool, sources: bool, raw: bytes | None
+) -> Station:
     compile_loops()  # before the imports: many loops are compiled by them
     from seerob.session.reading import readable, shortened
 
-    found = readable(path, allowed)
+    found = readable(path, allowed, raw)
     if sources and any(_is_workbook(source) for source in found.entries["sources"].values()):
         begin("seerob.files.tables.table_files", "openpyxl")
     if any(_is_mjcf(robot) for robot in found.entries["robots"].values()):

@@ -58,6 +58,12 @@ class Client:
         self._waiting[kind] = payload
         self._wake.set()
 
+    def begin(self, scene: bytes) -> None:
+        """Let another scene wait; a frame of the one before it is dropped."""
+        self._waiting.pop(FRAME, None)
+        self._waiting_since = None
+        self.offer("Scene", scene)
+
     def offer_frame(self, seq: int, payload: bytes, until: float = inf) -> None:
         """Let a frame wait; it replaces an earlier one, and patience ends here.
 

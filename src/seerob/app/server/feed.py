@@ -28,7 +28,7 @@ class Feed(Protocol):
 
     @property
     def mode(self) -> str:
-        """``live`` or ``replay``."""
+        """``live``, ``replay`` or ``edit``."""
 
     @property
     def duration(self) -> float | None:

@@ -16,14 +16,18 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from seerob.app.server.access import Role, Visit, Visits
 from seerob.app.server.allowance import Allowance
 from seerob.app.server.client import Client, Closing
+from seerob.app.server.desk import Desk
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
 from seerob.app.wire import schema
 from seerob.core.markers import plain
 from seerob.core.snapshot import (
     PROTOCOL,
     Command,
+    Edit,
+    Edited,
     Hello,
     History,
+    Mistake,
     Scene,
     Snapshot,
     SoFar,
@@ -39,20 +43,27 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
-_decode: Callable[[bytes], Command | Tracking] = msgspec.msgpack.Decoder(Command | Tracking).decode
+Message = Command | Tracking | Edit
+"""Of a page."""
+_decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(Message).decode
 LARGEST_COMMAND = 512
 """[B]; one has less than 100."""
 RATES: dict[str, tuple[float, float]] = {
     "ack": (120.0, 240.0),
     "tracking": (160.0, 320.0),
     "command": (40.0, 80.0),
+    "edit": (10.0, 20.0),
 }
 """What one page may send: per second, and at once. Beyond that it is read no faster."""
-SHARED: dict[str, tuple[float, float]] = {"tracking": (640.0, 1280.0), "command": (100.0, 200.0)}
+SHARED: dict[str, tuple[float, float]] = {
+    "tracking": (640.0, 1280.0),
+    "command": (100.0, 200.0),
+    "edit": (20.0, 40.0),
+}
 """What all pages together may send."""
 
 
-def read_message(data: bytes) -> Command | Tracking:
+def read_message(data: bytes) -> Message:
     """Decode what a page sent.
 
     Raises:
@@ -62,7 +73,7 @@ def read_message(data: bytes) -> Command | Tracking:
         command = _decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise ValueError(f"not a command: {error}") from None
-    if isinstance(command, Tracking):
+    if not isinstance(command, Command):
         return command
     if len(data) > LARGEST_COMMAND:
         raise ValueError(f"a command of {len(data)} bytes")
@@ -86,9 +97,10 @@ class Hub:
         feed: Feed,
         offers: Offers,
         visits: Visits | None = None,
+        desk: Desk | None = None,
         patience: float = PATIENCE,
     ) -> None:
-        self._feed, self._patience, self._offers = feed, patience, offers
+        self._feed, self._patience, self._offers, self._desk = feed, patience, offers, desk
         self._visits = Visits() if visits is None else visits
         self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
         self._scene = _encode(scene)
@@ -97,6 +109,12 @@ class Hub:
         self._until = inf
         self._ended: Closing | None = None
         self.clients: set[Client] = set()
+
+    def begin(self, scene: Scene) -> None:
+        """Send another scene to every page, of which snapshots are from now on."""
+        self._scene, self._newest = _encode(scene), None
+        for client in self.clients:
+            client.begin(self._scene)
 
     def show(self, snapshot: Snapshot, until: float = inf) -> None:
         """Send a snapshot to every page, if it is sent before ``until`` [s], monotonic time."""
@@ -142,7 +160,8 @@ class Hub:
             await _close(socket, Closing(1013, f"{MOST_CLIENTS} pages are connected already"))
             return
         client = Client(socket, patience=self._patience)
-        hello = replace(self._hello, may=tuple(sorted(state["roles"])))
+        edits = self._desk is not None and Role.CONTROL in state["roles"]
+        hello = replace(self._hello, may=(*sorted(state["roles"]), *(("edit",) if edits else ())))
         client.offer("Hello", _encode(hello))
         client.offer("Scene", self._scene)
         client.offer("History", _encode(self._feed.history()))
@@ -152,6 +171,8 @@ class Hub:
         if self._newest is not None:
             client.offer_frame(self._newest.seq, _encode(self._newest), self._until)
         self.clients.add(client)
+        if self._desk is not None and edits:
+            self._desk.come(client)
         visit = self._visits.come(state["role"], address)
         listening = self._listen(client, socket, visit, state["roles"])
         tasks = [asyncio.create_task(client.send()), asyncio.create_task(listening)]
@@ -160,6 +181,8 @@ class Hub:
         finally:
             self.clients.discard(client)
             self._offers.gone(client)
+            if self._desk is not None:
+                self._desk.gone(client)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -172,10 +195,10 @@ class Hub:
         try:
             while True:
                 message = read_message(await socket.receive_bytes())
-                if isinstance(message, Tracking):
-                    kind = "tracking"
-                else:
+                if isinstance(message, Command):
                     kind = "ack" if message.action == "ack" else "command"
+                else:
+                    kind = "tracking" if isinstance(message, Tracking) else "edit"
                 shared = self._shared.get(kind)
                 wait = max(own[kind].take(), 0.0 if shared is None else shared.take())
                 if wait:
@@ -184,6 +207,8 @@ class Hub:
                     await asyncio.sleep(wait)
                 if isinstance(message, Tracking):
                     last_answer = self._offer(client, message, last_answer, visit, may=Role.TRACK in roles)
+                elif isinstance(message, Edit):
+                    client.offer("Edited", _encode(await self._edit(client, message, visit, roles)))
                 elif kind == "ack":
                     client.acknowledge(int(message.value or 0))
                 else:
@@ -197,6 +222,17 @@ class Hub:
             client.end(Closing(1007, str(error)))
         except (WebSocketDisconnect, RuntimeError):
             client.end(Closing(1006, "gone"))
+
+    async def _edit(self, client: Client, edit: Edit, visit: Visit, roles: frozenset[Role]) -> Edited:
+        """Make an edit, to its end also when the page leaves meanwhile."""
+        if self._desk is not None and Role.CONTROL in roles:
+            return await asyncio.shield(self._desk.take(client, edit))
+        visit.refuse(f"edit: {edit.action[:20]}")
+        what, remedy = "this page may not edit", "start seerob edit, and open its address to control"
+        if self._desk is None:
+            what = "this run is not edited"
+        refusal = Mistake(key="", what=what, remedy=remedy)
+        return Edited(id=edit.id, accepted=False, revision=0, mistakes=(refusal,))
 
     def _offer(
         self, client: Client, tracking: Tracking, last_answer: Tracked | None, visit: Visit, *, may: bool

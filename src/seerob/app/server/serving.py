@@ -33,6 +33,7 @@ from seerob.app.server.access import Role, Tokens, Visits
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
 from seerob.app.server.connection import Doorstep, PromptLoop, PromptRequests, WholeBinaryFrames
+from seerob.app.server.desk import Desk
 from seerob.app.server.door import Door
 from seerob.app.server.feed import Feed
 from seerob.app.server.hub import PATIENCE, Hub
@@ -101,12 +102,15 @@ def answer(folder: Path, path: str) -> Response:
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
 
-def build(*, hub: Hub, meshes: Mapping[str, bytes], folder: Path, lifespan: Lifespan) -> Starlette:
+def build(
+    *, hub: Hub, meshes: Mapping[str, bytes], schema: bytes, folder: Path, lifespan: Lifespan
+) -> Starlette:
     """The application behind the `Door`.
 
     Args:
         hub: Serves the WebSockets.
         meshes: Binary glTF by hash.
+        schema: JSON schema of the workstation file, for forms; empty where nobody edits.
         folder: The built page.
         lifespan: What runs while the application does.
     """
@@ -119,12 +123,18 @@ def build(*, hub: Hub, meshes: Mapping[str, bytes], folder: Path, lifespan: Life
         headers = {"Cache-Control": "private, max-age=31536000, immutable"}
         return Response(data, media_type="model/gltf-binary", headers=headers)
 
+    async def forms(_: Request) -> Response:
+        if not schema:
+            return PlainTextResponse("nobody edits here\n", 404)
+        return Response(schema, media_type="application/json", headers={"Cache-Control": "no-store"})
+
     async def file(request: Request) -> Response:
         return await run_in_threadpool(answer, folder, request.path_params["path"])
 
     routes = [
         WebSocketRoute("/ws", hub.attend),
         Route("/mesh/{name}", mesh),
+        Route("/schema.json", forms),
         Route("/{path:path}", file),
     ]
     return Starlette(routes=routes, lifespan=lifespan)
@@ -159,6 +169,7 @@ class Server:
         tls: Encrypts; see `seerob.app.server.certificates`.
         clear_text: Whether others may be served unencrypted, so that anyone on the way reads and changes it.
         hosts: Names, besides addresses and ``localhost``, under which the server may be asked for.
+        desk: Where pages edit the workstation; None where nobody does.
         origins: Origins, such as ``https://line3.example``, whose pages may connect as well.
         page: Folder of the built page.
         patience: How long a page may leave a frame waiting before it is disconnected [s].
@@ -177,6 +188,7 @@ class Server:
         clear_text: bool = False,
         hosts: Iterable[str] = (),
         origins: Iterable[str] = (),
+        desk: Desk | None = None,
         page: Path = FOLDER,
         patience: float = PATIENCE,
     ) -> None:
@@ -187,8 +199,12 @@ class Server:
         """Who is, and was, connected."""
         self.offers = Offers()
         """What headsets that show a page see: the sources of the same run take it."""
-        self.hub = Hub(scene=scene, feed=feed, offers=self.offers, visits=self.visits, patience=patience)
-        app = build(hub=self.hub, meshes=meshes, folder=page, lifespan=self._lifespan)
+        self.hub = Hub(
+            scene=scene, feed=feed, offers=self.offers, visits=self.visits, desk=desk, patience=patience
+        )
+        self._meshes = dict(meshes)
+        schema = b"" if desk is None else desk.schema
+        app = build(hub=self.hub, meshes=self._meshes, schema=schema, folder=page, lifespan=self._lifespan)
         known = (*hosts, *(() if tls is None else tls.names))
         names = {name.lower() for name in known} | ({host.lower()} if not is_address(host) else set())
         self._app = Door(
@@ -223,6 +239,16 @@ class Server:
         base = f"{'http' if self.tls is None else 'https'}://{name}:{self.port}/"
         tokens = self._tokens or ("",) * len(Role)
         return {role: base + (token and f"?token={token}") for role, token in zip(Role, tokens, strict=True)}
+
+    def begin(self, scene: Scene, meshes: Mapping[str, bytes]) -> None:
+        """Show another scene from now on; only to be called in the server's own loop.
+
+        Args:
+            scene: What does not change until the next one.
+            meshes: Those of its nodes; earlier ones are kept, as pages may still ask for them.
+        """
+        self._meshes.update(meshes)
+        self.hub.begin(scene)
 
     def start(self) -> str:
         """Listen, and return `url`; connections are answered as soon as this returns.

@@ -1,0 +1,324 @@
+"""Editing a workstation file over real sockets: what changes, what stays, what two pages do together."""
+
+import os
+import stat
+import tomllib
+
+import msgspec
+import pytest
+
+from seerob.app.commands.edit import serving
+from seerob.app.console.loading import compiled
+from seerob.app.console.visiting import Visiting
+from seerob.app.server.access import Role, Tokens
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Change, Draft, Edit, Edited, Scene, Snapshot
+from seerob.workstation.allowed import NOTHING
+from server.frames import Visitor
+
+CELL = b"""# A cell; this line and all others that nobody edits stay.
+title = "Edited"
+
+[[parts]]
+name = "table"            # beside the robot
+shape = { box = [0.8, 1.4, 0.74] }
+at = { position = [0.8, 0, 0.37] }  # its middle
+
+[[parts]]
+name = "rack"
+shape = { box = [0.2, 0.2, 1] }
+at.position_mm = [2000, 0, 500]
+
+# -- people --
+
+[[humans]]
+name = "operator"
+stature = 1.75
+mass = 75
+sex = "male"
+at = { position = [3, 0, 0] }
+
+[[safety]]
+kind = "minimum_distance"
+between = ["table", "operator"]
+limit = 0.5               # [m]
+"""
+MOVE = Change(kind="set", path=("parts", 0, "at", "position"), value=[0.9, 0, 0.37])
+AREA = {"name": "zone", "shape": {"box": [1, 1, 2]}, "at": {"position": [1, 2, 1]}}
+
+
+class Page(Visitor):
+    """A page that edits; `draft` is the newest that it was told."""
+
+    def __init__(self, server, **options):
+        super().__init__(server, **options)
+        self.draft, self.shown, self._id = None, {}, 0
+
+    def read(self, timeout=60.0):
+        message = super().read(timeout)
+        if isinstance(message, Draft):
+            self.draft = message
+        if isinstance(message, Scene | Snapshot):
+            self.shown[type(message)] = message
+        return message
+
+    def edit(self, *changes, action="change", revision=None):
+        """What became of an edit; by then the draft has come too."""
+        self._id += 1
+        if revision is None:
+            revision = self.draft.revision
+        edit = Edit(id=self._id, action=action, revision=revision, changes=changes)
+        self.socket.send(msgspec.msgpack.encode(edit))
+        answer = self.until(lambda m: isinstance(m, Edited) and m.id == self._id)
+        while answer.accepted and self.draft.revision < answer.revision:
+            self.read()
+        return answer
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "workstation.toml"
+    path.write_bytes(CELL)
+    path.chmod(0o640)
+    return path
+
+
+@pytest.fixture
+def desk(file):
+    how = Visiting(tokens=None, tls=None, clear_text=False)
+    server, desk = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
+    with server:
+        yield server, desk
+
+
+def pages(server, n):
+    found = [Page(server) for _ in range(n)]
+    for page in found:
+        page.of(Draft)
+    return found
+
+
+def test_an_edit_is_shown_reviewed_and_saved_and_all_else_stays_byte_for_byte(desk, file):
+    server, table = desk
+    with Page(server) as page:
+        assert "edit" in page.read().may
+        before = page.of(Scene)
+        page.of(Draft)
+        answer = page.edit(MOVE, Change(kind="add", path=("areas",), value=AREA))
+        assert answer.accepted
+        while page.shown[Snapshot].seq == 0:
+            page.read()
+        after, first = page.shown[Scene], page.shown[Snapshot]
+        assert {n.name for n in after.nodes} - {n.name for n in before.nodes} == {"zone"}
+        assert first.results[0].value == pytest.approx(1.4, abs=0.4)
+        assert file.read_bytes() == CELL  # not before it is saved
+        assert "+at = { position = [0.9, 0, 0.37] }  # its middle" in page.draft.diff.splitlines()
+        assert table.unsaved
+        assert page.edit(action="save").accepted
+    saved = CELL.replace(b"[0.8, 0, 0.37]", b"[0.9, 0, 0.37]")
+    added = b'\n[[areas]]\nname = "zone"\nshape = { box = [1, 1, 2] }\nat = { position = [1, 2, 1] }\n'
+    assert file.read_bytes() == saved + added
+    assert stat.S_IMODE(file.stat().st_mode) == 0o640
+    assert os.listdir(file.parent) == [file.name]
+    assert not table.unsaved
+
+
+def test_undo_and_redo_restore_it_byte_for_byte_also_behind_a_save(desk, file):
+    server, _ = desk
+    edits = (
+        (Change(kind="remove", path=("parts", 1)),),
+        (
+            Change(
+                kind="copy", path=("parts", 0), value={"name": "table_2", "at": {"position": [5, 0, 0.37]}}
+            ),
+        ),
+        (Change(kind="remove", path=("safety", 0, "limit")), MOVE),
+    )
+    (page,) = pages(server, 1)
+    with page:
+        for changes in edits:
+            assert page.edit(*changes).accepted
+        assert page.edit(action="save").accepted
+        edited = file.read_bytes()
+        for _ in edits:
+            assert page.draft.undo
+            assert page.edit(action="undo").accepted
+        assert not page.draft.undo
+        assert page.edit(action="save").accepted
+        assert file.read_bytes() == CELL
+        for _ in edits:
+            assert page.edit(action="redo").accepted
+        assert page.edit(action="save").accepted
+        assert file.read_bytes() == edited
+        assert not page.edit(action="redo").accepted
+
+
+WRONG = [
+    Change(kind="set", path=("safety", 0, "limit"), value="wide"),
+    Change(kind="set", path=("safety", 0, "between"), value=["table", "nobody"]),
+    Change(kind="set", path=("parts", 0, "shpe"), value={}),
+    Change(kind="remove", path=("humans", 0)),
+    Change(kind="add", path=("parts",), value={"name": "table", "shape": {"box": [1, 1, 1]}}),
+    Change(kind="add", path=("tools",), value={"name": "t", "on": "x", "mesh": "../../etc/passwd"}),
+]
+
+
+@pytest.mark.parametrize("change", WRONG, ids=lambda change: ".".join(map(str, change.path)))
+def test_what_makes_the_file_wrong_is_refused_with_key_and_words_of_check_file(desk, file, change, tmp_path):
+    from seerob.workstation.editing import changed
+
+    wrong = tmp_path / "wrong"
+    wrong.mkdir()
+    (wrong / file.name).write_bytes(changed(CELL, [change], "")[0])
+    with pytest.raises(InputError) as said:
+        compiled(wrong)
+    (page,) = pages(desk[0], 1)
+    with page:
+        answer = page.edit(change)
+        assert not answer.accepted
+        words = {(p.key, p.what, p.remedy) for p in said.value.problems}
+        assert {(m.key, m.what, m.remedy) for m in answer.mistakes} == words
+        assert page.draft.revision == answer.revision == 1
+        assert not page.edit(action="undo").accepted
+    assert file.read_bytes() == CELL
+
+
+NOWHERE = [
+    Change(kind="set", path=(), value=1),
+    Change(kind="set", path=("parts", 7, "name"), value="x"),
+    Change(kind="set", path=("parts", -1, "name"), value="x"),
+    Change(kind="set", path=("parts", 0, "name"), value=None),
+    Change(kind="set", path=("parts", 0, "name", "x"), value=1),
+    Change(kind="set", path=("title",), value=float("nan")),
+    Change(kind="set", path=("title",), value={"a": {1: 2}}),
+    Change(kind="set", path=("title",), value=b"x"),
+    Change(kind="remove", path=("parts", 0, "nothing")),
+    Change(kind="copy", path=("parts",), value={}),
+    Change(kind="copy", path=("parts", -1), value={"name": "x"}),
+    Change(kind="add", path=("title",), value={}),
+    Change(kind="sudo", path=("title",), value=1),
+]
+
+
+def test_what_leads_nowhere_or_is_no_value_is_refused(desk, file):
+    (page,) = pages(desk[0], 1)
+    with page:
+        for change in NOWHERE:
+            answer = page.edit(change)
+            assert not answer.accepted, change
+            assert answer.mistakes[0].what
+        assert not page.edit(MOVE, NOWHERE[1]).accepted  # all of it or nothing
+        assert not page.edit(action="format the disk").accepted
+        assert page.edit(MOVE).accepted
+        assert page.draft.diff.count("\n+") == 2
+
+
+def test_two_pages_lose_nothing_of_each_other(desk, file):
+    one, other = pages(desk[0], 2)
+    with one, other:
+        assert one.edit(
+            Change(kind="remove", path=("parts", 0)), Change(kind="remove", path=("safety", 0))
+        ).accepted
+        # The other one has not heard of that: what it calls the second part is the first now.
+        rack = Change(kind="set", path=("parts", 1, "at", "position_mm"), value=[2500, 0, 500])
+        assert other.edit(rack, revision=1).accepted
+        assert other.edit(Change(kind="add", path=("areas",), value=AREA), revision=1).accepted
+        told = other.edit(MOVE, revision=1)
+        assert [m.key for m in told.mistakes] == ["parts[0].at.position"]
+        assert "taken away meanwhile" in told.mistakes[0].what or "changed meanwhile" in told.mistakes[0].what
+        now = tomllib.loads(_saved(other, file).decode())
+        assert [p["name"] for p in now["parts"]] == ["rack"]
+        assert now["parts"][0]["at"]["position_mm"] == [2500, 0, 500]
+        assert now["areas"][0]["name"] == "zone"
+        # Each takes back its own, whatever the other did since.
+        assert one.edit(action="undo").accepted
+        now = tomllib.loads(_saved(one, file).decode())
+        assert [p["name"] for p in now["parts"]] == ["table", "rack"]
+        assert now["parts"][1]["at"]["position_mm"] == [2500, 0, 500]
+        assert other.edit(action="undo").accepted
+        assert other.edit(action="undo").accepted
+        assert _saved(other, file) == CELL
+
+
+def test_who_changes_what_another_page_changed_is_told_what_it_is_now(desk):
+    one, other = pages(desk[0], 2)
+    with one, other:
+        assert one.edit(MOVE).accepted
+        for change in (
+            Change(kind="set", path=MOVE.path, value=[0.1, 0, 0.37]),
+            Change(kind="remove", path=("parts", 0)),
+            Change(kind="set", path=("parts", 0, "at", "position", 2), value=0.4),
+        ):
+            told = other.edit(change, revision=1)
+            assert not told.accepted
+            assert "changed meanwhile by another page" in told.mistakes[0].what
+        assert "[0.9, 0, 0.37]" in other.edit(WRONG[0], MOVE, revision=1).mistakes[0].what
+        # A save is of what was reviewed, and so is what is thrown away.
+        assert not other.edit(action="save", revision=1).accepted
+        assert other.edit(Change(kind="set", path=("title",), value="Mine")).accepted
+        assert other.edit(action="discard").accepted
+        assert "0.9" in other.draft.diff
+        assert "Mine" not in other.draft.diff
+
+
+def test_discarding_ends_at_the_file_and_a_file_that_somebody_else_saved_is_not_written_over(desk, file):
+    (page,) = pages(desk[0], 1)
+    with page:
+        assert page.edit(MOVE).accepted
+        assert page.edit(action="discard").accepted
+        assert page.draft.diff == ""
+        assert page.edit(MOVE).accepted
+        theirs = CELL.replace(b"Edited", b"By an editor")
+        file.write_bytes(theirs)
+        assert "another program has changed" in page.edit(action="save").mistakes[0].what
+        assert file.read_bytes() == theirs
+        assert page.edit(action="discard").accepted
+        assert page.draft.tables["title"] == "By an editor"
+        assert page.edit(MOVE).accepted
+        assert page.edit(action="save").accepted
+        assert file.read_bytes() == theirs.replace(b"[0.8, 0, 0.37]", b"[0.9, 0, 0.37]")
+
+
+def test_only_a_page_that_may_control_edits_and_only_where_the_command_line_says_so(file):
+    tokens = Tokens.made()
+    how = Visiting(tokens=tokens, tls=None, clear_text=False)
+    server, desk = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
+    edit = msgspec.msgpack.encode(Edit(id=7, action="change", revision=1, changes=(MOVE,)))
+    with server:
+        for role in (Role.VIEW, Role.TRACK):
+            with Visitor(server, path=f"/ws?token={tokens[list(Role).index(role)]}") as page:
+                assert "edit" not in page.read().may
+                page.socket.send(edit)
+                assert not page.of(Edited).accepted
+        with Page(server, path=f"/ws?token={tokens.control}") as page:
+            page.of(Draft)
+            assert page.edit(MOVE).accepted
+    assert desk.unsaved
+    assert file.read_bytes() == CELL
+
+
+def test_line_ends_and_forms_of_toml_stay_as_they_are(tmp_path):
+    from seerob.workstation.editing import changed
+
+    raw = b'\xef\xbb\xbfa = "x" # y\r\n[[parts]]\r\nname = """\r\n[[areas]]\r\n# no"""\r\n'
+    raw += b"at.position = [\r\n1, # x\r\n2]\r\n"
+    raw += b'[parts.more]\r\nk = 1\r\n[other]\r\n[[parts]]\r\nname = "b"\r\n'
+    made, _ = changed(raw, [Change(kind="set", path=("parts", 1, "name"), value="c")], "")
+    assert made == raw.replace(b'"b"', b'"c"')
+    made, _ = changed(raw, [Change(kind="set", path=("parts", 0, "more", "k"), value=2)], "")
+    assert made == raw.replace(b"k = 1", b"k = 2")
+    made, _ = changed(raw, [Change(kind="remove", path=("parts", 0))], "")
+    assert made == raw[:16] + raw[raw.index(b"[other]") :]
+    inline = b"parts = [ { name = 'a' }, { name = 'b' } ] # all\n"
+    made, _ = changed(inline, [Change(kind="set", path=("parts", 1, "name"), value="c")], "")
+    assert made == inline.replace(b"'b'", b'"c"')
+    with pytest.raises(InputError):
+        changed(b"a = 1\r\nb = 2\n", [Change(kind="set", path=("a",), value=2)], "")
+
+
+def _saved(page, file):
+    while True:  # what the other page did is on its way
+        answer = page.edit(action="save")
+        if answer.accepted:
+            return file.read_bytes()
+        page.of(Draft)

@@ -297,3 +297,23 @@ def test_a_log_of_rtde_is_told_from_any_other_table(tmp_path):
     head = ["timestamp", *(f"{which}_q_{i}" for which in ("target", "actual") for i in range(3))]
     with pytest.raises(InputError, match=r'a log of RTDE, which kind = "ur_record" reads'):
         read_motion(table(tmp_path / "a.csv", head, [T, Q, Q], delimiter=" "))
+
+
+@pytest.mark.parametrize(("header", "first"), [(1, 1), (3, 1), (None, 2)])
+def test_values_in_or_above_the_header_are_refused(tmp_path, header, first):
+    """They were left out without a word, and nobody judged the beginning of the motion."""
+    path = tmp_path / "motion.csv"
+    values = "".join(f"{0.1 * k:.1f},{0.01 * k:.2f},{0.5 - 0.01 * k:.2f}\n" for k in range(20))
+    path.write_text(values if header else "a,b,c\n" + values + "t [s],j1 [rad],j2 [rad]\n" + values)
+    units = {"time_unit": "s", "joint_unit": "rad", "delimiter": ","}
+    given = Mapping(header_row=header, time=1, joints=(2, 3), **units) if header else Mapping(delimiter=",")
+    with pytest.raises(InputError, match=rf"row {first}: values up to row {header or 22}, the header"):
+        read_motion(path, given)
+
+
+def test_columns_that_are_numbered_have_numbers_for_names(tmp_path):
+    path = tmp_path / "motion.csv"
+    path.write_text("0,1,2\n" + "".join(f"{0.1 * k:.1f},{0.01 * k:.2f},0.5\n" for k in range(20)))
+    units = {"time_unit": "s", "joint_unit": "rad", "delimiter": ","}
+    motion, _, _ = read_motion(path, Mapping(header_row=1, time=1, joints=(2, 3), **units))
+    assert len(motion.t) == 20

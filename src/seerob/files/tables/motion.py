@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.transforms import Array, wxyz_from
-from seerob.files.tables.grid import Numbers, place, read_numbers
+from seerob.files.tables.grid import Numbers, blank, number, place, read_numbers
 from seerob.files.tables.guess import Guess, guess
 from seerob.files.tables.headers import Layout
 from seerob.files.tables.mapping import SI, Mapping, Motion
@@ -65,6 +67,8 @@ def read_table(
         raise found.error()
     layout, mapping = found.layout, found.mapping
     indices = _indices(layout, mapping)
+    comma = bool(mapping.decimal_comma)
+    _refuse_values_above(found.file, layout, {i for group in indices.values() for i in group}, comma)
     factors = _factors(found.file, mapping, indices, target)
     columns = {
         # Two keys may name the same column; numbers keep the names apart.
@@ -80,7 +84,7 @@ def read_table(
         layout.grid,
         layout.first_row,
         columns,
-        decimal_comma=bool(mapping.decimal_comma),
+        decimal_comma=comma,
         select=select,
         width=len(layout.headers) if layout.header_row else None,
     )
@@ -95,6 +99,23 @@ def read_table(
             f"{where}; the surplus is left out"
         )
     return Table(found, numbers.rows, _blocks(numbers, indices, factors), tuple(notes))
+
+
+def _refuse_values_above(file: str, layout: Layout, used: Collection[int], comma: bool) -> None:
+    """Refuse a header with values above it, or that holds values itself: nobody would judge those.
+
+    Raises:
+        InputError: A row before the first one of values has a number in every column that is used.
+    """
+    for row, cells in enumerate(islice(layout.grid.rows(), layout.header_row), start=1):
+        found = [number(cells[i], decimal_comma=comma) if i < len(cells) else "" for i in used]
+        values = [value for value in found if isinstance(value, float)]
+        # Columns that are numbered, as pandas does, have numbers for names.
+        numbered = all(number(cell) in (k, k + 1) for k, cell in enumerate(cells) if not blank(cell))
+        if len(values) == len(found) and not numbered:
+            what = f"values up to row {layout.header_row}, the header, which are judged by nobody then"
+            remedy = "header_row = 0 says that no row names the columns; else take them out"
+            raise InputError.at(file, place(layout.grid, row), what, remedy)
 
 
 def read_motion(

@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.metadata import version
 
 from seerob.app.console.interruption import Interrupts
-from seerob.app.console.terminal import Exit, Parser, PrintableLines
+from seerob.app.console.terminal import Exit, Leaves, Parser, PrintableLines
 from seerob.core.errors import SeerobError, ended_by
 from seerob.core.interrupted import stopped
 from seerob.core.printable import printable
@@ -99,7 +99,7 @@ def _asked(options: argparse.Namespace) -> int:
     """
     try:
         return int(options.run(options))
-    except (Exception, KeyboardInterrupt):
+    except (Exception, KeyboardInterrupt, Leaves):
         raise
     except BaseException as error:
         raise RuntimeError(ended_by(error)) from error

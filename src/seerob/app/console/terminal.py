@@ -74,6 +74,10 @@ class Exit(IntEnum):
     ERROR = 3
 
 
+class Leaves(SystemExit):
+    """The words of the command line end the program, by ``--help`` or a mistake: no plug-in does."""
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose mistakes end with `Exit.ERROR`: argparse's own 2 means undecided here."""
 
@@ -81,6 +85,12 @@ class Parser(argparse.ArgumentParser):
         """Print the usage and the mistake, and leave."""
         self.print_usage(sys.stderr)
         self.exit(Exit.ERROR, f"{self.prog}: {message}\n")
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """Print the message, and leave."""
+        if message:
+            sys.stderr.write(message)
+        raise Leaves(status)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Also values that begin with a minus, ``--to -60,70``: argparse takes them for options."""

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from made_mvnx import PERSON, Q, angles, made, segments
+from made_mvnx import PERSON, Q, angles, made, moving, segments
 from scipy.spatial.transform import Rotation
 
 from seerob.core.errors import InputError
@@ -152,7 +152,7 @@ def test_a_segment_that_is_there_twice_is_refused(tmp_path):
         read(path)
 
 
-def test_joint_angles_that_are_not_those_of_the_segments_are_told(tmp_path):
+def test_joint_angles_that_are_not_those_of_the_segments_are_told(tmp_path, monkeypatch):
     def changed(frames):
         return [f.replace("<jointAngle>", "<jointAngle>90 0 0 ") for f in frames]
 
@@ -170,6 +170,11 @@ def test_joint_angles_that_are_not_those_of_the_segments_are_told(tmp_path):
     captured = read(made(tmp_path / "c.mvnx", Q, change=touched), human="op")
     assert "warning: its joint angles differ" in told(captured)
     assert [f.holds for f in captured.findings if f.level == "warning"] == [("op",)]
+    # Nor is it missed between those of many frames that say how segments are turned, or where few are kept.
+    many = made(tmp_path / "d.mvnx", moving(500), change=touched)
+    assert [f.holds for f in read(many, human="op").findings if f.level == "warning"] == [("op",)]
+    monkeypatch.setattr(mvnx, "KEPT", 10)
+    assert [f.holds for f in read(many, human="op").findings if f.level == "warning"] == [("op",)]
     # Another count of numbers is no comparison.
     assert "joint angles" not in told(read(made(tmp_path / "b.mvnx", Q, change=changed)))
 

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, ClassVar
 from xml.etree.ElementTree import ParseError
@@ -263,7 +264,9 @@ def lengths(head: Head) -> dict[str, float]:
 KEPT = 50_000
 """Frames that are kept in memory, 65 MB; a longer file is read again whenever it is needed."""
 CHECKED = 200
-"""Frames at most whose joint angles are compared."""
+"""Frames at most by which it is decided how segments are turned."""
+TOGETHER = 512
+"""Frames whose joint angles are compared at once."""
 AGREE = math.radians(0.1)
 """Angles that are no further apart are the same."""
 CONTRADICTION = math.radians(5.0)
@@ -376,6 +379,8 @@ class _Survey:
     special: dict[str, CaptureFrame] = field(default_factory=dict)
     unit: str | None = None
     kept: list[CaptureFrame] | None = field(default_factory=list)
+    angles: list[Array | None] = field(default_factory=list)
+    """Joint angles of the frames that are kept [rad]."""
     checked: list[tuple[Array, Array, Array | None]] = field(default_factory=list)
     """Positions, orientations and joint angles of frames spread over the file."""
 
@@ -405,7 +410,7 @@ def read(path: Path, *, file: str = "", human: str = "") -> Captured:
     if found.unit is None:
         what = "the trunk of the first frame is not as long as a person's in any unit"
         raise InputError.at(name, "position", what, "is it an export of MVN, in metres?")
-    turn, turned = _turn(name, found, human)
+    turn, turned = _turn(opened, found, human)
     metres = METRES[found.unit]
     kept = None
     if found.kept is not None:
@@ -472,12 +477,16 @@ def _survey(file: _File, head: Head, items: Iterator[Head | RawFrame]) -> _Surve
             found.first = frame.t if not found.frames else found.first
             found.frames, found.last = found.frames + 1, frame.t
             found.unit = found.unit or unit_of(frame.positions)
+            looked_at = found.frames % every == 0
+            has_angles = len(head.joints) == len(JOINTS) and (looked_at or found.kept is not None)
+            angles = _joint_angles(raw) if has_angles else None
             if found.kept is not None:
                 found.kept.append(frame)
-                found.kept = None if len(found.kept) > KEPT else found.kept
-            if found.frames % every == 0:
+                found.angles.append(angles)
+                if len(found.kept) > KEPT:
+                    found.kept, found.angles = None, []
+            if looked_at:
                 assert frame.orientations is not None  # every frame of this format has them
-                angles = _joint_angles(raw) if len(head.joints) == len(JOINTS) else None
                 found.checked.append((frame.positions, frame.orientations, angles))
                 if len(found.checked) > CHECKED:
                     found.checked, every = found.checked[::2], 2 * every
@@ -553,7 +562,7 @@ def _findings(name: str, head: Head, found: _Survey) -> list[Finding]:
     return said
 
 
-def _turn(name: str, found: _Survey, human: str) -> tuple[Array | None, list[Finding]]:
+def _turn(file: _File, found: _Survey, human: str) -> tuple[Array | None, list[Finding]]:
     """What turns the file's segments into those that have the world's axes in the T-pose.
 
     Files differ in what a segment's axes are. Which it is the file's own joint angles say; without them the
@@ -562,12 +571,14 @@ def _turn(name: str, found: _Survey, human: str) -> tuple[Array | None, list[Fin
     Raises:
         InputError: No hypothesis fits.
     """
+    name = file.name
 
     def say(level: str, text: str) -> Finding:
         return Finding(level=level, subject=name, text=text)
 
     hypotheses = _hypotheses(found.special)
-    off = [_off(found, turn) for turn, _ in hypotheses]
+    both = [(q, angles) for _, q, angles in found.checked]
+    off = [_off(both, turn) for turn, _ in hypotheses]
     if not len(off[0]):
         beside = [_beside(found, turn) for turn, _ in hypotheses]
         fits = [k for k, angle in enumerate(beside) if angle < BESIDE]
@@ -578,10 +589,11 @@ def _turn(name: str, found: _Survey, human: str) -> tuple[Array | None, list[Fin
         return turn, [say("assumed", f"{text}: the arms' segments point along the arms then")]
     best = min(range(len(off)), key=lambda k: float(np.median(off[k])))
     turn, text = hypotheses[best]
-    usual, largest = float(np.median(off[best])), float(off[best].max())
+    usual = float(np.median(off[best]))
     if usual > CONTRADICTION:
         what = f"its joint angles are {_degrees(usual)} from those of its segments, whatever their axes"
         raise InputError.at(name, "jointAngle", what, "was it edited? export it again, or without jointAngle")
+    largest = _largest(file, found, turn)
     said = [say("note", f"{text}; its joint angles agree")]
     differ = f"its joint angles differ from those of its segments by at most {_degrees(largest)}"
     if largest <= AGREE:
@@ -613,9 +625,36 @@ def _hypotheses(special: dict[str, CaptureFrame]) -> list[tuple[Array | None, st
     ]
 
 
-def _off(found: _Survey, turn: Array | None) -> Array:
-    """Largest angle between joints by the file and by its segments of each frame [rad], shape (frames,)."""
-    both = [(q, angles) for _, q, angles in found.checked if angles is not None]
+def _largest(file: _File, found: _Survey, turn: Array | None) -> float:
+    """Largest angle between joints by the file and by its segments [rad], of every frame of the motion."""
+    every = _with_angles(file, found)
+    largest = 0.0
+    while block := list(islice(every, TOGETHER)):
+        largest = max(largest, float(_off(block, turn).max(initial=0.0)))
+    return largest
+
+
+def _with_angles(file: _File, found: _Survey) -> Iterator[tuple[Array, Array | None]]:
+    """Orientations of the segments, w first, and joint angles [rad], of every frame that has any."""
+    if found.kept is not None:
+        for frame, angles in zip(found.kept, found.angles, strict=True):
+            if frame.orientations is not None:
+                yield frame.orientations, angles
+        return
+    for number, raw in enumerate(_motion(file.path, file.name)):
+        read_again = file.frame(raw, number)
+        if read_again is not None and read_again.orientations is not None:
+            yield read_again.orientations, _joint_angles(raw)
+
+
+def _off(frames: Iterable[tuple[Array, Array | None]], turn: Array | None) -> Array:
+    """Largest angle between joints by the file and by its segments of each frame [rad], shape (frames,).
+
+    Args:
+        frames: Orientations of the segments, w first, and joint angles [rad].
+        turn: What turns them into those of the ideal T-pose.
+    """
+    both = [(q, angles) for q, angles in frames if angles is not None]
     if not both:
         return np.empty(0)
     q, angles = (np.stack(columns) for columns in zip(*both, strict=True))

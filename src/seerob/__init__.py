@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from seerob.core.errors import InputError, SeerobError, Undecided, UnknownName
     from seerob.core.snapshot import Origin, Result, Snapshot, Verdict
     from seerob.model.model import Model
+    from seerob.outputs.comparison import Comparison
     from seerob.recording.recording import Recording
     from seerob.recording.result_log import ResultLog, Series
+    from seerob.session.comparing import compare
     from seerob.session.reading import read
     from seerob.session.run import Summary
     from seerob.session.station import Station, load, load_recorded
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "core.errors": ("InputError", "SeerobError", "Undecided", "UnknownName"),
     "model.model": ("Model",),
+    "outputs.comparison": ("Comparison",),
+    "session.comparing": ("compare",),
     "session.reading": ("read",),
     "recording.recording": ("Recording",),
     "recording.result_log": ("ResultLog", "Series"),
@@ -40,6 +44,7 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Comparison",
     "InputError",
     "Model",
     "Origin",
@@ -55,6 +60,7 @@ __all__ = [
     "UnknownName",
     "Verdict",
     "Workstation",
+    "compare",
     "load",
     "load_recorded",
     "read",

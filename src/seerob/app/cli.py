@@ -26,6 +26,7 @@ COMMANDS = (
     "assess",
     "replay",
     "report",
+    "compare",
     "repair",
     "share",
     "swept",

@@ -232,6 +232,17 @@ class Stage:
         self._rooms.append(room)
         return lettering.png(image)
 
+    def view(
+        self,
+        snapshot: Snapshot,
+        result: Result | None = None,
+        *,
+        subjects: Iterable[str] = (),
+        size: tuple[int, int] = SIZE,
+    ) -> Camera:
+        """Find the view that `picture` takes when none is given, to draw other snapshots from it, too."""
+        return self._view(self._bodies.placed(snapshot)[0], snapshot, result, tuple(subjects), size)
+
     def _drawn(
         self,
         camera: Camera,

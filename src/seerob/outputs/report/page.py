@@ -156,15 +156,6 @@ def page(report: Report) -> str:
     """The whole document."""
     scene = report.scene
     title = f"Evaluation of {scene.title}"
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", name="referrer", content="no-referrer"),
-        tag("title", title),
-        tag("style", Html(STYLE)),
-    )
     sections = [
         ("Verdicts", _verdicts(report)),
         ("Criterion by criterion", _criteria(report)),
@@ -185,6 +176,20 @@ def page(report: Report) -> str:
             )
             for k, (name, content) in enumerate(written)
         ],
+    )
+    return document(title, body)
+
+
+def document(title: str, body: Html) -> str:
+    """A whole document around a body, with the report's style; nothing in it is from elsewhere."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", name="referrer", content="no-referrer"),
+        tag("title", title),
+        tag("style", Html(STYLE)),
     )
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en") + "\n"
 

@@ -10,7 +10,7 @@ import tomllib
 import pytest
 
 from seerob.app.commands import emulate, probe
-from seerob.app.commands.emulate import probes_of
+from seerob.app.emulation.serving import probes_of
 from seerob.core.plugin import kinds, load
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.sources.fri import Fri

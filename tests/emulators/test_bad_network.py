@@ -14,7 +14,8 @@ import time
 import pytest
 
 from free_ports import free_port
-from seerob.app.commands.emulate import options_of, with_faults
+from seerob.app.commands.emulate import options_of
+from seerob.app.emulation.serving import with_faults
 from seerob.app.emulation.wire import AGAIN, Faults, FaultyWire
 from seerob.core.errors import InputError
 from seerob.protocols.robots.rtde import Kind, pack

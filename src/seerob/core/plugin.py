@@ -33,7 +33,7 @@ HOMES = {
     "sinks": "seerob.outputs.sinks",
     "emulators": "seerob.app.emulators",
 }
-"""Table of the workstation file → the package of its kinds; ``emulators`` are of `seerob emulate`."""
+"""Table of the workstation file → the package of its kinds."""
 
 
 class PluginError(SeerobError):

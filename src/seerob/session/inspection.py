@@ -170,6 +170,8 @@ def _rest(table: Mapping[str, object], file: Path) -> Iterator[Fact]:
                 yield _imported(kind, f"{group}[{i}].kind", offered.get(kind))
             elif group == "sources":
                 yield from _source(kind, entry, f"sources[{i}]", file)
+            elif group == "emulators":
+                yield Fact("starts", f"{kind}, only with run --emulated (emulators[{i}])")
             elif group == "sinks":
                 yield Fact("writes", f"{entry.get('file', kind)}, in the folder of results (sinks[{i}])")
     yield from _writing(table)

@@ -20,6 +20,7 @@ from seerob.outputs.sink import Sink
 from seerob.workstation import naming
 from seerob.workstation.allowed import NOTHING, Allowed, Named, named_outside
 from seerob.workstation.conversion import convert, tables
+from seerob.workstation.emulator import Emulator
 from seerob.workstation.plausibility.ranges import unknown
 from seerob.workstation.source import Source
 from seerob.workstation.tables.controller_zones import zones_of
@@ -30,6 +31,7 @@ BASES: dict[str, type[Struct]] = {
     "safety": Criterion,
     "ergonomics": Criterion,
     "sinks": Sink,
+    "emulators": Emulator,
 }
 """Plug-in table → base class of its entries."""
 

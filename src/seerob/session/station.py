@@ -192,6 +192,7 @@ class Station:
         ]
         named += [*measured, *(curve for name in measured for curve in curves(self.model.folder / name))]
         named.append(station.report.logo)
+        named += [getattr(each, name, None) for each in station.emulators for name in ("file", "waypoints")]
         references = [name for name in named if isinstance(name, str)]
         return {
             **self.model.files,

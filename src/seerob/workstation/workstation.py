@@ -426,6 +426,8 @@ class Workstation(_Table, frozen=True, kw_only=True):
     """Rules, which are `Criterion`s too."""
     sinks: tuple[Any, ...] = ()
     """`Sink`s."""
+    emulators: tuple[Any, ...] = ()
+    """`Emulator`s that stand for its devices where somebody asks for that."""
 
     folder: str = ""
     """Folder of the file; not written in it."""
@@ -457,7 +459,7 @@ TABLES: dict[str, type[Struct]] = {
 }
 """Lists of tables and the type of their entries."""
 
-PLUGINS = ("sources", "safety", "ergonomics", "sinks")
+PLUGINS = ("sources", "safety", "ergonomics", "sinks", "emulators")
 """Tables whose type is told by their ``kind``."""
 
 

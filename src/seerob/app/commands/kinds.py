@@ -24,23 +24,21 @@ COMMON = {
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    sub.add_argument("group", nargs="?", choices=(*PLUGINS, "emulators"), help="only these")
+    sub.add_argument("group", nargs="?", choices=PLUGINS, help="only these")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print them."""
-    from seerob.app.emulation.options import EmulatorOptions
     from seerob.core import plugin
     from seerob.description.robots import library
     from seerob.session.reading import BASES
 
-    bases: dict[str, type[msgspec.Struct]] = {**BASES, "emulators": EmulatorOptions}
-    for group in [options.group] if options.group else list(bases):
+    for group in [options.group] if options.group else PLUGINS:
         common = ", ".join(COMMON[group])
-        title = "seerob emulate" if group == "emulators" else f"[[{group}]]"
+        title = f"[[{group}]]" + (", and seerob emulate" if group == "emulators" else "")
         OUT.print(title + (f"  (all: {common})" if common else ""), style="bold", markup=False)
         for kind in plugin.kinds(group):
-            found = plugin.load(group, kind, bases[group])
+            found = plugin.load(group, kind, BASES[group])
             title = (found.__doc__ or "").strip().split("\n")[0]
             OUT.print(f"  {kind:<18} {title}", markup=False)
             fields = [f for f in msgspec.structs.fields(found) if f.name not in COMMON[group]]

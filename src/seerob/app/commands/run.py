@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from msgspec.structs import replace
 
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.loading import compiled
@@ -25,8 +29,11 @@ from seerob.app.console.terminal import (
 )
 from seerob.app.console.visiting import add_page, tell_pages, visiting
 from seerob.core.errors import InputError
+from seerob.core.snapshot import Finding
+from seerob.workstation.workstation import locate
 
 if TYPE_CHECKING:
+    from seerob.app.emulation.processes import Running
     from seerob.core.snapshot import Scene
     from seerob.outputs.sink import Writer
     from seerob.session.station import Station
@@ -55,6 +62,8 @@ def add(sub: argparse.ArgumentParser) -> None:
         help="let the workstation's triggers write to machines, where its file allows it too",
     )
     sub.add_argument("--seconds", type=seconds, help="end the run after this time")
+    text = "start what stands for its devices ([[emulators]]), and end it afterwards"
+    sub.add_argument("--emulated", action="store_true", help=text)
     sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
 
 
@@ -72,10 +81,48 @@ def run(options: argparse.Namespace) -> int:
         raise InputError.at("seerob run", "workstation", "missing", "name a folder, or --replay FILE")
     station = compiled(options.workstation, allowed(options))
     describe(station)
-    reach(station)
-    scene = station.scene()
-    tell(scene.findings, verbose=options.verbose)
-    return live(station, scene, options)
+    with _emulated(station, locate(options.workstation), wanted=options.emulated) as running:
+        reach(station)
+        scene = station.scene()
+        said = tuple(
+            Finding(level="assumed", subject=each.key, text=f"no device, an emulator ({each.kind}) {each.at}")
+            for each in running
+        )
+        scene = replace(scene, findings=(*scene.findings, *said))
+        tell(scene.findings, verbose=options.verbose)
+        found = live(station, scene, options)
+        for each in running:
+            if each.ended:
+                line("warning", f"{each.key}: the emulator ({each.kind}) ended by itself", "yellow")
+    return found
+
+
+@contextmanager
+def _emulated(station: Station, file: Path, *, wanted: bool) -> Iterator[tuple[Running, ...]]:
+    """What stands for the devices of a workstation meanwhile, where that is wanted.
+
+    Raises:
+        InputError: One of them cannot be had, or none is named.
+    """
+    emulators = station.workstation.emulators
+    if not wanted:
+        if emulators:
+            line(
+                "note", f"its devices are expected to be there; --emulated starts {len(emulators)} emulators"
+            )
+        yield ()
+        return
+    if not emulators:
+        raise InputError.at(file, "emulators", "none is named", "add [[emulators]], or leave out --emulated")
+    from seerob.app.emulation.processes import emulated
+
+    with ExitStack() as stack:
+        with spinner() as say:
+            say("starting emulators")
+            running = stack.enter_context(emulated(emulators, file))
+        for each in running:
+            line("emulates", f"{each.kind} {each.at}: {each.what.split(';')[0]}", "bold")
+        yield running
 
 
 def reach(station: Station) -> None:

@@ -11,11 +11,12 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
 
-from msgspec import Meta, Struct
+from msgspec import Meta
 
 from seerob.app.emulation.wire import Faults
 from seerob.core.errors import InputError
 from seerob.core.host_name import check_host
+from seerob.workstation.emulator import Emulator
 
 if TYPE_CHECKING:
     from seerob.app.emulation.motions import Motion
@@ -72,10 +73,10 @@ class Ready(NamedTuple):
     """Where it listens or what it sends to, for a message when that cannot be had: ``127.0.0.1:30004``."""
     commands: tuple[str, ...] = ()
     """That hear it, where ``seerob probe`` with its kind and address is not the way; see
-    `seerob.app.commands.emulate`."""
+    `seerob.app.emulation.serving`."""
 
 
-class EmulatorOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class EmulatorOptions(Emulator, frozen=True, kw_only=True):
     """Base of every emulator's options: one file, one class; its first line says what is emulated."""
 
     host: Annotated[str, option("address to listen on")] = "127.0.0.1"

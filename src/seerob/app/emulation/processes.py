@@ -1,0 +1,136 @@
+"""The emulators of a workstation, each in a process of its own as long as a run lasts.
+
+Such a process is told on its standard input what to be, says on its standard output that it is, and ends when
+its input is closed: with whoever started it, however that ends. A workstation file may come from anywhere, so
+what it asks for listens on this machine and sends to this machine only.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from seerob.app.emulation.options import HOSTS, EmulatorOptions
+from seerob.app.emulation.serving import served
+from seerob.core.errors import InputError, SeerobError
+from seerob.core.host_name import is_loopback
+from seerob.core.plugin import kind_of, load
+
+STARTED_WITHIN = 60.0
+"""Libraries of a first start are compiled until then [s]."""
+ENDED_WITHIN = 5.0
+"""[s]"""
+_LONGEST = 1 << 16
+"""What a process says of itself is no longer [byte]."""
+
+
+class Running(NamedTuple):
+    """An emulator that runs."""
+
+    key: str
+    """Where the workstation file asks for it: ``emulators[0]``."""
+    kind: str
+    what: str
+    """What it plays."""
+    at: str
+    """``listens at 127.0.0.1:30004``, or ``sends to`` somebody."""
+    process: subprocess.Popen[bytes]
+
+    @property
+    def ended(self) -> bool:
+        """Whether it ended by itself."""
+        return self.process.poll() is not None
+
+
+@contextmanager
+def emulated(emulators: Sequence[EmulatorOptions], file: Path) -> Iterator[tuple[Running, ...]]:
+    """Start what a workstation file asks for, and end it afterwards.
+
+    Args:
+        emulators: In the order of the file.
+        file: The workstation file; the names of files that they play start at its folder.
+
+    Raises:
+        InputError: One listens or sends beyond this machine, plays what is not there, or cannot listen.
+    """
+    for i, options in enumerate(emulators):
+        for name in (*HOSTS, "multicast"):
+            host = getattr(options, name, None)
+            if host and not is_loopback(host):
+                key, what = f"emulators[{i}].{name}", f"{host} is not this machine"
+                remedy = "leave it out, or start that one by hand with seerob emulate"
+                raise InputError.at(file, key, what, remedy)
+    with ExitStack() as stack:
+        started = [stack.enter_context(_process(options, file.parent)) for options in emulators]
+        running = []
+        for i, (options, process) in enumerate(zip(emulators, started, strict=True)):
+            kind, key = kind_of("emulators", options), f"emulators[{i}]"
+            said = _said(process)
+            if "error" in said:
+                remedy = "mend it, or end the program that listens there"
+                raise InputError.at(file, key, f"{kind}: {said['error']}", remedy)
+            running.append(Running(key, kind, said["what"], said["at"], process))
+        yield tuple(running)
+
+
+@contextmanager
+def _process(options: EmulatorOptions, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    # -P: a module that lies in the folder of the workstation is not imported.
+    command = [sys.executable, "-P", "-m", __name__]
+    with subprocess.Popen(  # noqa: S603 - our own interpreter
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=folder, start_new_session=True
+    ) as process:
+        assert process.stdin is not None
+        order = {"kind": kind_of("emulators", options), "options": msgspec.to_builtins(options)}
+        try:
+            process.stdin.write(json.dumps(order).encode() + b"\n")
+            process.stdin.flush()
+            yield process
+        finally:
+            process.stdin.close()
+            try:
+                process.wait(ENDED_WITHIN)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _said(process: subprocess.Popen[bytes]) -> dict[str, str]:
+    """What a process says once it serves, or why it does not."""
+    assert process.stdout is not None
+    end, said = time.monotonic() + STARTED_WITHIN, b""
+    while not said.endswith(b"\n") and len(said) < _LONGEST:
+        left = end - time.monotonic()
+        if left <= 0 or not select.select([process.stdout], [], [], left)[0]:
+            return {"error": f"does not start within {STARTED_WITHIN:g} s"}
+        part = os.read(process.stdout.fileno(), _LONGEST)
+        if not part:
+            return {"error": "ended before it served; what it said is above"}
+        said += part
+    found: dict[str, str] = json.loads(said)
+    return found
+
+
+def serve() -> None:
+    """Be the emulator that standard input asks for, until that is closed."""
+    order = json.loads(sys.stdin.buffer.readline(_LONGEST))
+    try:
+        kind = load("emulators", order["kind"], EmulatorOptions, allow_plugins=True)
+        with served(order["kind"], msgspec.convert(order["options"], kind, strict=False)) as (what, at, _):
+            print(json.dumps({"what": what, "at": at}), flush=True)  # noqa: T201 - to who started it
+            sys.stdin.buffer.read()
+    except (SeerobError, OSError) as error:
+        print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,0 +1,141 @@
+"""Being a device: what the options of an emulator ask for, served until whoever asked has had enough."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from msgspec.structs import fields, replace
+
+from seerob.app.emulation.options import COMMAND, EmulatorOptions, Ready
+from seerob.app.emulation.wire import FaultyWire
+from seerob.core.errors import InputError
+from seerob.core.host_name import is_loopback
+from seerob.core.plugin import load
+from seerob.workstation.source import Source
+
+
+@contextmanager
+def served(kind: str, asked: EmulatorOptions) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Be a device meanwhile.
+
+    Args:
+        kind: What it is.
+        asked: Its options.
+
+    Yields:
+        What it plays, ``listens at`` or ``sends to`` an address, and commands that hear it.
+
+    Raises:
+        InputError: What it shall play is wrong, or it cannot listen there.
+    """
+    from seerob.devices.live.listening import because
+
+    made = with_faults(asked) if asked.faults().any else asked.ready()
+    server, where = made.server, made.where
+    try:
+        server.start()
+    except OSError as error:
+        found = f"cannot listen on {where}: {because(error)}"
+        raise InputError.at(COMMAND, "--port", found, "choose another, or 0 for any free one") from error
+    try:
+        to = getattr(server, "to", None)
+        host, port = to or (getattr(server, "host", asked.host), getattr(server, "port", 0))
+        commands = probes_of(kind, host, port, sends=bool(to), commands=made.commands)
+        yield made.what, f"{'sends to' if to else 'listens at'} {host}:{port}", commands
+    finally:
+        server.stop()
+
+
+class _Behind:
+    """An emulator and the bad network before it."""
+
+    def __init__(self, asked: EmulatorOptions) -> None:
+        self._asked, self._sends = asked, sends(asked)
+        self.to: tuple[str, int] | None = None
+        if self._sends:
+            self.to = asked.to, asked.port  # type: ignore[attr-defined]
+            self._wire = FaultyWire(
+                asked.faults(), at=("127.0.0.1", 0), to=self.to, device_listens=False
+            ).start()
+            self.made = replace(asked, to="127.0.0.1", port=self._wire.port).ready()
+        else:
+            self.made = replace(asked, host="127.0.0.1", port=0).ready()
+        self.host, self.port = asked.host, getattr(asked, "port", 0)
+
+    def start(self) -> None:
+        """Begin both.
+
+        Raises:
+            OSError: The address cannot be listened on.
+        """
+        self.made.server.start()
+        if not self._sends:
+            inner = "127.0.0.1", getattr(self.made.server, "port", 0)
+            at = self.host, self.port
+            self._wire = FaultyWire(self._asked.faults(), at=at, to=inner, device_listens=True)
+            try:
+                self.port = self._wire.start().port
+            except OSError:
+                self.made.server.stop()
+                raise
+
+    def stop(self) -> None:
+        """End both."""
+        self._wire.stop()
+        self.made.server.stop()
+
+
+def sends(asked: EmulatorOptions) -> bool:
+    """Whether it sends to somebody by itself, instead of listening."""
+    return hasattr(asked, "to") and not getattr(asked, "websocket", False)
+
+
+def with_faults(asked: EmulatorOptions) -> Ready:
+    """The device that the options ask for, behind a bad network.
+
+    Raises:
+        InputError: What it shall play is missing or wrong.
+        OSError: The network cannot be had.
+    """
+    behind = _Behind(asked)
+    faults = asked.faults()
+    said = (
+        f"{faults.drop:.3g} of its packets lost, {faults.garble:.3g} damaged, late by {faults.delay:g} s "
+        f"and up to {faults.jitter:g} s more"
+    )
+    where = f"{asked.host}:{getattr(asked, 'port', 0)}"
+    return behind.made._replace(server=behind, what=f"{behind.made.what}; {said}", where=where)
+
+
+# -- what to type to hear it ----------------------------------------------------------------------
+
+ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104 - compared with, not listened on
+
+
+def probes_of(kind: str, host: str, port: int, *, sends: bool, commands: tuple[str, ...]) -> tuple[str, ...]:
+    """Commands that hear it.
+
+    Args:
+        kind: What is emulated.
+        host: Where it listens, or whom it sends to.
+        port: The same.
+        sends: Whether it sends by itself, so that its source listens.
+        commands: Given when its own kind with the address is not the way to hear it; with ``{at}`` for
+            both, ``{host}``, ``{port}``, and ``{option}`` for a port that its source does not expect.
+    """
+    option = _port_option(kind, port)
+    if sends:
+        option += "" if is_loopback(host) else f" --set bind={host}"
+    host = "127.0.0.1" if host in ANYWHERE else host
+    at = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    if commands:
+        return tuple(command.format(at=at, host=host, port=port, option=option) for command in commands)
+    address = "" if sends else f" {host}"
+    return (f"seerob probe {kind}{address}{option}",)
+
+
+def _port_option(kind: str, port: int) -> str:
+    """The port, where the source expects another one."""
+    usual = {field.name: field.default for field in fields(load("sources", kind, Source))}.get("port", port)
+    return "" if port == usual else f" --port {port}"

@@ -126,6 +126,14 @@ def test_who_knows_better_says_so_of_the_device_or_in_the_rule(tmp_path, where):
     assert (told.value, told.origin) == (pytest.approx(0.573, abs=1e-3), Origin.GIVEN)
 
 
+@pytest.mark.parametrize("where", ["source", "rule"])
+def test_nobody_knows_angles_to_the_last_digit(tmp_path, where):
+    """Written of the device, 0 took the place of the 9° and 15° that were found of it."""
+    result, _, station = scored(tmp_path, **{where: "accuracy = 0"})
+    assert result.verdict is Verdict.UNDECIDED
+    assert any("accuracy = 0 rad: less than 0.001 rad" in f.text for f in station.model.findings if f.holds)
+
+
 def test_what_nobody_knows_of_a_device_is_said(tmp_path):
     made_bvh(tmp_path / "x.bvh")
     unknown = "angles of a posture may be off that x.bvh captures nobody says"

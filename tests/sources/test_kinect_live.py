@@ -14,7 +14,7 @@ from seerob.core.errors import InputError
 from seerob.core.samples import Quality
 from seerob.core.transforms import wxyz_from_rotation
 from seerob.devices.live.listening import Listener
-from seerob.devices.sources.kinect import Kinect, Link
+from seerob.devices.sources.kinect import Kinect, Link, remarks
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.kinect import (
     BODY_FROM_OPTICAL,
@@ -56,6 +56,14 @@ def heard(source, enough):
 def source(port, link=Link.UDP, **more):
     more = {"at": AT, "human": "anna", "name": "camera", "timeout": 1.0} | more
     return Kinect(host="127.0.0.1", port=port, link=link, **more)
+
+
+def test_a_sender_without_confidences_says_what_that_means():
+    places = np.random.default_rng(1).uniform(1, 2, (32, 3))
+    for confidence, said in ((None, True), (np.ones(32), False)):
+        picture = Picture(t=0.0, bodies=(Body(1, places, None, confidence),))
+        found = [text for level, text in remarks([picture], AT) if level == "assumed"]
+        assert any("the tracker only predicts count as seen" in text for text in found) is said
 
 
 @pytest.mark.parametrize("link", list(Link))

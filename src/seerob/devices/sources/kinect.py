@@ -167,6 +167,10 @@ def remarks(heard: list[Picture], at: Pose) -> list[tuple[str, str]]:
     elif max(len(p.bodies) for p in heard) > 1:
         listed = ", ".join(map(str, ids))
         said.append(("warning", f"it sees several persons ({listed}): name the person's number as subject"))
+    if any(body.confidence is None for p in heard for body in p.bodies):
+        said.append(
+            ("assumed", "it sends no confidences: joints that the tracker only predicts count as seen")
+        )
     ups = [p.up for p in heard if p.up is not None]
     if ups:
         said.append(_level(np.median(ups, axis=0), at))

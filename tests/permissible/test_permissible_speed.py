@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -156,8 +157,12 @@ def test_a_limit_of_a_tool_speed_is_one_more_ceiling(tmp_path):
 def test_energy_falls_with_the_square_of_the_speed(tmp_path):
     """½ (1 + 4) q̇² of the point masses at 1 m and 2 m."""
     energy = '[[safety]]\nkind = "kinetic_energy"\nname = "E"\nrobot = "arm"\nlimit = 0.4\n'
-    found = cell(tmp_path, energy).permissible_speed(wish=COARSE)
+    found = cell(tmp_path, energy).permissible_speed(wish=replace(COARSE, verify=9.0))
     np.testing.assert_allclose(found.map.stations[0].permissible, 0.4, rtol=1e-6)
+    # A period longer than the plan: it is looked at all the same, and without a look it is not kept.
+    assert (found.verified.asked, found.verified.kept) == (1, True)
+    assert found.verified.use == pytest.approx(0.98, rel=1e-2)
+    assert not replace(found.verified, asked=0).kept
 
 
 def test_not_faster_than_given(tmp_path):

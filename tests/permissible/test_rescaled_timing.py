@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError
+from seerob.session.permissible.ceilings import By, Ceiling
 from seerob.session.permissible.joint_limits import JointLimits
 from seerob.session.permissible.path import STEP, GivenMotion, _dense, largest_hermite, largest_on, path_of
+from seerob.session.permissible.rescaled import Rescaled, _governs, ceiling, check, rescale, spent
+from seerob.session.permissible.speed_map import SpeedMap, Stations, reference_speed
 from seerob.session.permissible.timing import Parabolas, Profile, Timed, Use, _opened, _spread, timed
 
 
@@ -316,3 +319,179 @@ def test_an_averaged_profile_has_the_same_way_and_its_own_derivatives():
     exact = replace(profile, window=0.25, stretch=2.0)
     np.testing.assert_array_equal(exact.breaks(), [0, 0.5, 2, 2.5, 4, exact.duration])
     np.testing.assert_array_equal(exact.at(exact.breaks()).jerk, [1, 0, -2, 0, 1, 0])
+
+
+HALF = Ceiling("S", 0.5, governs="distance")
+
+
+def mapped(*each, most=(HALF, None, None), begun=0.0, top=(2.0, 8.0, 80.0)):
+    """The map of a motion of stations at even places; what governs the parts of each piece, first to last."""
+    given = parts(*each)
+    path, top = path_of(replace(given, t=given.t + begun), tolerance=5e-4), limits(*top)
+    stations = []
+    for piece in path.pieces:
+        s = np.linspace(0, piece.length, 41)
+        reference, joint = reference_speed(piece, s, top)
+        governs = tuple((c,) if (c := most[int(i)]) else () for i in np.linspace(0, len(most) - 0.01, 41))
+        speed, q = np.interp(s, piece.s, piece.speed), piece.at(s)[0]
+        stations.append(
+            Stations(s, piece.when(s), reference, joint, speed, governs, By.ALL, q, np.zeros((41, 3)), s)
+        )
+    return SpeedMap("arm", path, top, tuple(stations), By.ALL, ("S",), {})
+
+
+BACK = (1.0, lambda x: -MOVES[1](x), lambda x: -MOVES[2](x))
+
+
+def by_hand(*stretch, each=(STANDS, MOVES, STANDS, BACK, STANDS), top=(2.0, 8.0, 80.0)):
+    """On, a stand, and back, begun at 3 s of its clock; each way within 3 s, and stretched."""
+    found, pieces = mapped(*each, begun=3.0, top=top), []
+    for piece, k in zip(found.path.pieces, stretch, strict=True):
+        s = np.linspace(0, piece.length, 41)
+        raw = Parabolas.of(s, np.sin(np.pi * np.linspace(0, 1, 41)).round(12))
+        pieces.append(Timed(piece, Profile(raw, 0.1, k)))
+    return Rescaled(found, tuple(pieces), False, 0.1)
+
+
+def test_a_rescaled_motion_moves_and_stands_in_turn():
+    motion = by_hand(1.0, 1.1)
+    (one, two), path = motion.pieces, motion.of.path
+    before, between, after = path.stands
+    assert path.stands == pytest.approx(0.5, abs=0.1)
+    assert motion.before == pytest.approx(3.5)
+    assert motion.duration == pytest.approx(before + one.duration + between + two.duration + after)
+    np.testing.assert_allclose(motion.starts, [before, before + one.duration + between])
+    t = np.array([0, before / 2, before + one.duration + between / 2, motion.duration, motion.duration + 1])
+    q, *moves = motion.at(t)
+    np.testing.assert_allclose(q[:, 0], [0, 0, 1, 0, 0], atol=1e-4)
+    np.testing.assert_array_equal(moves, 0)
+    for piece, start in zip(motion.pieces, motion.starts, strict=True):
+        local = np.linspace(0.01, piece.duration - 0.01, 7)
+        np.testing.assert_allclose(motion.at(start + local), piece.at(local), atol=1e-9)
+        assert motion.at([start])[3] == pytest.approx(piece.at(np.zeros(1))[3]) != 0
+        for late in (0.0, 0.1):
+            own = motion.own_instant(float(piece.piece.t[-1]) + late)
+            assert own == pytest.approx(start + piece.duration + late)
+        # Both motions are in one place then, by the clock of each.
+        for s in (0.2, 0.7):
+            own = motion.own_instant(float(piece.piece.when(s)))
+            assert piece.profile.at(np.array([own - start])).s == pytest.approx(s, abs=1e-4)
+    assert motion.own_instant(3.0) == 0
+    assert motion.own_instant(3.0 + before / 2) == pytest.approx(before / 2, abs=1e-6)
+    assert motion.own_instant(6.5) == pytest.approx(motion.duration)
+
+
+def test_a_rescaled_motion_is_sampled_to_its_last_instant():
+    motion = by_hand(1.0, 1.1)
+    for period in (0.008, motion.duration / 100, motion.duration):
+        found = motion.trajectory(period)
+        np.testing.assert_allclose(np.diff(found.t)[:-1], period)
+        assert 0 < found.t[-1] - found.t[-2] <= period * (1 + 1e-9)
+        assert (found.t[0], found.t[-1]) == (0, motion.duration)
+        np.testing.assert_array_equal((found.q, found.qd), motion.at(found.t)[:2])
+    assert len(motion.trajectory(motion.duration / 100).t) == 101
+    for wrong in (0.0, -1.0, motion.duration * 1.01, np.nan):
+        with pytest.raises(InputError, match="more than 0, such as"):
+            motion.trajectory(wrong)
+
+
+@pytest.mark.parametrize(
+    ("share", "what"),
+    [(0.0, "is none at 14 .* first at 0.000 s"), (np.nan, "cannot be told at 14 .* 0.000 s")],
+)
+def test_where_nothing_is_permitted_there_is_no_rescaled_motion(share, what):
+    for region in ("", "Face"):
+        why = Ceiling("S", share, region=region, reason="too near")
+        about = f"S, {region}: too near" if region else "S: too near"
+        with pytest.raises(InputError, match=f"{what}.*{about}"):
+            rescale(mapped(MOVES, most=(why, None, None)), not_faster=False, margin=0.0)
+
+
+def test_a_rescaled_motion_uses_what_its_map_leaves_it():
+    """Halved by a criterion at first, and then as fast as its joint may: less the margin each."""
+    found = mapped(MOVES)
+    motion = rescale(found, not_faster=False, margin=0.02)
+    use = check(motion)
+    assert 0.979 < use.map <= 0.98
+    assert max(vars(use).values()) <= 1
+    assert rescale(found, not_faster=False, margin=0.0).duration < motion.duration
+    for wrong in (-0.01, 1.0, np.nan):
+        with pytest.raises(InputError, match="margin"):
+            rescale(found, not_faster=False, margin=wrong)
+
+
+@pytest.mark.parametrize("stretch", [(0.5, 1.0), (1.0, 0.5)])
+def test_of_each_limit_the_worst_use_in_any_piece_is_said(stretch):
+    motion, most = by_hand(*stretch), []
+    for piece, stations in zip(motion.pieces, motion.of.stations, strict=True):
+        use = piece.use(piece.instants(), stations.between, motion.of.limits)
+        most.append([np.max(x) for x in (use.map, use.velocity, use.acceleration, use.jerk)])
+    assert (np.argmax(most, axis=0) == np.argmin(stretch)).all()
+    np.testing.assert_allclose(list(vars(check(motion)).values()), np.max(most, axis=0))
+
+
+def test_not_faster_than_the_given_motion_around_each_place():
+    (stations,) = mapped(MOVES, most=(HALF,)).stations
+    stations.given[20:23] = 0
+    s = np.concatenate([stations.s, (stations.s[1:] + stations.s[:-1]) / 2])
+    free, held = (ceiling(stations, not_faster=x, margin=0.1)(s) for x in (False, True))
+    np.testing.assert_allclose(free, 0.9)
+    least = 0.01 * stations.given.max()
+    for at, now in zip(s, held, strict=True):
+        k = min(np.searchsorted(stations.s, at, side="right") - 1, 39)
+        assert now == pytest.approx(min(0.9, max(*stations.given[[k, k + 1]], least)))
+    rests = ceiling(replace(stations, given=np.zeros(41)), not_faster=True, margin=0.0)(s)
+    np.testing.assert_allclose(rests, 1e-14)
+
+
+@pytest.mark.parametrize(
+    ("each", "stretch", "stands"), [((MOVES, STANDS, BACK), (0.25, 0.3), 0.5), ((MOVES,), (0.25,), 0.0)]
+)
+def test_where_the_time_goes_is_all_of_it_by_what_governs(each, stretch, stands):
+    motion = by_hand(*stretch, each=each, top=(4.0, 16.0, 1e3))
+    times = spent(motion)
+    assert [one.time for one in times] == sorted((one.time for one in times), reverse=True)
+    by = {one.what: one.time for one in times}
+    assert sum(by.values()) == pytest.approx(motion.duration)
+    assert ("stands as the given motion does" in by) is (stands > 0)
+    assert by.pop("stands as the given motion does", 0) == pytest.approx(stands, abs=0.05)
+    assert by.pop("transition between limits") > 0.2
+    # At the map's speed less the margin, or above it, which is halved by a criterion or not; or speeding up.
+    expected = np.zeros(3)
+    for piece, stations in zip(motion.pieces, motion.of.stations, strict=True):
+        t = np.linspace(0, piece.duration, 20_001)
+        now = piece.profile.at(t)
+        top = stations.between(now.s)
+        at_top, halved = now.speed >= 0.98 * 0.9 * top, np.isclose(top, 2.0)
+        quick = ~at_top & (np.abs(piece.at(t)[2][:, 0]) >= 0.98 * 16)
+        expected += np.array([at_top & halved, at_top & ~halved, quick]).mean(axis=1) * piece.duration
+    assert expected.min() > 0.02
+    assert by == pytest.approx(
+        dict(
+            zip(
+                ("S: distance", "speed of the given motion, or of a joint", "acceleration of j"),
+                expected,
+                strict=True,
+            )
+        ),
+        abs=4e-3,
+    )
+
+
+def test_what_governs_is_what_is_used_most_in_the_order_of_the_limits():
+    (free,) = mapped(MOVES, most=(None,)).stations
+    stations = replace(free, ceilings=tuple((HALF,) if i in (0, 20, 40) else () for i in range(41)))
+    low, names, first = np.zeros(2), ("j1", "j2"), stations.s[20]
+    step, end = stations.s[1], stations.s[-1]
+
+    def governs(of_map, s, *joints):
+        return _governs(of_map, *(np.array(x) for x in joints or (low,) * 3), stations, s, names)
+
+    for s in (0.0, step / 2, first - step / 2, first, first + step / 2, end - step / 2, end):
+        assert governs(0.98, s) == "S: distance"
+    for s in (1.5 * step, first - 1.5 * step, first + 1.5 * step, end - 1.5 * step):
+        assert governs(0.98, s, (1, 0), (1, 0), (1, 0)) == "speed of the given motion, or of a joint"
+    assert governs(0.97, first) == "transition between limits"
+    assert governs(0.97, first, (0.97, 0.98), (1, 0), (1, 0)) == "speed of j2"
+    assert governs(0.97, first, (0, 0.97), (0.99, 0.98), (0, 1)) == "acceleration of j1"
+    assert governs(0.97, first, (0, 0.97), (0, 0.97), (0, 0.98)) == "jerk of j2"

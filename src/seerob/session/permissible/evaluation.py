@@ -42,7 +42,8 @@ class Wish:
     spacing: float = SPACING
     """Largest way between two stations of the map in joint space [rad or m]."""
     margin: float = 0.02
-    """Share of the map's speeds that is not used."""
+    """Share of the map's speeds that is not used, for what happens between two stations and how the twin
+    follows."""
     not_faster: bool = False
     """Nowhere faster than the given motion."""
     period: float = 0.008

@@ -16,8 +16,6 @@ from seerob.session.permissible.timing import CHECK, Ceiling, Timed, timed
 BLOCKED = "change the path or the cell there; where contact may be permitted, power_and_force, --by either"
 USED = 0.98
 """A limit that is used by this share governs."""
-MARGIN = 0.02
-"""Of the map's speeds that is not used, for what happens between two stations and how the twin follows."""
 LEAST_GIVEN = 1e-2
 """Share of its largest speed that the given motion is taken to have everywhere, with ``not_faster``."""
 
@@ -71,16 +69,16 @@ class Rescaled:
 
     @cached_property
     def _clock(self) -> tuple[Array, Array]:
-        """Instants of this motion and of the given one at the same places, both from 0."""
-        begun = self.of.path.pieces[0].t[0] - self.of.path.stands[0]
-        new, old = [0.0], [0.0]
+        """Instants of this motion, from 0, and of the given one, by its own clock, at the same places."""
+        begun = float(self.of.path.pieces[0].t[0] - self.of.path.stands[0])
+        new, old = [0.0], [begun]
         for piece, start in zip(self.pieces, self.starts, strict=True):
             local = np.arange(0.0, piece.duration, 10 * CHECK)
             new += [*(start + local).tolist(), start + piece.duration]
             s = piece.profile.at(np.append(local, piece.duration)).s
-            old += (piece.piece.when(s) - begun).tolist()
+            old += piece.piece.when(s).tolist()
         new.append(self.duration)
-        old.append(self.before)
+        old.append(begun + self.before)
         return np.array(new), np.maximum.accumulate(np.array(old))
 
     def trajectory(self, period: float) -> Trajectory:
@@ -98,7 +96,7 @@ class Rescaled:
         return Trajectory("rescaled trajectory", t, q, qd)
 
 
-def rescale(found: SpeedMap, *, not_faster: bool = False, margin: float = MARGIN) -> Rescaled:
+def rescale(found: SpeedMap, *, not_faster: bool, margin: float) -> Rescaled:
     """Time a path within its map.
 
     Args:
@@ -174,8 +172,7 @@ def check(motion: Rescaled) -> Check:
     """Look at every limit again, independently of how the motion came about."""
     most = np.zeros(4)
     for piece, stations in zip(motion.pieces, motion.of.stations, strict=True):
-        t = np.union1d(np.arange(0.0, piece.duration, CHECK), piece.instants())
-        use = piece.use(t, stations.between, motion.of.limits)
+        use = piece.use(piece.instants(), stations.between, motion.of.limits)
         most = np.maximum(most, [np.max(x) for x in (use.map, use.velocity, use.acceleration, use.jerk)])
     return Check(*most.tolist())
 

@@ -235,7 +235,7 @@ class Verified:
     @property
     def kept(self) -> bool:
         """Whether the plan keeps to the criteria at every instant looked at."""
-        return self.use <= 1 + 1e-9 and not self.undecided
+        return self.asked > 0 and self.use <= 1 + 1e-9 and not self.undecided
 
 
 def verify(
@@ -263,7 +263,8 @@ def verify(
     use, at, what_then = 0.0, 0.0, ""
     over: list[Array] = []
     for piece, start, stations in zip(motion.pieces, motion.starts, motion.of.stations, strict=True):
-        t = np.arange(0.0, piece.duration, period)
+        # In its middle too: whatever the period, no piece is without a look.
+        t = np.union1d(np.arange(0.0, piece.duration, period), piece.duration / 2)
         moment = piece.profile.at(t)
         q, qd, _, _ = piece.at(t)
         moving = moment.speed > RESTS * stations.between(moment.s)

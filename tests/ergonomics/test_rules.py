@@ -1,6 +1,7 @@
 """The rules on the twin: sides, verdicts, what is not assessed, phases, accuracy, what drives a score."""
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -393,3 +394,44 @@ def test_every_action_level_is_announced_with_its_highest_score(tmp_path):
     assert [level.up_to for level in infos["rula"].levels] == [2, 4, 6, 7]
     assert [level.name for level in infos["reba"].levels] == [f"action level {k}" for k in range(5)]
     assert [level.up_to for level in infos["owas"].levels] == [1, 2, 3, 4]
+
+
+PHASE = """
+[[phases]]
+load = 0
+supported_arms = "none"
+back_supported = false
+legs = "standing"
+balanced = true
+rapid = false
+{}
+"""
+HELD_RULES = {
+    "iso_11226": "limit = 1\nfrom_rest = true",
+    "rula": "action_level = 2\ndetect = { from_rest = true }",  # 4, and 5 once it is static
+    "posture_table": 'table = "held.csv"\nlimit = 4\nfrom_rest = true',
+    "acme.bending": "limit = 10",
+}
+HELD_TABLE = "angle,from_deg,to_deg,score,hold_s\ntrunk flexion,,20,0,\ntrunk flexion,20,,1,\n" + (
+    "trunk flexion,45,,6,4\n"
+)
+
+
+@pytest.mark.parametrize("kind", HELD_RULES)
+@pytest.mark.parametrize(
+    ("bent", "more", "verdict"),
+    [
+        ("lumbar_flexion = 40, thorax_flexion = 30, neck_flexion = 30", "", Verdict.UNDECIDED),
+        ("", "", Verdict.WITHIN),
+        ("", "end = 20", Verdict.WITHIN),
+    ],
+)
+def test_how_long_a_posture_is_held_that_nothing_moves_nobody_knows(
+    tmp_path, monkeypatch, kind, bent, more, verdict
+):
+    """One instant is all of such a run, and at its first instant nothing is held yet."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    cell = HUMAN.format(posture="standing") + f"joints_deg = {{ {bent} }}\n" + PHASE.format(more)
+    cell += f'[[ergonomics]]\nkind = "{kind}"\nhuman = "op"\n{HELD_RULES[kind]}\n'
+    station = made(tmp_path, cell, {"held.csv": HELD_TABLE})
+    assert station.run().verdict is verdict

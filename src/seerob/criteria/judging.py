@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable, Sequence
+from copy import copy
 from functools import partial
 
 from msgspec.structs import replace
@@ -22,6 +23,9 @@ from seerob.criteria.question import Bound, Kept, Question, held_names, question
 from seerob.model.model import Model
 from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import SLACK
+
+SHIFT = 28800.0
+"""How much later a run in which nobody moves is looked at again [s]."""
 
 _log = logging.getLogger(__name__)
 # To ask an enumeration for a member takes longer than all the rest of a judgement.
@@ -167,10 +171,13 @@ class Judge:
     Args:
         bound: The criteria.
         findings: Of sources and of the run, besides those of the model (`Finding.holds`).
+        still: Whether nobody ever moves, so that the first instant stands for all that come.
     """
 
-    def __init__(self, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> None:
-        self._bound = bound
+    def __init__(
+        self, bound: Sequence[Bound], findings: Iterable[Finding] = (), *, still: bool = False
+    ) -> None:
+        self._bound, self._still = bound, still
         self._questions: list[Question] = []
         """Of every criterion, once the model is known."""
         self._findings = tuple(findings)
@@ -204,6 +211,10 @@ class Judge:
             findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *self._worded)))
             self._hold(state.model, findings)
         results = [self._one(question, state) for question in self._questions]
+        if self._still:
+            self._still = False
+            every = zip(self._questions, results, strict=True)
+            results = [self._lasting(question, result, state) for question, result in every]
 
         def ask(i: int) -> Result:
             self._questions[i].kept = None
@@ -254,6 +265,29 @@ class Judge:
             asked = tuple(sorted(state.asked))
             question.kept = Kept(result, state.t, state.t + every, result.muted, asked)
         return result
+
+    def _lasting(self, question: Question, result: Result, state: State) -> Result:
+        """What is said of the first instant of nobody's motion, as far as it is said a shift later, too.
+
+        How long something is held is a figure of methods that judge work: none at the first instant.
+        """
+        criterion, model = question.criterion, state.model
+        by_instant = not (question.own or question.bound.group == "ergonomics" or criterion.remembers(model))
+        if by_instant or result.verdict is not _WITHIN:
+            return result
+        later = State(model, copy(state.data), state.hearings, state.signals)
+        later.attachments = state.attachments
+        edges = question.turns(state.t, state.t + SHIFT) if question.turns is not None else ()
+        later.refresh((state.t + edges[0]) / 2 if edges else state.t + SHIFT)
+        evaluate = criterion.bind(model)  # what the one that is asked remembers is of the run
+        said = [self._says(question, evaluate, twin) for twin in (state, later)][-1]
+        limit, ends = said.limit, said.interval or ()
+        keeps_it = limit is not None and all(keeps(end, limit, at_most=said.at_most) for end in ends)
+        if said.verdict is _WITHIN or (said.verdict is _UNDECIDED and ends and keeps_it):
+            return result
+        why = "" if said.reason in result.reason else f" ({said.reason})"
+        text = f"nothing moves, and {later.t - state.t:g} s later it is {said.verdict or 'not judged'}{why}"
+        return undecided(result, f"{text}: give a motion that lasts as long as the work")
 
     def _at_least(self, question: Question, evaluate: Evaluate, state: State, reason: str) -> Result:
         """What the known masses of a robot exceed, when others are not known; else undecided."""

@@ -309,6 +309,9 @@ def test_line_ends_and_forms_of_toml_stay_as_they_are(tmp_path):
     assert made == raw.replace(b"k = 1", b"k = 2")
     made, _ = changed(raw, [Change(kind="remove", path=("parts", 0))], "")
     assert made == raw[:16] + raw[raw.index(b"[other]") :]
+    turned = Change(kind="set", path=("at", "rpy_deg"), value=[0, 0, 30])
+    made, _ = changed(b"at = { position = [1, 2, 3] } # x\n", [turned], "")
+    assert made == b"at = { position = [1, 2, 3], rpy_deg = [0, 0, 30] } # x\n"
     inline = b"parts = [ { name = 'a' }, { name = 'b' } ] # all\n"
     made, _ = changed(inline, [Change(kind="set", path=("parts", 1, "name"), value="c")], "")
     assert made == inline.replace(b"'b'", b'"c"')

@@ -1,5 +1,6 @@
 // The page's end of the worker: what it says becomes signals, traces and poses.
 
+import { draft, heardEdited, lostDraft } from "./editing/draft";
 import type { Frame, FromWorker, ToWorker } from "./messages";
 import {
   beginScene,
@@ -76,7 +77,10 @@ export class Connection {
     switch (message.kind) {
       case "link":
         if (link.value.state !== "refused") link.value = { state: message.state, reason: message.reason };
-        if (message.state !== "open") stale.value = true;
+        if (message.state !== "open") {
+          stale.value = true;
+          lostDraft();
+        }
         return;
       case "hello":
         hello.value = message.hello;
@@ -102,6 +106,12 @@ export class Connection {
         return;
       case "tracked":
         tracked.value = message.tracked;
+        return;
+      case "draft":
+        draft.value = message.draft;
+        return;
+      case "edited":
+        heardEdited(message.edited);
         return;
       case "points":
         for (const points of message.points) traces.get(points.name)?.append(points);

@@ -1,5 +1,7 @@
 // The keys of the page; they do nothing while one writes or uses a control that needs them itself.
 
+import { ask, mayEdit } from "./editing/draft";
+import { gizmoMode } from "./editing/handles";
 import { rows, select, selection, toggleMuted } from "./page_state";
 import type { Actions } from "./panels/app_context";
 import { keysShown } from "./panels/Keys";
@@ -19,6 +21,13 @@ export function listenToKeys(actions: Actions): void {
   });
   window.addEventListener("keydown", (event) => {
     if (event.key === "Tab") byKeys = true;
+    const redo = event.shiftKey || event.key === "y";
+    if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(event.key) && mayEdit.peek()) {
+      if (needsKeys(event.target, event.key)) return;
+      event.preventDefault();
+      void ask(redo ? "redo" : "undo");
+      return;
+    }
     if (event.ctrlKey || event.metaKey || event.altKey || needsKeys(event.target, event.key)) return;
     // An open dialog takes its own keys, and time stands still behind it.
     if (keysShown.peek() && event.key !== "?") return;
@@ -57,6 +66,14 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
     case "l":
     case "L":
       return () => time.follow();
+    case "m":
+    case "M":
+    case "r":
+    case "R":
+      if (!mayEdit.peek()) return null;
+      return () => {
+        gizmoMode.value = key.toLowerCase() === "m" ? "move" : "turn";
+      };
     case "?":
       return () => {
         keysShown.value = !keysShown.peek();

@@ -4,6 +4,7 @@ import "uplot/dist/uPlot.min.css";
 import "./look/index.css";
 import { h, render } from "preact";
 import { Connection } from "./connection";
+import { connectDraft } from "./editing/draft";
 import { listenToKeys } from "./keyboard";
 import { now, selectedNodes } from "./page_state";
 import { App } from "./panels/App";
@@ -25,6 +26,8 @@ declare global {
       doubted(name: string): boolean;
       /** Where a point of the world (z up) [m] is on the screen [px]. */
       project(point: [number, number, number]): [number, number];
+      /** Whether the pointer is on a handle of what is edited, or drags one. */
+      readonly held: boolean;
     };
   }
 }
@@ -39,6 +42,7 @@ function begin(element: HTMLElement): void {
   });
   actions.time.connect((message) => connection.send(message));
   actions.offer = (tracking) => connection.send({ kind: "tracking", tracking });
+  connectDraft((edit) => connection.send({ kind: "edit", edit }));
   actions.look = (preset) => viewer.viewpoint.go(preset);
   actions.frameSelection = () => {
     const names = selectedNodes.value;
@@ -56,6 +60,9 @@ function begin(element: HTMLElement): void {
     tint: (name) => viewer.bodies.byName.get(name)?.tint ?? null,
     doubted: (name) => viewer.bodies.byName.get(name)?.doubted ?? false,
     project: (point) => viewer.project(point),
+    get held() {
+      return viewer.gizmo.held;
+    },
   };
 }
 

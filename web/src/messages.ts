@@ -1,6 +1,19 @@
 // What the worker and the page tell each other. The worker owns the socket; the page owns the screen.
 
-import type { Hello, History, Result, Scene, Snapshot, SoFar, Tracked, Tracking, Transport } from "./wire";
+import type {
+  Draft,
+  Edit,
+  Edited,
+  Hello,
+  History,
+  Result,
+  Scene,
+  Snapshot,
+  SoFar,
+  Tracked,
+  Tracking,
+  Transport,
+} from "./wire";
 
 /** What a page asks of the server; `ack` is the worker's own affair. */
 export type Action = "play" | "pause" | "seek" | "speed" | "step" | "loop";
@@ -41,6 +54,9 @@ export type FromWorker =
   | { kind: "so_far"; soFar: SoFar }
   /** What became of what this page's headset sees. */
   | { kind: "tracked"; tracked: Tracked }
+  | { kind: "draft"; draft: Draft }
+  /** What became of what this page asked of the file. */
+  | { kind: "edited"; edited: Edited }
   /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
   | { kind: "frame"; frame: Frame; heard: number; silent: boolean }
   /** A live run has said nothing for too long. */
@@ -55,5 +71,6 @@ export type ToWorker =
   | { kind: "recycle"; buffer: ArrayBuffer }
   | { kind: "command"; action: Action; value: number | null }
   | { kind: "tracking"; tracking: Tracking }
+  | { kind: "edit"; edit: Edit }
   /** While live: show the kept snapshot of this run time, or follow the newest (null). */
   | { kind: "look"; t: number | null };

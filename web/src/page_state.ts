@@ -148,7 +148,8 @@ function toggled(set: ReadonlySet<string>, names: readonly string[]): ReadonlySe
 /** A new scene: what belonged to another one is forgotten, the rest is kept over a reconnection. */
 export function beginScene(next: Scene): void {
   batch(() => {
-    if (scene.value?.workstation_hash !== next.workstation_hash) {
+    // What is edited is called as before; another run is another run.
+    if (scene.value?.workstation_hash !== next.workstation_hash && hello.value?.mode !== "edit") {
       selection.value = null;
       hidden.value = new Set();
       mutedCriteria.value = new Set();

@@ -69,6 +69,12 @@ function received(message: ServerMessage, raw: Uint8Array): void {
     case "tracked":
       post({ kind: "tracked", tracked: message });
       return;
+    case "draft":
+      post({ kind: "draft", draft: message });
+      return;
+    case "edited":
+      post({ kind: "edited", edited: message });
+      return;
   }
 }
 
@@ -178,6 +184,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "tracking":
       socket?.send(message.tracking);
+      return;
+    case "edit":
+      socket?.send(message.edit);
       return;
     case "look":
       look(message.t);

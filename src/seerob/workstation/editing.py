@@ -271,6 +271,14 @@ def _in_piece(body: str, change: Change) -> str:
         at = at[part]
     key: Any = change.path[-1]
     match change.kind:
+        case "set" if isinstance(at, tomlkit.items.InlineTable) and key not in at:
+            # As it is written by hand, with spaces inside of the braces.
+            inner = at.as_string().strip()[1:-1].strip()
+            more = f"{_key(key)} = {literal(change.value)}"
+            around: Any = document
+            for part in change.path[:-2]:
+                around = around[part]
+            around[change.path[-2]] = tomlkit.value(f"{{ {inner + ', ' if inner else ''}{more} }}")
         case "set":
             at[key] = tomlkit.value(literal(change.value))
         case "remove":

@@ -2,6 +2,7 @@
 
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
@@ -18,6 +19,7 @@ import { ViewTools } from "./ViewTools";
 
 export function App({ room }: { room: (element: HTMLElement) => void }) {
   const place = useRef<HTMLDivElement>(null);
+  const plots = usePlotCount();
   useEffect(() => room(place.current!), [room]);
   useEffect(
     () =>
@@ -44,12 +46,16 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       </main>
       <RightSide />
       <footer class="bottom">
-        <Plots count={usePlotCount()} />
+        {!notRun.value && <Plots count={plots} />}
         <div class="time-row">
-          <TransportBar />
+          {notRun.value ? (
+            <p class="not-run">Nothing is run: this is where everybody begins.</p>
+          ) : (
+            <TransportBar />
+          )}
           <PageTools />
         </div>
-        <Timeline />
+        {!notRun.value && <Timeline />}
       </footer>
       <Keys />
     </div>

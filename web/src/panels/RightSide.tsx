@@ -1,15 +1,18 @@
 // What is said: verdicts, contacts on the body, posture, and what to know of the model.
 
 import { useSignal } from "@preact/signals";
+import { mayEdit } from "../editing/draft";
 import { BodyMap } from "./BodyMap";
 import { CriteriaTable } from "./CriteriaTable";
+import { Editor } from "./Editor";
 import { allFindings, Findings } from "./Findings";
 import { Posture } from "./Posture";
 
-const TABS = ["criteria", "body", "posture", "findings"] as const;
+const TABS = ["edit", "criteria", "body", "posture", "findings"] as const;
 type Tab = (typeof TABS)[number];
 
 const TITLES: Record<Tab, string> = {
+  edit: "Edit",
   criteria: "Criteria",
   body: "Body",
   posture: "Posture",
@@ -17,15 +20,21 @@ const TITLES: Record<Tab, string> = {
 };
 
 export function RightSide() {
-  const tab = useSignal<Tab>("criteria");
-  const shown = tab.value;
+  const tab = useSignal<Tab | null>(null);
+  const tabs = TABS.filter((name) => name !== "edit" || mayEdit.value);
+  const shown = tab.value ?? tabs[0]!;
   const open = (name: Tab): void => {
     tab.value = name;
   };
   return (
     <aside class="right" aria-label="Results">
-      <div class="tabs" role="tablist" aria-label="Results" onKeyDown={(event) => turn(event, shown, open)}>
-        {TABS.map((name) => (
+      <div
+        class="tabs"
+        role="tablist"
+        aria-label="Results"
+        onKeyDown={(event) => turn(event, tabs, shown, open)}
+      >
+        {tabs.map((name) => (
           <button
             key={name}
             type="button"
@@ -42,6 +51,7 @@ export function RightSide() {
         ))}
       </div>
       <div class="tabpanel" id="results" role="tabpanel" aria-labelledby={`tab-${shown}`}>
+        {shown === "edit" && <Editor />}
         {shown === "criteria" && <CriteriaTable />}
         {shown === "body" && <BodyMap />}
         {shown === "posture" && <Posture />}
@@ -53,17 +63,17 @@ export function RightSide() {
 }
 
 // Arrows go from tab to tab while the focus is on one; everywhere else time has them.
-function turn(event: KeyboardEvent, shown: Tab, open: (name: Tab) => void): void {
-  const at = TABS.indexOf(shown);
+function turn(event: KeyboardEvent, tabs: readonly Tab[], shown: Tab, open: (name: Tab) => void): void {
+  const at = tabs.indexOf(shown);
   const to: Record<string, number> = {
-    ArrowRight: (at + 1) % TABS.length,
-    ArrowLeft: (at + TABS.length - 1) % TABS.length,
+    ArrowRight: (at + 1) % tabs.length,
+    ArrowLeft: (at + tabs.length - 1) % tabs.length,
     Home: 0,
-    End: TABS.length - 1,
+    End: tabs.length - 1,
   };
   const next = to[event.key];
   if (next === undefined) return;
-  open(TABS[next]!);
+  open(tabs[next]!);
   (event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=tab]")[next]?.focus();
   event.preventDefault();
   event.stopPropagation();

@@ -1,5 +1,6 @@
 // What is shown, from where, and what the run came to.
 
+import { notRun } from "../editing/draft";
 import { against, percent, withUnit } from "../figures";
 import {
   elsewhere,
@@ -47,7 +48,13 @@ function SourceState() {
     connecting: "connecting…",
     lost: "disconnected – trying again",
     refused: "refused",
-    open: isLive.value ? (stale.value ? "live – nothing heard" : "live") : "replay",
+    open: notRun.value
+      ? "editing"
+      : isLive.value
+        ? stale.value
+          ? "live – nothing heard"
+          : "live"
+        : "replay",
   }[state];
   const look = lost || stale.value ? "off" : isLive.value ? "live" : "replay";
   return (
@@ -83,6 +90,17 @@ function StatusPill() {
       </output>
     );
   }
+  if (notRun.value) {
+    return (
+      <output class="pill state-none" aria-live="polite">
+        <span class="badge-icon" aria-hidden="true">
+          –
+        </span>
+        <strong>NOT RUN</strong>
+        <AtInstant />
+      </output>
+    );
+  }
   const run = runState.value;
   const other = elsewhere.value;
   const told = soFar.value;
@@ -112,7 +130,7 @@ function AtInstant() {
   const there = orderedRows.value.filter((row) => row.state === state);
   const worst = there[0];
   const named = worst && state !== "within" && state !== "none";
-  const when = isLive.value && lookingAt.value === null ? "now" : "here";
+  const when = notRun.value ? "at the start" : isLive.value && lookingAt.value === null ? "now" : "here";
   return (
     <span class={`pill-now now-${state}`}>
       {when} <span aria-hidden="true">{STATE_ICONS[state]}</span> {STATE_WORDS[state]}

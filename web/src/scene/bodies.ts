@@ -147,6 +147,8 @@ export class Bodies {
   private hidden: ReadonlySet<string> = new Set();
   private absent: ReadonlySet<string> = new Set();
   private generation = 0;
+  /** Meshes of this scene and the one before: an edit changes few. */
+  private models = new Map<string, Promise<Object3D>>();
   private readonly position = new Vector3();
   private readonly orientation = new Quaternion();
 
@@ -166,20 +168,23 @@ export class Bodies {
       this.root.add(body.group);
     }
     const failed: string[] = [];
+    const before = this.models;
     const models = new Map<string, Promise<Object3D>>();
+    this.models = models;
     await Promise.all(
       this.list.map(async (body) => {
         const hash = body.node.mesh;
         if (!hash) return;
         let model = models.get(hash);
         if (!model) {
-          model = fetchModel(hash);
+          model = before.get(hash) ?? fetchModel(hash);
           models.set(hash, model);
         }
         try {
           const shape = (await model).clone();
           if (generation === this.generation) body.dress(shape);
         } catch {
+          models.delete(hash);
           failed.push(body.node.name);
         }
       }),

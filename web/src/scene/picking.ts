@@ -7,14 +7,21 @@ import type { Stage } from "./stage";
 /** A pointer that moved less than this between press and release clicked [px]. */
 const STILL_PX = 4;
 
-export function pickOnClick(stage: Stage, bodies: Bodies, picked: (name: string | null) => void): void {
+/** @param taken Whether something else has the pointer, such as the handles of what is moved. */
+export function pickOnClick(
+  stage: Stage,
+  bodies: Bodies,
+  picked: (name: string | null) => void,
+  taken: () => boolean,
+): void {
   const canvas = stage.renderer.domElement;
   const ray = new Raycaster();
   const at = new Vector2();
   const pressed = new Vector2();
   canvas.addEventListener("pointerdown", (event) => pressed.set(event.clientX, event.clientY));
   canvas.addEventListener("pointerup", (event) => {
-    if (event.button !== 0 || pressed.distanceTo(at.set(event.clientX, event.clientY)) > STILL_PX) return;
+    if (taken() || event.button !== 0 || pressed.distanceTo(at.set(event.clientX, event.clientY)) > STILL_PX)
+      return;
     const box = canvas.getBoundingClientRect();
     at.set(
       ((event.clientX - box.left) / box.width) * 2 - 1,

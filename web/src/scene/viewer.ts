@@ -13,6 +13,7 @@ import { manikinTints } from "../posture/coloring";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
 import { DoubtCaptions } from "./doubt_captions";
+import { Gizmo } from "./gizmo";
 import { Outline } from "./outline";
 import { pickOnClick } from "./picking";
 import { Stage } from "./stage";
@@ -35,6 +36,7 @@ export class Viewer {
   private readonly doubts = new DoubtCaptions(this.bodies);
   private readonly outline = new Outline(this.bodies);
   private readonly view: View;
+  readonly gizmo: Gizmo;
   private readonly glide = new Glide();
   private feed: PoseFeed | null = null;
   private frame: Frame | null = null;
@@ -50,7 +52,15 @@ export class Viewer {
     this.stage.world.add(this.bodies.root, this.markers.root, this.doubts.root);
     this.viewpoint = new Viewpoint(this.stage, this.bodies);
     this.view = { camera: this.stage.camera, pixel: 0, margins: true };
-    pickOnClick(this.stage, this.bodies, (name) => select(name === null ? null : { kind: "node", name }));
+    this.gizmo = new Gizmo(this.stage, this.bodies, (free) => {
+      this.viewpoint.controls.enabled = free;
+    });
+    pickOnClick(
+      this.stage,
+      this.bodies,
+      (name) => select(name === null ? null : { kind: "node", name }),
+      () => this.gizmo.held,
+    );
     this.follow();
     new ResizeObserver(() => this.stage.invalidate()).observe(element);
   }
@@ -86,6 +96,7 @@ export class Viewer {
       const shown = this.glide.at(time);
       if (shown) {
         this.bodies.pose(shown);
+        this.gizmo.place();
         this.posed = true;
         this.stage.moved();
       }

@@ -1,0 +1,441 @@
+// The workstation file, edited: what is selected, where it is, what else is said of it, and what there may be more.
+
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import {
+  ask,
+  asking,
+  change,
+  chosenEntry,
+  draft,
+  type Entry,
+  entries,
+  freeName,
+  isCriteria,
+  isPlaced,
+  mistakesAt,
+  named,
+  type Path,
+  refused,
+  set,
+  type Table,
+} from "../editing/draft";
+import { gizmoMode, lengthUnit, STEP_NAMES, STEPS, steps } from "../editing/handles";
+import { moveTo, placing, poseKey, setNumber, tidy } from "../editing/pose";
+import { entrySchema, fetchSchema, kinds, schema } from "../editing/schema";
+import { select } from "../page_state";
+import type { Change } from "../wire";
+import { MistakeList } from "./MistakeList";
+import { Review } from "./Review";
+import { NameChoices, SchemaForm } from "./SchemaForm";
+
+const GROUPS: readonly [group: string, title: string, one: string][] = [
+  ["robots", "Robots", "robot"],
+  ["parts", "Parts", "part"],
+  ["areas", "Areas", "area"],
+  ["sensors", "Sensors", "sensor"],
+  ["humans", "People", "person"],
+  ["machines", "Machines", "machine"],
+  ["tools", "Tools", "tool"],
+  ["workpieces", "Workpieces", "workpiece"],
+  ["safety", "Safety criteria", "safety criterion"],
+  ["ergonomics", "Ergonomics", "ergonomics rule"],
+];
+/** How far a copy stands from what it is a copy of [m]. */
+const ASIDE = 0.5;
+
+export function Editor() {
+  useEffect(() => void fetchSchema(), []);
+  const adding = useSignal<string | null>(null);
+  const reviewing = useSignal(false);
+  const now = draft.value;
+  if (!now) return <p class="empty">The server has not said what the file has.</p>;
+  const entry = chosenEntry.value;
+  const changedLines = now.diff.split("\n").filter((line) => /^[+-](?![+-]{2})/.test(line)).length;
+  return (
+    <section class="editor scroll" aria-label="Edit">
+      <NameChoices />
+      <div class="edit-bar">
+        <button type="button" disabled={!now.undo} title="Ctrl+Z" onClick={() => void ask("undo")}>
+          Undo
+        </button>
+        <button type="button" disabled={!now.redo} title="Ctrl+Y" onClick={() => void ask("redo")}>
+          Redo
+        </button>
+        <button
+          type="button"
+          class="primary"
+          disabled={now.diff === ""}
+          onClick={() => {
+            reviewing.value = true;
+          }}
+        >
+          Review and save{changedLines > 0 && ` (${changedLines})`}
+        </button>
+        <span role="status">{asking.value ? "checking …" : now.diff === "" ? "saved" : "not saved"}</span>
+      </div>
+      <div class="edit-bar">
+        <select
+          aria-label="What is edited"
+          value={entry ? `${entry.group} ${entry.index}` : ""}
+          onChange={(event) => {
+            adding.value = null;
+            choose(event.currentTarget.value);
+          }}
+        >
+          <option value="">select something …</option>
+          {GROUPS.map(([group, title]) => {
+            const own = entries.value.filter((e) => e.group === group);
+            return (
+              own.length > 0 && (
+                <optgroup key={group} label={title}>
+                  {own.map((e) => (
+                    <option key={e.index} value={`${group} ${e.index}`}>
+                      {e.name}
+                    </option>
+                  ))}
+                </optgroup>
+              )
+            );
+          })}
+        </select>
+        <select
+          aria-label="Add"
+          value=""
+          onChange={(event) => {
+            adding.value = event.currentTarget.value || null;
+            refused.value = null;
+            event.currentTarget.value = "";
+          }}
+        >
+          <option value="">add …</option>
+          {GROUPS.map(([group, , one]) => (
+            <option key={group} value={group}>
+              {one}
+            </option>
+          ))}
+        </select>
+      </div>
+      <Refusal
+        path={adding.value ? [adding.value, count(adding.value)] : entry && [entry.group, entry.index]}
+      />
+      {adding.value ? (
+        <Adding
+          key={adding.value}
+          group={adding.value}
+          close={() => {
+            adding.value = null;
+          }}
+        />
+      ) : entry ? (
+        <EntryForm key={`${entry.group} ${entry.index}`} entry={entry} />
+      ) : (
+        <p class="empty">Select something in the room, the tree or above, or add something.</p>
+      )}
+      <Review
+        open={reviewing.value}
+        close={() => {
+          reviewing.value = false;
+        }}
+      />
+    </section>
+  );
+}
+
+const count = (group: string): number => entries.value.filter((e) => e.group === group).length;
+
+function choose(value: string): void {
+  const [group, index] = value.split(" ");
+  const found = entries.value.find((e) => e.group === group && e.index === Number(index));
+  if (found) select({ kind: isCriteria(found.group) ? "criterion" : "owner", name: found.name });
+  else select(null);
+}
+
+/** What was refused and is not beside a field that is shown. */
+function Refusal({ path }: { path: Path | null }) {
+  const last = refused.value;
+  if (!last) return null;
+  const beside = path ? mistakesAt(path) : [];
+  const start = path ? named(path) : "";
+  const elsewhere = last.mistakes.filter((m) => !beside.includes(m) || m.key === start);
+  const removed = last.changes[0]?.kind === "remove" && typeof last.changes[0].path.at(-1) === "number";
+  const others = removed ? speakers(last.mistakes.map(({ key }) => key)) : [];
+  return (
+    <div class="refusal" role="alert">
+      <p>
+        Refused; nothing was changed
+        {elsewhere.length < last.mistakes.length && ": see below"}
+      </p>
+      <MistakeList mistakes={elsewhere} keys />
+      {others.length > 0 && (
+        <button
+          type="button"
+          onClick={() => void change(...removals([...others, ...last.changes.map((c) => c.path)]))}
+        >
+          Remove with {others.map(named).join(", ")}
+        </button>
+      )}
+    </div>
+  );
+}
+
+function speakers(keys: readonly string[]): Path[] {
+  const found = new Map<string, Path>();
+  for (const key of keys) {
+    const at = key.match(/^(\w+)\[(\d+)\]/);
+    if (at) found.set(at[0], [at[1]!, Number(at[2])]);
+  }
+  return [...found.values()];
+}
+
+// The last of a list first: the numbers of those before it stay.
+function removals(paths: Path[]): Change[] {
+  const once = new Map(paths.map((path) => [named(path), path]));
+  return [...once.values()]
+    .sort((a, b) => Number(b[1]) - Number(a[1]))
+    .map((path) => ({ kind: "remove", path, value: null }));
+}
+
+function EntryForm({ entry }: { entry: Entry }) {
+  const { group, index, table, name } = entry;
+  const path: Path = [group, index];
+  const form = schema.value ? entrySchema(group, table) : null;
+  const at = poseKey(entry);
+  const copy = async (): Promise<void> => {
+    const other = freeName(name);
+    const value: Table = { name: other };
+    if (at !== null && isPlaced(group)) {
+      const { position } = placing(entry);
+      const shifted = moveTo(entry, position.setX(position.x + ASIDE), null);
+      const pose = (table[at] ?? {}) as Table;
+      const [one] = shifted;
+      if (one)
+        value[at] = table[at] === undefined ? one.value : { ...pose, [String(one.path.at(-1))]: one.value };
+    }
+    if (await change({ kind: "copy", path, value }))
+      select({ kind: isCriteria(group) ? "criterion" : "owner", name: other });
+  };
+  return (
+    <div class="entry" data-entry={named(path)}>
+      <h2>{name}</h2>
+      {typeof table.kind === "string" && <p class="kind">{table.kind}</p>}
+      {at !== null && <PlaceForm entry={entry} at={at} />}
+      {form ? (
+        <SchemaForm
+          schema={form}
+          table={table}
+          path={path}
+          without={at === null ? [] : [at]}
+          onChange={(key, value) =>
+            void change(
+              value === undefined
+                ? { kind: "remove", path: [...path, key], value: null }
+                : set([...path, key], value),
+            )
+          }
+        />
+      ) : (
+        <p class="empty">{schema.value ? "A kind of your own: edit its options in the file." : "…"}</p>
+      )}
+      <div class="edit-bar">
+        <button type="button" onClick={() => void copy()}>
+          Copy
+        </button>
+        <button type="button" onClick={() => void change({ kind: "remove", path, value: null })}>
+          Remove
+        </button>
+      </div>
+    </div>
+  );
+}
+
+const AXES = ["x", "y", "z"] as const;
+const TURNS = ["roll", "pitch", "yaw"] as const;
+
+function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
+  const place = placing(entry);
+  const scale = lengthUnit.value === "mm" ? 1000 : 1;
+  const [length, angle] = STEPS[steps.value];
+  return (
+    <fieldset class="place">
+      <legend>
+        Place
+        {typeof entry.table.on === "string" && <span class="unit"> on {entry.table.on}</span>}
+      </legend>
+      <div class="numbers">
+        {AXES.map((axis, k) => (
+          <NumberField
+            key={axis}
+            name={axis}
+            unit={lengthUnit.value}
+            value={tidy(place.position.getComponent(k) * scale, 6)}
+            step={(length || 0.001) * scale}
+            put={(value) => change(...setNumber(entry, "position", k, value / scale))}
+          />
+        ))}
+        {TURNS.map((turn, k) => (
+          <NumberField
+            key={turn}
+            name={turn}
+            unit="°"
+            value={place.rpy[k]!}
+            step={angle || 1}
+            put={(value) => change(...setNumber(entry, "rpy", k, value))}
+          />
+        ))}
+      </div>
+      <MistakeList mistakes={mistakesAt([entry.group, entry.index, at])} />
+      <div class="edit-bar">
+        <Choice name="Handles" choices={["move", "turn"] as const} chosen={gizmoMode} />
+        <Choice
+          name="Steps"
+          choices={STEP_NAMES}
+          chosen={steps}
+          title={(one) => (STEPS[one][0] ? `${STEPS[one][0] * 1000} mm, ${STEPS[one][1]}°` : "none")}
+        />
+        <Choice name="Unit" choices={["m", "mm"] as const} chosen={lengthUnit} />
+      </div>
+    </fieldset>
+  );
+}
+
+interface ChoiceProps<T extends string> {
+  name: string;
+  choices: readonly T[];
+  chosen: { value: T };
+  title?: (one: T) => string;
+}
+
+function Choice<T extends string>({ name, choices, chosen, title = (one) => one }: ChoiceProps<T>) {
+  return (
+    <label>
+      {name}{" "}
+      <select
+        value={chosen.value}
+        onChange={(event) => {
+          chosen.value = choices.find((one) => one === event.currentTarget.value) ?? chosen.value;
+        }}
+      >
+        {choices.map((one) => (
+          <option key={one} value={one}>
+            {title(one)}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
+interface NumberProps {
+  name: string;
+  unit: string;
+  value: number;
+  step: number;
+  put(value: number): Promise<boolean>;
+}
+
+function NumberField({ name, unit, value, step, put }: NumberProps) {
+  return (
+    <label>
+      {name} <span class="unit">[{unit}]</span>
+      <input
+        type="number"
+        step={step}
+        value={value}
+        onChange={async (event) => {
+          const input = event.currentTarget;
+          const next = input.valueAsNumber;
+          // What is refused is not what the file has.
+          if (!Number.isFinite(next) || !(await put(next))) input.value = String(value);
+        }}
+      />
+    </label>
+  );
+}
+
+// Shapes and fields to begin with; figures that a verdict rests on are left to whoever adds it.
+const BEGIN: Record<string, () => Table> = {
+  robots: () => ({ name: freeName("robot"), model: "library:ur5e", base: { position: [0, 0, 0] } }),
+  parts: () => ({ name: freeName("part"), shape: { box: [0.5, 0.5, 0.5] }, at: { position: [0, 0, 0.25] } }),
+  areas: () => ({ name: freeName("area"), shape: { box: [1, 1, 2] }, at: { position: [0, 0, 1] } }),
+  sensors: () => ({
+    name: freeName("scanner"),
+    at: { position: [0, 0, 0.3] },
+    laser_scanner: {
+      range: 4,
+      angle_deg: 190,
+      resolution_deg: 0.5,
+      fields: [
+        {
+          name: "protective",
+          corners: [
+            [0, -1],
+            [2, -1],
+            [2, 1],
+            [0, 1],
+          ],
+        },
+      ],
+    },
+  }),
+  humans: () => ({ name: freeName("person"), at: { position: [1.5, 0, 0] } }),
+};
+
+function Adding({ group, close }: { group: string; close: () => void }) {
+  const table = useSignal<Table>(
+    BEGIN[group]?.() ?? (isPlaced(group) ? { name: freeName(group.slice(0, -1)) } : {}),
+  );
+  const choices = schema.value ? kinds(group) : [];
+  const form =
+    schema.value && (choices.length === 0 || table.value.kind) ? entrySchema(group, table.value) : null;
+  const path: Path = [group, count(group)];
+  const add = async (): Promise<void> => {
+    if (!(await change({ kind: "add", path: [group], value: table.value }))) return;
+    close();
+    const added = entries.value.filter((e) => e.group === group).at(-1);
+    if (added) select({ kind: isCriteria(group) ? "criterion" : "owner", name: added.name });
+  };
+  return (
+    <div class="entry adding" data-entry={named(path)}>
+      <h2>Add to {GROUPS.find(([name]) => name === group)?.[1].toLowerCase()}</h2>
+      {choices.length > 0 && (
+        <label>
+          kind{" "}
+          <select
+            value={String(table.value.kind ?? "")}
+            onChange={(event) => {
+              table.value = { kind: event.currentTarget.value };
+            }}
+          >
+            <option value="">choose …</option>
+            {choices.map(([kind, about]) => (
+              <option key={kind} value={kind} title={about}>
+                {kind}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
+      {form?.description && <p class="kind">{form.description}</p>}
+      {form && (
+        <SchemaForm
+          schema={form}
+          table={table.value}
+          path={path}
+          onChange={(key, value) => {
+            const { [key]: _, ...rest } = table.value;
+            table.value = value === undefined ? rest : { ...table.value, [key]: value };
+          }}
+        />
+      )}
+      <div class="edit-bar">
+        <button type="button" class="primary" disabled={!form || asking.value} onClick={() => void add()}>
+          Add
+        </button>
+        <button type="button" onClick={close}>
+          Cancel
+        </button>
+      </div>
+    </div>
+  );
+}

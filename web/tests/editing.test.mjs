@@ -1,0 +1,265 @@
+// The workstation file edited in real pages of the real `seerob edit`: what is in the file in the end.
+
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import { createRequire } from "node:module";
+import os from "node:os";
+import path from "node:path";
+import { createInterface } from "node:readline";
+import { after, before, test } from "node:test";
+import { openBrowser } from "./browser.mjs";
+import { python } from "./python.mjs";
+
+const AXE = fs.readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const CELL = `# A cell; what nobody edits stays as it is, this line too.
+title = "Edited"
+
+[[parts]]
+name = "table"            # beside the robot
+shape = { box = [0.8, 1.4, 0.74] }
+at = { position = [0.8, 0, 0.37] }  # its middle
+
+# -- people --
+
+[[humans]]
+name = "operator"
+stature = 1.75
+mass = 75
+sex = "male"
+at = { position = [3, 0, 0] }
+
+[[safety]]
+kind = "minimum_distance"
+name = "beside the table"
+between = ["table", "operator"]
+limit = 0.5               # [m]
+`;
+/** An edit is checked as the whole file is; a loaded machine takes its time. */
+const PATIENT = { timeout: 120_000 };
+const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-edit-"));
+const file = path.join(folder, "workstation.toml");
+let child;
+let browser;
+let page;
+let url;
+
+before(async () => {
+  fs.writeFileSync(file, CELL);
+  child = python("-m", "seerob", "edit", folder, "--port", "0");
+  const opening = openBrowser({ width: 1366, height: 768 });
+  for await (const line of createInterface({ input: child.stdout })) {
+    url = line.match(/http:\/\/\S+/)?.[0];
+    if (url) break;
+  }
+  child.stdout.resume();
+  browser = await opening;
+  page = browser.page;
+  await show(page);
+});
+
+after(async () => {
+  const over = new Promise((resolve) => child?.once("exit", resolve));
+  child?.kill("SIGINT");
+  await Promise.all([browser?.close(), over]);
+  fs.rmSync(folder, { recursive: true });
+});
+
+async function show(where) {
+  where.setDefaultTimeout(PATIENT.timeout);
+  await where.goto(url);
+  await where.waitForSelector(".editor");
+  await where.waitForFunction(() => Number.isFinite(window.seerob?.t));
+}
+
+const saved = () => fs.readFileSync(file, "utf8");
+const status = (where, word) => where.locator(".edit-bar [role=status]", { hasText: word }).waitFor();
+const pick = (name, where = page) => where.getByLabel("What is edited").selectOption({ label: name });
+
+async function fill(where, value) {
+  await where.fill(value);
+  await where.press("Enter");
+}
+
+async function add(group, values, kind) {
+  await page.getByLabel("Add", { exact: true }).selectOption(group);
+  if (kind) await page.getByLabel("kind").selectOption(kind);
+  for (const [name, value] of Object.entries(values))
+    await fill(page.locator(".adding").getByLabel(name), value);
+  await page.getByRole("button", { name: "Add", exact: true }).click();
+  await page.locator(".adding").waitFor({ state: "detached" });
+}
+
+async function review(action) {
+  await page.getByRole("button", { name: /Review/ }).click();
+  await page.getByRole("button", { name: action, exact: true }).click();
+  await status(page, /^saved/);
+}
+
+test("an edit that makes the file wrong is refused beside its field, and the file stays", async () => {
+  await pick("beside the table");
+  const field = page.locator('[data-field="limit"]');
+  await fill(field.getByRole("textbox"), "-1");
+  await field.locator(".mistake").waitFor();
+  assert.match(await field.locator(".mistake").innerText(), /-1/);
+  assert.equal(await field.locator("[aria-invalid]").count(), 1);
+  assert.equal(saved(), CELL);
+  await fill(field.getByRole("textbox"), "0.5");
+});
+
+test("a robot, an area, a scanner and a criterion are added, saved and there after a reload", async () => {
+  await add("robots", { "model *": "library:ur5e" });
+  await add("areas", { "name *": "zone" });
+  await add("sensors", { "name *": "scanner" });
+  await add("safety", { "between 1": "robot", "between 2": "operator", limit: "0.3" }, "minimum_distance");
+  assert.equal(saved(), CELL);
+  await review("Save");
+  const added = `[[robots]]
+name = "robot"
+model = "library:ur5e"
+base = { position = [0, 0, 0] }`;
+  const text = saved();
+  assert.ok(text.includes(added), text);
+  const before = CELL.split("\n").filter((line) => line !== "");
+  const after = text.split("\n").filter((line) => line !== "");
+  // All that was there is there, in its order; what is more are the four tables.
+  const more = [];
+  for (const line of after) {
+    if (line === before[0]) before.shift();
+    else more.push(line);
+  }
+  assert.deepEqual(before, [], text);
+  assert.deepEqual(more.filter((line) => line.startsWith("[[")).sort(), [
+    "[[areas]]",
+    "[[robots]]",
+    "[[safety]]",
+    "[[sensors]]",
+  ]);
+  assert.ok(text.includes('between = ["robot", "operator"]\nlimit = 0.3\n'), text);
+  await page.reload();
+  await pick("scanner");
+  await pick("zone");
+  await page.getByRole("tab", { name: "Criteria" }).click();
+  await page.waitForSelector('tr[data-criterion="minimum distance robot – operator"]');
+  await page.getByRole("tab", { name: "Edit" }).click();
+});
+
+test("what is dragged by a handle is where it was put, in steps, and undo gives back the file byte for byte", async () => {
+  const begun = saved();
+  await pick("table");
+  const steps = page.getByLabel("Steps");
+  await steps.selectOption({ label: "100 mm, 15°" });
+  const [from, to] = await page.evaluate(() => [
+    window.seerob.project([0.8, 0, 0.37]),
+    window.seerob.project([1.8, 0, 0.37]),
+  ]);
+  const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+  const along = (px) => [0, 1].map((k) => from[k] + ((to[k] - from[k]) / length) * px);
+  let px = 20;
+  for (; px < 120; px += 4) {
+    await page.mouse.move(...along(px));
+    if (await page.evaluate(() => window.seerob.held)) break;
+  }
+  assert.ok(px < 120, "no handle on the way");
+  await page.mouse.move(...along(px + 8));
+  await page.mouse.down();
+  await page.mouse.move(...along(px + 8 + length / 2), { steps: 6 });
+  const carried = await page.evaluate(() => window.seerob.pose("table").position[0]);
+  await page.mouse.up();
+  await status(page, /^not saved/);
+  const x = Number(await page.getByLabel("x [m]").inputValue());
+  assert.ok(x > 0.9 && Math.abs(x * 10 - Math.round(x * 10)) < 1e-9, String(x));
+  assert.ok(Math.abs(carried - x) < 1e-6, `${carried} was shown, ${x} is in the file`);
+  await fill(page.getByLabel("yaw [°]"), "30");
+  await page.waitForFunction(
+    () => document.querySelector(".edit-bar [role=status]").textContent === "not saved",
+  );
+  await review("Save");
+  const place = `at = { position = [${x}, 0, 0.37], rpy_deg = [0, 0, 30] }  # its middle`;
+  assert.equal(saved(), begun.replace("at = { position = [0.8, 0, 0.37] }  # its middle", place));
+  await page
+    .locator(".room canvas")
+    .focus()
+    .catch(() => {});
+  for (let k = 0; k < 2; k += 1) await page.getByRole("button", { name: "Undo" }).click();
+  await page.waitForFunction(
+    () => document.querySelector(".edit-bar [role=status]").textContent === "not saved",
+  );
+  await page.waitForFunction(() => [...document.querySelectorAll(".numbers input")][0].value === "0.8");
+  await review("Save");
+  assert.equal(saved(), begun);
+});
+
+test("two pages edit at once and lose nothing of each other", async () => {
+  const other = await browser.context.newPage();
+  await show(other);
+  await pick("table");
+  await pick("operator", other);
+  await Promise.all([fill(page.getByLabel("y [m]"), "0.25"), fill(other.getByLabel("x [m]"), "3.5")]);
+  for (const where of [page, other]) await status(where, /^not saved/);
+  await page.waitForFunction(() => document.querySelector(".editor") !== null);
+  await pick("operator");
+  await page.waitForFunction(() => document.querySelector(".numbers input").value === "3.5");
+  await review("Save");
+  await status(other, /^saved/);
+  assert.ok(saved().includes("at = { position = [0.8, 0.25, 0.37] }  # its middle"), saved());
+  assert.ok(saved().includes("at = { position = [3.5, 0, 0] }"), saved());
+  await other.close();
+});
+
+test("what others speak of is removed with them, or not at all", async () => {
+  const begun = saved();
+  await pick("zone");
+  await page.getByRole("button", { name: "Copy", exact: true }).click();
+  await page.locator(".entry h2", { hasText: "zone_2" }).waitFor();
+  await page.getByRole("button", { name: "Remove", exact: true }).click();
+  await page.locator(".entry").waitFor({ state: "detached" });
+  await pick("table");
+  await page.getByRole("button", { name: "Remove", exact: true }).click();
+  await page.getByRole("button", { name: "Remove with safety[0]" }).click();
+  await page.locator(".entry").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: /Review/ }).click();
+  assert.ok(
+    (await page.locator(".review .removed").allInnerTexts()).some((line) =>
+      line.startsWith('-name = "table"'),
+    ),
+  );
+  await page.getByRole("button", { name: "Discard", exact: true }).click();
+  await status(page, /^saved/);
+  assert.equal(saved(), begun);
+});
+
+test("axe finds no fault in the panels, dark and light", async () => {
+  await page.evaluate(AXE);
+  const found = [];
+  const look = async (state) => {
+    for (const colorScheme of ["dark", "light"]) {
+      await page.emulateMedia({ colorScheme });
+      await page.waitForFunction((theme) => document.documentElement.dataset.theme === theme, colorScheme);
+      const { violations } = await page.evaluate(() =>
+        globalThis.axe.run(document, { resultTypes: ["violations"] }),
+      );
+      found.push(...violations.map(({ id, nodes }) => `${state}, ${colorScheme}: ${id} ${nodes[0].target}`));
+    }
+  };
+  await pick("table");
+  await look("a part");
+  await fill(page.locator('[data-field="name"] input'), "no name");
+  await page.locator(".mistake").first().waitFor();
+  await look("refused");
+  await page.getByLabel("Add", { exact: true }).selectOption("safety");
+  await page.getByLabel("kind").selectOption("separation");
+  await look("a criterion is added");
+  await page.getByRole("button", { name: "Cancel" }).click();
+  await fill(page.getByLabel("x [m]"), "0.85");
+  await status(page, /^not saved/);
+  await page.getByRole("button", { name: /Review/ }).click();
+  await look("reviewed");
+  await page.getByRole("button", { name: "Discard", exact: true }).click();
+  await status(page, /^saved/);
+  assert.deepEqual(found, []);
+});
+
+test("nothing complained, and nothing was asked of another origin", () => {
+  assert.deepEqual(browser.complaints, []);
+  assert.deepEqual(browser.outside, []);
+});

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import builtins
+import gc
 import itertools
 import operator
 import os
+import sys
 import time
 from datetime import date, timedelta
 from decimal import Decimal
@@ -123,3 +125,17 @@ def test_several_threads_ask_at_once():
         thread.join()
     assert answers == {k: 2 * k for k in range(6)}
     assert len(parser_process._idle) <= parser_process.KEPT
+
+
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_a_forked_process_neither_asks_nor_ends_nor_complains_of_those_of_before(monkeypatch):
+    """Each test that read a file of a stranger failed in a forked process, as `scripts/mutate` has them."""
+    asked, told = parsed(os.getpid, file="a"), []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    if not (fork := os.fork()):
+        own = parsed(os.getpid, file="a")
+        parser_process._end_all()
+        gc.collect()
+        os._exit(own == asked or bool(told))
+    assert os.waitpid(fork, 0)[1] == 0
+    assert parsed(os.getpid, file="a") == asked

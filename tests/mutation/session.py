@@ -2,7 +2,7 @@
 
 The changed code is put into the living functions of a forked process: nothing on disk changes, and what was
 imported and collected once is not imported again. Which tests run which statements is seen while they run
-unchanged.
+unchanged. A test that fails in a forked process also without any change kills nothing, and is told.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import threading
 import time
 import types
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -73,6 +73,8 @@ class Mutation:
         """Of each test: how long it takes, times how much it calls; little where it asks one function."""
         self.naming: dict[str, list[Any]] = defaultdict(list)
         """Tests that call what speaks of a constant or attribute, by its name."""
+        self.passing: dict[str, bool] = {}
+        """Of each test that killed a mutant: whether it passes in a forked process with no change at all."""
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection(self) -> None:
@@ -126,11 +128,23 @@ class Mutation:
                     if os.WIFEXITED(status) and os.WEXITSTATUS(status) == NOT_PUT_IN:
                         self.failed.append(mutant.key)
                         continue
-                    self.tell(Outcome(mutant, status != 0, len(items)))
                     first = os.WEXITSTATUS(status) - FIRST if os.WIFEXITED(status) else -1
                     if 0 <= first < len(items):
+                        if not self._passes(items[first], seconds):
+                            queue.append((mutant, items[:first] + items[first + 1 :]))
+                            continue
                         kills[mutant.file, mutant.function, items[first].nodeid] += 1
+                    self.tell(Outcome(mutant, status != 0, len(items)))
         return True
+
+    def _passes(self, item: Any, seconds: Mapping[str, float]) -> bool:
+        """Whether a test passes in a forked process if nothing is changed: else it tells of no mutant."""
+        if item.nodeid not in self.passing:
+            pid = _forked(None, "", [item], LEAST + int(10 * seconds[item.nodeid]))
+            self.passing[item.nodeid] = os.waitpid(pid, 0)[1] == 0
+            if not self.passing[item.nodeid]:
+                self.failed.append(f"{item.nodeid} (in a forked process)")
+        return self.passing[item.nodeid]
 
     def _unchanged(self, session: pytest.Session) -> tuple[Callers, Lines, dict[str, float]]:
         """Tests that call each function and run each line, and how long each takes."""
@@ -233,7 +247,7 @@ def _names(item: pytest.Item) -> set[str]:
     return {name for code in codes for name in code.co_names}
 
 
-def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> int:
+def _forked(mutant: Mutant | None, source: str, items: Sequence[Any], limit: int) -> int:
     pid = os.fork()
     if pid:
         return pid
@@ -243,7 +257,8 @@ def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> in
         os.dup2(silence, 1)
         os.dup2(silence, 2)
         try:
-            put_in(mutant, source)
+            if mutant is not None:
+                put_in(mutant, source)
         except (LookupError, StopIteration, AttributeError):
             os._exit(NOT_PUT_IN)
         for k, item in enumerate(items):

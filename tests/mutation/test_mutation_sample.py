@@ -118,3 +118,17 @@ def test_a_sample_is_killed():
     told = re.findall(r"^(\S+): (\d+) of (\d+) mutants killed", done.stdout, re.MULTILINE)
     assert [file for file, *_ in told] == files
     assert all(int(killed) == int(tried) > 3 for _, killed, tried in told)
+
+
+def test_a_test_that_fails_in_any_forked_process_kills_nothing(tmp_path):
+    """Every mutant that it ran was counted as killed."""
+    (tmp_path / "test_made.py").write_text(
+        "import os\nfrom seerob.core.verdict import judge\nHERE = os.getpid()\n"
+        "def test_it():\n    judge(1.0, None)\n    assert os.getpid() == HERE\n"
+    )
+    command = [sys.executable, ROOT / "scripts/mutate", "--only", "core/verdict", "--named", " judge: limit"]
+    command += ["--jobs", "1", "--tests", tmp_path / "test_made.py"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "::test_it (in a forked process)" in done.stderr
+    assert "survived" in done.stdout

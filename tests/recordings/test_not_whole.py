@@ -2,11 +2,13 @@
 
 import io
 import struct
+from itertools import islice
 from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
+import zstandard
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from msgspec.structs import replace as changed
@@ -16,6 +18,7 @@ from seerob.app.cli import main
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Verdict
 from seerob.criteria.judging import Judge
+from seerob.outputs.mcap import mend
 from seerob.outputs.sinks import recorder
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.format import END_METADATA, SAMPLES, Tick
@@ -199,12 +202,17 @@ def test_a_recording_that_nobody_sealed_is_not_within(whole, tmp_path, monkeypat
 
 
 def test_a_recording_that_lacks_more_than_damage_leaves_out_is_refused(whole, tmp_path):
+    more = 10**6
+
     def far(topic, message):
         if topic != SAMPLES or message.log_time < 10**9:
             return message.data
         tick = msgspec.msgpack.decode(message.data, type=Tick)
-        return msgspec.msgpack.encode(msgspec.structs.replace(tick, seq=tick.seq + 10**12))
+        return msgspec.msgpack.encode(msgspec.structs.replace(tick, seq=tick.seq + more))
 
+    recording = Recording.open(rewritten(whole, tmp_path / "most.mcap", far))
+    assert next(islice(recording.heard(), 100 + more, None))
+    more += 1
     recording = Recording.open(rewritten(whole, tmp_path / "run.mcap", far))
     with pytest.raises(InputError, match="follows tick 99; do not trust this recording"):
         load_recorded(recording).replay(recording)
@@ -262,6 +270,43 @@ def test_a_name_of_no_more_than_a_mebibyte_is_read(size, told):
         _record(McapIndex(), io.BytesIO(name), 0x0C, 0, 2**20 + 1)
 
 
+def text(data: bytes) -> bytes:
+    return struct.pack("<I", len(data)) + data
+
+
+@pytest.mark.parametrize("off", [-1, 0, 1])
+@pytest.mark.parametrize("what", ["chunk", "attachment", "metadata"])
+def test_a_record_holds_what_it_says_that_it_holds(what, off):
+    """A stretch that is longer than its record would be read from the next one; behind it lie more bytes."""
+    opcode, head, data, end = {
+        "chunk": (0x06, struct.pack("<QQQI", 1, 2, 3, 4) + text(b"z" * 64), b"content", b""),
+        "attachment": (0x09, bytes(16) + text(b"name") + text(b"type"), b"content", b"\x01\0\0\0"),
+        "metadata": (0x0C, text(b"name"), text(b"key") + text(b"value"), b""),
+    }[what]
+    size = struct.pack("<I" if what == "metadata" else "<Q", len(data) + off)
+    record = head + size + data + end
+    file, index = io.BytesIO(b"before!" + record + bytes(40)), McapIndex()
+    file.seek(7)
+    if off == 1 or (off and what == "attachment"):  # which alone has to fill its record
+        with pytest.raises(Damaged):
+            _record(index, file, opcode, 7, len(record))
+        return
+    _record(index, file, opcode, 7, len(record))
+    at = 7 + len(head) + len(size)
+    if what == "chunk":
+        assert index.chunks == [ChunkPlace(1, 2, at, len(data) + off, 3, 4, "z" * 64, [])]
+    elif what == "attachment":
+        assert index.attachments == {"name": ("name", at, len(data), 1, 7)}
+    else:
+        assert index.metadata == {"name": {"key": "value"}}
+
+
+def test_the_name_of_a_compression_has_no_more_than_64_characters():
+    record = struct.pack("<QQQI", 1, 2, 3, 4) + text(b"z" * 65) + bytes(8)
+    with pytest.raises(Damaged, match="too long"):
+        _record(McapIndex(), io.BytesIO(record), 0x06, 0, len(record))
+
+
 def test_a_file_that_is_cut_anywhere_is_read_up_to_its_last_whole_record(whole, tmp_path):
     """And it is finished from its end mark on, whatever of its summary is there, and whatever lies behind."""
     data, file = whole.read_bytes(), tmp_path / "cut.mcap"
@@ -294,6 +339,44 @@ def test_a_file_that_is_cut_anywhere_is_read_up_to_its_last_whole_record(whole, 
         scan(file)
 
 
+@pytest.mark.parametrize("how", ["whole", "cut", "data", "checksum", "name"])
+def test_a_copy_has_what_is_whole_before_the_first_that_is_not(whole, tmp_path, how, capsys):
+    """Also where a byte flipped, in a file with an end as in one without."""
+    raw, file = bytearray(whole.read_bytes()), tmp_path / "run.mcap"
+    chunks = [c for c in scan(whole).chunks if c.end > c.start]
+    broken = chunks[len(chunks) // 2]
+    at = {"data": 20, "checksum": -8 - 4 - len("zstd") - 1, "name": -8 - len("zstd")}.get(how)
+    if how == "cut":
+        del raw[broken.offset + 3 :]
+    elif at is not None:
+        raw[broken.offset + at] ^= 0xFF
+    file.write_bytes(raw)
+    before = list(Recording.open(whole).ticks())
+    if how == "whole":
+        copied = mend(file, tmp_path / "copy.mcap")
+        with whole.open("rb") as one, (tmp_path / "copy.mcap").open("rb") as other:
+            both = list(zip(*(make_reader(each).iter_messages() for each in (one, other)), strict=True))
+            for (schema, channel, message), (of, to, repeated) in both:
+                assert (schema and schema.name, channel.topic) == (of and of.name, to.topic)
+                assert (message.log_time, message.data) == (repeated.log_time, repeated.data)
+        assert copied == len(both)
+    else:
+        assert main(["repair", str(file), "-o", str(tmp_path / "copy.mcap")]) == 2
+    copy = Recording.open(tmp_path / "copy.mcap")
+    assert all(chunk.crc for chunk in scan(copy.path).chunks)
+    assert copy.files == Recording.open(whole).files
+    ticks = list(copy.ticks())
+    if how == "whole":
+        assert (copy.check(), copy.complete, ticks) == ((), True, before)
+        assert main(["repair", str(copy.path)]) == 3
+        assert "is whole" in capsys.readouterr().err
+    else:
+        assert ticks == [tick for tick in before if tick.t < broken.start / 1e9 - 1e-6]
+        assert not copy.complete
+        assert f" messages, to {copy.end:.2f} s;" in capsys.readouterr().out
+        assert 0 < copy.end < before[-1].t
+
+
 def test_what_is_read_is_what_the_other_library_reads(whole, tmp_path):
     index, read, topics = scan(whole), [], {}
     with whole.open("rb") as file:
@@ -316,9 +399,16 @@ def test_what_is_read_is_what_the_other_library_reads(whole, tmp_path):
     for damaged in (first._replace(crc=first.crc + 1), first._replace(size=first.size + 1)):
         with pytest.raises(Damaged):
             read_chunk(whole, damaged)
-    # Two channels without compression, whole and without their last byte.
+    # Whoever compresses as it goes does not know the size beforehand.
+    stream = zstandard.ZstdCompressor().compressobj()
     record = struct.pack("<BQHHI3s", 0x04, 11, 7, 0, 3, b"one")
     raw = tmp_path / "raw"
+    raw.write_bytes(stream.compress(record) + stream.flush())
+    streamed = ChunkPlace(0, 0, 0, raw.stat().st_size, len(record), 0, "zstd", [])
+    assert read_chunk(raw, streamed) == ({7: "one"}, [])
+    with pytest.raises(Damaged, match="cannot be decompressed"):
+        read_chunk(raw, streamed._replace(size=len(record) - 1))
+    # Two channels without compression, whole and without their last byte.
     raw.write_bytes(record + struct.pack("<BQHHI3s", 0x04, 11, 8, 0, 3, b"two"))
     whole_one = ChunkPlace(0, 0, 0, 2 * len(record), 2 * len(record), 0, "", [])
     assert read_chunk(raw, whole_one) == ({7: "one", 8: "two"}, [])

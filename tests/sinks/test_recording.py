@@ -24,8 +24,8 @@ from seerob.core.snapshot import Scene, Snapshot
 from seerob.outputs.mcap import McapTape
 from seerob.outputs.sinks import recorder as recorder_module
 from seerob.outputs.sinks.recorder import FLUSH_PERIOD, Recorder
-from seerob.recording.format import SAMPLES, SCENE, SNAPSHOT, nanoseconds
-from seerob.recording.recording import AFTER_HOLE, Recording
+from seerob.recording.format import END_METADATA, SAMPLES, SCENE, SNAPSHOT, VISITORS, Visitor, nanoseconds
+from seerob.recording.recording import AFTER_HOLE, Recording, scan
 
 N = 150
 
@@ -61,6 +61,22 @@ def test_everything_comes_back_bit_for_bit(path):
     assert [(tick.seq, tick.t) for tick in ticks] == [(s.seq, s.t) for s in snapshots]
     assert [tick.samples for tick in ticks] == [made_run.samples(k) for k in range(N)]
     assert (recording.start, recording.end) == (0.0, snapshots[-1].t)
+    assert recording._index.metadata[END_METADATA]["ticks"] == str(N)
+
+
+def test_who_looked_on_has_one_channel_that_other_recordings_lack(path, tmp_path):
+    tape = McapTape(tmp_path / "run.mcap", made_run.scene(), {}, {})
+    came = [Visitor(event=event, role="view", address="", since="") for event in ("came", "left")]
+    for t, visitors in ((0.1, ()), (0.2, came[:1]), (0.3, came[1:])):
+        tape.visitors(t, tuple(visitors))
+    tape.finish({})
+    for file, told in ((path, []), (tmp_path / "run.mcap", [(0.2, "came"), (0.3, "left")])):
+        with file.open("rb") as opened:
+            found = list(make_reader(opened).iter_messages(topics=[VISITORS]))
+        said = [msgspec.json.decode(message.data) for *_, message in found]
+        assert [(each["t"], each["event"]) for each in said] == told
+        assert [(m.log_time, m.sequence) for *_, m in found] == [(nanoseconds(t), 0) for t, _ in told]
+        assert len({channel.id for _, channel, _ in found}) == bool(told)
 
 
 def test_seek_agrees_with_search_in_all_of_it(tmp_path, monkeypatch):
@@ -69,11 +85,15 @@ def test_seek_agrees_with_search_in_all_of_it(tmp_path, monkeypatch):
     every = list(recording.snapshots())
     assert every == [made_run.snapshot(k) for k in range(N)]
     rng = np.random.default_rng(1)
-    for t in [0.0, -1.0, 99.0, *(s.t for s in every[::7]), *rng.uniform(0, N / 100, 50)]:
+    # Also where chunks begin and end.
+    edges = [x / 1e9 for chunk in scan(recording.path).chunks[2:40:9] for x in (chunk.start, chunk.end)]
+    for t in [0.0, -1.0, 99.0, *edges, *(s.t for s in every[::7]), *rng.uniform(0, N / 100, 30)]:
         before = [s for s in every if s.t <= t]
         assert recording.snapshot_at(t) == (before[-1] if before else every[0])
-        end = t + rng.uniform(0, 0.3)
-        assert list(recording.snapshots(t, end)) == [s for s in every if t <= s.t <= end]
+        for end in (t + rng.uniform(0, 0.3), float(rng.choice(edges))):
+            assert list(recording.snapshots(t, end)) == [s for s in every if t <= s.t <= end]
+    assert list(recording.snapshots(None, edges[4])) == [s for s in every if s.t <= edges[4]]
+    assert list(recording.snapshots(edges[4])) == [s for s in every if s.t >= edges[4]]
 
 
 def test_cut_anywhere_it_opens_shorter_or_says_why(path, tmp_path):
@@ -191,6 +211,11 @@ def test_a_foreign_reader_understands_every_channel(path):
         # A second implementation of MessagePack reads ours without knowing our types.
         assert msgspec.convert(msgspec.msgpack.decode(first.data), Scene) == made_run.scene()
         attachments = {a.name: a.data for a in reader.iter_attachments()}
+        # Nobody says when a file or the scene was made.
+        assert {(a.create_time, a.log_time) for a in reader.iter_attachments()} == {(0, 0)}
+        begun = reader.iter_messages(topics=[SCENE, "/scene"])
+        assert [(c.topic, m.log_time, m.sequence) for _, c, m in begun] == [(SCENE, 0, 0), ("/scene", 0, 0)]
+        assert {topics[topic].schema_id for topic in (SCENE, SAMPLES, SNAPSHOT)} == {0}
     nodes = made_run.scene().nodes
     assert [e.frame_id for e in scenes[0].entities] == [n.name for n in nodes if n.mesh]
     assert scenes[0].entities[0].models[0].data == made_run.MESHES["c" * 64]
@@ -257,6 +282,7 @@ def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkey
     assert [t.samples for t in recording.ticks()] == [made_run.samples(k) for k in range(60)]
     assert 0 < len(list(recording.snapshots())) == 60 - writer.dropped < 60
     assert recording.findings[0].text.startswith(f"{writer.dropped} snapshots were dropped")
+    assert recording.findings[0].holds == ()
     assert writer.findings()[0].level == "warning"
 
 
@@ -353,6 +379,7 @@ def test_time_that_stands_still_or_turns_back_is_left_out(tmp_path):
     recording = Recording.open(tmp_path / "run.mcap")
     assert [s.seq for s in recording.snapshots()] == [0, 1, 2, 3]
     assert "5 ticks were left out" in recording.findings[0].text
+    assert recording.findings[0].holds == ("*",)
 
 
 @pytest.mark.parametrize("missing", [(0,), (2,), (0, 1, 4)])
@@ -364,7 +391,10 @@ def test_ticks_that_are_missing_are_silence_also_at_the_beginning(tmp_path, miss
     with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
         for k in sorted(set(range(6)) - set(missing)):
             writer.write(made_run.snapshot(k), said)
-    heard = list(Recording.open(tmp_path / "run.mcap").heard())
+    recording = Recording.open(tmp_path / "run.mcap")
+    first = min(set(range(6)) - set(missing)) * 0.01
+    assert (recording.start, recording.end, recording.duration) == (first, 0.05, 0.05 - first)
+    heard = list(recording.heard())
     assert [k for k, samples in enumerate(heard) if not samples] == list(missing)
     for k in set(range(6)) - set(missing):
         assert {sample.reason for sample in heard[k]} == {AFTER_HOLE if k - 1 in missing else ""}
@@ -441,6 +471,7 @@ def test_files_are_extracted_where_they_were(path, tmp_path):
 
 def test_a_run_without_ticks_is_a_recording_too(tmp_path):
     recording = Recording.open(record(tmp_path, 0))
-    assert (recording.complete, recording.duration, list(recording.snapshots())) == (True, 0.0, [])
+    assert (recording.complete, recording.start, recording.end) == (True, 0.0, 0.0)
+    assert list(recording.snapshots()) == []
     with pytest.raises(InputError, match="no snapshot"):
         recording.snapshot_at(0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import struct
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -42,6 +43,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
+from zstandard import ZstdError
 
 from seerob.core.errors import InputError
 from seerob.core.markers import plain
@@ -318,7 +320,9 @@ def mend(source: Path, to: Path) -> int:
     schemas, channels, messages = {0: 0}, {}, 0
     with source.open("rb") as cut, to.open("xb") as whole:
         writer: Any = Writer(whole, enable_crcs=True)
-        with suppress(McapError, EOFError):  # here it was cut off
+        with suppress(
+            McapError, ZstdError, EOFError, LookupError, ValueError, struct.error
+        ):  # here it is not
             for record in StreamReader(cut, validate_crcs=True).records:
                 if isinstance(record, Header):
                     writer.start(profile=record.profile, library=record.library)
@@ -466,7 +470,6 @@ class McapTape:
             raise
 
     def _register(self) -> dict[str, int]:
-
         channels = {
             topic: self._mcap.register_channel(topic, "msgpack", 0) for topic in (SCENE, SAMPLES, SNAPSHOT)
         }
@@ -475,18 +478,18 @@ class McapTape:
         results = self._mcap.register_schema(
             "seerob.Results", "jsonschema", json.dumps(_RESULTS_SCHEMA).encode()
         )
-        people = 0
-        if self._people:
-            people = self._mcap.register_schema(
-                "seerob.People", "jsonschema", json.dumps(_PEOPLE_SCHEMA).encode()
-            )
-        for topic, encoding, schema in (
+        views = [
             (VIEW_SCENE, "protobuf", update),
             (VIEW_MARKERS, "protobuf", update),
             (VIEW_FRAMES, "protobuf", transforms),
             (VIEW_RESULTS, "json", results),
-            *([(VIEW_PEOPLE, "json", people)] if self._people else []),
-        ):
+        ]
+        if self._people:
+            people = self._mcap.register_schema(
+                "seerob.People", "jsonschema", json.dumps(_PEOPLE_SCHEMA).encode()
+            )
+            views.append((VIEW_PEOPLE, "json", people))
+        for topic, encoding, schema in views:
             channels[topic] = self._mcap.register_channel(topic, encoding, schema)
         return channels
 

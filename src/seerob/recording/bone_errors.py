@@ -47,11 +47,11 @@ class _Counted:
 
     def __init__(self) -> None:
         self.classes: NDArray[np.int64] = np.zeros(CLASSES, np.int64)
-        self.largest, self.t = -1.0, math.nan
+        self.largest, self.t = -math.inf, math.nan
 
     def take(self, error: float, t: float) -> None:
-        k = int((math.log(error / LEAST)) / WIDTH) if error > LEAST else 0
-        self.classes[min(max(k, 0), CLASSES - 1)] += 1
+        k = int(math.log(error / LEAST) / WIDTH) if error > LEAST else 0
+        self.classes[min(k, CLASSES - 1)] += 1
         if error > self.largest:
             self.largest, self.t = error, t
 

@@ -125,8 +125,6 @@ def _candidates(
         for base in bases:
             for ancestor in (base, *base.parents):
                 yield _inside(ancestor / package / inner)
-                if ancestor.name == package:
-                    yield _inside(ancestor / inner)
     elif Path(name).is_absolute():
         yield _inside(PurePosixPath(os.path.relpath(name, folder)))
     else:
@@ -183,8 +181,7 @@ SNAPSHOT = "/seerob/snapshot"
 
 VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf", "/results"
 VIEW_PEOPLE = "/people"
-VIEWS = (VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS, VIEW_PEOPLE)
-"""For foreign viewers; `VIEW_SCENE` is sent once, these from time to time."""
+"""For foreign viewers; `VIEW_SCENE` is sent once, the others from time to time."""
 VISITORS = "/visitors"
 """Who looked on; only where somebody did."""
 

@@ -10,7 +10,7 @@ import struct
 import zlib
 from bisect import bisect_right
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
@@ -39,7 +39,6 @@ from seerob.recording.format import (
     SNAPSHOT,
     VERSION,
     VIEW_SCENE,
-    VIEWS,
     WITH_NAMES,
     Tick,
     content_hash,
@@ -284,7 +283,6 @@ AFTER_HOLE = "the recording lacks what was heard before"
 _POSE = 7 * 4
 _CACHED_CHUNKS = 8
 _TICK = {SAMPLES, SNAPSHOT}
-_TICK_VIEWS = {SAMPLES, SNAPSHOT, *VIEWS}
 _REMEDY = "give a recording (.mcap) made by seerob"
 _DISTRUST = "do not trust this recording"
 
@@ -377,7 +375,8 @@ class Recording:
         self._damage: dict[str, None] = {}
         self.scene = self._read_scene()
         """What did not change during the run."""
-        self._tick_chunks = [c for c in index.chunks if self._has(c, SAMPLES, SNAPSHOT)]
+        # Message indexes have no checksum: only what holds nothing else by them is left unread.
+        self._tick_chunks = [c for c in index.chunks if self._listed(c) not in ([SCENE], [VIEW_SCENE])]
         self._starts = [c.start for c in self._tick_chunks]
         self.start, self.end = self._span()
 
@@ -454,14 +453,14 @@ class Recording:
             (
                 "dropped",
                 "snapshots were dropped because the disk could not keep up; their samples are there",
-                1,
+                True,
             ),
             (
                 "lost",
                 "ticks are missing altogether because the disk could not keep up: replay is not exact",
-                0,
+                False,
             ),
-            ("out_of_order", "ticks were left out because their time did not advance", 0),
+            ("out_of_order", "ticks were left out because their time did not advance", False),
         ):
             if end.get(key, "0") != "0":
                 (texts if heard else short).append(f"{end[key]} {text}")
@@ -512,11 +511,10 @@ class Recording:
         Raises:
             InputError: A snapshot is not what it should be.
         """
-        first = 0 if start is None else max(0, bisect_right(self._starts, nanoseconds(start) - 1) - 1)
-        for chunk in self._tick_chunks[first:]:
-            if end is not None and chunk.start > nanoseconds(end) + 1:
+        for chunk in self._tick_chunks:
+            if end is not None and chunk.start > nanoseconds(end):
                 return
-            if start is not None and chunk.end < nanoseconds(start) - 1:
+            if start is not None and chunk.end < nanoseconds(start):
                 continue
             for message in self._messages(chunk, SNAPSHOT):
                 snapshot = self._snapshot(message)
@@ -529,10 +527,9 @@ class Recording:
         Raises:
             InputError: The recording holds no snapshot, or this one is broken.
         """
-        last = bisect_right(self._starts, nanoseconds(t) + 1) - 1
-        for chunk in reversed(self._tick_chunks[: last + 1]):
+        for chunk in reversed(self._tick_chunks[: bisect_right(self._starts, nanoseconds(t))]):
             for message in reversed(self._messages(chunk, SNAPSHOT)):
-                if message.time <= nanoseconds(t) + 1:
+                if message.time <= nanoseconds(t):
                     snapshot = self._snapshot(message)
                     if snapshot.t <= t:
                         return snapshot
@@ -639,28 +636,17 @@ class Recording:
         raise InputError.at(self.path, "", "was cut off before anything was recorded", "record again")
 
     def _span(self) -> tuple[float, float]:
-        first = next((t for c in self._tick_chunks for t in self._times(c)), 0.0)
-        last = next((t for c in reversed(self._tick_chunks) for t in reversed(self._times(c))), first)
-        return first, last
+        def said(chunks: Iterable[ChunkPlace], which: int) -> float:
+            for chunk in chunks:
+                if ticks := self._messages(chunk, SAMPLES):
+                    tick: Tick = self._decode(_decode_tick, ticks[which], SAMPLES)
+                    return tick.t
+            return 0.0
 
-    def _times(self, chunk: ChunkPlace) -> list[float]:
-        ticks = self._messages(chunk, SAMPLES)
-        ends = ticks if len(ticks) < 2 else [ticks[0], ticks[-1]]
-        return [
-            tick.t
-            for tick in (self._decode(_decode_tick, m, SAMPLES) for m in ends)
-            if isinstance(tick, Tick)
-        ]
+        return said(self._tick_chunks, 0), said(reversed(self._tick_chunks), -1)
 
-    def _has(self, chunk: ChunkPlace, *topics: str) -> bool:
-        listed = [self._topics.get(channel) for channel in chunk.channels]
-        # Message indexes have no checksum: what no recorder would write is looked up in the chunk.
-        plausible = len(set(listed)) == len(listed) and None not in listed
-        if not plausible or (
-            listed not in ([SCENE], [VIEW_SCENE]) and not _TICK <= set(listed) <= _TICK_VIEWS
-        ):
-            listed = [self._topics.get(m.channel) for m in self._chunk(chunk)]
-        return any(topic in topics for topic in listed)
+    def _listed(self, chunk: ChunkPlace) -> list[str | None]:
+        return [self._topics.get(channel) for channel in chunk.channels]
 
     def _messages(self, chunk: ChunkPlace, topic: str) -> list[Message]:
         return [m for m in self._chunk(chunk) if self._topics.get(m.channel) == topic]

@@ -1,4 +1,4 @@
-"""``seerob repair``: a recording whose writer was killed gets the end and the index that readers need."""
+"""``seerob repair``: what is whole of a recording gets the end and the index that readers need."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ def run(options: argparse.Namespace) -> int:
     from seerob.recording.recording import Recording
 
     recording = Recording.open(options.recording)
+    recording.check()
     if recording.complete:
         raise InputError.at(options.recording, "", "is whole", "read it as it is")
     to = options.output or options.recording.with_suffix(".repaired.mcap")
@@ -37,5 +38,6 @@ def run(options: argparse.Namespace) -> int:
         raise InputError.at(to, "", "exists already", "give another file with -o")
     with whole_file(to) as hidden:
         messages = mend(options.recording, hidden)
-    line("wrote", f"{to}: {messages} messages, to {recording.end:.2f} s; what came after that is lost")
+        end = Recording.open(hidden).end
+    line("wrote", f"{to}: {messages} messages, to {end:.2f} s; what came after that is lost")
     return Exit.UNDECIDED

@@ -121,7 +121,6 @@ class _Child:
             env={**kept, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
             process_group=0,  # Ctrl-C is for this process, which ends it
         )
-        self.owner = os.getpid()
         self.answered = time.monotonic()
 
     def ask(self, request: bytes, seconds: float) -> _Answer:
@@ -168,11 +167,15 @@ class _Child:
         """End it."""
         if kill:
             self.process.kill()
+        self.leave()
+        self.process.wait()
+
+    def leave(self) -> None:
+        """Close this process's ends of the pipes."""
         for pipe in (self.process.stdin, self.process.stdout):
             if pipe is not None:
                 with contextlib.suppress(OSError):  # what nobody reads any more
                     pipe.close()
-        self.process.wait()
 
 
 class _Plain(pickle.Unpickler):
@@ -201,8 +204,6 @@ def _taken() -> tuple[_Child, bool]:
             child = _idle.pop() if _idle else None
         if child is None:
             return _Child(), True
-        if child.owner != os.getpid():  # of the process that this one was forked from
-            continue
         if time.monotonic() - child.answered < USED_AGAIN_WITHIN and child.process.poll() is None:
             return child, False
         child.close(kill=True)
@@ -219,9 +220,19 @@ def _give_back(child: _Child, *, tired: bool) -> None:
 @atexit.register
 def _end_all() -> None:
     while _idle:
+        _idle.pop().close(kill=True)
+
+
+def _forget() -> None:
+    """In a process that was forked from the one that has them, and ends them."""
+    while _idle:
         child = _idle.pop()
-        if child.owner == os.getpid():
-            child.close(kill=True)
+        child.leave()
+        child.process.returncode = 0
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)
 
 
 class _Conversation:

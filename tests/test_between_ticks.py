@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace as sample_with
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
 from made_ticks import DOOR, PLC, SOURCE, rows
+from seerob.core.markers import plain
+from seerob.core.samples import Quality
 from seerob.core.snapshot import Finding, Verdict
 from seerob.criteria.between_ticks import SpanResult
 from seerob.criteria.contact.regions import REGIONS
 from seerob.criteria.safety.power_and_force import Contacts
 from seerob.description.humans.skeleton import BONES
-from seerob.session.run import Judge, engine_of, pump, ticks
+from seerob.session.run import Judge, bind, engine_of, pump, ticks
 from seerob.twin.engine import Engine
-from worst_between import worst_found
+from worst_between import one_by_one, worst_found
+
+msgpack = msgspec.msgpack.Encoder(enc_hook=plain).encode
 
 STICK = (
     '[[tools]]\nname = "stick"\non = "arm/tip"\nmass = 0.01\n'
@@ -333,7 +339,7 @@ of = "op"
 """
 
 
-def random_cell(folder, rng, *, tick, physics, rate, text=RANDOM, scale=1.0):
+def random_cell(folder, rng, *, tick, physics, rate, text=RANDOM, scale=1.0, seconds=0.2):
     files = {}
     for name in "ab":
         joints = int(rng.integers(2, 6))
@@ -341,7 +347,7 @@ def random_cell(folder, rng, *, tick, physics, rate, text=RANDOM, scale=1.0):
         slides = rng.random(joints) < 0.3
         units = ("m" if slide else "rad" for slide in slides)
         lines = [",".join(["t [s]", *(f"j{k} [{unit}]" for k, unit in enumerate(units))])]
-        for t in np.arange(0, 0.2, 1 / rate):
+        for t in np.arange(0, seconds, 1 / rate):
             lines.append(",".join(f"{x:.12g}" for x in (t, *(scale * wave(t)[0]))))
         files |= {f"{name}.urdf": random_robot(rng, slides), f"{name}.csv": "\n".join(lines) + "\n"}
     return made(folder, text.format(tick=tick, physics=physics), files)
@@ -360,6 +366,47 @@ def test_nothing_that_is_met_between_two_ticks_is_worse_than_the_bound(tmp_path,
     assert ("singularity" in room) is (seed != 1)
     for name, found in room.items():
         assert min(found) >= -1e-9, name
+
+
+def spoiled_feed(station, rng):
+    """The samples of a motion, of which some are missing, in doubt or elsewhere for a while."""
+    silent = dict.fromkeys("ab", 0)
+    for samples in pump(station.sources, station.workstation.engine.tick):
+        heard = []
+        for sample in samples:
+            draw, name = rng.random(), sample.target
+            silent[name] = 60 if draw < 0.01 else max(silent[name] - 1, 0)
+            if silent[name]:
+                continue
+            quality = Quality.DEGRADED if draw > 0.98 else Quality.GOOD
+            off = 3.0 if 0.95 < draw < 0.96 else 0.0
+            heard.append(sample_with(sample, quality=quality, q=tuple(x + off for x in sample.q)))
+        yield tuple(heard)
+
+
+@pytest.mark.parametrize(("seed", "tick", "physics", "rate"), CASES)
+def test_what_is_done_with_all_at_once_comes_to_what_each_by_itself_does(tmp_path, seed, tick, physics, rate):
+    text = RANDOM.replace("limit = 10\n", "limit = 1.2\n").replace("limit = 2000", "limit = 20")
+    text = text.replace("limit = 0\n", "limit = 0.05\n")
+    cell = {"tick": tick, "physics": physics, "rate": rate, "text": text, "scale": 0.5, "seconds": 0.6}
+    station = random_cell(tmp_path, np.random.default_rng(seed), **cell)
+    together, alone = Judge(bind(station.model)), Judge(bind(station.model))
+    assert len(together._between._plain) == 5
+    one_by_one(alone)
+    said = set()
+
+    def both(state):
+        results = together(state)
+        assert msgpack(results) == msgpack(alone(state))
+        said.update((result.name, result.verdict) for result in results)
+        return results
+
+    feed = spoiled_feed(station, np.random.default_rng(seed))
+    for _ in ticks(engine_of(station.model), both, feed):
+        pass
+    assert together.looks == alone.looks > 0
+    verdicts = {verdict for _, verdict in said}
+    assert verdicts >= {Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED}
 
 
 NOT_HEAD = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]

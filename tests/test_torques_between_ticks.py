@@ -10,6 +10,7 @@ from seerob.core.snapshot import Verdict
 from seerob.criteria.between_ticks import SpanResult
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
+from worst_between import one_by_one
 
 TORQUES = """
 engine = { physics = false }
@@ -37,7 +38,7 @@ def measuring(folder, tau, limit, watching=None):
     station = made(folder, TORQUES.replace("FORCE", str(limit)))
     engine, judge = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound)
     if watching is not None:
-        judge._between._judge = watching(judge._between)
+        one_by_one(judge)._judge = watching(judge._between)
     verdicts = []
     for k in range(8):
         times = [0.01 * k] if k == 0 else [0.01 * (k - 1) + 0.002 * i for i in range(1, 6)]

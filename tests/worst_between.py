@@ -8,11 +8,18 @@ from seerob.criteria.between_ticks import SpanResult
 from seerob.session.run import Judge, engine_of, looks_ahead, pump, ticks
 
 
+def one_by_one(judge):
+    """Let a judge look at every criterion by itself, also at those that it is done with all at once."""
+    between = judge._between
+    between._others, between._plain = range(len(between._watches)), []
+    return between
+
+
 def worst_found(station, looks):
     """By criterion, how far the bound is from the worst that many looks between each two ticks meet."""
     engine = engine_of(station.model)
     judge = Judge(station.bound)
-    between = judge._between
+    between = one_by_one(judge)
     room, largest = {}, {}
 
     def watching(i, watch, ends, state):

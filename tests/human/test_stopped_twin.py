@@ -25,6 +25,7 @@ from seerob.session.station import Station
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
 from seerob.twin.state import Hearing, State
+from worst_between import one_by_one
 
 POST = {"name": "post", "at": {"position": [1.0, -0.2, 0.9]}, "shape": {"box": [0.05, 0.05, 0.05]}}
 
@@ -87,7 +88,7 @@ def test_between_two_ticks_a_stopped_hand_may_be_where_it_was_captured():
     criterion = MinimumDistance(name="far", between=("post", "operator/right_hand"), limit=0.02)
     stage = Station(replace(station, safety=(criterion,)))
     engine, judge = Engine(stage.model, driven={"operator": 0.2}), Judge(stage.bound)
-    between, room, ways, off = judge._between, [], [], []
+    between, room, ways, off = one_by_one(judge), [], [], []
     person, data = stage.model.mechanisms["operator"], mujoco.MjData(stage.model.mj)
     hand = next(b.index for b in stage.model.bodies if b.name == "operator/right_hand")
     gap = stage.model.gap(stage.model.select("post"), stage.model.select("operator/right_hand"))
@@ -104,7 +105,7 @@ def test_between_two_ticks_a_stopped_hand_may_be_where_it_was_captured():
             found.append(there.positions[hand].copy())
         _, _, looked = between._look(i, watch, between._way, (ends[0].t + ends[1].t) / 2, state)
         off.append(np.linalg.norm(looked.captured("operator", (hand,))[1][0] - found[2]))
-        span = between._span(watch, between._way, ends, state)
+        span = between._span(between._way, ends, state)
         ways.append((np.linalg.norm(found[-1] - found[0]), span.fast[hand] * span.T, between._way))
         return SpanResult()
 

@@ -131,7 +131,7 @@ def risen(station, looks):
         path, own = between._way, watch.criterion
         if ends[0].margin is None or ends[1].margin is None:
             return SpanResult()
-        bound = own.rises(model)(between._span(watch, path, ends, state))
+        bound = own.rises(model)(between._span(path, ends, state))
         S_p = []
         for t in np.union1d(np.linspace(path.t[0], path.t[-1], looks), path.t).tolist():
             result, _, _ = between._look(i, watch, path, t, state)

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -78,6 +78,12 @@ class Watch:
     """Whose place it depends on: how well devices know that changes from tick to tick."""
     looks: int
     """Instants that are looked at between two ticks at most."""
+
+    @property
+    def plain(self) -> bool:
+        """Whether it applies at all times, by a limit that is bounded with its figure, which is one."""
+        own = type(self.criterion).margin is not Criterion.margin
+        return self.criterion.active is None and self.follows is None and not own
 
     @property
     def accepted(self) -> str:
@@ -208,6 +214,7 @@ class BetweenTicks:
 
     def __init__(self, watches: Sequence[Watch | None]) -> None:
         self._watches = watches
+        self._points = next((watch.points for watch in watches if watch is not None), None)
         self._before: list[End | None] = [None] * len(watches)
         self._ids: bytes | None = None
         """Which of MuJoCo's bodies moved each body at the last tick."""
@@ -216,6 +223,13 @@ class BetweenTicks:
         self._whole: Span | None = None
         """Of the way from tick to tick, which all criteria ask for."""
         self._simple = AllFalls(watch.falls for watch in watches if watch is not None)
+        self._plain = [
+            (i, watch.criterion.margin, watch.falls)
+            for i, watch in enumerate(watches)
+            if watch is not None and watch.falls in self._simple.bounds and watch.plain
+        ]
+        """Of criteria that `_unclear` looks at: which they are, their margins, and what bounds these."""
+        self._others = sorted({*range(len(watches))} - {i for i, *_ in self._plain})
         self._falls: dict[Falls, Fall] | None = None
         """What these can lose on that way."""
         self._again: dict[int, Evaluate] = {}
@@ -255,7 +269,10 @@ class BetweenTicks:
         back = None
         if path is not None and path.gaps:
             back = self._back(path.gaps, ids.tobytes(), speeds, state)
-        for i, watch in enumerate(self._watches):
+        # Whoever looks back, or failed, is looked at one by one.
+        alone = back is not None or self._failed
+        for i in range(len(found)) if alone else (*self._others, *self._unclear(found, state, speeds)):
+            watch = self._watches[i]
             if watch is None:
                 continue
             try:
@@ -270,6 +287,36 @@ class BetweenTicks:
                 found[i] = asking.take_back(found[i], self._failed[i])
         self._ids, self._speeds = ids.tobytes(), speeds
         return tuple(found)
+
+    def _unclear(self, results: Sequence[Result], state: State, speeds: Array) -> list[int]:
+        """Which criteria with one figure at each end may have lost their margin since the last tick.
+
+        Of the others `_one` would come to nothing, and nothing else is asked of them.
+        """
+        left, path, ends, t = list[int](), self._way, self._before, state.t
+        begin = self._begins if path is not None and self._ends == t else None
+        for i, margin_of, falls in self._plain:
+            result, before = results[i], ends[i]
+            if before is None or before.t != begin or result.t is not None:
+                left.append(i)
+                continue
+            verdict = result.verdict
+            margin = margin_of(result) if verdict is _WITHIN else None
+            now = End(t, verdict, margin, speeds, result.nothing, result.muted)
+            if verdict is not _EXCEEDED and before.verdict is not _EXCEEDED:
+                last = before.margin
+                if last is None or margin is None:
+                    if last is not margin:
+                        left.append(i)
+                        continue
+                else:
+                    assert path is not None
+                    fall = (self._falls or self._every_fall(path, (before, now), state))[falls]
+                    if not _least(margin, last, fall) >= 0:
+                        left.append(i)
+                        continue
+            ends[i] = now
+        return left
 
     def _remember(self, path: Path) -> None:
         """Keep what is known where a tick begins, while robots are heard live."""
@@ -288,8 +335,8 @@ class BetweenTicks:
         since = max((k for k, tick in enumerate(self._past) if tick.path.t[0] <= begin), default=0)
         past = self._past[since:]
         first, path = past[0], Path.joined([tick.path for tick in past], gaps)
-        points = next(watch.points for watch in self._watches if watch is not None)
-        span = points.span(
+        assert self._points is not None
+        span = self._points.span(
             path, float(path.t[0]), self._ends, np.frombuffer(first.ids, np.int64), state.model.mj
         )
         span.between_speeds(first.speeds, speeds)
@@ -413,7 +460,7 @@ class BetweenTicks:
             least = np.maximum(least, told.most)
 
         def bounded(a: End, b: End, at: Moment) -> tuple[float, float, End, End, Moment, Array]:
-            most = follows.most(self._span(watch, path, (a, b), state), at)
+            most = follows.most(self._span(path, (a, b), state), at)
             return -float((most - least).max(initial=0.0)), a.t, a, b, at, most
 
         spans = [bounded(*ends, moments[0])]
@@ -543,14 +590,15 @@ class BetweenTicks:
             )
         return self._search(i, watch, ends, low, state)
 
-    def _span(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Span:
+    def _span(self, path: Path, ends: tuple[End, End], state: State) -> Span:
         a, b = ends
         whole = a.t == self._begins and b.t == self._ends
         span = self._whole if whole else None
         if span is None:
             assert self._ids is not None
+            assert self._points is not None
             ids = np.frombuffer(self._ids, np.int64)
-            span = watch.points.span(path, a.t, b.t, ids, state.model.mj)
+            span = self._points.span(path, a.t, b.t, ids, state.model.mj)
             span.between_speeds(a.speeds, b.speeds)
             span.foresee, span.knots = state.foresee, state.knots
             if state.speed_errors:
@@ -558,15 +606,17 @@ class BetweenTicks:
             self._whole = span if whole else self._whole
         return span
 
+    def _every_fall(self, path: Path, ends: tuple[End, End], state: State) -> dict[Falls, Fall]:
+        """What simple ones can lose from tick to tick."""
+        self._falls = self._simple.of(self._span(path, ends, state))
+        return self._falls
+
     def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
         assert watch.falls is not None
         a, b = ends
-        if a.t == self._begins and b.t == self._ends:
-            if self._falls is None:
-                self._falls = self._simple.of(self._span(watch, path, ends, state))
-            if (found := self._falls.get(watch.falls)) is not None:
-                return found
-        span = self._span(watch, path, ends, state)
+        if a.t == self._begins and b.t == self._ends and watch.falls in self._simple.bounds:
+            return (self._falls or self._every_fall(path, ends, state))[watch.falls]
+        span = self._span(path, ends, state)
         (m, off), *rest = [end.margin for end in ends if end.margin is not None]
         if not rest:
             return watch.falls(span, m - off)
@@ -586,7 +636,7 @@ class BetweenTicks:
             if not self._same:
                 return -np.inf
             try:
-                return float(watch.lowest(state, self._span(watch, path, ends, state)))
+                return float(watch.lowest(state, self._span(path, ends, state)))
             except Undecided:
                 return -np.inf
         fall = self._fall(watch, path, ends, state)
@@ -667,9 +717,16 @@ def least_margin(one: Margin, other: Margin | None, lost: Fall) -> float:
         return float(np.min(m - fall - off))
     m_other, also = other
     if type(fall) is float is type(m) and type(m_other) is float is type(bend):
-        return float(max((m + m_other - fall) / 2, min(m, m_other) - bend) - max(off, also))
+        return _least((m, off), (m_other, also), (fall, bend))
     low = np.maximum((m + m_other - fall) / 2, np.minimum(m, m_other) - bend)
     return float(np.min(low - np.maximum(off, also)))
+
+
+def _least(one: tuple[Any, Any], other: tuple[Any, Any], lost: tuple[Any, Any]) -> float:
+    """`least_margin` of one figure, known at both ends."""
+    (m, off), (m_other, also), (fall, bend) = one, other, lost
+    least: float = max((m + m_other - fall) / 2, min(m, m_other) - bend) - max(off, also)
+    return least
 
 
 def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:

@@ -168,11 +168,11 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def judging(self, compute: Compute, present: Present) -> Evaluate:
         """Return the function that judges what one function computes and another one shows."""
-        same = Result(name=self.name, unit=self.unit, at_most=self.at_most)
+        same, at_most = Result(name=self.name, unit=self.unit, at_most=self.at_most), self.at_most
 
         def evaluate(state: State) -> Result:
             figure = compute(state)
-            verdict = verdict_of(figure, at_most=same.at_most)
+            verdict = verdict_of(figure, at_most=at_most)
             return result_of(figure, verdict, present(state, figure, verdict), same)
 
         return evaluate

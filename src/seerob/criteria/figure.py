@@ -17,13 +17,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from msgspec import Struct, structs
-from numpy import ndarray
 from numpy.typing import NDArray
 
 from seerob.core.markers import Marker, drawn
 from seerob.core.snapshot import Result, Row
 from seerob.core.transforms import Array
-from seerob.core.verdict import ROUNDING, Verdict, judge, judge_interval, worst
+from seerob.core.verdict import ROUNDING, Verdict, judge_interval, keeps, worst
 from seerob.kernels.verdicts import Codes, judged, judged_many
 from seerob.recording.answers import Answers, Flags
 from seerob.recording.series import CODES
@@ -137,27 +136,32 @@ def verdict_of(figure: Figure, *, at_most: bool) -> Verdict | None:
     """Verdict of a figure of one instant, and of its parts, which is written into these."""
     if figure.parts is not None:
         return _verdict_of_parts(figure, figure.parts, at_most=at_most)
-    limit, value, interval = figure.limit, figure.value, figure.interval
-    assert not isinstance(limit, ndarray)
     if figure.nothing:
         return None
+    limit: Any
+    limit, value, interval = figure.limit, figure.value, figure.interval
     if limit is not None and (figure.exceeded or figure.undecided):
         return _UNDECIDED if figure.undecided else _EXCEEDED
-    known = value is not None and not isnan(value)
-    if interval is not None:
+    unknown = value is None or isnan(value)
+    if interval is None:
+        if unknown:
+            return _UNDECIDED
+        if limit is None:
+            return None
+        number: Any = value
+        if type(number) is not int and type(number) is not float:
+            number = float(number)
+        verdict: Verdict | None = _WITHIN if keeps(number, limit, at_most=at_most) else _EXCEEDED
+    else:
         low, high = interval
         if type(low) is not float and type(low) is not int:
             low = float(low)
         if type(high) is not float and type(high) is not int:
             high = float(high)
         verdict = judge_interval((low, high), limit, at_most=at_most)
-        if not known:  # wherever it lies in there
+        if unknown:  # wherever it lies in there
             informs = verdict is None and not figure.open
             return verdict if informs or verdict is _EXCEEDED else _UNDECIDED
-    elif value is None or not known:
-        return _UNDECIDED
-    else:
-        verdict = judge(value if type(value) is int else float(value), limit, at_most=at_most)
     # Nothing could exceed a limit without end.
     if verdict is _WITHIN and (figure.open or limit is None or isinf(limit)):
         return _UNDECIDED
@@ -205,9 +209,11 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         shown: What is said and drawn of it.
         result: What is the same at all instants: name, unit, side of the limit.
     """
-    value, limit, parts, nothing = figure.value, figure.limit, shown.parts, figure.nothing
+    limit: Any
+    reason, draw, parts, _, _, rows = shown
+    value, limit, nothing = figure.value, figure.limit, figure.nothing
     interval: tuple[float, float] | None = None
-    if value is not None and type(value) is not int:
+    if type(value) is not float and type(value) is not int and value is not None:
         value = float(value)
     if figure.interval is not None:
         low, high = figure.interval
@@ -226,7 +232,6 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         nothing = nothing or (verdict is None and interval is None)
     elif isinf(value):
         value, nothing = None, nothing or verdict is None
-    assert not isinstance(limit, ndarray)
     return Result(
         name=result.name,
         value=value,
@@ -234,12 +239,12 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         limit=limit,
         at_most=result.at_most,
         verdict=verdict,
-        reason=shown.reason,
+        reason=reason,
         interval=interval,
         nothing=bool(nothing),
         parts=parts,
-        rows=shown.rows,
-        markers=() if shown.draw is None else drawn(shown.draw),
+        rows=rows,
+        markers=() if draw is None else drawn(draw),
     )
 
 

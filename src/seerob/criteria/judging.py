@@ -245,6 +245,11 @@ class Judge:
             self._holds = self._holds or holds  # and stays so for what was said meanwhile
 
     def _one(self, question: Question, state: State) -> Result:
+        if question.always:
+            result = self._says(question, question.bound.evaluate, state)
+            if self._holds:
+                question.why = question.held_for(state.asked)
+            return result
         criterion, kept = question.criterion, question.kept
         passed_over = question.turns is not None and question.passed_over(state.t)
         if criterion.active is not None and (pulse := question.pulse(state)):
@@ -375,7 +380,7 @@ class Judge:
             for said in question.undecided_reasons(state):
                 if said:
                     return undecided(result, str(said))
-        if question.shaken and state.speed_errors:
+        if state.speeds_asked and question.shaken and state.speed_errors:
             return self._shaken(question, result, state)
         return result
 

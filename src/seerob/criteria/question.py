@@ -278,6 +278,8 @@ class Question:
     """Why nothing that it said last is within."""
     own: bool = field(init=False)
     """Whether it is one of the user's, which does not ship."""
+    always: bool = field(init=False)
+    """Whether it is asked at every tick, whatever variables and phases of the task say."""
     shaken: bool = field(init=False)
     """Whether the judge finds out what errors of speeds would change (`Criterion.by_speed`)."""
     held_names: Mapping[str, str] = field(default_factory=dict)
@@ -285,6 +287,7 @@ class Question:
 
     def __post_init__(self) -> None:
         self.own, self.shaken = self.bound.own, not self.criterion.by_speed
+        self.always = self.criterion.active is None and self.criterion.every is None and self.turns is None
 
     def hold(self, model: Model, findings: Iterable[Finding], names: Mapping[str, str]) -> bool:
         """Take note of what is held by findings, and by shapes that are missing; whether anything is.

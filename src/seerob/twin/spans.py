@@ -667,7 +667,8 @@ class AllFalls:
         every = [each for each in falls if isinstance(each, Approaching | Speeding | Turning)]
         own = [each for each in every if not isinstance(each, Turning)]
         self._turning = [each for each in every if isinstance(each, Turning)]
-        self._own = (*own, *self._turning)
+        self.bounds = (*own, *self._turning)
+        """Those that are not left out."""
         sets = [
             rows
             for each in own
@@ -685,7 +686,7 @@ class AllFalls:
         self._shares = np.zeros((len(couplings), joints, columns))
         for moves, shares, each in zip(self._moves, self._shares, couplings, strict=True):
             moves[:], shares[:, : each.shares.shape[1]] = each
-        self._found = np.empty((2, len(self._own)))
+        self._found = np.empty((2, len(self.bounds)))
 
     def of(self, span: Span) -> dict[Falls, Fall]:
         """What each says of a span."""
@@ -696,4 +697,4 @@ class AllFalls:
             self._points, start, joints, turns, lengths, self._moves, self._shares, self._found,
         )  # fmt: skip
         falls, below = self._found.tolist()
-        return dict(zip(self._own, map(_FALL, zip(falls, below, strict=True)), strict=True))
+        return dict(zip(self.bounds, map(_FALL, zip(falls, below, strict=True)), strict=True))

@@ -5,10 +5,12 @@ Which bones of people a question is about, and what is said of those that nobody
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from operator import attrgetter, sub
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -110,6 +112,9 @@ class Heard(NamedTuple):
     nobody says so."""
 
 
+_INSTANT, _REASON = attrgetter("t"), attrgetter("reason")
+
+
 @dataclass
 class Hearing:
     """What is known of where a robot or human really is."""
@@ -121,7 +126,7 @@ class Hearing:
     timeout: float = 0.2
     """[s]"""
     heard: list[Heard] = field(default_factory=list)
-    """The newest samples, oldest first; some may lie ahead of the tick."""
+    """The newest samples, each newer than the one before; some may lie ahead of the tick."""
     invalid_torque_reason: str = ""
     """Why those torques may not be relied on; empty when they may."""
     error: float = 0.0
@@ -205,7 +210,7 @@ class Hearing:
         """
         if not self.driven:
             return "" if self.given else "no source drives it and the file gives no position (q)"
-        k = _by(self.heard, t)
+        k = self._past(t)
         if k == 0:
             return "nothing heard yet"
         last = self.heard[k - 1].t
@@ -219,6 +224,8 @@ class Hearing:
         if k == len(self.heard) and t - last > self.grace + SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
+        if not any(map(_REASON, self.heard)):
+            return ""
         # Who falls behind has more than one sample ahead: the last takes all of them back.
         heard, until = self.heard, len(self.heard) - 1
         while until > k and not heard[until].t - heard[until - 1].t < REPEATED:
@@ -230,8 +237,12 @@ class Hearing:
 
     def around(self, t: float) -> list[Heard]:
         """Return the last sample at or before ``t`` [s] and the next one, where there are such."""
-        k = _by(self.heard, t)
+        k = self._past(t)
         return self.heard[max(k - 1, 0) : k + 1]
+
+    def _past(self, t: float) -> int:
+        """How many of the newest samples are of ``t`` [s] or before."""
+        return bisect_right(self.heard, t + SLACK, key=_INSTANT)
 
     def speed_error(self, t: float) -> Array | None:
         """How far joint velocities may be off at ``t`` [s], shape (n,).
@@ -247,7 +258,10 @@ class Hearing:
     def invalid_ahead_reason(self, t: float, until: float) -> str:
         """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""
         begin, end, longest = t + SLACK, until - SLACK, self.timeout + SLACK
-        for before, said in pairwise(self.heard):
+        times = [*map(_INSTANT, self.heard)]
+        # What is heard well ahead is mostly so all the way: pairs are looked at where one of them is not.
+        doubt = any(map(_REASON, self.heard)) or max(map(sub, times[1:], times), default=0.0) > longest
+        for before, said in pairwise(self.heard) if doubt else ():
             a, b = before.t, said.t
             if begin < b and a < end:
                 if said.reason:
@@ -307,7 +321,11 @@ class Hearing:
 
     def _said_of_bones(self, t: float) -> list[BonesHeard]:
         """What was said last by ``t`` [s] and what next: between two samples either may hold."""
-        k = _by(self.bones_heard, t)
+        k = 0
+        for said in self.bones_heard:
+            if not said.t <= t + SLACK:
+                break
+            k += 1
         return self.bones_heard[max(k - 1, 0) : k + 1]
 
 
@@ -316,13 +334,3 @@ def no_position_reason(bones: Sequence[str]) -> str:
     shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
     which = "the person is" if len(bones) == len(BONES) else f"{shown} {'is' if len(bones) == 1 else 'are'}"
     return f"no device says where {which}, only how bones are turned" if bones else ""
-
-
-def _by(said: Sequence[Heard] | Sequence[BonesHeard], t: float) -> int:
-    """How many of some samples, oldest first, are of ``t`` [s] or before."""
-    k = 0
-    for each in said:
-        if not each.t <= t + SLACK:
-            break
-        k += 1
-    return k

@@ -78,3 +78,18 @@ def test_links_without_a_namesake_keep_their_envelope(tmp_path):
     assert "forearm_link" in finding.text
     assert "shoulder_link" not in finding.text
     assert any("envelope made by seerob" in f.text for f in dressed.findings)
+
+
+def test_a_display_mesh_of_the_maker_that_cannot_be_read_holds_the_robot(tmp_path):
+    """The envelope had room for it; the maker's collision shape, which takes its place, need not."""
+    text = """<robot name="r"><link name="base_link"/><link name="shoulder_link">
+    <visual><geometry><mesh filename="gone.stl"/></geometry></visual>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+    <joint name="shoulder_pan_joint" type="continuous">
+    <axis xyz="0 0 1"/>
+    <parent link="base_link"/><child link="shoulder_link"/><origin xyz="0 0 0.1273"/></joint>
+    </robot>"""
+    (tmp_path / "r.urdf").write_text(text)
+    dressed = load_robot("library:ur10", folder=tmp_path, meshes="r.urdf", name="left")
+    held = [(f.subject, f.holds) for f in dressed.findings if "left out of pictures" in f.text]
+    assert held == [("left/shoulder_link", ("left",))]

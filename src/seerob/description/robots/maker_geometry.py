@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from seerob.core.errors import InputError
 from seerob.core.shapes import Mesh, Solid
@@ -126,8 +127,9 @@ def _said(
     for finding in maker.findings:
         subject = f"{robot.name}/{finding.subject.partition('/')[2]}"
         of_a_file = finding.text.partition(": ")[0] in maker.files
-        if subject in about and (of_a_file or "sticks out" in finding.text):
-            said.append(Finding(level=finding.level, subject=subject, text=finding.text))
+        # What holds the robot holds it in these shapes, too.
+        if finding.holds or (subject in about and (of_a_file or "sticks out" in finding.text)):
+            said.append(structs.replace(finding, subject=subject))
     return said
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
@@ -191,4 +192,4 @@ def gaps(t: Array, positions: Array, *, file: str, subject: str) -> list[Finding
 
 def about(findings: tuple[Finding, ...], subject: str) -> tuple[Finding, ...]:
     """The findings of a file with the name of the person whom it drives."""
-    return tuple(Finding(level=f.level, subject=f.subject or subject, text=f.text) for f in findings)
+    return tuple(structs.replace(f, subject=f.subject or subject) for f in findings)

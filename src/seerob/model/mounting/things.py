@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.shapes import Mesh, Solid, capsule, dilated_rectangle, prism_mesh
@@ -132,8 +133,8 @@ def load_thing(
 
 
 def replace_subject(finding: Finding, subject: str) -> Finding:
-    """Return the finding with its level and text, about another subject."""
-    return Finding(level=finding.level, subject=subject, text=finding.text)
+    """Return the finding about another subject."""
+    return structs.replace(finding, subject=subject)
 
 
 def _piece(name: str, mesh: Mesh) -> Piece:

@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from seerob.app.commands.import_aml import Made
+from seerob.app.importing.plant import Made
 from seerob.core.errors import InputError
 from seerob.criteria.contact import measured
 from seerob.description.formats import automationml

@@ -41,7 +41,7 @@ COMMANDS = (
     "explain",
     "measure",
     "capture",
-    "import_aml",
+    "import_",
 )
 """One module each in `seerob.app.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
 
@@ -56,7 +56,7 @@ def parser(asked: str = "") -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"seerob {version('seerob')}")
     commands = top.add_subparsers(dest="command", required=True, metavar="command")
-    named = {name.replace("_", "-"): name for name in COMMANDS}
+    named = {name.rstrip("_").replace("_", "-"): name for name in COMMANDS}
     for command in [asked] if asked in named else named:
         name = named[command]
         module = import_module(f"seerob.app.commands.{name}")

@@ -25,6 +25,7 @@ EXTRAS = {
     "openvr": "vive",
     "xr": "openxr",
     "cryptography": "tls",
+    "OCP": "cad",
 }
 """Package as it is imported → the extra that brings it."""
 

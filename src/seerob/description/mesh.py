@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.mesh_files import MeshSource, RawFile, RawMesh, in_parser_process
 from seerob.description.meshes import collada, gltf, obj, off, ply, stl, threemf
-from seerob.description.shapes.mesh_bodies import tidied
+from seerob.description.shapes.mesh_bodies import joined
 from seerob.description.shapes.mesh_mending import sided
 
 MAX_BYTES = 512 * 2**20
@@ -40,7 +41,7 @@ READERS: dict[str, Callable[[MeshSource], RawFile]] = {
 }
 """File name ending → reader."""
 
-_PROPRIETARY = {
+_IMPORTED = {
     **dict.fromkeys((".sldprt", ".sldasm"), "SolidWorks"),
     **dict.fromkeys((".catpart", ".catproduct", ".cgr", ".3dxml"), "CATIA"),
     **dict.fromkeys((".ipt", ".iam"), "Inventor"),
@@ -64,6 +65,13 @@ class NamedMesh:
     name: str
     """Unique within the file; the path in its scene graph joined with ``/``."""
     mesh: Mesh
+    colored: tuple[Mesh, ...] = ()
+    """Its surface by colour; empty when it has one."""
+
+    @property
+    def drawn(self) -> tuple[Mesh, ...]:
+        """What is shown of it."""
+        return self.colored or (self.mesh,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +87,10 @@ class LoadedMeshes:
     def plain(self) -> tuple[Mesh, ...]:
         """The meshes without their names."""
         return tuple(named.mesh for named in self.meshes)
+
+    def drawn(self) -> tuple[Mesh, ...]:
+        """What is shown of them, by colour."""
+        return tuple(mesh for named in self.meshes for mesh in named.drawn)
 
     def hashes(self) -> dict[str, str]:
         """SHA-256, hexadecimal, of every file that was read."""
@@ -115,19 +127,59 @@ def load_meshes(
     """
     path = Path(path)
     _check_options(path, units, up, scale)
-    reader = _reader(path)
-    source = MeshSource(path, _content(path, max_bytes), max_bytes, max_faces)
+    file = opened(path, _ending(path), units=units, up=up, max_bytes=max_bytes, max_faces=max_faces)
+    raws = [raw.placed() for raw in file.meshes]
+    matrix = np.diag(scale) @ file.world_from_file
+    _check_reach(file.source, raws, float(np.abs(matrix).max()))
+    meshes = _finished(file.source, raws, matrix)
+    return LoadedMeshes(meshes, tuple(file.source.findings), file.source.files)
+
+
+class OpenedFile(NamedTuple):
+    """A mesh file that was read and not yet brought into metres."""
+
+    source: MeshSource
+    meshes: tuple[RawMesh, ...]
+    """Those that have triangles, where their instances are or with their places beside them."""
+    world_from_file: Array
+    """Shape (3, 3): to metres, z up."""
+
+
+def opened(
+    path: Path,
+    ending: str,
+    *,
+    units: str | None = None,
+    up: str | None = None,
+    max_bytes: int = MAX_BYTES,
+    max_faces: int = MAX_FACES,
+) -> OpenedFile:
+    """What a mesh file holds, finite and no larger than a site.
+
+    Args:
+        path: The file.
+        ending: Which of `READERS` reads it.
+        units: As `load_meshes` takes it.
+        up: As `load_meshes` takes it.
+        max_bytes: Largest file, with those it refers to [bytes].
+        max_faces: Most triangles.
+
+    Raises:
+        InputError: As `load_meshes` raises it.
+    """
+    _check_options(path, units, up, (1.0, 1.0, 1.0))
+    source = MeshSource(path, file_content(path, max_bytes), max_bytes, max_faces)
     source.files[path.name] = source.data
-    raw = reader(source)
-    raws = [m for m in raw.meshes if len(m.faces)]
-    if not raws:
+    raw = READERS[ending](source)
+    meshes = tuple(m for m in raw.meshes if len(m.faces))
+    if not meshes:
         source.fail("holds no triangles", "export surfaces, not only points, lines or a B-rep")
+    raws = [m.placed() for m in meshes]
     _check(source, raws)
     _check_reach(source, raws, min(LENGTHS.values()))
-    matrix = np.diag(scale) @ _Z_FROM[_up(source, raw, up)] * _meters(source, raw, raws, units)
+    matrix = _Z_FROM[_up(source, raw, up)] * _meters(source, raw, raws, units)
     _check_reach(source, raws, float(np.abs(matrix).max()))
-    meshes = _finished(source, raws, matrix)
-    return LoadedMeshes(meshes, tuple(source.findings), source.files)
+    return OpenedFile(source, meshes, matrix)
 
 
 def _check_options(path: Path, units: str | None, up: str | None, scale: tuple[float, ...]) -> None:
@@ -139,22 +191,26 @@ def _check_options(path: Path, units: str | None, up: str | None, scale: tuple[f
         raise InputError.at(path, "scale", f"{scale!r}", "three finite factors, none of them zero")
 
 
-def _reader(path: Path) -> Callable[[MeshSource], RawFile]:
+def _ending(path: Path) -> str:
     ending = path.suffix.lower()
     if ending in READERS:
-        return READERS[ending]
+        return ending
     known = "STL, OBJ, PLY, OFF, GLB, glTF, COLLADA (.dae) or 3MF"
-    if maker := _PROPRIETARY.get(ending):
-        raise InputError.at(
-            path,
-            "",
-            f"{maker} files ({ending}) cannot be read",
-            f"export it as GLB or STL ({known} are read)",
+    if maker := _IMPORTED.get(ending):
+        what = f"{maker} files ({ending}) are no meshes"
+        remedy = (
+            f"seerob import {path.name[:80]} FOLDER reads it or says what to export; {known} are read here"
         )
+        raise InputError.at(path, "", what, remedy)
     raise InputError.at(path, "", f"{ending or 'no ending'!r} is not a mesh format", f"{known} are read")
 
 
-def _content(path: Path, max_bytes: int) -> bytes:
+def file_content(path: Path, max_bytes: int) -> bytes:
+    """A file whole.
+
+    Raises:
+        InputError: It is missing, empty, too large, or a web page that was saved instead.
+    """
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "there is no such file"
         raise InputError.at(path, "", what, missing_file(path, "name a mesh file"))
@@ -234,24 +290,45 @@ def _finished(source: MeshSource, raws: list[RawMesh], matrix: Array) -> tuple[N
     mirrored = np.linalg.det(matrix) < 0
     taken: set[str] = set()
     meshes = []
-    for raw in raws:
-        name = _unique(printable(raw.name) or source.path.stem, taken)
-        faces = raw.faces[:, ::-1] if mirrored else raw.faces
-        with np.errstate(all="ignore"):  # a vertex that no face uses may be anything
-            vertices = raw.vertices @ matrix.T
-        mesh, said = tidied(Mesh(vertices, faces.astype(np.int32), raw.color or Mesh.color))
+    for group in parts(raws):
+        name = _unique(printable(group[0].name) or source.path.stem, taken)
+        pieces = []
+        for raw in group:
+            faces = raw.faces[:, ::-1] if mirrored else raw.faces
+            with np.errstate(all="ignore"):  # a vertex that no face uses may be anything
+                vertices = raw.vertices @ matrix.T
+            pieces.append(Mesh(vertices, faces.astype(np.int32), raw.color or Mesh.color))
+        mesh, said = joined(pieces)
         if said:
             source.note(f"{name}: {said}")
         if len(mesh.faces):
             mesh, turned = sided(mesh)
             if turned:
                 source.note(f"{name}: {turned}")
-            meshes.append(NamedMesh(name, mesh))
+            meshes.append(NamedMesh(name, mesh, by_color(pieces)))
         else:
             source.note(f"{name}: nothing but triangles without area; left out", level="warning")
     if not meshes:
         source.fail("holds nothing but triangles without area", "export it again")
     return tuple(meshes)
+
+
+def parts(raws: Sequence[RawMesh]) -> list[list[RawMesh]]:
+    """Meshes that are one part together, in the file's order."""
+    groups: dict[object, list[RawMesh]] = {}
+    for number, raw in enumerate(raws):
+        groups.setdefault(("alone", number) if raw.part is None else raw.part, []).append(raw)
+    return list(groups.values())
+
+
+def by_color(pieces: Sequence[Mesh]) -> tuple[Mesh, ...]:
+    """One mesh per colour; empty when there is one colour."""
+    groups: dict[object, list[Mesh]] = {}
+    for piece in pieces:
+        groups.setdefault(piece.color, []).append(piece)
+    if len(groups) < 2:
+        return ()
+    return tuple(mesh for group in groups.values() if len((mesh := joined(group)[0]).faces))
 
 
 def _unique(name: str, taken: set[str]) -> str:

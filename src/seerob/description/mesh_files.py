@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
 from urllib.parse import unquote, urlsplit
@@ -85,7 +85,7 @@ Color = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """One mesh as the file has it: its own unit and axes, instance transforms already applied."""
+    """One mesh as the file has it: its own unit and axes."""
 
     name: str
     """Path in the file's scene graph, joined with ``/``; empty when the file names nothing."""
@@ -94,6 +94,22 @@ class RawMesh:
     faces: NDArray[np.int64]
     """Shape (m, 3)."""
     color: Color | None = None
+    file_from_mesh: Array | None = None
+    """Where this instance is, (4, 4), in the file's unit, perhaps scaled or mirrored; None: as it is."""
+    geometry: str = ""
+    """Equal for instances of one geometry; empty when there are none."""
+    part: int | None = None
+    """Equal for meshes that are one part, split by colour; None for a part of one mesh."""
+
+    def placed(self) -> RawMesh:
+        """The mesh where its instance is; what is mirrored keeps its outside."""
+        if self.file_from_mesh is None:
+            return self
+        matrix = self.file_from_mesh
+        with np.errstate(all="ignore"):  # what is no number, or too large, is refused later
+            vertices = self.vertices.astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
+            faces = self.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else self.faces
+        return replace(self, vertices=vertices, faces=faces, file_from_mesh=None, geometry="")
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,15 +235,24 @@ def in_parser_process(read: Reader) -> Reader:
 def _plain(read: Reader, path: Path, data: bytes, max_bytes: int, max_faces: int) -> tuple[Any, ...]:
     source = MeshSource(path, data, max_bytes, max_faces)
     raw = read(source)
-    meshes = [
-        (m.name, np.asarray(m.vertices, "<f8").tobytes(), np.asarray(m.faces, "<i8").tobytes(), m.color)
-        for m in raw.meshes
-    ]
+    meshes = []
+    for m in raw.meshes:
+        where = None if m.file_from_mesh is None else m.file_from_mesh.tolist()
+        arrays = np.asarray(m.vertices, "<f8").tobytes(), np.asarray(m.faces, "<i8").tobytes()
+        meshes.append((m.name, *arrays, m.color, where, m.geometry, m.part))
     findings = [(finding.level, finding.subject, finding.text) for finding in source.findings]
     return meshes, raw.meters, raw.up, findings, source.files
 
 
-def _mesh(name: str, vertices: bytes, faces: bytes, color: Any) -> RawMesh:
+def _mesh(
+    name: str, vertices: bytes, faces: bytes, color: Any, where: Any, geometry: str, part: int | None
+) -> RawMesh:
     return RawMesh(
-        name, np.frombuffer(vertices, "<f8").reshape(-1, 3), np.frombuffer(faces, "<i8").reshape(-1, 3), color
+        name,
+        np.frombuffer(vertices, "<f8").reshape(-1, 3),
+        np.frombuffer(faces, "<i8").reshape(-1, 3),
+        color,
+        None if where is None else np.array(where, float),
+        geometry,
+        part,
     )

@@ -110,7 +110,7 @@ def shapes(gap: Gap) -> tuple[Input, ...]:
                 value=gap.deviation,
                 unit="m",
                 origin=Origin.COMPUTED,
-                source="display meshes against collision meshes",
+                source="display meshes against collision meshes, and what is said of the meshes of things",
             )
         )
     return tuple(found)

@@ -187,6 +187,9 @@ class Thing(_Table, frozen=True, kw_only=True):
     """Unit of the mesh file (``mm``, ``m``, ``inch`` …) when the format does not say."""
     up: Literal["x", "y", "z"] | None = None
     """Axis that points up in the mesh file, when the format does not say."""
+    deviation: Annotated[float, unit("m", ge=0, le=1)] = 0.0
+    """How far the real surface may lie outside the mesh [m], as of a round one that was cut into triangles;
+    every distance is uncertain by it."""
     at: Pose = Pose()
     """Pose in the world, or in the frame it is mounted on."""
     mass: Mass | None = None
@@ -203,6 +206,8 @@ class Thing(_Table, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if (self.mesh is None) == (self.shape is None):
             raise ValueError("give either mesh or shape")
+        if self.deviation and self.mesh is None:
+            raise ValueError("deviation is of a mesh: leave it out beside a shape")
         if self.mass is not None and self.density is not None:
             raise ValueError("mass and density are both given: keep one")
         if self.inertia is not None and (self.mass is None or self.com is None):

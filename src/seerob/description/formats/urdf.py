@@ -23,7 +23,7 @@ from seerob.description import lint
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
 from seerob.description.formats.mimic import flattened
 from seerob.description.formats.resolve import Resolver
-from seerob.description.mesh import LoadedMeshes, load_meshes
+from seerob.description.mesh import LoadedMeshes, NamedMesh, load_meshes
 from seerob.description.shapes import shapes
 from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.mesh_mending import with_insides
@@ -77,7 +77,7 @@ class Shapes:
         for key, element, kind, link_from_shape in self._elements(link, name, "visual"):
             color = self._color(element.find("material"), key)
             if kind.tag == "mesh":
-                meshes = [mesh for _, mesh in self._meshes(kind, key, name)]
+                meshes = [mesh for named in self._meshes(kind, key, name) for mesh in named.drawn]
             else:
                 solid = self._primitive(kind, key)
                 meshes = [] if solid is None else [solid[1]]
@@ -92,9 +92,9 @@ class Shapes:
         for i, (key, element, kind, link_from_shape) in enumerate(self._elements(link, name, tag)):
             label = element.get("name") or (f"{tag}_{i}" if i else tag)
             if kind.tag == "mesh":
-                for part, mesh in self._meshes(kind, key, name):
-                    exact = physics_mesh(mesh.moved(link_from_shape))
-                    found.append(Solid(mesh=exact, name=f"{label}/{part}"))
+                for named in self._meshes(kind, key, name):
+                    exact = physics_mesh(named.mesh.moved(link_from_shape))
+                    found.append(Solid(mesh=exact, name=f"{label}/{named.name}"))
             else:
                 solid = self._primitive(kind, key)
                 if solid is not None:
@@ -154,7 +154,7 @@ class Shapes:
             return np.zeros(count)
         return values
 
-    def _meshes(self, kind: Element, key: str, link: str) -> list[tuple[str, Mesh]]:
+    def _meshes(self, kind: Element, key: str, link: str) -> Sequence[NamedMesh]:
         uri = kind.get("filename", "")
         scale = self.reader.numbers(kind, "scale", f"{key}.mesh", (1.0, 1.0, 1.0))
         x, y, z = scale.tolist()
@@ -166,7 +166,7 @@ class Shapes:
             self.loaded[uri, (x, y, z)] = self._load(uri, (x, y, z), key, link)
         loaded = self.loaded[uri, (x, y, z)]
         if isinstance(loaded, LoadedMeshes):
-            return [(named.name, named.mesh) for named in loaded.meshes]
+            return loaded.meshes
         said = {problem.what for problem in self.reader.problems}
         self.reader.problems += [each._replace(key=f"{key}.mesh") for each in loaded if each.what not in said]
         return []

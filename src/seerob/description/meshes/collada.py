@@ -17,7 +17,7 @@ _MAX_NODES = 200_000
 
 
 def read(source: MeshSource) -> RawFile:
-    """Meshes of the visual scene, one per primitive of each geometry instance.
+    """Meshes of the visual scene, one per primitive of each geometry instance, which is one part.
 
     Raises:
         InputError: with a document type or entities, which no honest COLLADA file has.
@@ -46,7 +46,7 @@ def read(source: MeshSource) -> RawFile:
             if len(names) > _MAX_DEPTH or visited > _MAX_NODES:
                 source.fail(f"has more than {_MAX_NODES} nodes, or nests them deeper than {_MAX_DEPTH}")
             if isinstance(node, collada.scene.GeometryNode):
-                for mesh in _meshes(source, node, matrix, names):
+                for mesh in _meshes(source, node, matrix, names, visited):
                     count += len(mesh.faces)
                     if count > source.max_faces:
                         source.fail(f"has more than {source.max_faces} triangles", "raise max_faces")
@@ -86,12 +86,12 @@ def _unit_and_axis(source: MeshSource, root: Any) -> tuple[float, str]:
     return meters, up
 
 
-def _meshes(source: MeshSource, node: Any, matrix: Array, names: tuple[str, ...]) -> list[RawMesh]:
+def _meshes(source: MeshSource, node: Any, matrix: Array, names: tuple[str, ...], part: int) -> list[RawMesh]:
     import collada
 
     materials = {m.symbol: m.target for m in node.materials}
     name = "/".join(names) or node.geometry.name or node.geometry.id or ""
-    meshes = []
+    meshes: list[RawMesh] = []
     for primitive in node.geometry.primitives:
         if isinstance(primitive, collada.lineset.LineSet):
             source.note(f"{name}: lines are not a surface and were left out")
@@ -101,11 +101,11 @@ def _meshes(source: MeshSource, node: Any, matrix: Array, names: tuple[str, ...]
             surface = primitive.triangleset()
         if not isinstance(surface, collada.triangleset.TriangleSet) or surface.vertex is None:
             continue
-        vertices = np.asarray(surface.vertex, float) @ matrix[:3, :3].T + matrix[:3, 3]
+        vertices = np.asarray(surface.vertex, float)
         faces = np.asarray(surface.vertex_index, np.int64).reshape(-1, 3)
-        if np.linalg.det(matrix[:3, :3]) < 0:
-            faces = faces[:, ::-1]
-        meshes.append(RawMesh(name, vertices, faces, _color(materials.get(primitive.material))))
+        color = _color(materials.get(primitive.material))
+        label = f"{node.geometry.name or ''}#{node.geometry.id}.{len(meshes)}.{color}"
+        meshes.append(RawMesh(name, vertices, faces, color, matrix, label, part))
     return meshes
 
 

@@ -26,7 +26,10 @@ _MAX_ZEROS = 5_000_000
 
 
 def read(source: MeshSource) -> RawFile:
-    """Meshes of the default scene, one per primitive, named by their path in the tree of nodes."""
+    """Meshes of the default scene, one per primitive, named by their path in the tree of nodes.
+
+    The primitives of one node are one part, split by material.
+    """
     tree, binary = _split(source)
     with source.parsing("glTF file"):
         if not isinstance(tree, dict) or not str(tree.get("asset", {}).get("version", "")).startswith("2."):
@@ -101,7 +104,7 @@ class _Reader:
             if "mesh" in node:
                 if "skin" in node:
                     self.source.note(f"{'/'.join(path)}: skinned; read in its bind pose", level="warning")
-                for mesh in self.primitives(node["mesh"], matrix, "/".join(path)):
+                for mesh in self.primitives(node["mesh"], matrix, "/".join(path), visited):
                     faces += len(mesh.faces)
                     if faces > self.source.max_faces:
                         self.source.fail(
@@ -124,9 +127,9 @@ class _Reader:
             self.source.fail("a transform is not finite", "export it again", f"nodes[{index}]")
         return matrix
 
-    def primitives(self, index: Any, matrix: Array, name: str) -> list[RawMesh]:
+    def primitives(self, index: Any, matrix: Array, name: str, part: int) -> list[RawMesh]:
         meshes = []
-        for primitive in self.item("meshes", index).get("primitives", ()):
+        for number, primitive in enumerate(self.item("meshes", index).get("primitives", ())):
             mode = primitive.get("mode", 4)
             if mode not in {4, 5, 6}:
                 self.source.note(f"{name}: points or lines are not a surface and were left out")
@@ -141,11 +144,9 @@ class _Reader:
                 if "indices" in primitive
                 else np.arange(len(position))
             )
-            faces = _triangles(corners, mode)
-            if np.linalg.det(matrix[:3, :3]) < 0:
-                faces = faces[:, ::-1]
-            vertices = position.astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
-            meshes.append(RawMesh(name, vertices, faces, self.color(primitive.get("material"), name)))
+            faces, color = _triangles(corners, mode), self.color(primitive.get("material"), name)
+            label = f"{self.item('meshes', index).get('name') or ''}#{index}.{number}"
+            meshes.append(RawMesh(name, position.astype(float), faces, color, matrix, label, part))
         return meshes
 
     def color(self, index: Any, name: str) -> Color | None:

@@ -154,11 +154,9 @@ class _Package:
                 self.source.fail(f"object {identity!r} contains itself", "export it again")
             path_names = (*names, found.name)
             if len(found.faces):
-                turned = np.linalg.det(matrix[:3, :3]) < 0
-                moved = found.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-                triangles = found.faces[:, ::-1] if turned else found.faces
-                meshes.append(RawMesh("/".join(path_names), moved, triangles, found.color))
-                faces += len(triangles)
+                name, label = "/".join(path_names), f"{found.name}#{part}.{identity}"
+                meshes.append(RawMesh(name, found.vertices, found.faces, found.color, matrix, label))
+                faces += len(found.faces)
             for p, i, below in reversed(found.components):
                 stack.append((p, i, matrix @ below, path_names, (*above, (part, identity))))
         return meshes

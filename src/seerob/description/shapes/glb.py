@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.mesh_bodies import tidied
+
+_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 _ROUND = 20
 """Segments of a full circle; a multiple of four."""
@@ -353,13 +355,12 @@ def stl_bytes(mesh: Mesh) -> bytes:
     return b"seerob, metres, z up".ljust(80) + len(records).to_bytes(4, "little") + records.tobytes()
 
 
-def glb_y_up(mesh: Mesh) -> bytes:
-    """Binary glTF as the format has it: metres, y up."""
-    turned = np.column_stack([mesh.vertices[:, 0], mesh.vertices[:, 2], -mesh.vertices[:, 1]])
-    return glb_bytes([Mesh(turned, mesh.faces, mesh.color)])
+def glb_y_up(*meshes: Mesh) -> bytes:
+    """Binary glTF as the format has it: metres, y up; one part, split by colour where there are several."""
+    return glb_bytes([mesh.moved(_Y_UP) for mesh in meshes])
 
 
-WRITERS = {".stl": stl_bytes, ".glb": glb_y_up}
+WRITERS: dict[str, Callable[[Mesh], bytes]] = {".stl": stl_bytes, ".glb": glb_y_up}
 
 
 def check_format(path: Path) -> None:

@@ -94,20 +94,24 @@ def load_thing(
         files = loaded.files
         single = len(loaded.meshes) == 1
         own_color = thing.color is not None
-        meshes = [
-            (m.name, Mesh(m.mesh.vertices, m.mesh.faces, color) if own_color else m.mesh)
+        pieces = tuple(
+            _piece(
+                "" if single else m.name,
+                m.mesh,
+                (Mesh(m.mesh.vertices, m.mesh.faces, color),) if own_color else m.drawn,
+                thing.deviation,
+            )
             for m in loaded.meshes
-        ]
-        pieces = tuple(_piece("" if single else name, mesh) for name, mesh in meshes)
+        )
         source = f"shape of {thing.mesh}"
-        whole = [mesh for _, mesh in meshes]
+        whole = [m.mesh for m in loaded.meshes]
         if not all(map(is_closed, whole)):
             around = enclosing(whole)
             if around is None:
                 findings += (_hole(thing, path),)
             else:
                 # Split by colour or by name, none of the pieces has an inside; all of them together do.
-                inside = Solid(mesh=detail.physics_mesh(around))
+                inside = Solid(mesh=detail.physics_mesh(around), deviation=thing.deviation)
                 pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
     else:
         assert thing.shape is not None
@@ -137,9 +141,9 @@ def replace_subject(finding: Finding, subject: str) -> Finding:
     return structs.replace(finding, subject=subject)
 
 
-def _piece(name: str, mesh: Mesh) -> Piece:
-    display = detail.display_mesh(mesh)
-    return Piece(name, (display,), (Solid(mesh=detail.physics_mesh(mesh), name=name),))
+def _piece(name: str, mesh: Mesh, drawn: Sequence[Mesh], deviation: float) -> Piece:
+    solid = Solid(mesh=detail.physics_mesh(mesh), name=name, deviation=deviation)
+    return Piece(name, tuple(map(detail.display_mesh, drawn)), (solid,))
 
 
 def _round(shape: Shape | None) -> tuple[float, float] | None:

@@ -91,7 +91,7 @@ def packed(folder, text, box, *, name="cell.amlx"):
 def test_a_plant_becomes_a_workstation(tmp_path, capsys, box, edition, make):
     file = make(tmp_path / "plant", edition.format(plant()), box)
     made = tmp_path / "cell"
-    assert cli.main(["import-aml", str(file), str(made)]) == Exit.WITHIN
+    assert cli.main(["import", str(file), str(made)]) == Exit.WITHIN
     assert "1 parts with a shape, 1 robots, 2 variables" in capsys.readouterr().out
     assert cli.main(["check-file", str(made)]) == Exit.WITHIN
     (body,) = load(made).model.bodies
@@ -174,7 +174,7 @@ def test_names_in_brackets_other_geometry_and_paths_from_the_root_of_a_container
         tmp_path / "a.amlx",
         **{"plants/cell.aml": text, "geometry/box.dae": box, "_rels/.rels": related("plants/cell.aml")},
     )
-    assert cli.main(["import-aml", str(file), str(tmp_path / "made")]) == Exit.WITHIN
+    assert cli.main(["import", str(file), str(tmp_path / "made")]) == Exit.WITHIN
     assert "1 parts with a shape, 1 robots" in capsys.readouterr().out
 
 
@@ -204,14 +204,14 @@ def test_nothing_outside_the_plant_is_read(tmp_path, capsys, box, uri):
     for make in (written, packed):
         folder = tmp_path / make.__name__
         file = make(folder, OLD.format(plant(uri=uri)), box)
-        assert cli.main(["import-aml", str(file), str(folder / "made")]) == Exit.WITHIN
+        assert cli.main(["import", str(file), str(folder / "made")]) == Exit.WITHIN
         assert "0 parts with a shape" in capsys.readouterr().out
         assert not list((folder / "made" / "cad").iterdir())
 
 
 def test_a_folder_with_something_in_it_is_not_touched(tmp_path, capsys, box):
     file = written(tmp_path / "plant", OLD.format(plant()), box)
-    assert cli.main(["import-aml", str(file), str(tmp_path / "plant")]) == Exit.ERROR
+    assert cli.main(["import", str(file), str(tmp_path / "plant")]) == Exit.ERROR
     assert "exists already" in capsys.readouterr().err
 
 
@@ -244,7 +244,7 @@ def test_a_container_that_unpacks_to_too_much_is_refused(tmp_path):
 def test_a_plant_of_structure_alone_is_said_to_be_so(tmp_path, capsys):
     inner = '<InternalElement Name="Site"><InternalElement Name="Cell"/></InternalElement>'
     (tmp_path / "plant.aml").write_text("\ufeff" + hierarchy(inner), encoding="utf-8")
-    assert cli.main(["import-aml", str(tmp_path / "plant.aml"), str(tmp_path / "made")]) == Exit.WITHIN
+    assert cli.main(["import", str(tmp_path / "plant.aml"), str(tmp_path / "made")]) == Exit.WITHIN
     said = " ".join(capsys.readouterr().out.split())
     assert "3 elements, none of which has a geometry file" in said
 
@@ -258,7 +258,7 @@ def test_names_of_others_are_texts_and_a_decimal_comma_is_said(tmp_path, box):
     file.write_text(re.sub(r"<Value>1</Value>", "<Value>1,0</Value>", text, count=1), encoding="utf-8")
     found = read(file)
     assert ["commas in numbers are read as decimal points" in f.text for f in found.findings] == [True]
-    assert cli.main(["import-aml", str(file), str(tmp_path / "cell")]) == Exit.WITHIN
+    assert cli.main(["import", str(file), str(tmp_path / "cell")]) == Exit.WITHIN
     table = tomllib.loads((tmp_path / "cell" / "workstation.toml").read_text(encoding="utf-8"))
     assert "robots" not in table
     assert table["title"] == file.name

@@ -1,0 +1,147 @@
+"""``seerob import``: a workstation folder from a CAD file or a plant, to be completed by hand."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seerob.app.console.terminal import Exit, line, tell
+from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_folder
+
+if TYPE_CHECKING:
+    from seerob.app.importing.folder import Files
+    from seerob.description.cad.assembly import Assembly
+
+HELP = "make a workstation folder from CAD: parts with names, places, colours and meshes"
+EXAMPLE = "seerob import line.step my_line"
+
+_SHOWN = 20
+"""Lines about what was left out."""
+FINEST, COARSEST = 1e-3, 50.0
+"""Tolerances that are taken [mm]."""
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    text = "STEP, IGES, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA or AutomationML file"
+    sub.add_argument("file", type=Path, help=text)
+    sub.add_argument("folder", type=Path, help="folder to make")
+    text = "how far triangles may be from a STEP or IGES surface [mm] (default: 0.1); counts as uncertainty"
+    sub.add_argument("--tolerance", type=float, metavar="MM", help=text)
+    text = "density of every part [kg/m³], or of one material as S235JR=7850; may be given several times"
+    sub.add_argument("--density", action="append", default=[], metavar="[NAME=]DENSITY", help=text)
+    sub.add_argument("--units", help="unit of lengths of a file that does not say it: mm, m, inch")
+    sub.add_argument(
+        "--up", choices=("x", "y", "z"), help="axis that points up in a file that does not say it"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the folder; nothing that exists is touched.
+
+    Raises:
+        InputError: The file cannot be read, or the folder exists.
+        MissingPackage: The file needs OpenCASCADE, which is not installed.
+    """
+    from seerob.description.cad.recognised import recognised
+    from seerob.description.mesh import MAX_BYTES, file_content
+
+    folder: Path = options.folder
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError.at(folder, "", "exists already", "give the name of a new folder")
+    ending = recognised(options.file, file_content(options.file, MAX_BYTES))
+    if ending in (".aml", ".amlx"):
+        return _plant(options.file, folder)
+    return _assembly(options, ending, folder)
+
+
+def _assembly(options: argparse.Namespace, ending: str, folder: Path) -> Exit:
+    from seerob.app.importing.folder import densities, files
+    from seerob.description.cad.assembly import baked
+
+    given = densities(options.density)
+    assembly = baked(_read(options, ending))
+    made = files(assembly, options.file, given)
+    _write(folder, made.texts, made.meshes)
+    _say(options.file, assembly, made)
+    return Exit.WITHIN
+
+
+def _read(options: argparse.Namespace, ending: str) -> Assembly:
+    from seerob.description.cad import scene, step
+    from seerob.description.mesh import MAX_BYTES, MAX_FACES, file_content
+    from seerob.description.mesh_files import MeshSource
+
+    file: Path = options.file
+    if ending in scene.FORMATS:
+        if options.tolerance is not None:
+            raise InputError.at("--tolerance", "", f"a {scene.FORMATS[ending]} file has triangles already")
+        return scene.read(file, ending, units=options.units, up=options.up)
+    if options.units or options.up:
+        what = "a STEP or IGES file says its unit, and its z is up"
+        raise InputError.at("--units" if options.units else "--up", "", what, "leave it out")
+    tolerance = step.TOLERANCE * 1e3 if options.tolerance is None else options.tolerance
+    if not FINEST <= tolerance <= COARSEST:
+        what = f"{tolerance:g} mm"
+        raise InputError.at("--tolerance", "", what, f"from {FINEST:g} to {COARSEST:g} mm")
+    source = MeshSource(file, file_content(file, MAX_BYTES), MAX_BYTES, MAX_FACES)
+    source.files[file.name] = source.data
+    return step.read(source, iges=ending == ".igs", tolerance=tolerance * 1e-3)
+
+
+def _say(file: Path, assembly: Assembly, made: Files) -> None:
+    low = [min(row["box"][0][axis] for row in made.parts) for axis in range(3)]
+    high = [max(row["box"][1][axis] for row in made.parts) for axis in range(3)]
+    size = " × ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))
+    triangles = sum(row["triangles"] for row in made.parts)
+    line("read", f"{file.name}: {assembly.format}, unit {assembly.unit}")
+    parts = f"{len(made.parts)} part{'' if len(made.parts) == 1 else 's'} of {len(assembly.shapes)} shapes"
+    line("found", f"{parts}, {triangles} triangles, {size} m")
+    for finding in made.findings:
+        word = "guessed" if finding.level == "assumed" else finding.level
+        line(word, f"{finding.subject}: {finding.text}", "yellow" if word == "warning" else "dim")
+    for name, why in assembly.left_out[:_SHOWN]:
+        line("left out", f"{name}: {why}", "yellow")
+    if len(assembly.left_out) > _SHOWN:
+        line("left out", f"and {len(assembly.left_out) - _SHOWN} more, which import.json lists", "yellow")
+
+
+def _plant(file: Path, folder: Path) -> Exit:
+    from seerob.app.importing.plant import GEOMETRY, VARIABLES, Made
+    from seerob.description.formats.automationml import read
+
+    plant = read(file)
+    made = Made(plant)
+    _write(folder, made.files(), made.meshes)
+    tell((*plant.findings, *made.findings))
+    count, links = sum(1 for _ in plant.walk()), len(plant.links)
+    line("read", f"{file.name}: CAEX {plant.version}, {count} elements, {links} links")
+    line("found", f"{made.parts} parts with a shape, {made.robots} robots, {len(made.variables)} variables")
+    if not (made.parts or made.robots or made.variables):
+        text = (
+            f"{count} elements, none of which has a geometry file ({', '.join(sorted(GEOMETRY))}), "
+            f"the role Robot or a variable ({', '.join(sorted(VARIABLES))}): the folder is an empty "
+            "workstation"
+        )
+        line("warning", text, "yellow")
+    text = f"choose the robots' models and give the variables their units, then seerob check-file {folder}"
+    line("next", text)
+    return Exit.WITHIN
+
+
+def _write(folder: Path, texts: Mapping[str, str], meshes: Mapping[str, bytes]) -> None:
+    try:
+        with whole_folder(folder) as working:
+            (working / "cad").mkdir()
+            for name, data in meshes.items():
+                (working / name).write_bytes(data)
+            for name, text in texts.items():
+                (working / name).write_text(text, encoding="utf-8")
+    except OSError as error:
+        what = f"cannot be written: {error.strerror}"
+        raise InputError.at(folder, "", what, "give a folder that may be written") from error
+    for name in texts:
+        line("wrote", str(folder / name))

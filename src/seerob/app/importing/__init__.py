@@ -1,0 +1,1 @@
+"""From an assembly or a plant to the files of a workstation folder."""

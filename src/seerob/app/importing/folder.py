@@ -1,0 +1,211 @@
+"""The files of a workstation folder that an assembly becomes: parts with places, meshes, and the table."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seerob.core.errors import InputError
+from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.description.cad.assembly import Assembly, Instance, Shape
+from seerob.description.cad.names import plain_name
+from seerob.description.shapes.glb import glb_y_up
+from seerob.description.shapes.mesh_bodies import is_closed, joined
+from seerob.description.shapes.mesh_mending import sided
+from seerob.description.shapes.moments import signed_volume
+from seerob.files.tables.mapping import toml_value
+
+TABLE = "import.json"
+"""What was found, mended, guessed and left out, beside the workstation file."""
+NEGLIGIBLE = 1e-6
+"""Deviations up to this are not written [m]; meshes are simplified by as much when they are read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Densities:
+    """Densities that the user gave [kg/m³]."""
+
+    of_all: float | None = None
+    by_material: dict[str, float] = field(default_factory=dict)
+
+    def of(self, shape: Shape) -> tuple[float | None, str]:
+        """Density of a shape, None when nobody gave it, and why it is that."""
+        if shape.material in self.by_material:
+            return self.by_material[shape.material], f"given for {shape.material}"
+        return self.of_all, "given for everything"
+
+
+@dataclass(frozen=True, eq=False)
+class Files:
+    """What is written."""
+
+    texts: dict[str, str]
+    meshes: dict[str, bytes]
+    parts: tuple[dict[str, Any], ...]
+    """Rows of the table: one for each part."""
+    findings: tuple[Finding, ...]
+
+
+def files(assembly: Assembly, source: Path, densities: Densities) -> Files:
+    """Content of each file of the folder by its name.
+
+    Args:
+        assembly: With rigid places.
+        source: The CAD file.
+        densities: For the masses.
+    """
+    findings = list(assembly.findings)
+    names = _mesh_names(assembly.shapes)
+    meshes, facts = {}, []
+    for shape, name in zip(assembly.shapes, names, strict=True):
+        meshes[name], known = _measured(shape, findings)
+        facts.append(known)
+    parts, tables = [], []
+    for full, instance in zip(assembly.names(), assembly.instances, strict=True):
+        shape = assembly.shapes[instance.shape]
+        density, why = densities.of(shape)
+        row = {
+            "name": full,
+            "in_file": "/".join(instance.path),
+            "product": shape.name,
+            "mesh": names[instance.shape],
+            **facts[instance.shape],
+            "material": shape.material,
+            "density": density,
+            "box": _box(shape, instance),
+            "at": pose(instance.world_from_shape),
+        }
+        parts.append(row)
+        color = None if instance.color is None else instance.color[:3]
+        tables.append("\n".join(part_table(row, color, why)))
+    unknown = sorted(set(densities.by_material) - {shape.material for shape in assembly.shapes})
+    if unknown:
+        text = f"no part is of {', '.join(unknown)}: its density is not used"
+        findings.append(Finding(level="warning", subject=source.name, text=text))
+    table = {
+        "file": source.name,
+        "sha256": hashlib.sha256(assembly.files[source.name]).hexdigest(),
+        "format": assembly.format,
+        "unit": assembly.unit,
+        "parts": parts,
+        "left_out": [{"name": name, "why": why} for name, why in assembly.left_out],
+        "findings": [{"level": f.level, "subject": f.subject, "text": f.text} for f in findings],
+    }
+    texts = {
+        "workstation.toml": "\n".join([*_head(assembly, source), "", *tables]),
+        TABLE: json.dumps(table, indent=1, ensure_ascii=False) + "\n",
+    }
+    return Files(texts, meshes, tuple(parts), tuple(findings))
+
+
+def _head(assembly: Assembly, source: Path) -> list[str]:
+    # Names are of others: as values they cannot end a comment.
+    origin = f"{toml_value(source.name)} ({toml_value(assembly.format)}, unit {toml_value(assembly.unit)})"
+    head = [f"# Made by `seerob import` from {origin}; {TABLE} lists what became of it."]
+    if assembly.left_out:
+        head.append(
+            f"# {len(assembly.left_out)} things of the file became no part: nothing is judged of them."
+        )
+        head += [f"#   {toml_value(name)}: {toml_value(why)}" for name, why in assembly.left_out[:20]]
+    return [*head, f"title = {toml_value(source.stem)}"]
+
+
+def part_table(row: dict[str, Any], color: tuple[float, ...] | None = None, why: str = "") -> list[str]:
+    """Lines of a part in the workstation file."""
+    lines = ["[[parts]]", f"name = {toml_value(row['name'])}", f"mesh = {toml_value(row['mesh'])}"]
+    lines.append(f"at = {row['at']}")
+    if row["deviation"] > NEGLIGIBLE:
+        lines.append(f"deviation_mm = {math.ceil(row['deviation'] * 1e7) / 1e4:g}")
+    if color is not None:
+        lines.append(f"color = [{', '.join(f'{c:.4g}' for c in color)}]")
+    if row["density"] is not None:
+        lines.append(f"density = {row['density']:g}   # {why}")
+    return [*lines, ""]
+
+
+def pose(world: Array) -> str:
+    """A rigid place (4, 4) [m] as a workstation file has it."""
+    position = ", ".join(f"{x + 0.0:.9g}" for x in world[:3, 3].round(12))
+    wxyz = wxyz_from_rotation(world[:3, :3])
+    if abs(wxyz[0]) > 1 - 1e-14:
+        return f"{{ position = [{position}] }}"
+    return f"{{ position = [{position}], wxyz = [{', '.join(f'{x:.12g}' for x in wxyz)}] }}"
+
+
+def _mesh_names(shapes: tuple[Shape, ...]) -> list[str]:
+    taken: set[str] = set()
+    found = []
+    for shape in shapes:
+        stem = plain_name(shape.name)
+        name, number = stem, 1
+        while name.lower() in taken:  # some file systems know no case
+            number += 1
+            name = f"{stem}_{number}"
+        taken.add(name.lower())
+        found.append(f"cad/{name}.glb")
+    return found
+
+
+def _measured(shape: Shape, findings: list[Finding]) -> tuple[bytes, dict[str, Any]]:
+    """A shape's mesh file, closed as far as it can be, and what is known of it."""
+    whole, dropped = joined(shape.pieces)
+    _, turned = sided(whole)
+    for said in filter(None, (dropped, turned)):
+        findings.append(Finding(level="note", subject=shape.name, text=said))
+    closed = is_closed(whole)
+    if not closed:
+        text = "its surface is open: what is inside of it is not known"
+        findings.append(Finding(level="note", subject=shape.name, text=text))
+    facts = {
+        "triangles": len(whole.faces),
+        "solids": shape.solids,
+        "closed": closed,
+        "volume": abs(signed_volume(whole)) if closed else None,
+        "deviation": shape.deviation,
+        "shape": _print(whole),
+    }
+    return glb_y_up(*shape.pieces), facts
+
+
+def _print(mesh: Mesh) -> str:
+    """What tells shapes apart: a hash of their corners to 10 µm, in any order."""
+    corners = np.unique((mesh.vertices * 1e5).round().astype(np.int64), axis=0)
+    return hashlib.sha256(corners.tobytes()).hexdigest()[:16]
+
+
+def _box(shape: Shape, instance: Instance) -> list[list[float]]:
+    """Lowest and highest corner in the world [m]."""
+    moved = np.vstack([mesh.moved(instance.world_from_shape).vertices for mesh in shape.pieces])
+    return [[float(f"{x:.7g}") for x in corner] for corner in (moved.min(axis=0), moved.max(axis=0))]
+
+
+def densities(words: list[str]) -> Densities:
+    """What ``--density`` was given: ``2700`` for everything, ``S235JR=7850`` for a material.
+
+    Raises:
+        InputError: One is no density.
+    """
+    of_all: float | None = None
+    by_material: dict[str, float] = {}
+    for word in words:
+        name, _, figure = word.rpartition("=")
+        try:
+            density = float(figure)
+        except ValueError:
+            density = float("nan")
+        if not 0 < density <= 1e5:
+            what = f"{word!r} is no density"
+            raise InputError.at("--density", "", what, "2700 for everything, or S235JR=7850 [kg/m³]")
+        if name:
+            by_material[name] = density
+        else:
+            of_all = density
+    return Densities(of_all, by_material)

@@ -1,0 +1,103 @@
+"""An assembly as a CAD file has it, whatever its format: shapes, and where instances of them are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.description.cad.names import full_name, told_apart
+from seerob.description.mesh_files import Color
+
+RIGID = 1e-9
+"""A transform whose axes are within this of being unit vectors at right angles is rigid."""
+SINGLE = 6e-8
+"""Rounding of a coordinate to four bytes, as a share of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """The surface of one product, which may be there several times."""
+
+    name: str
+    """Of the product, as the file has it."""
+    pieces: tuple[Mesh, ...]
+    """Its surface by colour, in its own frame [m]."""
+    deviation: float = 0.0
+    """How far the real surface may lie outside the triangles [m]."""
+    solids: int = 0
+    """Closed bodies that the file says it has; 0 when it says nothing of that."""
+    material: str = ""
+    """Name of its material, as the file has it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """One part: a shape at a place."""
+
+    path: tuple[str, ...]
+    """Names that lead to it, as the file has them."""
+    shape: int
+    """Which of the assembly's shapes."""
+    world_from_shape: Array
+    """Shape (4, 4) [m], z up."""
+    color: Color | None = None
+    """Of this instance, instead of its shape's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """What a CAD file holds."""
+
+    format: str
+    """``STEP AP214``, ``COLLADA``."""
+    unit: str
+    """Unit of lengths of the file, as it says or as it was told."""
+    shapes: tuple[Shape, ...]
+    instances: tuple[Instance, ...]
+    findings: tuple[Finding, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
+    """Full names of what became no part, and why."""
+    files: dict[str, bytes] = field(default_factory=dict)
+    """Every file that was read, by its path from the folder of the first."""
+
+    def names(self) -> list[str]:
+        """Full name of each instance, unique and as names may be here."""
+        return told_apart(full_name(instance.path) for instance in self.instances)
+
+
+def baked(assembly: Assembly) -> Assembly:
+    """Places that are rigid: a scale or a mirror of an instance goes into a shape of its own."""
+    shapes = list(assembly.shapes)
+    made: dict[tuple[int, bytes], int] = {}
+    instances = []
+    for instance in assembly.instances:
+        linear = instance.world_from_shape[:3, :3]
+        if np.abs(linear.T @ linear - np.eye(3)).max() <= RIGID and np.linalg.det(linear) > 0:
+            instances.append(instance)
+            continue
+        key = instance.shape, linear.round(12).tobytes()
+        if key not in made:
+            made[key] = len(shapes)
+            shapes.append(_stretched(assembly.shapes[instance.shape], linear))
+        moved = np.eye(4)
+        moved[:3, 3] = instance.world_from_shape[:3, 3]
+        instances.append(replace(instance, shape=made[key], world_from_shape=moved))
+    used = sorted({instance.shape for instance in instances})
+    number = {shape: k for k, shape in enumerate(used)}
+    return replace(
+        assembly,
+        shapes=tuple(shapes[shape] for shape in used),
+        instances=tuple(replace(instance, shape=number[instance.shape]) for instance in instances),
+    )
+
+
+def _stretched(shape: Shape, linear: Array) -> Shape:
+    mirrored = np.linalg.det(linear) < 0
+    pieces = tuple(
+        Mesh(m.vertices @ linear.T, m.faces[:, ::-1] if mirrored else m.faces, m.color) for m in shape.pieces
+    )
+    return replace(shape, pieces=pieces, deviation=shape.deviation * float(np.linalg.norm(linear, 2)))

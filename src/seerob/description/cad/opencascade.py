@@ -1,0 +1,474 @@
+"""OpenCASCADE asked for products, usages, colours, materials and triangles; in the parsers' process alone.
+
+Answers with plain data. It reads copies in a folder of their own; other files that a STEP file names are put
+there when they lie in its folder or below, and are named as missing when they do not: OpenCASCADE itself
+would follow a path to anywhere.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import InputError
+from seerob.core.transforms import Array
+from seerob.description.cad.names import told_apart
+from seerob.description.mesh_files import MeshSource
+
+TURN = 0.35
+"""Largest angle between neighbouring triangles of a curved surface [rad]: small holes stay round."""
+COLOR = (0.7, 0.72, 0.75, 1.0)
+"""Shown of a face without a colour: red, green, blue, alpha in 0…1."""
+MAX_INSTANCES = 200_000
+MAX_DEPTH = 100
+MAX_SAMPLES = 40_000
+"""Points of a shape's curved surfaces at which its triangles are compared with it."""
+_REFERENCES = re.compile(
+    rb"(?:APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|DOCUMENT_FILE)\s*\(\s*'((?:[^']|'')*)'", re.I
+)
+_NAMELESS = re.compile(rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\s*\(\s*'((?:[^']|'')*)'\s*,\s*'\s*'", re.I)
+_FILE = re.compile(rb"(?i)\.(stp|step|p21|igs|iges|ste)$")
+_SCHEMAS = {"CONFIG_CONTROL_DESIGN": "AP203", "AP203": "AP203", "AUTOMOTIVE": "AP214", "AP242": "AP242"}
+
+
+def plain(
+    path: Path, data: bytes, max_bytes: int, max_faces: int, iges: bool, tolerance: float
+) -> dict[str, Any]:
+    """Shapes, instances, findings and files that were read, in numbers, texts and bytes."""
+    source = MeshSource(path, data, max_bytes, max_faces)
+    with source.parsing("IGES file" if iges else "STEP file"), tempfile.TemporaryDirectory() as folder:
+        return _Document(source, Path(folder), iges, tolerance).told()
+
+
+class _Document:
+    """One file as OpenCASCADE has read it."""
+
+    def __init__(self, source: MeshSource, folder: Path, iges: bool, tolerance: float) -> None:
+        from OCP.TCollection import TCollection_ExtendedString
+        from OCP.TDocStd import TDocStd_Document
+        from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+        self.source, self.tolerance = source, tolerance
+        self.missing: list[str] = []
+        self.copies: dict[bytes, bytes] = {}
+        self.nameless: set[str] = set()
+        self.document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
+        self.format, self.unit = ("IGES", "in the file") if iges else (_schema(source.data), "mm")
+        if iges:
+            self._read_iges(folder)
+        else:
+            self._read_step(folder)
+        self.labels = XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
+        self.shapes: dict[str, int | str] = {}
+        self.rows: list[dict[str, Any]] = []
+        self.instances: list[tuple[list[str], int, list[list[float]], Any]] = []
+        self.left_out: list[tuple[str, str]] = []
+        self.faces = 0
+
+    def _read_iges(self, folder: Path) -> None:
+        from OCP.IFSelect import IFSelect_ReturnStatus
+        from OCP.IGESCAFControl import IGESCAFControl_Reader
+
+        file = folder / "part.igs"
+        file.write_bytes(self.source.data)
+        reader = IGESCAFControl_Reader()
+        reader.SetNameMode(True)
+        reader.SetColorMode(True)
+        done = reader.ReadFile(str(file)) == IFSelect_ReturnStatus.IFSelect_RetDone
+        if not done or not reader.Transfer(self.document):
+            self.source.fail("is not a readable IGES file", "export it as STEP")
+        unit = reader.IGESModel().GlobalSection().UnitName()
+        self.unit = "" if unit is None else str(unit.ToCString()).lower()
+        self.source.note("IGES keeps neither assemblies nor instances; export STEP where there is a choice")
+
+    def _read_step(self, folder: Path) -> None:
+        from OCP.collections import Sequence_TCollection_AsciiString
+        from OCP.IFSelect import IFSelect_ReturnStatus
+        from OCP.STEPCAFControl import STEPCAFControl_Reader
+
+        file = folder / "assembly.step"
+        file.write_bytes(self._local(self.source.data, folder, 0))
+        reader = STEPCAFControl_Reader()
+        for mode in (reader.SetNameMode, reader.SetColorMode, reader.SetMatMode, reader.SetLayerMode):
+            mode(True)
+        if reader.ReadFile(str(file)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+            self.source.fail("is not a readable STEP file", "export it again")
+        lengths, angles, solids = (Sequence_TCollection_AsciiString() for _ in range(3))
+        reader.Reader().FileUnits(lengths, angles, solids)
+        found = [str(lengths.Value(i).ToCString()).lower() for i in range(1, lengths.Length() + 1)]
+        self.unit = ", ".join(sorted(set(found))) or "mm, for the file does not say"
+        if not found:
+            self.source.note("the file does not say its unit of length: millimetres", level="assumed")
+        if not reader.Transfer(self.document):
+            self.source.fail("holds nothing that can be taken over", "export solids or surfaces")
+
+    def _local(self, data: bytes, folder: Path, depth: int) -> bytes:
+        """Content whose references lead into a folder, to copies of the files they mean."""
+        self.nameless |= {name.decode("latin-1") for name in _NAMELESS.findall(data)}
+
+        def found(match: re.Match[bytes]) -> bytes:
+            name = match[1]
+            if not _FILE.search(name):
+                return match[0]
+            if name not in self.copies:
+                self.copies[name] = f"{folder.name}_{len(self.copies)}.stp".encode()
+                self._copy(name.decode("utf-8", "replace"), folder / self.copies[name].decode(), depth)
+            start, end = match.span(1)
+            whole = match[0]
+            return whole[: start - match.start()] + self.copies[name] + whole[end - match.start() :]
+
+        return _REFERENCES.sub(found, data)
+
+    def _copy(self, name: str, to: Path, depth: int) -> None:
+        try:
+            held = self.source.beside(name) if depth < MAX_DEPTH else None
+        except InputError:
+            held = None
+        if held is None:
+            self.missing.append(name)
+            text = f"refers to {name!r}, which is not beside it or below: what is in there is missing"
+            self.source.findings = [f for f in self.source.findings if repr(name) not in f.text]
+            self.source.note(text, level="warning")
+            return
+        to.write_bytes(self._local(held, to.parent, depth + 1))
+
+    def told(self) -> dict[str, Any]:
+        """Plain data of it."""
+        from OCP.collections import Sequence_TDF_Label
+
+        roots = Sequence_TDF_Label()
+        self.labels.GetFreeShapes(roots)
+        found = [roots.Value(i) for i in range(1, roots.Length() + 1)]
+        for name, label in zip(told_apart(map(_label_name, found)), found, strict=True):
+            self._walk(label, (name,), np.eye(4), None)
+        self.left_out += [(name, "a file that is not there") for name in self.missing]
+        if not self.instances:
+            missing = f"; it refers to {', '.join(self.missing[:5])}" if self.missing else ""
+            self.source.fail(
+                f"holds no surface{missing}",
+                "put the files that it names beside it" if missing else "export solids or surfaces",
+            )
+        if len(found) > 1:
+            self.source.note(f"has {len(found)} roots, which stand beside each other")
+        return {
+            "format": self.format,
+            "unit": self.unit,
+            "shapes": self.rows,
+            "instances": self.instances,
+            "left_out": self.left_out,
+            "findings": [(f.level, f.subject, f.text) for f in self.source.findings],
+            "files": self.source.files,
+        }
+
+    def _walk(self, label: Any, path: tuple[str, ...], above: Array, color: Any) -> None:
+        from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+        if len(path) > MAX_DEPTH or len(self.instances) > MAX_INSTANCES:
+            what = f"nests deeper than {MAX_DEPTH} or has more than {MAX_INSTANCES} parts"
+            self.source.fail(what, "export the cell alone")
+        if XCAFDoc_ShapeTool.IsAssembly_s(label):
+            self._components(label, path, above, color)
+            return
+        key = _entry(label)
+        if key not in self.shapes:
+            row = self._row(label, path[-1])
+            if isinstance(row, str):
+                self.shapes[key] = row
+            else:
+                self.shapes[key] = len(self.rows)
+                self.rows.append(row)
+        number = self.shapes[key]
+        if isinstance(number, str):
+            self.left_out.append(("/".join(path), number))
+        else:
+            self.instances.append((list(path), number, above.tolist(), color))
+
+    def _components(self, label: Any, path: tuple[str, ...], above: Array, color: Any) -> None:
+        from OCP.collections import Sequence_TDF_Label
+        from OCP.TDF import TDF_Label
+        from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+        components = Sequence_TDF_Label()
+        XCAFDoc_ShapeTool.GetComponents_s(label, components, False)
+        if not components.Length():
+            self.left_out.append(("/".join(path), "an assembly of nothing"))
+        children = []
+        for i in range(1, components.Length() + 1):
+            component, product = components.Value(i), TDF_Label()
+            if not XCAFDoc_ShapeTool.GetReferredShape_s(component, product):
+                product = component
+            own = _label_name(component, empty="")
+            name = own if own and own not in self.nameless else _label_name(product)
+            children.append((name, component, product))
+        names = told_apart(name for name, _, _ in children)
+        for name, (_, component, product) in zip(names, children, strict=True):
+            placed = above @ _matrix(XCAFDoc_ShapeTool.GetLocation_s(component).Transformation())
+            self._walk(product, (*path, name), placed, _color(component) or color)
+
+    def _row(self, label: Any, name: str) -> dict[str, Any] | str:
+        """Plain data of a product's shape; or why it has none."""
+        from OCP.BRepGProp import BRepGProp
+        from OCP.BRepMesh import BRepMesh_IncrementalMesh
+        from OCP.GProp import GProp_GProps
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+        shape = XCAFDoc_ShapeTool.GetShape_s(label)
+        name = _label_name(label, empty=name)
+        if shape is None or shape.IsNull():
+            return "has no shape"
+        solids = sum(1 for _ in _explored(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+        faces = list(_explored(shape, TopAbs_ShapeEnum.TopAbs_FACE))
+        colors = _colors(label)
+        whole = _color(label)
+        if not solids and len(faces) > 1:
+            shape, faces, colors = _sewn(shape, faces, colors)
+        if not faces:
+            return "has no surface: points or curves only"
+        BRepMesh_IncrementalMesh(shape, self.tolerance * 1e3, False, TURN, False)
+        by_color: dict[Any, list[tuple[NDArray[np.float64], NDArray[np.int32]]]] = {}
+        points: list[Array] = []
+        lost = 0
+        most = max(20, MAX_SAMPLES // len(faces))
+        for face in faces:
+            vertices, triangles, uv = _triangles(face)
+            points.append(_samples(face, triangles, uv, most))
+            if not len(triangles):
+                lost += 1
+                continue
+            self.faces += len(triangles)
+            if self.faces > self.source.max_faces:
+                self.source.fail(
+                    f"has more than {self.source.max_faces} triangles", "give a larger tolerance"
+                )
+            color = _of_face(colors, face) or whole or COLOR
+            by_color.setdefault(color, []).append((vertices, triangles))
+        if not by_color:
+            return "none of its faces could be cut into triangles"
+        area, volume = GProp_GProps(), GProp_GProps()
+        BRepGProp.SurfaceProperties_s(shape, area)
+        if solids:
+            BRepGProp.VolumeProperties_s(shape, volume)
+        return {
+            "name": name,
+            "pieces": [(*_merged(parts), color) for color, parts in by_color.items()],
+            "points": (np.vstack(points) * 1e-3).tobytes() if points else b"",
+            "solids": solids,
+            "faces": len(faces),
+            "lost": lost,
+            "flat": not lost and _is_flat(faces),
+            "area": float(area.Mass()) * 1e-6,
+            "volume": float(volume.Mass()) * 1e-9 if solids else 0.0,
+            "material": _material(label),
+        }
+
+
+def _schema(data: bytes) -> str:
+    head = re.search(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", data[:100_000], re.I)
+    said = "" if head is None else head[1].decode("latin-1").upper()
+    return "STEP " + next((ap for word, ap in _SCHEMAS.items() if word in said), said[:40])
+
+
+def _entry(label: Any) -> str:
+    from OCP.TCollection import TCollection_AsciiString
+    from OCP.TDF import TDF_Tool
+
+    text = TCollection_AsciiString()
+    TDF_Tool.Entry_s(label, text)
+    return str(text.ToCString())
+
+
+def _label_name(label: Any, empty: str = "part") -> str:
+    """What a label is called; ``=>[0:1:1:3]`` is what OpenCASCADE calls one without a name."""
+    from OCP.TDataStd import TDataStd_Name
+
+    attribute = TDataStd_Name()
+    if not label.FindAttribute(TDataStd_Name.GetID_s(), attribute):
+        return empty
+    name = str(attribute.Get().ToExtString()).strip()
+    return empty if not name or re.fullmatch(r"=>\[[\d:]*\]", name) else name
+
+
+def _matrix(trsf: Any) -> Array:
+    """A placement (4, 4), its translation in metres."""
+    matrix = np.eye(4)
+    matrix[:3] = [[trsf.Value(i, j) for j in range(1, 5)] for i in range(1, 4)]
+    matrix[:3, 3] *= 1e-3
+    return matrix
+
+
+def _explored(shape: Any, kind: Any) -> Iterator[Any]:
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        found = explorer.Current()
+        # An explorer knows no kinds of shapes; functions do.
+        if kind == TopAbs_ShapeEnum.TopAbs_FACE:
+            found = TopoDS.Face(found)
+        elif kind == TopAbs_ShapeEnum.TopAbs_EDGE:
+            found = TopoDS.Edge(found)
+        yield found
+        explorer.Next()
+
+
+def _color(label: Any) -> tuple[float, float, float, float] | None:
+    from OCP.Quantity import Quantity_ColorRGBA, Quantity_TypeOfColor
+    from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
+
+    found = Quantity_ColorRGBA()
+    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
+        if XCAFDoc_ColorTool.GetColor_s(label, kind, found):
+            r, g, b = found.GetRGB().Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
+            return round(r, 6), round(g, 6), round(b, 6), round(float(found.Alpha()), 6)
+    return None
+
+
+_Colors = dict[int, list[tuple[Any, Any]]]
+
+
+def _colors(label: Any) -> _Colors:
+    """Colours of single faces, by the hash of the face: those of solids, then of what lies in them."""
+    from OCP.collections import Sequence_TDF_Label
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+    labels = Sequence_TDF_Label()
+    XCAFDoc_ShapeTool.GetSubShapes_s(label, labels)
+    colored = []
+    for i in range(1, labels.Length() + 1):
+        color = _color(labels.Value(i))
+        if color is not None:
+            colored.append((XCAFDoc_ShapeTool.GetShape_s(labels.Value(i)), color))
+    found: _Colors = {}
+    # Kinds of shapes are numbered from compounds to vertices.
+    for shape, color in sorted(colored, key=lambda one: int(one[0].ShapeType())):
+        for face in _explored(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+            found.setdefault(hash(face), []).append((face, color))
+    return found
+
+
+def _of_face(colors: _Colors, face: Any) -> Any:
+    same = [color for other, color in colors.get(hash(face), ()) if other.IsSame(face)]
+    return same[-1] if same else None
+
+
+def _sewn(shape: Any, faces: list[Any], colors: _Colors) -> tuple[Any, list[Any], _Colors]:
+    """Loose faces with common edges, so that their triangles meet."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    sewing = BRepBuilderAPI_Sewing(1e-3)
+    sewing.Add(shape)
+    sewing.Perform()
+    new = sewing.SewedShape()
+    if new is None or new.IsNull():
+        return shape, faces, colors
+    moved: _Colors = {}
+    for face in faces:
+        color = _of_face(colors, face)
+        if color is not None:
+            after = sewing.ModifiedSubShape(face)
+            moved.setdefault(hash(after), []).append((after, color))
+    return new, list(_explored(new, TopAbs_ShapeEnum.TopAbs_FACE)), moved
+
+
+def _triangles(face: Any) -> tuple[Array, NDArray[np.int32], Array]:
+    """Vertices [mm] (n, 3), triangles (m, 3) and parameters of the vertices (n, 2) of a face."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation
+    from OCP.TopLoc import TopLoc_Location
+
+    where = TopLoc_Location()
+    found = BRep_Tool.Triangulation_s(face, where)
+    if found is None or not found.NbTriangles():
+        return np.empty((0, 3)), np.empty((0, 3), np.int32), np.empty((0, 2))
+    count = found.NbNodes()
+    nodes = (found.Node(i) for i in range(1, count + 1))
+    vertices = np.array([(p.X(), p.Y(), p.Z()) for p in nodes], float)
+    if not where.IsIdentity():
+        matrix = _matrix(where.Transformation())
+        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3] * 1e3
+    triangles = np.array([found.Triangle(i).Get() for i in range(1, found.NbTriangles() + 1)], np.int32) - 1
+    if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
+        triangles = triangles[:, ::-1]
+    if not found.HasUVNodes():
+        return vertices, triangles, np.empty((0, 2))
+    pairs = (found.UVNode(i) for i in range(1, count + 1))
+    return vertices, triangles, np.array([(p.X(), p.Y()) for p in pairs], float)
+
+
+def _samples(face: Any, triangles: NDArray[np.int32], uv: Array, most: int) -> Array:
+    """Points [mm] of a curved face amid its triangles and their edges; all over it when it has none."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_SurfaceType
+
+    surface = BRepAdaptor_Surface(face, True)
+    if len(triangles) and (surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane or not len(uv)):
+        return np.empty((0, 3))
+    if len(triangles):
+        corners = uv[triangles]
+        middles = (corners + corners[:, [1, 2, 0]]) / 2
+        inner = np.vstack([corners.mean(axis=1), middles.reshape(-1, 2)])
+    else:
+        u = surface.FirstUParameter(), surface.LastUParameter()
+        v = surface.FirstVParameter(), surface.LastVParameter()
+        # A surface that ends nowhere is looked at within 100 m.
+        (u0, u1), (v0, v1) = np.clip([u, v], -1e5, 1e5).tolist()
+        grid = np.meshgrid(np.linspace(u0, u1, 9), np.linspace(v0, v1, 9))
+        inner = np.column_stack([axis.ravel() for axis in grid])
+    inner = inner[:: max(1, len(inner) // most)]
+    found = [surface.Value(float(u), float(v)) for u, v in inner]
+    return np.array([(p.X(), p.Y(), p.Z()) for p in found], float).reshape(-1, 3)
+
+
+def _is_flat(faces: list[Any]) -> bool:
+    """Whether faces are plane and their edges straight, so that triangles are the surface itself."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    plane, straight = GeomAbs_SurfaceType.GeomAbs_Plane, GeomAbs_CurveType.GeomAbs_Line
+    return all(BRepAdaptor_Surface(face, False).GetType() == plane for face in faces) and all(
+        BRepAdaptor_Curve(edge).GetType() == straight
+        for face in faces
+        for edge in _explored(face, TopAbs_ShapeEnum.TopAbs_EDGE)
+    )
+
+
+def _merged(parts: list[tuple[Array, NDArray[np.int32]]]) -> tuple[bytes, bytes]:
+    """Vertices [m] and triangles of faces together, as bytes."""
+    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    faces = np.vstack([triangles + offset for (_, triangles), offset in zip(parts, offsets, strict=False)])
+    vertices = np.vstack([vertices for vertices, _ in parts]) * 1e-3
+    return np.ascontiguousarray(vertices, "<f8").tobytes(), np.ascontiguousarray(faces, "<i4").tobytes()
+
+
+def _material(label: Any) -> str:
+    from OCP.TDataStd import TDataStd_TreeNode
+    from OCP.XCAFDoc import XCAFDoc, XCAFDoc_Material
+
+    # Attributes that are asked for by their identity are copies, whose links lead nowhere.
+    for node in _attributes(label):
+        if isinstance(node, TDataStd_TreeNode) and node.ID().IsSame(XCAFDoc.MaterialRefGUID_s()):
+            for attribute in _attributes(node.Father().Label()) if node.HasFather() else ():
+                if isinstance(attribute, XCAFDoc_Material) and attribute.GetName() is not None:
+                    return str(attribute.GetName().ToCString()).strip()
+    return ""
+
+
+def _attributes(label: Any) -> Iterator[Any]:
+    from OCP.TDF import TDF_AttributeIterator
+
+    found = TDF_AttributeIterator(label)
+    while found.More():
+        yield found.Value()
+        found.Next()

@@ -1,0 +1,88 @@
+"""Assemblies of mesh files: glTF, COLLADA, 3MF, OBJ, STL, PLY and OFF, their instances kept as such."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from seerob.core.shapes import Mesh
+from seerob.core.transforms import Array
+from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape
+from seerob.description.mesh import by_color, opened, parts
+from seerob.description.mesh_files import RawMesh
+from seerob.description.shapes.mesh_bodies import joined
+
+FORMATS = {
+    ".glb": "glTF",
+    ".gltf": "glTF",
+    ".dae": "COLLADA",
+    ".3mf": "3MF",
+    ".obj": "OBJ",
+    ".stl": "STL",
+    ".ply": "PLY",
+    ".off": "OFF",
+}
+
+
+def read(path: Path, ending: str, *, units: str | None = None, up: str | None = None) -> Assembly:
+    """The assembly of a mesh file.
+
+    Args:
+        path: The file.
+        ending: Of its format, a key of `FORMATS`.
+        units: Unit of lengths, where the format does not say or is wrong.
+        up: Axis that points up, likewise.
+
+    Raises:
+        InputError: It cannot be read, holds no triangles, or its unit is not known.
+    """
+    file = opened(path, ending, units=units, up=up)
+    meters = float(np.linalg.norm(file.world_from_file[:, 0]))
+    turned = np.eye(4)
+    turned[:3, :3] = file.world_from_file / meters
+    shapes: list[Shape] = []
+    known: dict[tuple[str, ...], int] = {}
+    instances: list[Instance] = []
+    left_out: list[tuple[str, str]] = []
+    for group in parts(file.meshes):
+        first = group[0]
+        names = tuple(filter(None, first.name.split("/"))) or (path.stem,)
+        key = tuple(mesh.geometry for mesh in group)
+        if not all(key) or key not in known:
+            shape = _shape(group, file.world_from_file, names[-1])
+            if shape is None:
+                left_out.append(("/".join(names), "nothing but triangles without area"))
+                continue
+            known[key] = len(shapes)
+            shapes.append(shape)
+        world = turned @ _metric(first.file_from_mesh, meters) @ turned.T
+        instances.append(Instance(names, known[key], world))
+    if not instances:
+        file.source.fail("holds nothing but triangles without area", "export it again")
+    findings = tuple(file.source.findings)
+    unit = f"{meters:g} m" if units is None else units
+    return Assembly(
+        FORMATS[ending], unit, tuple(shapes), tuple(instances), findings, tuple(left_out), file.source.files
+    )
+
+
+def _metric(file_from_mesh: Array | None, meters: float) -> Array:
+    if file_from_mesh is None:
+        return np.eye(4)
+    matrix = np.array(file_from_mesh, float)
+    matrix[:3, 3] *= meters
+    return matrix
+
+
+def _shape(group: Sequence[RawMesh], world_from_file: Array, name: str) -> Shape | None:
+    pieces = [
+        Mesh(m.vertices @ world_from_file.T, m.faces.astype(np.int32), m.color or Mesh.color) for m in group
+    ]
+    whole, _ = joined(pieces)
+    if not len(whole.faces):
+        return None
+    label = group[0].geometry.partition("#")[0] or name
+    deviation = SINGLE * float(np.abs(whole.vertices).max())
+    return Shape(label, by_color(pieces) or (whole,), deviation)

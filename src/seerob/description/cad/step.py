@@ -1,0 +1,107 @@
+"""STEP (AP203, AP214, AP242) and IGES through OpenCASCADE: products, usages, colours, materials, triangles.
+
+It runs in the parsers' process: damaged files crash it, which takes that process along and no other. What
+comes back is compared here with what it said of areas, volumes and points of the surfaces.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from seerob.core.extras import need
+from seerob.core.files.parser_process import parsed
+from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape
+from seerob.description.cad.opencascade import plain
+from seerob.description.mesh_files import MeshSource
+from seerob.description.shapes.mesh_bodies import is_closed, joined
+from seerob.description.shapes.moments import signed_volume
+from seerob.kernels.signed_distance import outside
+from seerob.kernels.tree import build_tree
+
+TOLERANCE = 1e-4
+"""How far triangles may be from the surface unless the caller says otherwise [m]."""
+SECONDS, MEMORY = 900.0, 4 << 30
+"""Computing time [s] and memory [byte] that reading may take."""
+AREA, VOLUME = 0.02, 0.02
+"""Shares of area and volume by which triangles may be off without a warning."""
+
+
+def read(source: MeshSource, *, iges: bool = False, tolerance: float = TOLERANCE) -> Assembly:
+    """The assembly of a STEP or IGES file.
+
+    Args:
+        source: The file.
+        iges: Whether it is IGES.
+        tolerance: Largest distance of triangles from the surface [m].
+
+    Raises:
+        InputError: It cannot be read, holds no surface, or crashes OpenCASCADE.
+        MissingPackage: OpenCASCADE is not installed.
+    """
+    need("OCP")
+    arguments = (source.path, source.data, source.max_bytes, source.max_faces, iges, tolerance)
+    remedy = "export it again, perhaps as another edition of STEP, or as glTF"
+    told = parsed(plain, *arguments, file=str(source.path), remedy=remedy, memory=MEMORY, seconds=SECONDS)
+    source.files.update(told["files"])
+    findings = [Finding(level=level, subject=subject, text=text) for level, subject, text in told["findings"]]
+    shapes = tuple(_shape(row, tolerance, findings) for row in told["shapes"])
+    instances = tuple(
+        Instance(tuple(path), shape, np.array(matrix, float), color)
+        for path, shape, matrix, color in told["instances"]
+    )
+    left_out = tuple((name, why) for name, why in told["left_out"])
+    return Assembly(
+        told["format"], told["unit"], shapes, instances, tuple(findings), left_out, dict(source.files)
+    )
+
+
+def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Shape:
+    pieces = tuple(
+        Mesh(np.frombuffer(v, "<f8").reshape(-1, 3), np.frombuffer(f, "<i4").reshape(-1, 3), color)
+        for v, f, color in row["pieces"]
+    )
+    name = row["name"]
+    whole, _ = joined(pieces)
+    points = np.frombuffer(row["points"], "<f8").reshape(-1, 3)
+    far = _farthest(whole, points)
+    rounding = SINGLE * float(np.abs(whole.vertices).max(initial=0.0))
+    deviation = (0.0 if row["flat"] else max(tolerance, far)) + rounding
+
+    def note(level: str, text: str) -> None:
+        findings.append(Finding(level=level, subject=name, text=text))
+
+    if far > 1.5 * tolerance:
+        text = f"its surface lies up to {far * 1e3:.3g} mm outside its triangles, which counts as uncertainty"
+        note("warning", text)
+    if row["lost"]:
+        note("warning", f"{row['lost']} of {row['faces']} faces could not be cut into triangles")
+    a, b, c = np.moveaxis(whole.vertices[whole.faces], 1, 0)
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    if row["area"] > 0 and abs(area / row["area"] - 1) > AREA:
+        note("warning", f"its triangles have {100 * (area / row['area'] - 1):+.1f} % of the surface's area")
+    if row["solids"] and not is_closed(whole):
+        note("warning", "a solid of the file has triangles that do not close")
+    elif row["solids"] and row["volume"] > 0:
+        share = signed_volume(whole) / row["volume"] - 1
+        if abs(share) > VOLUME:
+            note("warning", f"its triangles enclose {100 * share:+.1f} % of the solid's volume")
+    elif not row["solids"] and is_closed(whole):
+        note("note", "is made of surfaces, not of a solid; they close")
+    return Shape(name, pieces, deviation, row["solids"], row["material"])
+
+
+def _farthest(whole: Mesh, points: Array) -> float:
+    """How far the farthest of points on the surface lies outside the triangles [m]."""
+    if not len(points) or not len(whole.faces):
+        return 0.0
+    faces = whole.faces
+    if not is_closed(whole):
+        # Sides that are there twice enclose nothing: what counts is how far the triangles are.
+        faces = np.vstack([faces, faces[:, ::-1]])
+    nodes, links, T = build_tree(np.ascontiguousarray(whole.vertices), np.ascontiguousarray(faces, np.int32))
+    return float(outside(nodes, links, T, np.ascontiguousarray(points)).max())

@@ -1,0 +1,174 @@
+"""``seerob import`` from a file to a workstation that reads, and what it says on the way."""
+
+import io
+import json
+import math
+import runpy
+import tomllib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.core.errors import InputError
+from seerob.description.cad.recognised import CLOSED, recognised
+from seerob.session.station import load
+
+MADE = runpy.run_path(str(Path(__file__).parents[2] / "scripts/make-imported-line"))
+
+
+def imported(file, folder, *options):
+    code = cli.main(["import", str(file), str(folder), *options])
+    return code, tomllib.loads((folder / "workstation.toml").read_text()) if code == Exit.WITHIN else {}
+
+
+def test_a_step_file_becomes_a_workstation(tmp_path, capsys):
+    file = tmp_path / "line.STP"
+    file.write_text(MADE["line"]().text())
+    given = ("--density", "S235JR=7850", "--density", "2700")
+    code, table = imported(file, tmp_path / "cell", *given)
+    assert code == Exit.WITHIN
+    assert "10 parts of 5 shapes" in capsys.readouterr().out
+    assert cli.main(["check-file", str(tmp_path / "cell")]) == Exit.WITHIN
+    densities = {part["name"]: part["density"] for part in table["parts"]}
+    assert densities["line/post"] == 7850
+    assert densities["line/fixture_1/clamp_1"] == 2700
+    assert len({part["mesh"] for part in table["parts"]}) == 5
+    model = load(tmp_path / "cell").model
+    assert sorted(body.name for body in model.bodies) == sorted(densities)
+    deviations = {body.name: body.deviation for body in model.bodies}
+    assert 1e-4 <= deviations["line/post"] < 1.1e-4
+    assert deviations["line/table"] == 0
+    # What is written is read by nobody's library of ours: two primitives, one part.
+    scene = trimesh.load(tmp_path / "cell/cad/base.glb")
+    assert scene.bounds == pytest.approx(np.array([[0, 0, -0.2], [0.3, 0.02, 0]]), abs=1e-6)
+    assert len(scene.geometry) == 2
+    rows = json.loads((tmp_path / "cell/import.json").read_text())
+    turned = next(row for row in rows["parts"] if row["name"] == "line/fixture_2/base")
+    # Base of 300 × 200 mm, turned by 30° about (1.15, 0.1).
+    c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    low, high = turned["box"]
+    assert low == pytest.approx([1.15 - 0.2 * s, 0.1, 0.74], abs=1e-6)
+    assert high == pytest.approx([1.15 + 0.3 * c, 0.1 + 0.3 * s + 0.2 * c, 0.76], abs=1e-6)
+
+
+@pytest.mark.parametrize("ending", ["glb", "3mf"])
+def test_instances_of_a_mesh_file_share_a_mesh_and_a_scale_is_baked(tmp_path, ending):
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box((200, 100, 100)), node_name="left", geom_name="box")
+    moved = trimesh.transformations.translation_matrix((1000, 0, 0))
+    for name, matrix in (("right", moved), ("large", np.diag([2.0, 2.0, 2.0, 1.0]))):
+        scene.graph.update(name, "world", matrix=matrix, geometry="box")
+    file = tmp_path / f"a.{ending}"
+    scene.export(file)
+    code, table = imported(file, tmp_path / "cell")
+    assert code == Exit.WITHIN
+    assert [len({p["mesh"] for p in table["parts"]}), len(table["parts"])] == [2, 3]
+    assert cli.main(["check-file", str(tmp_path / "cell")]) == Exit.WITHIN
+    rows = json.loads((tmp_path / "cell/import.json").read_text())["parts"]
+    sizes = sorted(max(np.ptp(row["box"], axis=0)) for row in rows)
+    k = {"glb": 1.0, "3mf": 1e-3}[ending]
+    assert sizes == pytest.approx([200 * k, 200 * k, 400 * k], rel=1e-6)
+    for part, row in zip(table["parts"], rows, strict=True):
+        # Places and meshes together are the box: what was baked is not placed again.
+        mesh = trimesh.load(tmp_path / "cell" / part["mesh"], force="mesh")
+        height = part["at"]["position"][2]
+        assert mesh.bounds[:, 1] + height == pytest.approx([b[2] for b in row["box"]], abs=1e-6)
+
+
+@pytest.mark.parametrize(("axis", "unit", "high"), [("Z_UP", 0.001, 3e-3), ("Y_UP", 0.0254, 2 * 0.0254)])
+def test_unit_and_up_axis_of_collada_are_kept(tmp_path, axis, unit, high):
+    trimesh.creation.box(bounds=[[0, 0, 0], [1, 2, 3]]).export(tmp_path / "a.dae")
+    text = (tmp_path / "a.dae").read_text()
+    asset = f'<unit name="x" meter="{unit}"/><up_axis>{axis}</up_axis></asset>'
+    start, end = text.index("<asset>"), text.index("</asset>")
+    text = text[:start] + "<asset>" + asset + text[end + len("</asset>") :]
+    (tmp_path / "a.dae").write_text(text)
+    assert imported(tmp_path / "a.dae", tmp_path / "cell")[0] == Exit.WITHIN
+    (row,) = json.loads((tmp_path / "cell/import.json").read_text())["parts"]
+    assert row["box"][1][2] == pytest.approx(high, rel=1e-6)
+
+
+def test_a_file_without_a_unit_is_asked_for_it(tmp_path, capsys):
+    trimesh.creation.box((200, 100, 50)).export(tmp_path / "a.stl")
+    assert imported(tmp_path / "a.stl", tmp_path / "cell")[0] == Exit.ERROR
+    assert 'units = "mm" would make it 0.2 m' in capsys.readouterr().err
+    assert imported(tmp_path / "a.stl", tmp_path / "cell", "--units", "mm")[0] == Exit.WITHIN
+    assert "guessed" in capsys.readouterr().out
+    assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
+
+
+def test_options_that_a_file_has_no_use_for_are_refused(tmp_path, capsys):
+    (tmp_path / "a.step").write_text(MADE["line"]().text())
+    trimesh.creation.box((1, 1, 1)).export(tmp_path / "a.glb")
+    for file, option, says in (
+        ("a.step", ("--units", "mm"), "says its unit"),
+        ("a.step", ("--tolerance", "0"), "from 0.001 to 50 mm"),
+        ("a.glb", ("--tolerance", "1"), "has triangles already"),
+        ("a.glb", ("--density", "steel"), "is no density"),
+        ("a.glb", ("--density", "nan"), "is no density"),
+    ):
+        assert cli.main(["import", str(tmp_path / file), str(tmp_path / "cell"), *option]) == Exit.ERROR
+        assert says in capsys.readouterr().err
+        assert not (tmp_path / "cell").exists()
+
+
+def zipped(name):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr(name, "x")
+    return buffer.getvalue()
+
+
+OLE = bytes.fromhex("d0cf11e0a1b11ae1") + bytes(504)
+CONTENTS = {
+    "SolidWorks": OLE + "SwDocMgrTempStorage".encode("utf-16-le"),
+    "Inventor": OLE + "RSeDb".encode("utf-16-le"),
+    "CATIA V5": b"V5_CFV2\0\0",
+    "Creo": b"#UGC:2 ASSEMBLY 1234",
+    "NX": b"SPLMSSTR\0\0",
+    "JT": b"Version 9.5 JT  DM 6.3.0.1",
+    "Parasolid": b"**ABCDEFGHIJKLMNOPQRSTUVWXYZ***",
+    "USD": zipped("scene.usdc"),
+}
+
+
+@pytest.mark.parametrize("program", CONTENTS)
+def test_files_of_cad_systems_are_known_by_content_and_answered_with_the_export(program):
+    with pytest.raises(InputError) as raised:
+        recognised(Path("a.step"), CONTENTS[program])
+    assert CLOSED[program].program in str(raised.value)
+    assert CLOSED[program].export in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "ending"),
+    [
+        (b"ISO-10303-21;\nHEADER;", ".step"),
+        (b"\xef\xbb\xbf\r\n/* x */ ISO-10303-21;", ".step"),
+        (b" " * 72 + b"S      1\n" + b" " * 72 + b"G      1\n", ".igs"),
+        (b"glTF\2\0\0\0", ".glb"),
+        (b'{"asset": {"version": "2.0"}}', ".gltf"),
+        (b'<?xml version="1.0"?><!-- x --><COLLADA version="1.4.1">', ".dae"),
+        (b'<caex:CAEXFile xmlns:caex="x">', ".aml"),
+        (b"solid a\n facet normal 0 0 1", ".stl"),
+        (b"solid " + bytes(74) + b"\1\0\0\0" + bytes(50), ".stl"),
+        (b"ply\nformat ascii 1.0", ".ply"),
+        (b"OFF\n3 1 0", ".off"),
+        (b"# x\no a\nv 0 0 0.5\n", ".obj"),
+        (zipped("3D/3dmodel.model"), ".3mf"),
+        (zipped("cell.aml"), ".amlx"),
+    ],
+)
+def test_formats_are_known_by_content(content, ending):
+    assert recognised(Path("a.sldprt"), content) == ending
+
+
+@pytest.mark.parametrize("content", [b"PK\3\4damaged", b"<html/>", b"hello", zipped("a.txt"), OLE])
+def test_what_nobody_knows_is_said_to_be_so(content):
+    with pytest.raises(InputError):
+        recognised(Path("a.bin"), content)

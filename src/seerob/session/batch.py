@@ -31,7 +31,7 @@ from seerob.outputs.notebook import batch_html
 from seerob.outputs.over_time import plotted
 from seerob.recording import frames
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
-from seerob.recording.series import CODES, INFORMS, ONE_INSTANT
+from seerob.recording.series import CODES, INFORMS, ONE_INSTANT, STILL
 from seerob.session.recorded_motion import hear, hearings_of
 from seerob.session.run import Bound, settled
 from seerob.twin.spans import Ways
@@ -238,13 +238,15 @@ def judged(
         name = one.criterion.name
         if name in asked and (spans := again[name]).any():
             walked[name] = _with(walked[name], _walked(model, [one], motion, findings, spans)[name], spans)
-    columns = {}
+    columns, still = {}, _is_still(model, motion)
     for one in bound:
         name = one.criterion.name
         said, reasons = walked[name]
         criterion, between = one.criterion, one.between if motion.ways is not None else ""
         if n == 1 and motion.foreseen and model.workstation.sources:
             between = ONE_INSTANT
+        elif still and between:
+            between = STILL
         columns[name] = Column(
             name, criterion.unit, criterion.at_most, said, reasons, notes.get(name, ""), between
         )
@@ -548,6 +550,11 @@ def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]
     return joined, np.concatenate([np.zeros(0, object), *(reasons for _, reasons in parts)])
 
 
+def _is_still(model: Model, motion: Motion) -> bool:
+    """Whether nobody ever moves, so that one instant is all there is."""
+    return len(motion.t) == 1 and not model.workstation.sources
+
+
 def _walked(
     model: Model,
     bound: Sequence[Bound],
@@ -573,7 +580,7 @@ def _walked(
         Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis, one.watch)
         for one in bound
     ]
-    judge = Judge(fresh, findings)
+    judge = Judge(fresh, findings, still=_is_still(model, motion))
     many = settled() if only is None else nullcontext()
     if motion.foreseen:
         state.foresee, state.knots = partial(_foresee, model, motion, state), partial(_knots, motion)

@@ -5,10 +5,9 @@ import fs from "node:fs";
 import { createRequire } from "node:module";
 import os from "node:os";
 import path from "node:path";
-import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { python } from "./python.mjs";
+import { edited, showEdited } from "./edited.mjs";
 
 const AXE = fs.readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const CELL = `# A cell; what nobody edits stays as it is, this line too.
@@ -34,42 +33,23 @@ name = "beside the table"
 between = ["table", "operator"]
 limit = 0.5               # [m]
 `;
-/** An edit is checked as the whole file is; a loaded machine takes its time. */
-const PATIENT = { timeout: 120_000 };
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-edit-"));
 const file = path.join(folder, "workstation.toml");
-let child;
+let server;
 let browser;
 let page;
-let url;
 
 before(async () => {
   fs.writeFileSync(file, CELL);
-  child = python("-m", "seerob", "edit", folder, "--port", "0");
-  const opening = openBrowser({ width: 1366, height: 768 });
-  for await (const line of createInterface({ input: child.stdout })) {
-    url = line.match(/http:\/\/\S+/)?.[0];
-    if (url) break;
-  }
-  child.stdout.resume();
-  browser = await opening;
+  [server, browser] = await Promise.all([edited(folder), openBrowser({ width: 1366, height: 768 })]);
   page = browser.page;
-  await show(page);
+  await showEdited(page, server.url);
 });
 
 after(async () => {
-  const over = new Promise((resolve) => child?.once("exit", resolve));
-  child?.kill("SIGINT");
-  await Promise.all([browser?.close(), over]);
+  await Promise.all([browser?.close(), server?.close()]);
   fs.rmSync(folder, { recursive: true });
 });
-
-async function show(where) {
-  where.setDefaultTimeout(PATIENT.timeout);
-  await where.goto(url);
-  await where.waitForSelector(".editor");
-  await where.waitForFunction(() => Number.isFinite(window.seerob?.t));
-}
 
 const saved = () => fs.readFileSync(file, "utf8");
 const status = (where, word) => where.locator(".edit-bar [role=status]", { hasText: word }).waitFor();
@@ -191,7 +171,7 @@ test("what is dragged by a handle is where it was put, in steps, and undo gives 
 
 test("two pages edit at once and lose nothing of each other", async () => {
   const other = await browser.context.newPage();
-  await show(other);
+  await showEdited(other, server.url);
   await pick("table");
   await pick("operator", other);
   await Promise.all([fill(page.getByLabel("y [m]"), "0.25"), fill(other.getByLabel("x [m]"), "3.5")]);

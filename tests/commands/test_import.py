@@ -93,6 +93,17 @@ def test_unit_and_up_axis_of_collada_are_kept(tmp_path, axis, unit, high):
     assert row["box"][1][2] == pytest.approx(high, rel=1e-6)
 
 
+def test_a_collada_archive_is_its_document(tmp_path):
+    trimesh.creation.box(bounds=[[0, 0, 0], [1, 2, 3]]).export(tmp_path / "a.dae")
+    with zipfile.ZipFile(tmp_path / "a.zae", "w") as archive:
+        archive.writestr("manifest.xml", "<dae_root>./inner/a.dae</dae_root>")
+        archive.writestr("other.dae", "<COLLADA/>")
+        archive.write(tmp_path / "a.dae", "inner/a.dae")
+    assert imported(tmp_path / "a.zae", tmp_path / "cell")[0] == Exit.WITHIN
+    (row,) = json.loads((tmp_path / "cell/import.json").read_text())["parts"]
+    assert sorted(np.ptp(row["box"], axis=0)) == pytest.approx([1, 2, 3])
+
+
 def test_a_file_without_a_unit_is_asked_for_it(tmp_path, capsys):
     trimesh.creation.box((200, 100, 50)).export(tmp_path / "a.stl")
     assert imported(tmp_path / "a.stl", tmp_path / "cell")[0] == Exit.ERROR
@@ -162,6 +173,8 @@ def test_files_of_cad_systems_are_known_by_content_and_answered_with_the_export(
         (b"# x\no a\nv 0 0 0.5\n", ".obj"),
         (zipped("3D/3dmodel.model"), ".3mf"),
         (zipped("cell.aml"), ".amlx"),
+        (zipped("Manifest.xml"), ".3dxml"),
+        (zipped("inner/a.dae"), ".zae"),
     ],
 )
 def test_formats_are_known_by_content(content, ending):

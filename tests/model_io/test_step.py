@@ -216,3 +216,15 @@ def test_without_opencascade_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "OCP", None)
     with pytest.raises(MissingPackage, match=r"seerob\[cad\]"):
         read(tmp_path / "a.step", Step().text())
+
+
+def test_places_that_are_rigid_but_for_the_digits_of_the_file_stay_instances():
+    mesh = Mesh(np.eye(3) * 0.1, np.array([[0, 1, 2]], np.int32))
+    turned = np.eye(4)
+    turned[:2, :2] = [[-0.187921, 0.982184], [-0.982184, -0.187921]]
+    (made,) = baked(
+        Assembly("3DXML", "mm", (step.Shape("a", (mesh,)),), (step.Instance(("a",), 0, turned),))
+    ).instances
+    rotation = made.world_from_shape[:3, :3]
+    assert rotation.T @ rotation == pytest.approx(np.eye(3), abs=1e-12)
+    assert rotation == pytest.approx(turned[:3, :3], abs=2e-6)

@@ -153,6 +153,7 @@ def opened(
     up: str | None = None,
     max_bytes: int = MAX_BYTES,
     max_faces: int = MAX_FACES,
+    data: bytes | None = None,
 ) -> OpenedFile:
     """What a mesh file holds, finite and no larger than a site.
 
@@ -163,13 +164,15 @@ def opened(
         up: As `load_meshes` takes it.
         max_bytes: Largest file, with those it refers to [bytes].
         max_faces: Most triangles.
+        data: What is read instead of the file's own content, as a member of an archive.
 
     Raises:
         InputError: As `load_meshes` raises it.
     """
     _check_options(path, units, up, (1.0, 1.0, 1.0))
-    source = MeshSource(path, file_content(path, max_bytes), max_bytes, max_faces)
-    source.files[path.name] = source.data
+    whole = file_content(path, max_bytes)
+    source = MeshSource(path, whole if data is None else data, max_bytes, max_faces)
+    source.files[path.name] = whole
     raw = READERS[ending](source)
     meshes = tuple(m for m in raw.meshes if len(m.faces))
     if not meshes:

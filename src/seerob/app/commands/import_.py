@@ -26,7 +26,7 @@ FINEST, COARSEST = 1e-3, 50.0
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    text = "STEP, IGES, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA or AutomationML file"
+    text = "STEP, IGES, 3DXML, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA or AutomationML file"
     sub.add_argument("file", type=Path, help=text)
     sub.add_argument("folder", type=Path, help="folder to make")
     text = "how far triangles may be from a STEP or IGES surface [mm] (default: 0.1); counts as uncertainty"
@@ -71,7 +71,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path) -> Exit:
 
 
 def _read(options: argparse.Namespace, ending: str) -> Assembly:
-    from seerob.description.cad import scene, step
+    from seerob.description.cad import scene, step, threedxml
     from seerob.description.mesh import MAX_BYTES, MAX_FACES, file_content
     from seerob.description.mesh_files import MeshSource
 
@@ -81,14 +81,18 @@ def _read(options: argparse.Namespace, ending: str) -> Assembly:
             raise InputError.at("--tolerance", "", f"a {scene.FORMATS[ending]} file has triangles already")
         return scene.read(file, ending, units=options.units, up=options.up)
     if options.units or options.up:
-        what = "a STEP or IGES file says its unit, and its z is up"
+        what = "a STEP, IGES or 3DXML file says its unit, and its z is up"
         raise InputError.at("--units" if options.units else "--up", "", what, "leave it out")
+    source = MeshSource(file, file_content(file, MAX_BYTES), MAX_BYTES, MAX_FACES)
+    source.files[file.name] = source.data
+    if ending == ".3dxml":
+        if options.tolerance is not None:
+            raise InputError.at("--tolerance", "", "a 3DXML file has triangles already")
+        return threedxml.read(source)
     tolerance = step.TOLERANCE * 1e3 if options.tolerance is None else options.tolerance
     if not FINEST <= tolerance <= COARSEST:
         what = f"{tolerance:g} mm"
         raise InputError.at("--tolerance", "", what, f"from {FINEST:g} to {COARSEST:g} mm")
-    source = MeshSource(file, file_content(file, MAX_BYTES), MAX_BYTES, MAX_FACES)
-    source.files[file.name] = source.data
     return step.read(source, iges=ending == ".igs", tolerance=tolerance * 1e-3)
 
 

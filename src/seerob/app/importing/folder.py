@@ -25,6 +25,8 @@ from seerob.files.tables.mapping import toml_value
 
 TABLE = "import.json"
 """What was found, mended, guessed and left out, beside the workstation file."""
+GRID = 8
+"""Decimals of a coordinate [m] that are kept: what differs by less is one corner."""
 NEGLIGIBLE = 1e-6
 """Deviations up to this are not written [m]; meshes are simplified by as much when they are read."""
 
@@ -156,7 +158,8 @@ def _mesh_names(shapes: tuple[Shape, ...]) -> list[str]:
 
 def _measured(shape: Shape, findings: list[Finding]) -> tuple[bytes, dict[str, Any]]:
     """A shape's mesh file, closed as far as it can be, and what is known of it."""
-    whole, dropped = joined(shape.pieces)
+    pieces = [Mesh(_snapped(mesh.vertices), mesh.faces, mesh.color) for mesh in shape.pieces]
+    whole, dropped = joined(pieces)
     _, turned = sided(whole)
     for said in filter(None, (dropped, turned)):
         findings.append(Finding(level="note", subject=shape.name, text=said))
@@ -172,7 +175,12 @@ def _measured(shape: Shape, findings: list[Finding]) -> tuple[bytes, dict[str, A
         "deviation": shape.deviation,
         "shape": _print(whole),
     }
-    return glb_y_up(*shape.pieces), facts
+    return glb_y_up(*pieces), facts
+
+
+def _snapped(vertices: Array) -> Array:
+    """Corners as a mesh file holds them, in four bytes; those that differ by rounding alone become one."""
+    return vertices.round(GRID).astype(np.float32).astype(float) + 0.0
 
 
 def _print(mesh: Mesh) -> str:

@@ -12,8 +12,8 @@ from seerob.core.transforms import Array
 from seerob.description.cad.names import full_name, told_apart
 from seerob.description.mesh_files import Color
 
-RIGID = 1e-9
-"""A transform whose axes are within this of being unit vectors at right angles is rigid."""
+RIGID = 1e-6
+"""A transform is rigid where the rotation nearest to it moves no corner by more than this [m]."""
 SINGLE = 6e-8
 """Rounding of a coordinate to four bytes, as a share of it."""
 
@@ -72,12 +72,16 @@ class Assembly:
 def baked(assembly: Assembly) -> Assembly:
     """Places that are rigid: a scale or a mirror of an instance goes into a shape of its own."""
     shapes = list(assembly.shapes)
+    reach = [max(float(np.abs(m.vertices).max()) for m in shape.pieces) * 3**0.5 for shape in shapes]
     made: dict[tuple[int, bytes], int] = {}
     instances = []
     for instance in assembly.instances:
         linear = instance.world_from_shape[:3, :3]
-        if np.abs(linear.T @ linear - np.eye(3)).max() <= RIGID and np.linalg.det(linear) > 0:
-            instances.append(instance)
+        rotation = _nearest_rotation(linear)
+        if np.linalg.norm(linear - rotation, 2) * reach[instance.shape] <= RIGID:
+            turned = instance.world_from_shape.copy()
+            turned[:3, :3] = rotation
+            instances.append(replace(instance, world_from_shape=turned))
             continue
         key = instance.shape, linear.round(12).tobytes()
         if key not in made:
@@ -93,6 +97,12 @@ def baked(assembly: Assembly) -> Assembly:
         shapes=tuple(shapes[shape] for shape in used),
         instances=tuple(replace(instance, shape=number[instance.shape]) for instance in instances),
     )
+
+
+def _nearest_rotation(linear: Array) -> Array:
+    u, _, v = np.linalg.svd(linear)
+    u[:, 2] *= np.linalg.det(u @ v)
+    return np.asarray(u @ v)
 
 
 def _stretched(shape: Shape, linear: Array) -> Shape:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from seerob.core.errors import InputError
+from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array
 from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape
-from seerob.description.mesh import by_color, opened, parts
+from seerob.description.mesh import MAX_BYTES, by_color, file_content, opened, parts
 from seerob.description.mesh_files import RawMesh
 from seerob.description.shapes.mesh_bodies import joined
+from seerob.description.xml_values import parse_xml
 
 FORMATS = {
     ".glb": "glTF",
     ".gltf": "glTF",
     ".dae": "COLLADA",
+    ".zae": "COLLADA",
     ".3mf": "3MF",
     ".obj": "OBJ",
     ".stl": "STL",
@@ -38,7 +45,10 @@ def read(path: Path, ending: str, *, units: str | None = None, up: str | None = 
     Raises:
         InputError: It cannot be read, holds no triangles, or its unit is not known.
     """
-    file = opened(path, ending, units=units, up=up)
+    data = None
+    if ending == ".zae":
+        data, ending = _packed(path), ".dae"
+    file = opened(path, ending, units=units, up=up, data=data)
     meters = float(np.linalg.norm(file.world_from_file[:, 0]))
     turned = np.eye(4)
     turned[:3, :3] = file.world_from_file / meters
@@ -66,6 +76,24 @@ def read(path: Path, ending: str, *, units: str | None = None, up: str | None = 
     return Assembly(
         FORMATS[ending], unit, tuple(shapes), tuple(instances), findings, tuple(left_out), file.source.files
     )
+
+
+def _packed(path: Path) -> bytes:
+    """The document of a ``.zae`` archive: the one that its manifest names, else the first."""
+    whole = file_content(path, MAX_BYTES)
+    try:
+        with zipfile.ZipFile(io.BytesIO(whole)) as archive:
+            names = [name for name in archive.namelist() if name.lower().endswith(".dae")]
+            root = ""
+            if "manifest.xml" in archive.namelist():
+                text = unpacked(archive, "manifest.xml", MAX_BYTES)
+                found = parse_xml(text, f"{path}: manifest.xml").find(".//{*}dae_root")
+                root = "" if found is None else (found.text or "").strip().removeprefix("./")
+            return unpacked(archive, root if root in names else names[0], MAX_BYTES)
+    except TooLarge as error:
+        raise InputError.at(path, "", str(error), "simplify it") from None
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, OSError, EOFError, ValueError) as error:
+        raise InputError.at(path, "", f"cannot be unpacked ({error})", "export it again") from error
 
 
 def _metric(file_from_mesh: Array | None, meters: float) -> Array:

@@ -8,10 +8,11 @@ from itertools import accumulate
 import numpy as np
 import pytest
 from made_samples import body, last, pose, said
+from msgspec.structs import replace
 
 from seerob.core.samples import JointSample
 from seerob.devices.live import contradictions
-from seerob.devices.live.contradictions import Contradictions, _Scale
+from seerob.devices.live.contradictions import Contradictions, _Repeats, _Scale
 from seerob.workstation.source import Target
 
 SLIDER = Target(name="arm", joints=("a", "b"), units=("rad", "m"), velocity=(3.2, 1.0))
@@ -676,3 +677,46 @@ def test_of_two_joints_that_hang_the_first_is_named():
     places = (0.0, 0.003, 0.00593, *[0.00593] * 3)
     found = last([said(0.01 * k, (q, q)) for k, q in enumerate(places)])
     assert found.startswith("joint 1 stands to the last bit")
+
+
+def again(places, finest=1e-6):
+    """At which of some places a robot is found to say its past again."""
+    repeats = _Repeats()
+    return [k for k, place in enumerate(places) if repeats.add((float(place),), finest)]
+
+
+def test_ten_positions_one_after_another_are_those_of_before():
+    past = [*range(20)]
+    assert again(past * 2) == [*range(29, 40)]
+    assert again(past * 2, 1.001e-6) == []  # digits so coarse repeat by themselves
+    assert again([*past, *past[5:]]) == [*range(29, 35)]
+    assert again([k for k in past * 2 for _ in range(2)])[0] == 58  # where it stands, it says nothing
+    for other in (past[::-1], [*past[:9], 99, *past[9:18]], [*past[:9], *past[10:19]], past[::2]):
+        assert again([*past, *other]) == []
+    assert again([*past, 99, *past[:5], *past])[0] == 40  # of two pasts, the last
+
+
+def test_that_is_known_of_32768_places():
+    assert again([*range(2**15), *range(10)]) == [2**15 + 9]
+    assert again([*range(2**15 + 1), *range(20)]) == []
+
+
+@pytest.mark.parametrize(
+    ("live", "rates", "error", "told"),
+    [
+        (True, False, None, True),
+        (True, True, None, False),  # as simulators repeat themselves
+        (True, True, (1e-3, 1e-3), True),  # derived from the positions
+        (False, False, None, False),
+    ],
+)
+def test_of_a_robot_that_measures_no_velocities_a_loop_is_found(live, rates, error, told):
+    looking, found = Contradictions(None, live=live), []
+    for k in range(150):
+        angle = 2 * math.pi * (k % 100) / 100
+        q = (0.3 * math.sin(angle), 1e-7 * (k % 100))
+        qd = (0.3 * math.cos(angle) * 2 * math.pi, 0.0) if rates else None
+        sample = replace(said(0.01 * k, q, qd), qd_error=error)
+        found.append(looking.find(sample))
+    assert [k for k, why in enumerate(found) if why] == ([*range(109, 150)] if told else [])
+    assert not told or "says its last 10 positions again" in found[109]

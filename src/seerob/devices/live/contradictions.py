@@ -216,7 +216,7 @@ class _Repeats:
 
     def __init__(self) -> None:
         self._numbers: dict[int, int] = {}
-        """Places that it was at, told by their hashes, and which of all each was the last time."""
+        """Places that it was at, told by their hashes, and which of all each was the last time, from 1 on."""
         self._count = self._then = self._run = 0
         self._at: tuple[float, ...] = ()
 
@@ -230,11 +230,9 @@ class _Repeats:
         if q == self._at:
             return ""
         self._at, place = q, hash(q)
-        then = self._numbers.pop(place, None)
-        if then is None or then != self._then + 1:
-            self._run = 0
-        self._run += then is not None
-        self._then = -1 if then is None else then
+        then = self._numbers.pop(place, 0)
+        self._run = self._run + 1 if then == self._then + 1 else min(then, 1)
+        self._then = then
         self._count += 1
         if len(self._numbers) >= REMEMBERED:
             del self._numbers[next(iter(self._numbers))]

@@ -87,8 +87,7 @@ def _packed(path: Path) -> bytes:
             root = ""
             if "manifest.xml" in archive.namelist():
                 text = unpacked(archive, "manifest.xml", MAX_BYTES)
-                found = parse_xml(text, f"{path}: manifest.xml").find(".//{*}dae_root")
-                root = "" if found is None else (found.text or "").strip().removeprefix("./")
+                root = (parse_xml(text, f"{path}: manifest.xml").text or "").strip().removeprefix("./")
             return unpacked(archive, root if root in names else names[0], MAX_BYTES)
     except TooLarge as error:
         raise InputError.at(path, "", str(error), "simplify it") from None

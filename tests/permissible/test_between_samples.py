@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -230,3 +231,77 @@ def test_who_has_no_motion_stands_where_the_file_says_with_what_follows_its_join
     qpos, qvel = MovingJoints(model, {}).at(0.0)
     assert qpos.tolist() == pytest.approx([0.2, 0.4])
     assert not qvel.any()
+
+
+def test_every_joint_weighs_as_far_as_its_body_may_ever_be_from_it(tmp_path):
+    """Rail, arm and rod in line: corners, ways between anchors, and how far a slide goes, moved or not."""
+    urdf = SLIDING.replace('<box size="0.6 0.05 0.05"/>', '<sphere radius="0.05"/>')
+    text = FLOATING + TWO_R + "q = [0.5, 0.1, -0.2]\nbase = { position = [1, 3, 0] }\n" + POST.format(x=9)
+    model = made(tmp_path, text, {"arm.urdf": urdf}).model
+    standing = MovingJoints(model, {}).slid()
+    np.testing.assert_allclose(standing, [0.5, 0.1, 0.2])
+    q = np.array([[0.1, 1.0, -0.3], [0.4, 2.0, -0.1], [0.0, 2.0, -0.1]])
+    qd = np.array([[0.5, 0, 0.2], [-0.5, 0, 0.4], [0.5, 0, 0.1]])
+    motion = GivenMotion("arm", np.array([0.0, 1.0, 3.0]), q, qd, np.ones(3, bool))
+    joints = MovingJoints(model, {"arm": motion})
+    a, b, c = np.diff(motion.t)[:, None] * qd[:-1], np.diff(motion.t)[:, None] * qd[1:], np.diff(q, axis=0)
+    most = np.abs([q[:-1], a, 3 * c - 2 * a - b, a + b - 2 * c]).sum(axis=0).max(axis=0)
+    np.testing.assert_allclose(joints.slid(), most)
+    rail, arm, rod = chains_of(model, model.robot("arm").moving, most)
+    assert [chain.turns.tolist() for chain in (rail, arm, rod)] == [
+        [False],
+        [False, True],
+        [False, True, False],
+    ]
+    own = [model.bodies[i].radius + model.bodies[i].deviation for i in model.robot("arm").moving]
+    np.testing.assert_allclose(rail.weight, [1.0])
+    np.testing.assert_allclose(arm.weight, [1.0, np.hypot(0.8, np.hypot(0.05, 0.05)) + own[1]])
+    assert own[2] >= 0.05
+    np.testing.assert_allclose(rod.weight, [1.0, own[2] + most[2] + 0.8, 1.0])
+    # Shapes that are simplified reach as far as what they are simplified from.
+    bodies = [
+        replace(body, solids=tuple(replace(solid, deviation=0.01) for solid in body.solids))
+        for body in model.bodies
+    ]
+    coarse = chains_of(replace(model, bodies=tuple(bodies)), model.robot("arm").moving, most)[2]
+    np.testing.assert_allclose(coarse.weight, np.add(rod.weight, [0, 0.01, 0]))
+    (post,) = chains_of(model, model.select("post"), most)
+    assert post.agility(np.ones((2, 3)), np.ones((2, 3))).tolist() == [0, 0]
+    # Where joints are as compiled counts, whichever sign it has.
+    model.mj.qpos0[:] = [0.7, -0.3, -0.1]
+    np.testing.assert_allclose(MovingJoints(model, {}).slid(), [0.2, 0.4, 0.1])
+    np.testing.assert_allclose(joints.slid(), np.add(most, [0.7, 0.3, 0.1]))
+
+
+def test_no_joint_is_faster_or_quicker_than_is_said_of_a_span_and_one_instant_of_it_is(tmp_path):
+    """The second of three joints follows the first, minus twice as fast; before and after it stands."""
+    urdf = two_r(mimic='<mimic joint="j1" multiplier="-2" offset="-0.3"/>')
+    model = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": urdf}).model
+    motion = GivenMotion(
+        "arm",
+        np.array([1.0, 1.5, 3.0]),
+        np.array([[0], [0.4], [0.3]]),
+        np.array([[1], [-2], [0.5]]),
+        np.ones(3, bool),
+    )
+    joints = MovingJoints(model, {"arm": motion})
+    low = np.array([1.0, 1.1, 1.5, 1.7, 2.9, 0.2, 0.5, 3.0, 3.5])
+    high = np.array([1.5, 1.4, 3.0, 2.1, 3.0, 0.9, 1.0, 3.2, 4.0])
+    qd, qdd = joints.largest(low, high)
+    for i, (begin, end) in enumerate(zip(low, high, strict=True)):
+        t = np.linspace(begin, end, 4001)
+        v = motion.at(t)[1][:, 0] if begin >= 1.0 and end <= 3.0 else np.zeros(4001)
+        np.testing.assert_allclose(qd[i], np.abs(v).max() * np.array([1, 2]), rtol=1e-6, atol=1e-12)
+        a = np.abs(np.diff(v)).max() / (t[1] - t[0])
+        np.testing.assert_allclose(qdd[i], a * np.array([1, 2]), rtol=1e-3, atol=1e-12)
+    # Where it is, the follower with its offset; as far as both could ever be from where they were compiled.
+    qpos, qvel = joints.at(1.25)
+    at, v = motion.at(np.array([1.25]))
+    np.testing.assert_allclose(qpos, [at[0, 0], -0.3 - 2 * at[0, 0]])
+    np.testing.assert_allclose(qvel, [v[0, 0], -2 * v[0, 0]])
+    most = np.abs(motion.powers()).sum(axis=0).max()
+    home = np.abs(model.mj.qpos0)
+    np.testing.assert_allclose(joints.slid(), [most + home[0], 2 * most + 0.3 + home[1]])
+    other = GivenMotion("x", np.array([0.0, 1.6, 2.0]), motion.q, motion.qd, motion.good)
+    both = MovingJoints(model, {"arm": motion, "x": other})
+    np.testing.assert_array_equal(both.breaks(1.2, 2.0), [1.2, 1.5, 1.6, 2.0])

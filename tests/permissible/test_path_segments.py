@@ -9,13 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PFL, SOURCE, cell, turn
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_folder
-from seerob.core.samples import PoseSample
+from seerob.core.samples import PoseSample, Quality
 from seerob.core.verdict import Verdict
 from seerob.criteria.safety.path_speed import passed
 from seerob.files.trajectories.path_map import Place, path_markers, read_map
@@ -190,6 +191,17 @@ def test_poses_of_the_tool_are_solved_into_the_joints_they_came_from(tmp_path):
     far = PoseSample(source="p", target="arm/tip", seq=0, t=0.0, position=(5.0, 0, 0), wxyz=(1.0, 0, 0, 0))
     with pytest.raises(InputError, match="out of reach"):
         solved(model, robot, [far])
+    # What its source does not vouch for may lie anywhere; how good it is goes on.
+    doubtful = replace(far, quality=Quality.DEGRADED)
+    found = solved(model, robot, [poses[0], doubtful, replace(poses[1], seq=9)])
+    assert [(s.quality, s.t, s.seq, s.target) for s in found] == [
+        (Quality.GOOD, 0.0, 0, "arm"),
+        (Quality.DEGRADED, 0.0, 0, "arm"),
+        (Quality.GOOD, 0.05, 9, "arm"),
+    ]
+    for lost in ({"position": (np.nan, 0, 0)}, {"wxyz": (1.0, 0, np.inf, 0)}):
+        with pytest.raises(InputError, match="a pose that is not finite"):
+            solved(model, robot, [replace(poses[0], **lost)])
 
 
 @pytest.mark.parametrize("raised", [KeyboardInterrupt, InputError([])])

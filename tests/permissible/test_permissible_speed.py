@@ -11,6 +11,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, heard, made, meant, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError
+from seerob.core.samples import Quality
 from seerob.session.permissible import evaluation
 from seerob.session.permissible.ceilings import By
 from seerob.session.permissible.evaluation import Wish
@@ -236,8 +237,34 @@ def test_the_samples_of_a_given_motion():
     found = evaluation.GivenMotion.of(samples)
     np.testing.assert_allclose(found.at(np.array([0.25, 1.5]))[0][:, 0], [0.25, 1.5])
     assert not found.derived
-    with pytest.raises(InputError, match="does not increase"):
-        evaluation.GivenMotion.of([*samples, samples[0]])
+    assert found.good.all()
+    for wrong in ([*samples, samples[0]], [samples[0], samples[0]]):
+        with pytest.raises(InputError, match="does not increase"):
+            evaluation.GivenMotion.of(wrong)
+    for few in ([], samples[:1]):
+        with pytest.raises(InputError, match=f"{len(few)} samples"):
+            evaluation.GivenMotion.of(few)
+    assert evaluation.GivenMotion.of(samples[1:]).duration == 1.0
+    # Whoever says no velocity once has none of their own: they are slopes, of what is known and is no jump.
+    said = [*samples, heard("arm", 3.0, (3.0, 0.0))]
+    derived = evaluation.GivenMotion.of(said)
+    assert derived.derived
+    np.testing.assert_allclose(derived.qd[:, 0], 1.0)
+    doubts = (
+        (Quality.DEGRADED, 20.0, [20.0] * 4),
+        (Quality.INVALID, 20.0, [20, 20, 0, 0]),
+        (Quality.GOOD, 40.0, [0] * 4),
+    )
+    for quality, rate, qd in doubts:
+        each = [
+            heard("arm", t, (rate * t, 0.0), quality=quality if t == 2 else Quality.GOOD) for t in range(4)
+        ]
+        found = evaluation.GivenMotion.of(each)
+        np.testing.assert_allclose(found.qd[:, 0], qd, atol=1e-9)
+        assert found.good.tolist() == [True, True, quality is Quality.GOOD, True]
+    for t, q, qd in ((2.0, np.nan, 1.0), (2.0, 2.0, np.inf), (np.inf, 2.0, 1.0)):
+        with pytest.raises(InputError, match="not finite"):
+            evaluation.GivenMotion.of([*samples[:2], heard("arm", t, (q, 0.0), (qd, 0.0))])
 
 
 def test_the_command(tmp_path, capsys):

@@ -11,7 +11,18 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.session.permissible.ceilings import By, Ceiling
 from seerob.session.permissible.joint_limits import JointLimits
-from seerob.session.permissible.path import STEP, GivenMotion, _dense, largest_hermite, largest_on, path_of
+from seerob.session.permissible.path import (
+    STEP,
+    GivenMotion,
+    _dense,
+    _piece,
+    _smooth,
+    _stands,
+    _stray,
+    largest_hermite,
+    largest_on,
+    path_of,
+)
 from seerob.session.permissible.rescaled import Rescaled, _governs, ceiling, check, rescale, spent
 from seerob.session.permissible.speed_map import SpeedMap, Stations, reference_speed
 from seerob.session.permissible.timing import Parabolas, Profile, Timed, Use, _opened, _spread, timed
@@ -228,15 +239,23 @@ def test_a_path_of_pieces_is_as_far_off_as_the_farthest_of_them():
     off = np.array([[1e-4, 4e-4, 2e-4], [3e-4, 1e-4, 2e-4]])
     two = replace(path, pieces=tuple(replace(piece, deviation=each) for each in off))
     np.testing.assert_array_equal(two.deviation, [3e-4, 4e-4, 2e-4])
+    stands = replace(two, stray=np.array([1e-4, 5e-4, 3e-4]))
+    np.testing.assert_array_equal(stands.deviation, [3e-4, 5e-4, 3e-4])
 
 
-@pytest.mark.parametrize("speeds", [(2.0, 0.0), (0.0, 2.0), (1.0, 1.0), (-3.0, -3.0)])
+@pytest.mark.parametrize("speeds", [(2.0, 0.0), (0.0, 2.0), (1.0, 1.0), (-3.0, -3.0), (2.345, 0.1)])
 def test_a_spline_is_compared_at_steps_that_no_joint_exceeds(speeds):
     """Wherever between two samples it is fastest."""
-    t, q, _ = _dense(motion([0.0, 1.0], [0.0, 1.0], speeds))
+    both = np.array([[0.0, 3.0], [1.0, 3.0]]), np.stack([speeds, [0.0, 0.0]], 1)
+    t, q, _ = _dense(motion([0.0, 1.0], *both))
+    # As few as need be: by the largest slope of the cubic, over the whole of it.
+    x = np.linspace(0, 1, 10_001)
+    slope = np.gradient(motion([0.0, 1.0], *both).at(x)[0][:, 0], x)
+    assert len(t) - 1 == np.ceil(np.abs(slope).max() / STEP - 1e-3)
     assert np.abs(np.diff(q, axis=0)).max() <= STEP * (1 + 1e-9)
     assert (np.diff(t) > 0).all()
     assert (t[0], t[-1]) == (0.0, 1.0)
+    assert len(_dense(line(0.5))[0]) == 51
 
 
 def test_stands_and_turns_cut_the_path_and_stands_are_kept():
@@ -266,12 +285,13 @@ MOVES = (1.0, lambda x: 10 * x**3 - 15 * x**4 + 6 * x**5, lambda x: 30 * x**2 - 
 STANDS = (0.5, lambda x: 0 * x, lambda x: 0 * x)
 CREEPS = (4.0, lambda x: 2e-3 * x, lambda x: 2e-3 + 0 * x)
 BLINKS = (0.02, lambda x: np.where(x < 1, 1.8e-3, 0.0), lambda x: 0 * x)
+SINKS = (4.0, lambda x: -2e-3 * x, lambda x: -2e-3 + 0 * x)
 SHIVERS = (0.2, lambda x: 0 * x, lambda x: 0.4 * np.cos(10 * np.pi * x))
 
 
-@pytest.mark.parametrize("between", [CREEPS, BLINKS, SHIVERS])
+@pytest.mark.parametrize("between", [CREEPS, SINKS, BLINKS, SHIVERS])
 def test_no_way_is_lost_where_the_given_motion_hardly_moves(between):
-    """Two milliradians in 4 s, and as far and back between two samples and in one."""
+    """Two milliradians in 4 s, up or down, and as far and back between two samples and in one."""
     given = parts(MOVES, STANDS, between, STANDS, MOVES)
     path = path_of(given, tolerance=5e-4)
     assert path.stands.sum() + sum(p.t[-1] - p.t[0] for p in path.pieces) == pytest.approx(given.duration)
@@ -279,16 +299,109 @@ def test_no_way_is_lost_where_the_given_motion_hardly_moves(between):
     np.testing.assert_allclose([b[0] for b in ends], [path.first, *(a[1] for a in ends[:-1])], atol=1e-12)
     # When it is where: on its piece at the coordinate of then, between two pieces where the last one ended.
     t = np.linspace(0, given.duration, 4001)
-    at = np.tile(path.first, (len(t), 1))
+    at, stands = np.tile(path.first, (len(t), 1)), np.ones(len(t), bool)
     for piece in path.pieces:
         begun = t >= piece.t[0]
         at[begun] = piece.at(np.interp(t[begun], piece.t, piece.s))[0]
-    assert (np.abs(given.at(t)[0] - at).max(axis=0) <= path.deviation + 1e-12).all()
+        stands &= ~begun | (t > piece.t[-1])
+    off = np.abs(given.at(t)[0] - at)
+    assert (off.max(axis=0) <= path.deviation + 1e-12).all()
+    np.testing.assert_allclose(path.stray, off[stands].max(axis=0), rtol=0.1)
+    assert path.stray > 1e-6
+    assert (path.deviation <= 5e-4).all() or between is SHIVERS
+
+
+def test_how_far_it_strays_while_it_stands_is_its_farthest_at_any_instant():
+    given = motion([0, 0.5, 2], [[3, -1], [3.1, -1], [3, -1.2]], [[1, 0], [-1, 0.1], [0.2, -2]])
+    place, t = np.array([2.95, -1.1]), np.linspace(0, 2, 20_001)
+    expected = np.abs(given.at(t)[0] - place).max(axis=0)
+    np.testing.assert_allclose(_stray(given.t, given.q, given.qd, place), expected, rtol=1e-6)
+    np.testing.assert_array_equal(_stray(given.t[:1], given.q[:1], given.qd[:1], place), 0)
+
+
+@pytest.mark.parametrize("shift", [4e-5, -4e-5])
+def test_where_a_piece_begins_beside_the_given_motion_it_is_off_by_that(shift):
+    given = line()
+    piece = _piece(given.t, given.q, given.qd, np.array([shift]), 5e-4)
+    assert 4e-5 <= piece.deviation[0] <= 4.7e-5
+    np.testing.assert_allclose(piece.at(np.array([0.0, piece.length]))[0], [[shift], [1]], atol=1e-12)
+    np.testing.assert_array_equal(piece.t, given.t)
+    np.testing.assert_allclose(piece.speed, np.gradient(piece.s, given.t))
+    assert piece.length == pytest.approx(1 - shift)
+
+
+def test_a_stand_lasts_a_twentieth_of_a_second_in_a_box():
+    t, near = 0.025 * np.arange(12), 0.5
+    q = np.array([0, 0.5, 0.25, 9, 9, 8, 8, 8.5, 8.6, 8.6, 8.5, 8.1])
+    # Two places in one box and a third, two only, three and those that follow, whose box is another one.
+    assert _stands(t, np.stack([q, 0 * q], 1), near) == [(0, 2), (5, 7), (8, 11)]
+    assert _stands(t, np.stack([0 * q, -q], 1), near) == [(0, 2), (5, 7), (8, 11)]
+    assert _stands(t * 0.99, q[:, None], near) == [(7, 11)]
+    assert _stands(np.array([0, 1, 1.05]), np.array([[0], [9], [9]]), near) == [(1, 2)]
+
+
+def test_where_the_direction_turns_by_more_than_half_a_right_angle_is_a_corner():
+    def way(*turns):
+        angles = np.radians(np.cumsum(turns))
+        steps = 0.01 * np.stack([np.cos(angles), np.sin(angles)], 1)
+        return np.cumsum(np.concatenate([np.zeros((1, 2)), steps]), axis=0)
+
+    q = way(0, 44, 0, 46, 0, -44, -46, 180, 1)
+    assert list(_smooth(q, 0, 9)) == [(0, 3), (3, 6), (6, 7), (7, 9)]
+    assert list(_smooth(q, 3, 6)) == [(3, 6)]
+    assert list(_smooth(way(0, 100, 0), 0, 3)) == [(0, 1), (1, 3)]
+    # What goes less than two milliradians in each joint has every direction, from one kept place on.
+    noisy = np.array([0, 1.9e-3, 0, 2.1e-3, 2.2e-3, 0.3e-3, 4.2e-3, 4.1e-3])[:, None]
+    assert list(_smooth(noisy, 0, 7)) == [(0, 7)]
+    back = np.array([0, 2.1e-3, 4.2e-3, 2.1e-3, 0])[:, None]
+    assert list(_smooth(back, 0, 4)) == [(0, 2), (2, 4)]
+    assert list(_smooth(np.array([[0], [1.8e-3], [0]]), 0, 2)) == [(0, 2)]  # there again: no direction
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1e-3, np.inf, np.nan])
+def test_a_tolerance_of_the_path_is_a_width(wrong):
+    with pytest.raises(InputError, match="give more than 0"):
+        path_of(line(), tolerance=wrong)
+
+
+def test_a_motion_has_positions_and_velocities_at_two_instants_or_more():
+    good = {"t": [0, 1], "q": np.zeros((2, 3)), "qd": np.zeros((2, 3)), "good": [True, True]}
+    for name, short in (("t", [0]), ("q", np.zeros((2, 2))), ("qd", np.zeros((1, 3))), ("good", [True])):
+        with pytest.raises(ValueError, match="are no motion"):
+            GivenMotion("arm", **{k: np.array(v) for k, v in {**good, name: short}.items()})
+    with pytest.raises(ValueError, match="are no motion"):
+        GivenMotion("arm", **{k: np.array(v)[:1] for k, v in good.items()})
+
+
+def test_a_motion_is_a_cubic_from_sample_to_sample_and_rests_outside():
+    """Of t³ − t there is nothing else; at its ends it still moves."""
+    t = np.array([-1.0, 0.5, 2.0, 2.25])
+    given = motion(t, t**3 - t, 3 * t**2 - 1)
+    at = np.linspace(-1, 2.25, 53)
+    q, qd = given.at(at)
+    np.testing.assert_allclose(q[:, 0], at**3 - at, atol=1e-12)
+    np.testing.assert_allclose(qd[:, 0], 3 * at**2 - 1, atol=1e-12)
+    q, qd = given.at(np.array([-2.0, -1.001, 2.251, 9.0]))
+    np.testing.assert_allclose(q[:, 0], [0, 0, t[-1] ** 3 - t[-1], t[-1] ** 3 - t[-1]], atol=1e-12)
+    np.testing.assert_array_equal(qd, 0)
+    assert given.duration == 3.25
+    assert given.interval(np.array([-9, -1, 0.4, 0.5, 1.9, 2, 2.2, 2.25, 9])).tolist() == [
+        0,
+        0,
+        0,
+        1,
+        1,
+        2,
+        2,
+        2,
+        2,
+    ]
 
 
 def test_what_never_moves_is_refused():
-    with pytest.raises(InputError, match="never moves"):
-        path_of(motion([0, 1, 2], [0, 0, 0], [0, 0, 0]), tolerance=1e-3)
+    for t in ([0, 1, 2], [0, 0.01, 0.02]):
+        with pytest.raises(InputError, match="never moves"):
+            path_of(motion(t, [1, 1, 1], [0, 0, 0]), tolerance=1e-3)
 
 
 def test_largest_values_of_polynomials():

@@ -190,16 +190,8 @@ def _smooth(q: Array, a: int, b: int) -> Iterator[tuple[int, int]]:
     for i in range(a + 1, b + 1):
         if np.abs(q[i] - q[keep[-1]]).max() > STEP / 10:
             keep.append(i)
-    if keep[-1] != b:
-        if len(keep) > 1:
-            keep[-1] = b
-        else:
-            keep.append(b)
     chords = np.diff(q[keep], axis=0)
     lengths = np.linalg.norm(chords, axis=1)
-    if not (lengths > SAME).all():
-        yield a, b
-        return
     cosines = (chords[1:] * chords[:-1]).sum(axis=1) / (lengths[1:] * lengths[:-1])
     ends = [a, *(keep[i + 1] for i in np.flatnonzero(cosines < CORNER)), b]
     yield from pairwise(ends)

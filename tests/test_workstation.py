@@ -35,6 +35,7 @@ CLEARANCES = {
     "iiwa_bench": ("fingers", "bench"),
     "two_robots": ("ur10", "ur5e"),
     "guarded_cell": ("ur5e", "rack"),
+    "imported_line": ("ur5e", "line/*"),
 }
 """Two names of each that must never meet."""
 

@@ -111,7 +111,8 @@ CELLS = {
     ),
     "joint_angles": (
         angles,
-        MAN + '[[sources]]\nkind = "joint_angles"\nhuman = "op"\nfile = "a.csv"\nstays = true\n',
+        MAN + '[[sources]]\nkind = "joint_angles"\nhuman = "op"\nfile = "a.csv"\nstays = true\n'
+        "rest_at_zero = true\n",
     ),
     "waypoints": (
         lambda folder: (folder / "w.toml").write_text(

@@ -15,7 +15,7 @@ from seerob.criteria.scoring.rule import bind_posture
 from seerob.description.capture.estimated import located
 from seerob.description.capture.following import HELD_SPEED, Following
 from seerob.description.capture.mapping import conventions
-from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 from seerob.devices.capture.options import Weights
 from seerob.session import run as road
 from seerob.session.reading import read
@@ -150,9 +150,34 @@ def test_a_table_of_joints_that_says_no_place_decides_no_distance_unless_the_per
     head = ",".join(("time [s]", *columns, "right_elbow_flexion [deg]"))
     rows = "\n".join(",".join([f"{0.1 * k:.1f}", *("0.0" for _ in columns), f"{10 * k}"]) for k in range(6))
     (tmp_path / "joints.csv").write_text(f"{head}\n{rows}\n")
-    results = assessed(tmp_path, f'kind = "joint_angles"\nfile = "joints.csv"\n{stays}')
+    table = 'kind = "joint_angles"\nfile = "joints.csv"\nrest_at_zero = true\n'
+    results = assessed(tmp_path, f"{table}{stays}")
     assert {r.verdict for r in results if r.name == "d"} == {verdict}
     assert {r.verdict for r in results if r.name == "owas"} == {Verdict.WITHIN}
+
+
+@pytest.mark.parametrize(
+    ("joints", "verdicts"),
+    [
+        (("right_elbow_flexion",), (Verdict.UNDECIDED, Verdict.UNDECIDED)),
+        (
+            tuple(name for name in JOINTS if not name.startswith("left_")),
+            (Verdict.UNDECIDED, Verdict.UNDECIDED),
+        ),
+        (tuple(name for name in JOINTS if "toes" not in name), (Verdict.WITHIN, Verdict.WITHIN)),
+    ],
+)
+def test_bones_of_which_a_table_has_no_joint_are_not_at_rest(tmp_path, joints, verdicts):
+    """An arm, trunk and neck that nobody measured were at 0: upright, and within."""
+    sliding = ("pelvis_x", "pelvis_y", "pelvis_z")
+    head = ",".join(("time [s]", *(f"{name} [{'m' if name in sliding else 'deg'}]" for name in joints)))
+    rows = "\n".join(",".join([f"{0.1 * k:.1f}", *("0.0" for _ in joints)]) for k in range(6))
+    (tmp_path / "joints.csv").write_text(f"{head}\n{rows}\n")
+    for more, expected in (("", verdicts), ("rest_at_zero = true\n", (Verdict.WITHIN, Verdict.WITHIN))):
+        table = f'kind = "joint_angles"\nfile = "joints.csv"\nstays = true\n{more}'
+        results = assessed(tmp_path, table)
+        for name, verdict in zip(("d", "owas"), expected, strict=True):
+            assert {r.verdict for r in results if r.name == name} == {verdict}
 
 
 def test_a_bvh_without_places_of_its_root_decides_no_distance(tmp_path):

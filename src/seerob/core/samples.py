@@ -93,6 +93,8 @@ class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):
     """What the source itself has at the robot's flange [kg]."""
     placed: bool = True
     """Whether it says where a person stands; if not, it is of the posture alone."""
+    unmeasured: tuple[str, ...] = ()
+    """Bones of a person of which it says nothing, and that are in ``q`` all the same."""
 
 
 class PoseSample(SampleBase, frozen=True, kw_only=True, tag="pose"):

@@ -46,7 +46,7 @@ from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import NOWHERE, BonesHeard, Heard
+from seerob.twin.validity.hearing import EVERYWHERE, NOWHERE, BonesHeard, Heard
 
 DEFAULT_TIMEOUT = 0.2
 """Time-out [s] of what is heard without a source that states one."""
@@ -312,8 +312,11 @@ class Engine:
                 speeds = isinstance(sample, JointSample) and sample.qd is not None
                 self._unheard[mechanism.name].hear(sample.t, sample.seq, speeds=speeds)
             self._note(mechanism.name, sample.t, reason, sample, taken=taken)
-            if isinstance(sample, JointSample) and not sample.placed:
-                self._hearings[mechanism.name].bones_heard.append(BonesHeard(sample.t, places=NOWHERE))
+            if isinstance(sample, JointSample) and (sample.unmeasured or not sample.placed):
+                reason = f"{sample.source} says nothing of {', '.join(sample.unmeasured)}"
+                parts = ((reason, sample.unmeasured),) if sample.unmeasured else ()
+                places = EVERYWHERE if sample.placed else NOWHERE
+                self._hearings[mechanism.name].bones_heard.append(BonesHeard(sample.t, parts, places=places))
 
         for name, following in self._followings.items():
             hearing = self._hearings[name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -16,12 +16,13 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.description import Description
 from seerob.description.humans.posture import on_floor
-from seerob.description.humans.skeleton import JOINTS, bone_poses
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses, without_side
+from seerob.devices.capture.options import Error, posture_error, unknown_error
 from seerob.files.motion_capture import joint_angles
 from seerob.files.motion_capture.frame_arrays import LATEST, SHORTEST, about
-from seerob.files.motion_capture.joint_angles import JointAngles
+from seerob.files.motion_capture.joint_angles import LENGTHS, JointAngles
 from seerob.files.trajectories.trajectory import derive_velocities
-from seerob.workstation.source import Opened, Source, Target
+from seerob.workstation.source import Opened, PostureError, Source, Target
 
 STORAGES = (".mot", ".sto")
 PLACE = [JOINTS.index(name) for name in ("pelvis_x", "pelvis_y", "pelvis_z")]
@@ -44,6 +45,7 @@ class _Samples:
     source: str
     target: str
     placed: bool
+    unmeasured: tuple[str, ...]
 
     def __iter__(self) -> Iterator[JointSample]:
         rows = zip(self.t.tolist(), self.q.tolist(), self.qd.tolist(), self.degraded.tolist(), strict=True)
@@ -57,6 +59,7 @@ class _Samples:
                 qd=tuple(qd),
                 quality=Quality.DEGRADED if degraded else Quality.GOOD,
                 placed=self.placed,
+                unmeasured=self.unmeasured,
             )
 
 
@@ -73,10 +76,18 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
     """Keep the lowest sole on the floor; else the pelvis is as high as the file says."""
     stays: bool = False
     """The person stays at its place ``at``; without it distances are undecided where it says no place."""
+    rest_at_zero: bool = False
+    """Bones of which the file has no joint are at 0; without it what asks for them is undecided."""
+    accuracy: Error | None = None
+    """How far each angle of a posture may be off [rad]."""
 
     def target(self) -> str:
         """The person."""
         return self.human
+
+    def posture_error(self) -> PostureError | None:
+        """What the workstation file gives: of no such file it is known."""
+        return posture_error(self.accuracy, None)
 
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Read the file and put what is beyond a limit of the person to it.
@@ -100,11 +111,26 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
                 "OpenSim): no distance is decided; write stays = true if the person stays at its at"
             )
             left_out = (*left_out, Finding(level="warning", subject="", text=text))
+        unmeasured = () if self.rest_at_zero else _unmeasured(found.given, target.description)
+        if unmeasured:
+            text = (
+                f"{self.file}: it has no joint of {', '.join(unmeasured)}: what asks for them is undecided; "
+                "write rest_at_zero = true if they are at 0"
+            )
+            left_out = (*left_out, Finding(level="warning", subject="", text=text))
+        left_out = (*left_out, *unknown_error(self.posture_error(), self.file, target.name))
         qd = derive_velocities(found.t, q, largest=largest).qd
         t = found.t - found.t[0]
         return Opened(
             samples=_Samples(
-                t, q, qd, degraded, self.name or f"joint_angles {self.human}", target.name, placed
+                t,
+                q,
+                qd,
+                degraded,
+                self.name or f"joint_angles {self.human}",
+                target.name,
+                placed,
+                unmeasured,
             ),
             duration=float(t[-1]),
             began=float(found.t[0]),
@@ -121,6 +147,18 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
             # The laboratory's origin means nothing in the workstation: begin where the person stands.
             q[:, PLACE[:2]] -= q[0, PLACE[:2]]
         return on_floor(description, q) if self.floor or not (known or found.high) else q
+
+
+def _unmeasured(given: Collection[str], description: Description) -> tuple[str, ...]:
+    """Bones that have joints, of which none is given; toes follow their foot."""
+    return tuple(
+        link.name
+        for link in description.links
+        if link.name in BONES
+        and without_side(link.name) != "toes"
+        and link.joints
+        and not any(joint.name in given and joint.name not in LENGTHS for joint in link.joints)
+    )
 
 
 def _usable(found: JointAngles, file: str) -> tuple[JointAngles, tuple[Finding, ...]]:

@@ -259,6 +259,8 @@ class JointAngles:
     """The joint values themselves say how high the pelvis is."""
     placed: bool = True
     """It says where the person stands."""
+    given: frozenset[str] = frozenset(JOINTS)
+    """Joints of which the file says anything; the others are at 0."""
 
 
 def from_storage(path: Path, *, file: str) -> JointAngles:
@@ -305,7 +307,11 @@ def _of_opensim(found: Storage, file: str) -> JointAngles:
     rest = [name for name in found.labels if name not in used]
     if rest:
         said.append(Finding(level="note", subject="", text=f"{file}: not used: {', '.join(rest)[:200]}"))
-    return JointAngles(found.t, q, pelvis, tuple(said), placed=bool(np.isfinite(pelvis).any()))
+    # Which of our joints any of its coordinates moves: several of ours may follow from several of its.
+    moved, _, _ = to_joints(found.labels, np.linspace(0.1, 0.4, len(found.labels))[None])
+    given = frozenset(name for name, q0 in zip(JOINTS, moved[0].tolist(), strict=True) if q0)
+    placed = bool(np.isfinite(pelvis).any())
+    return JointAngles(found.t, q, pelvis, tuple(said), placed=placed, given=given)
 
 
 def from_table(path: Path, *, file: str) -> JointAngles:
@@ -374,4 +380,5 @@ def _of_names(
     findings = said if not unseen else (*said, Finding(level="assumed", subject="", text=text))
     placed = {JOINTS.index(name) for name in LENGTHS[:2]} <= taken.keys()
     nowhere = np.full((len(t), 3), np.nan)
-    return JointAngles(t, q, nowhere, findings, JOINTS.index("pelvis_z") in taken, placed)
+    given = frozenset(JOINTS[place] for place in taken)
+    return JointAngles(t, q, nowhere, findings, JOINTS.index("pelvis_z") in taken, placed, given)

@@ -17,6 +17,7 @@ from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.capture.options import AZURE_KINECT, XSENS
 from seerob.devices.sources.bvh import Bvh
 from seerob.devices.sources.mvnx import Mvnx
+from seerob.devices.sources.vrpn import Vrpn
 from seerob.session.station import load
 from seerob.workstation.source import Target
 
@@ -140,6 +141,13 @@ def test_what_nobody_knows_of_a_device_is_said(tmp_path):
     for options, said in (({}, True), ({"accuracy": 0.1}, False)):
         source = Bvh(human="op", file="x.bvh", **options)
         assert (source.posture_error() is None) == said
+        assert any(unknown in f.text for f in source.open(tmp_path, TARGET).findings) == said
+
+
+def test_what_nobody_knows_of_a_live_device_is_said(tmp_path):
+    unknown = "angles of a posture may be off that vr captures nobody says"
+    for options, said in (({}, True), ({"accuracy": 0.1}, False)):
+        source = Vrpn(human="op", name="vr", host="127.0.0.1", mapping={"Head": "head"}, **options)
         assert any(unknown in f.text for f in source.open(tmp_path, TARGET).findings) == said
 
 

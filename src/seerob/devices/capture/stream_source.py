@@ -6,10 +6,12 @@ import contextlib
 import logging
 import time
 from collections.abc import AsyncGenerator
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 from msgspec import field
+from msgspec.structs import replace
 
 from seerob.core.quantities import Pose, Seconds
 from seerob.core.samples import BodyPoint, BodySample, Quality, Sample, SignalSample
@@ -34,8 +36,8 @@ from seerob.devices.capture.options import (
     posture_error,
     unknown_error,
 )
-from seerob.devices.live.listening import LiveSource, say_once
-from seerob.workstation.source import PostureError, Target
+from seerob.devices.live.listening import LiveSource, name_of, say_once
+from seerob.workstation.source import Opened, PostureError, Target
 
 _log = logging.getLogger(__name__)
 
@@ -82,6 +84,16 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
     def posture_error(self) -> PostureError | None:
         """What the file gives, else what is known of the device."""
         return posture_error(self.accuracy, self.known_error)
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Check what can be checked without a connection, and say what nobody knows of the device.
+
+        Raises:
+            InputError: An option that does not fit what it drives.
+        """
+        opened = super().open(folder, target)
+        unknown = unknown_error(self.posture_error(), name_of(self), self.human)
+        return replace(opened, findings=(*opened.findings, *unknown))
 
     def behind(self) -> float:
         """Delay behind the world that it needs [s]; latency and filter come on top of the period."""
@@ -159,7 +171,7 @@ class _Hearing:
                 self._observer, findings = observer(
                     source, layout, self._description, file=source.name or "stream"
                 )
-                _say((*findings, *unknown_error(source.posture_error(), source.name, source.human)))
+                _say(findings)
                 if self._calibrated:
                     self._drop_unplaced()
         return self._observer

@@ -104,6 +104,106 @@ def test_a_collada_archive_is_its_document(tmp_path):
     assert sorted(np.ptp(row["box"], axis=0)) == pytest.approx([1, 2, 3])
 
 
+def step_file(path, *, clamp=60.0, moved=0.0, pin="pin", post=True):
+    """A block with two clamps and a pin, as one revision or another has it."""
+    made, place = MADE["Step"](), MADE["place"]
+    block = made.box("block", (300.0, 200.0, 20.0), material="steel")
+    jaw = made.box("jaw", (clamp, 20.0, 30.0))
+    bolt = made.cylinder("bolt", 5.0, 40.0)
+    parts = [(block, "base", place()), (jaw, "clamp_1", place(10, 10, 20)), (bolt, pin, place(150, 100, 20))]
+    parts.append((jaw, "clamp_2", place(200.0 + moved, 10, 20)))
+    if post:
+        parts.append((made.box("post", (20.0, 20.0, 900.0)), "post", place(400)))
+    made.assembly("line", parts)
+    path.write_text(made.text())
+    return path
+
+
+HAND = """
+# Mine: what the person must not reach.
+[[safety]]
+kind = "minimum_distance"   # of the clamps
+name = "clamps"
+between = ["line/clamp_*", "line/post"]
+limit = 0.01
+"""
+
+
+def by_name(folder):
+    parts = tomllib.loads((folder / "workstation.toml").read_text())["parts"]
+    return {part["name"]: part for part in parts}
+
+
+def test_a_new_revision_keeps_names_and_what_was_edited_and_says_what_is_new(tmp_path, capsys):
+    file, cell = step_file(tmp_path / "line.step"), tmp_path / "cell"
+    assert imported(file, cell, "--density", "steel=7850")[0] == Exit.WITHIN
+    text = (cell / "workstation.toml").read_text() + HAND
+    # The base is put elsewhere by hand, and remarked.
+    text = text.replace('name = "line/base"', 'name = "line/base"   # bolted')
+    text = text.replace("position = [0, 0, 0]", "position = [0, 0, 0.5]", 1)
+    (cell / "workstation.toml").write_text(text)
+    before = by_name(cell)
+    step_file(file, clamp=80.0, moved=15.0, pin="dowel", post=False)
+    capsys.readouterr()
+    assert imported(file, cell)[0] == Exit.WITHIN
+    out = " ".join(capsys.readouterr().out.split())
+    for said in (
+        "added line/dowel",
+        "lost line/post: touches safety clamps",
+        "lost line/pin",
+        "resized line/clamp_1: touches safety clamps",
+        "moved and resized line/clamp_2: touches safety clamps",
+        "renamed? line/pin is perhaps line/dowel now: the same shape, the same place",
+    ):
+        assert said in out
+    after = by_name(cell)
+    assert list(after) == ["line/base", "line/clamp_1", "line/clamp_2", "line/dowel"]
+    assert after["line/base"] == before["line/base"]
+    assert after["line/base"]["density"] == 7850
+    assert after["line/clamp_2"]["at"]["position"] == pytest.approx([0.215, 0.01, 0.02])
+    text = (cell / "workstation.toml").read_text()
+    assert 'name = "line/base"   # bolted' in text
+    assert HAND.strip() in text
+    assert not (cell / "cad/post.glb").exists()
+    mesh = trimesh.load(cell / after["line/clamp_1"]["mesh"], force="mesh")
+    assert np.ptp(mesh.bounds, axis=0)[0] == pytest.approx(0.08)
+    # The criterion names a part that is gone: it is asked of nobody else.
+    assert cli.main(["check-file", str(cell)]) == Exit.ERROR
+    assert "line/post" in capsys.readouterr().err
+    assert imported(file, cell)[0] == Exit.WITHIN
+    assert "no part was added, moved, resized or lost" in capsys.readouterr().out
+    assert text == (cell / "workstation.toml").read_text()
+
+
+def test_where_the_hand_and_the_revision_differ_the_hand_counts_and_is_told(tmp_path, capsys):
+    file, cell = step_file(tmp_path / "line.step"), tmp_path / "cell"
+    imported(file, cell)
+    toml = cell / "workstation.toml"
+    toml.write_text(toml.read_text().replace("position = [0.2, 0.01, 0.02]", "position = [0.3, 0.01, 0.02]"))
+    imported(step_file(file, moved=15.0), cell)
+    assert "line/clamp_2: at as it was changed by hand" in capsys.readouterr().out
+    assert by_name(cell)["line/clamp_2"]["at"]["position"] == [0.3, 0.01, 0.02]
+
+
+def test_files_of_the_user_are_not_touched(tmp_path, capsys):
+    file, cell = step_file(tmp_path / "line.step", pin="pin", post=False), tmp_path / "cell"
+    imported(file, cell)
+    (cell / "cad/post.glb").write_bytes(b"mine")
+    (tmp_path / "keep.glb").write_bytes(b"mine")
+    table = json.loads((cell / "import.json").read_text())
+    table["parts"].append({**table["parts"][0], "name": "gone", "mesh": "cad/../../keep.glb"})
+    (cell / "import.json").write_text(json.dumps(table))
+    assert imported(step_file(file), cell)[0] == Exit.WITHIN
+    assert (cell / "cad/post.glb").read_bytes() == b"mine"
+    assert by_name(cell)["line/post"]["mesh"] == "cad/post_2.glb"
+    assert (tmp_path / "keep.glb").exists()
+    (cell / "import.json").write_text('{"parts": [{}]}')
+    assert imported(file, cell)[0] == Exit.ERROR
+    (cell / "import.json").unlink()
+    assert imported(file, cell)[0] == Exit.ERROR
+    assert "exists already" in capsys.readouterr().err
+
+
 def test_a_file_without_a_unit_is_asked_for_it(tmp_path, capsys):
     trimesh.creation.box((200, 100, 50)).export(tmp_path / "a.stl")
     assert imported(tmp_path / "a.stl", tmp_path / "cell")[0] == Exit.ERROR

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from seerob.app.console.terminal import Exit, line, tell
 from seerob.core.errors import InputError
-from seerob.core.files.whole_file import whole_folder
+from seerob.core.files.whole_file import whole_file, whole_folder
 
 if TYPE_CHECKING:
     from seerob.app.importing.folder import Files
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 HELP = "make a workstation folder from CAD: parts with names, places, colours and meshes"
 EXAMPLE = "seerob import line.step my_line"
 
+_KEPT = ("density", "tolerance", "units", "up")
+"""Options that a new revision takes over where they are not given again."""
 _SHOWN = 20
 """Lines about what was left out."""
 FINEST, COARSEST = 1e-3, 50.0
@@ -28,7 +31,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     text = "STEP, IGES, 3DXML, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA or AutomationML file"
     sub.add_argument("file", type=Path, help=text)
-    sub.add_argument("folder", type=Path, help="folder to make")
+    sub.add_argument("folder", type=Path, help="folder to make, or one that an older revision made")
     text = "how far triangles may be from a STEP or IGES surface [mm] (default: 0.1); counts as uncertainty"
     sub.add_argument("--tolerance", type=float, metavar="MM", help=text)
     text = "density of every part [kg/m³], or of one material as S235JR=7850; may be given several times"
@@ -40,7 +43,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the folder; nothing that exists is touched.
+    """Write the folder, or the new revision into one that was made so.
 
     Raises:
         InputError: The file cannot be read, or the folder exists.
@@ -50,24 +53,87 @@ def run(options: argparse.Namespace) -> int:
     from seerob.description.mesh import MAX_BYTES, file_content
 
     folder: Path = options.folder
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError.at(folder, "", "exists already", "give the name of a new folder")
+    before = _before(folder)
     ending = recognised(options.file, file_content(options.file, MAX_BYTES))
-    if ending in (".aml", ".amlx"):
-        return _plant(options.file, folder)
-    return _assembly(options, ending, folder)
+    if ending not in (".aml", ".amlx"):
+        return _assembly(options, ending, folder, before)
+    if before is not None:
+        raise InputError.at(folder, "", "exists already", "give the name of a new folder")
+    return _plant(options.file, folder)
 
 
-def _assembly(options: argparse.Namespace, ending: str, folder: Path) -> Exit:
+def _before(folder: Path) -> dict[str, Any] | None:
+    """The table of an older revision in a folder; None where there is no folder.
+
+    Raises:
+        InputError: There is something else.
+    """
+    from seerob.app.importing.folder import TABLE
+
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return None
+    if not (folder / TABLE).is_file() or not (folder / "workstation.toml").is_file():
+        what = f"exists already, and has no {TABLE} of an older revision"
+        raise InputError.at(folder, "", what, "give the name of a new folder")
+    try:
+        before: dict[str, Any] = json.loads((folder / TABLE).read_bytes())
+        for row in before["parts"]:
+            for key in ("name", "mesh", "shape", "box", "written"):
+                row[key]
+        before["options"].get("density")
+    except (ValueError, LookupError, TypeError, AttributeError, OSError) as error:
+        raise InputError.at(folder / TABLE, "", f"cannot be read ({error})", "import anew") from error
+    return before
+
+
+def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: dict[str, Any] | None) -> Exit:
     from seerob.app.importing.folder import densities, files
     from seerob.description.cad.assembly import baked
 
+    former = {} if before is None else before["options"]
+    for key in _KEPT:
+        if not getattr(options, key):
+            setattr(options, key, former.get(key) or getattr(options, key))
+    kept = {key: getattr(options, key) for key in _KEPT}
     given = densities(options.density)
     assembly = baked(_read(options, ending))
-    made = files(assembly, options.file, given)
-    _write(folder, made.texts, made.meshes)
+    if before is None:
+        made = files(assembly, options.file, given, options=kept)
+        _write(folder, made.texts, made.meshes)
+        _say(options.file, assembly, made)
+        return Exit.WITHIN
+    own = {f"cad/{file.name}" for file in (folder / "cad").glob("*")} - {
+        row["mesh"] for row in before["parts"]
+    }
+    made = files(assembly, options.file, given, options=kept, taken=own)
+    _revise(folder, before, made)
     _say(options.file, assembly, made)
     return Exit.WITHIN
+
+
+def _revise(folder: Path, before: dict[str, Any], made: Files) -> None:
+    """Write a new revision into a folder."""
+    from seerob.app.importing.folder import TABLE
+    from seerob.app.importing.revision import revised
+
+    file = folder / "workstation.toml"
+    try:
+        revision = revised(file.read_bytes(), before, made.parts, str(file))
+        (folder / "cad").mkdir(exist_ok=True)
+        contents = {file.name: revision.text, **made.meshes, TABLE: made.texts[TABLE].encode()}
+        for name, content in contents.items():
+            with whole_file(folder / name) as hidden:
+                hidden.write_bytes(content)
+        for name in revision.unused:
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        what = f"cannot be written: {error.strerror}"
+        raise InputError.at(folder, "", what, "give a folder that may be written") from error
+    line("wrote", f"{file}, of which everything that was edited by hand stays")
+    for word, text in revision.told:
+        line(word, text, "yellow" if word in ("lost", "kept", "renamed?") else "")
+    if not revision.told:
+        line("same", "no part was added, moved, resized or lost")
 
 
 def _read(options: argparse.Namespace, ending: str) -> Assembly:

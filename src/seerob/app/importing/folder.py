@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.description.cad.assembly import Assembly, Instance, Shape
 from seerob.description.cad.names import plain_name
+from seerob.description.mesh_files import Color
 from seerob.description.shapes.glb import glb_y_up
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.mesh_mending import sided
 from seerob.description.shapes.moments import signed_volume
 from seerob.files.tables.mapping import toml_value
+from seerob.workstation.editing import literal
 
 TABLE = "import.json"
 """What was found, mended, guessed and left out, beside the workstation file."""
@@ -38,11 +41,9 @@ class Densities:
     of_all: float | None = None
     by_material: dict[str, float] = field(default_factory=dict)
 
-    def of(self, shape: Shape) -> tuple[float | None, str]:
-        """Density of a shape, None when nobody gave it, and why it is that."""
-        if shape.material in self.by_material:
-            return self.by_material[shape.material], f"given for {shape.material}"
-        return self.of_all, "given for everything"
+    def of(self, shape: Shape) -> float | None:
+        """Density of a shape; None when nobody gave it."""
+        return self.by_material.get(shape.material, self.of_all)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,24 +57,33 @@ class Files:
     findings: tuple[Finding, ...]
 
 
-def files(assembly: Assembly, source: Path, densities: Densities) -> Files:
+def files(
+    assembly: Assembly,
+    source: Path,
+    densities: Densities,
+    *,
+    options: Mapping[str, Any],
+    taken: Collection[str] = (),
+) -> Files:
     """Content of each file of the folder by its name.
 
     Args:
         assembly: With rigid places.
         source: The CAD file.
         densities: For the masses.
+        options: Of the command, for the next revision.
+        taken: Names of mesh files that are the user's.
     """
     findings = list(assembly.findings)
-    names = _mesh_names(assembly.shapes)
+    names = _mesh_names(assembly.shapes, taken)
     meshes, facts = {}, []
     for shape, name in zip(assembly.shapes, names, strict=True):
         meshes[name], known = _measured(shape, findings)
         facts.append(known)
-    parts, tables = [], []
+    parts: list[dict[str, Any]] = []
     for full, instance in zip(assembly.names(), assembly.instances, strict=True):
         shape = assembly.shapes[instance.shape]
-        density, why = densities.of(shape)
+        density = densities.of(shape)
         row = {
             "name": full,
             "in_file": "/".join(instance.path),
@@ -83,11 +93,11 @@ def files(assembly: Assembly, source: Path, densities: Densities) -> Files:
             "material": shape.material,
             "density": density,
             "box": _box(shape, instance),
-            "at": pose(instance.world_from_shape),
+            "world": instance.world_from_shape,
         }
+        row["written"] = part_values(row, instance.color)
+        del row["world"]
         parts.append(row)
-        color = None if instance.color is None else instance.color[:3]
-        tables.append("\n".join(part_table(row, color, why)))
     unknown = sorted(set(densities.by_material) - {shape.material for shape in assembly.shapes})
     if unknown:
         text = f"no part is of {', '.join(unknown)}: its density is not used"
@@ -97,12 +107,15 @@ def files(assembly: Assembly, source: Path, densities: Densities) -> Files:
         "sha256": hashlib.sha256(assembly.files[source.name]).hexdigest(),
         "format": assembly.format,
         "unit": assembly.unit,
+        "options": dict(options),
         "parts": parts,
         "left_out": [{"name": name, "why": why} for name, why in assembly.left_out],
         "findings": [{"level": f.level, "subject": f.subject, "text": f.text} for f in findings],
     }
     texts = {
-        "workstation.toml": "\n".join([*_head(assembly, source), "", *tables]),
+        "workstation.toml": "\n".join(
+            [*_head(assembly, source), "", *(part_text(row["written"]) for row in parts)]
+        ),
         TABLE: json.dumps(table, indent=1, ensure_ascii=False) + "\n",
     }
     return Files(texts, meshes, tuple(parts), tuple(findings))
@@ -120,30 +133,40 @@ def _head(assembly: Assembly, source: Path) -> list[str]:
     return [*head, f"title = {toml_value(source.stem)}"]
 
 
-def part_table(row: dict[str, Any], color: tuple[float, ...] | None = None, why: str = "") -> list[str]:
-    """Lines of a part in the workstation file."""
-    lines = ["[[parts]]", f"name = {toml_value(row['name'])}", f"mesh = {toml_value(row['mesh'])}"]
-    lines.append(f"at = {row['at']}")
+def part_values(row: Mapping[str, Any], color: Color | None) -> dict[str, Any]:
+    """What a part's table in the workstation file says."""
+    values = {"name": row["name"], "mesh": row["mesh"], "at": place(row["world"])}
     if row["deviation"] > NEGLIGIBLE:
-        lines.append(f"deviation_mm = {math.ceil(row['deviation'] * 1e7) / 1e4:g}")
+        values["deviation_mm"] = _number(math.ceil(row["deviation"] * 1e7) / 1e4)
     if color is not None:
-        lines.append(f"color = [{', '.join(f'{c:.4g}' for c in color)}]")
+        values["color"] = [_number(c) for c in color[:3]]
     if row["density"] is not None:
-        lines.append(f"density = {row['density']:g}   # {why}")
-    return [*lines, ""]
+        values["density"] = _number(row["density"])
+    return values
 
 
-def pose(world: Array) -> str:
+def part_text(values: Mapping[str, Any]) -> str:
+    """A part's table in the workstation file."""
+    return "\n".join(["[[parts]]", *(f"{key} = {literal(value)}" for key, value in values.items()), ""])
+
+
+def place(world: Array) -> dict[str, list[float]]:
     """A rigid place (4, 4) [m] as a workstation file has it."""
-    position = ", ".join(f"{x + 0.0:.9g}" for x in world[:3, 3].round(12))
+    position = [_number(x) for x in world[:3, 3].round(12)]
     wxyz = wxyz_from_rotation(world[:3, :3])
     if abs(wxyz[0]) > 1 - 1e-14:
-        return f"{{ position = [{position}] }}"
-    return f"{{ position = [{position}], wxyz = [{', '.join(f'{x:.12g}' for x in wxyz)}] }}"
+        return {"position": position}
+    return {"position": position, "wxyz": [_number(x, 12) for x in wxyz]}
 
 
-def _mesh_names(shapes: tuple[Shape, ...]) -> list[str]:
-    taken: set[str] = set()
+def _number(value: float, digits: int = 9) -> float:
+    """A number with so many digits, whole where it is."""
+    rounded = float(f"{value + 0.0:.{digits}g}")
+    return int(rounded) if rounded.is_integer() else rounded
+
+
+def _mesh_names(shapes: tuple[Shape, ...], given: Collection[str]) -> list[str]:
+    taken = {PurePosixPath(name).stem.lower() for name in given}
     found = []
     for shape in shapes:
         stem = plain_name(shape.name)

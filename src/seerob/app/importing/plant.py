@@ -6,11 +6,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-from seerob.app.importing.folder import pose
+from seerob.app.importing.folder import place
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding
 from seerob.description.cad.names import plain_name
 from seerob.files.tables.mapping import toml_value
+from seerob.workstation.editing import literal
 
 if TYPE_CHECKING:
     from seerob.core.transforms import Array
@@ -81,7 +82,7 @@ class Made:
         yield "# [[robots]]              # which one it is the plant does not say in a way that can be read"
         yield f"# name = {toml_value(name)}"
         yield '# model = "library:…"     # `seerob kinds` lists the library; or a path to its URDF'
-        yield f"# base = {pose(world)}"
+        yield f"# base = {literal(place(world))}"
         yield ""
 
     def _part(self, path: str, interface: Interface, world: Array) -> Iterator[str]:
@@ -103,7 +104,7 @@ class Made:
         yield "[[parts]]"
         yield f"name = {toml_value(self._unique(path))}"
         yield f"mesh = {toml_value(file)}"
-        yield f"at = {pose(world)}"
+        yield f"at = {literal(place(world))}"
         yield ""
 
     def _variable(self, path: str, interface: Interface) -> Iterator[str]:

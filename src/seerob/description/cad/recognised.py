@@ -176,14 +176,15 @@ def _zipped(path: Path, data: bytes) -> str:
             names = [entry.filename.lower() for entry in archive.infolist()]
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:
         raise InputError.at(path, "", f"is a damaged archive ({error})", "export it again") from error
+    # A plant may contain files of any other kind, a COLLADA archive a manifest.
+    if any(name.endswith(".aml") for name in names):
+        return ".amlx"
     if any(name.endswith(".model") for name in names):
         return ".3mf"
     if any(name.endswith(".dae") for name in names):
         return ".zae"
     if any(name.endswith(".3dxml") for name in names) or "manifest.xml" in names:
         return ".3dxml"
-    if any(name.endswith(".aml") for name in names):
-        return ".amlx"
     if any(name.endswith((".usd", ".usda", ".usdc")) for name in names):
         raise refused(path, "USD")
     raise InputError.at(path, "", f"is an archive without a CAD file ({', '.join(names[:3])})", _known())

@@ -1,0 +1,172 @@
+"""A new revision of a CAD file in a folder that was made of an older one: what stays, comes, moves and goes.
+
+Parts are the same where their full names are. What the user wrote in their tables stays; what the import
+wrote and nobody changed becomes what it writes now. Comments and the order of the file stay.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seerob.core.errors import InputError
+from seerob.core.page_messages import Change
+from seerob.workstation.editing import changed
+
+_MESH = re.compile(r"cad/[A-Za-z0-9_.\-]+\.glb")
+"""Names of mesh files that an import makes; nothing else is removed, whatever a stranger's table says."""
+NEAR = 1e-6
+"""Places that differ by less are one [m]."""
+
+
+class Revision(NamedTuple):
+    """What a new revision does to a folder."""
+
+    text: bytes
+    """The workstation file."""
+    told: tuple[tuple[str, str], ...]
+    """What is new: a word, and what it is about."""
+    unused: tuple[str, ...]
+    """Mesh files of the older revision that no table names any more."""
+
+
+def revised(raw: bytes, before: Mapping[str, Any], rows: tuple[dict[str, Any], ...], file: str) -> Revision:
+    """The workstation file with the parts of a new revision.
+
+    Args:
+        raw: The workstation file.
+        before: The table of the older revision.
+        rows: Of the table of the new one.
+        file: Name of the workstation file, for messages.
+
+    Raises:
+        InputError: It cannot be read or edited, or a new part has the name of one of the user's.
+    """
+    try:
+        table = tomllib.loads(raw.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError.at(file, "", f"cannot be read: {error}", "mend it first") from error
+    entries = [entry for entry in table.get("parts", []) if isinstance(entry, dict)]
+    at = {entry.get("name"): number for number, entry in enumerate(entries)}
+    old = {row["name"]: row for row in before["parts"]}
+    new = {row["name"]: row for row in rows}
+    changes: list[Change] = []
+    told: list[tuple[str, str]] = []
+
+    def tell(word: str, name: str, what: str = "") -> None:
+        touched = ", ".join(_touched(table, name))
+        told.append((word, f"{name}{what}" + (f": touches {touched}" if touched else "")))
+
+    for name, row in new.items():
+        if name not in old:
+            if name in at:
+                what = f"a part of yours is called {name}, as a new one of the CAD file"
+                raise InputError.at(file, f"parts[{at[name]}].name", what, "give yours another name")
+            changes.append(Change(kind="add", path=("parts",), value=row["written"]))
+            tell("added", name)
+        elif name not in at:
+            tell("left out", name, ", whose table was taken out by hand")
+        else:
+            kept = list(_changes(at[name], entries[at[name]], old[name]["written"], row["written"], changes))
+            if how := _differs(old[name], row):
+                tell(how, name)
+            told += [("kept", f"{name}: {key} as it was changed by hand") for key in kept]
+    lost = [name for name in old if name not in new]
+    # From the end, so that numbers of entries stay what they are.
+    for name in sorted((n for n in lost if n in at), key=lambda n: -at[n]):
+        changes.append(Change(kind="remove", path=("parts", at[name])))
+    for name in lost:
+        tell("lost", name)
+    told += [("renamed?", text) for text in _renamed(old, new, lost)]
+    text, _ = changed(raw, changes, file)
+    named = {entry.get("mesh") for entry in _tables(tomllib.loads(text.decode("utf-8-sig")))}
+    now = {row["mesh"] for row in rows}
+    made = {row["mesh"] for row in old.values() if _MESH.fullmatch(str(row["mesh"]))}
+    unused = sorted(made - named - now)
+    return Revision(text, tuple(told), tuple(unused))
+
+
+def _changes(
+    number: int,
+    entry: Mapping[str, Any],
+    old: Mapping[str, Any],
+    new: Mapping[str, Any],
+    changes: list[Change],
+) -> Iterator[str]:
+    """Adds what a table gets; yields keys that the user changed and the new revision would change too."""
+    for key in dict.fromkeys((*old, *new)):
+        if old.get(key) == new.get(key):
+            continue
+        if entry.get(key) != old.get(key):
+            yield key
+        elif key in new:
+            changes.append(Change(kind="set", path=("parts", number, key), value=new[key]))
+        else:
+            changes.append(Change(kind="remove", path=("parts", number, key)))
+
+
+def _differs(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """``moved``, ``resized``, both, or nothing."""
+    words = []
+    if old["written"]["at"] != new["written"]["at"]:
+        words.append("moved")
+    if old["shape"] != new["shape"]:
+        words.append("resized" if np.abs(_size(old) - _size(new)).max() > NEAR else "reshaped")
+    return " and ".join(words)
+
+
+def _size(row: Mapping[str, Any]) -> Any:
+    return np.ptp(np.array(row["box"], float), axis=0)
+
+
+def _renamed(old: Mapping[str, Any], new: Mapping[str, Any], lost: list[str]) -> Iterator[str]:
+    """Lost parts that are perhaps new ones: of one shape, nearest first."""
+    free = [name for name in new if name not in old]
+    for name in lost:
+        alike = [other for other in free if new[other]["shape"] == old[name]["shape"]]
+        if not alike:
+            continue
+
+        def away(other: str, name: str = name) -> float:
+            middles = [np.mean(row["box"], axis=0) for row in (old[name], new[other])]
+            return float(np.linalg.norm(middles[0] - middles[1]))
+
+        best = min(alike, key=away)
+        free.remove(best)
+        where = "the same place" if away(best) < NEAR else f"{away(best):.3g} m away"
+        yield f"{name} is perhaps {best} now: the same shape, {where}"
+
+
+def _touched(table: Mapping[str, Any], name: str) -> Iterator[str]:
+    """Tables that name a part, by pattern or as what lies above it."""
+    for group, rows in table.items():
+        for number, row in enumerate(rows if isinstance(rows, list) else ()):
+            if group == "parts" or not isinstance(row, dict):
+                continue
+            if any(_means(text, name) for text in _texts(row)):
+                label = row.get("name") or row.get("kind") or number
+                yield f"{group} {label}"
+
+
+def _means(text: str, name: str) -> bool:
+    return name == text or name.startswith(f"{text}/") or ("*" in text and fnmatchcase(name, text))
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _texts(item)
+
+
+def _tables(table: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    for rows in table.values():
+        for row in rows if isinstance(rows, list) else ():
+            if isinstance(row, dict):
+                yield row

@@ -2,12 +2,13 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
 import seerob as sr
 from seerob.app import cli
-from seerob.core.snapshot import Finding, Scene, Snapshot
+from seerob.core.snapshot import CriterionInfo, Finding, Scene, Snapshot
 from seerob.outputs.comparison import Side, Turn, compared, conditions
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.result_log import log_of
@@ -197,6 +198,18 @@ def test_a_recording_that_is_not_whole_turns_undecided(cells, tmp_path, capsys):
         file.write(b"more")
     assert cli.main(["compare", str(cells / "run_far"), str(tmp_path / "joined")]) == 2
     assert "lie behind its end" in capsys.readouterr().out
+
+
+def test_what_never_gave_a_result_is_not_what_it_was():
+    """Its series is empty, and false as such: it counted as unchanged, and nothing as worse."""
+    asked = (CriterionInfo(name="a", kind="velocity", group="safety", title="v", unit="m"),)
+    never = replace(side(title="two"), results=log_of([], asked))
+    for was, turn in ((WITHIN, Turn.UNDECIDED), (EXCEEDED, Turn.UNDECIDED), (UNDECIDED, Turn.SAME)):
+        value = {WITHIN: 1.0, EXCEEDED: 3.0, UNDECIDED: None}[was]
+        (one,) = compared(side(result(was, value=value)), never)
+        assert one.turn is turn
+    (one,) = compared(never, side(result(WITHIN)))
+    assert one.turn is Turn.WITHIN
 
 
 def test_a_folder_with_two_recordings_is_asked_which(cells, tmp_path, capsys):

@@ -347,7 +347,8 @@ def _compared(name: str, before: Side, after: Side) -> Compared:
 
 
 def _turn(then: Series | None, now: Series | None, parts: Sequence[str]) -> Turn:
-    was, is_ = then and then.verdict, now and now.verdict
+    # A series that never had a result is empty, and false as such.
+    was, is_ = (None if each is None else each.verdict for each in (then, now))
     if (is_ is Verdict.EXCEEDED and was is not Verdict.EXCEEDED) or parts:
         return Turn.EXCEEDED
     if (is_ is Verdict.UNDECIDED or (is_ is None and was is not None)) and was is not is_:

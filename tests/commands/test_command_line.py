@@ -125,7 +125,10 @@ def test_new_makes_a_folder_that_is_fine_and_touches_nothing_that_exists(capsys,
     code, out, _ = seerob(capsys, "new", tmp_path / "cell")
     assert code == 0
     assert "next" in out
-    assert {p.name for p in (tmp_path / "cell").iterdir()} == {"workstation.toml", "motion.csv"}
+    names = {"workstation.toml", "motion.csv", "workstation.schema.json"}
+    assert {p.name for p in (tmp_path / "cell").iterdir()} == names
+    first = (tmp_path / "cell/workstation.toml").read_text().splitlines()[0]
+    assert (tmp_path / "cell" / first.removeprefix("#:schema ")).is_file()
     code, out, err = seerob(capsys, "check-file", tmp_path / "cell")
     assert (code, err) == (0, "")
     assert "fine" in out

@@ -46,6 +46,8 @@ def test_the_command_writes_it_whole(capsys, tmp_path, validator):
     assert json.loads(out) == validator.schema
     seerob(capsys, "schema", "-o", tmp_path / "s.json")
     assert json.loads((tmp_path / "s.json").read_text()) == validator.schema
+    seerob(capsys, "new", tmp_path / "cell")
+    assert json.loads((tmp_path / "cell/workstation.schema.json").read_text()) == validator.schema
 
 
 def test_every_workstation_and_the_starter_are_valid(validator):

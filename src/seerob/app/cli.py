@@ -18,6 +18,7 @@ from seerob.core.interrupted import stopped
 from seerob.core.printable import printable
 
 COMMANDS = (
+    "demo",
     "new",
     "inspect",
     "check_file",
@@ -34,6 +35,7 @@ COMMANDS = (
     "plan",
     "kinds",
     "schema",
+    "completion",
     "emulate",
     "probe",
     "variables",

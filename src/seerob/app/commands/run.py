@@ -49,6 +49,19 @@ def add(sub: argparse.ArgumentParser) -> None:
         "workstation", type=Path, nargs="?", help="folder with a workstation.toml, or the file itself"
     )
     add_allowed(sub)
+    add_live(sub)
+    sub.add_argument(
+        "--allow-writing",
+        action="store_true",
+        help="let the workstation's triggers write to machines, where its file allows it too",
+    )
+    text = "start what stands for its devices ([[emulators]]), and end it afterwards"
+    sub.add_argument("--emulated", action="store_true", help=text)
+    sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
+
+
+def add_live(sub: argparse.ArgumentParser) -> None:
+    """Options of every live run: its page, what it writes, how long it lasts."""
     add_page(sub)
     add_verbose(sub)
     add_pdf(sub)
@@ -56,15 +69,7 @@ def add(sub: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
     )
     sub.add_argument("--no-record", action="store_true", help="no recording and no report")
-    sub.add_argument(
-        "--allow-writing",
-        action="store_true",
-        help="let the workstation's triggers write to machines, where its file allows it too",
-    )
     sub.add_argument("--seconds", type=seconds, help="end the run after this time")
-    text = "start what stands for its devices ([[emulators]]), and end it afterwards"
-    sub.add_argument("--emulated", action="store_true", help=text)
-    sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
 
 
 def run(options: argparse.Namespace) -> int:

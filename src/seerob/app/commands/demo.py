@@ -1,0 +1,100 @@
+"""``seerob demo``: the workstations that come with seerob; one of them copied, and run live."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from seerob.app.commands import run as live
+from seerob.app.console.terminal import Exit, line
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.files.whole_file import whole_folder
+
+HELP = "list the workstations that come with seerob, copy one and run it live"
+EXAMPLE = "seerob demo ur10_assembly            (then open the address it prints; Ctrl-C ends the run)"
+
+SHIPPED = {
+    "ur10_assembly": "a UR10 brings a plate to a fixture, an operator across the table secures it",
+    "captured_operator": "an operator whom a depth camera recorded, beside a UR10: RULA, REBA, contact",
+    "guarded_cell": "a UR5e behind a laser scanner and a light curtain",
+    "two_robots": "a UR10 and a UR5e share a table with a person",
+    "iiwa_bench": "an LBR iiwa 14 hands parts over a bench",
+    "ur10_rtde": "live: a UR10, emulated",
+    "motor_station": "live: an LBR iiwa and a person with trackers, both emulated",
+    "assembly_line": "live: a UR10 and a person whom a depth camera sees, both emulated",
+    "plc_cell": "live: a UR10 and a PLC with a belt, a light curtain and a door",
+}
+"""What each shows; the first is run when none is named."""
+
+_BESIDE = {"plc_cell": ("seerob emulate rtde --robot ur10", "seerob emulate opcua")}
+"""What has to run beside, where no device does and the file names no emulators."""
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    text = f"which one (default: {next(iter(SHIPPED))}): {', '.join(SHIPPED)}"
+    sub.add_argument("name", nargs="?", metavar="name", help=text)
+    text = "where to copy it (default: its name, here); one that is there is run as it is"
+    sub.add_argument("folder", type=Path, nargs="?", help=text)
+    sub.add_argument("--list", action="store_true", help="list them, and run none")
+    live.add_live(sub)
+    sub.set_defaults(allow_plugins=False, allow_outside=False, allow_writing=False, replay=None)
+
+
+def run(options: argparse.Namespace) -> int:
+    """List what there is, copy one, and run it until Ctrl-C.
+
+    Raises:
+        UnknownName: There is none of that name.
+        InputError: The folder is something else, or cannot be made.
+    """
+    if options.name not in (None, *SHIPPED):
+        raise UnknownName("workstation", options.name, SHIPPED)
+    if options.name is None:
+        width = max(map(len, SHIPPED))
+        for name, text in SHIPPED.items():
+            line("demo", f"{name:<{width}}  {text}")
+    if options.list:
+        return Exit.WITHIN
+    name = options.name or next(iter(SHIPPED))
+    folder: Path = options.folder or Path(name)
+    if (folder / "workstation.toml").is_file():
+        line("found", f"{folder}, which is run as it is")
+    else:
+        copy(name, folder)
+        line("wrote", f"{folder}: yours to change; seerob run {folder} runs it again")
+    for command in _BESIDE.get(name, ()):
+        line("beside", f"{command}   in a terminal of its own, where no device is")
+    options.workstation = folder
+    options.emulated = "emulators" in tomllib.loads((folder / "workstation.toml").read_text("utf-8"))
+    return live.run(options)
+
+
+def copy(name: str, folder: Path) -> None:
+    """Copy a workstation that comes with seerob.
+
+    Raises:
+        InputError: The folder exists and is not empty, or cannot be made.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError.at(folder, "", "exists already", "give the name of a new folder")
+    with whole_folder(folder) as working:
+        _copied(_home() / name, working)
+
+
+def _home() -> Traversable:
+    """Where they are: in the package, or, where that is a checkout, at its top."""
+    packed = resources.files("seerob.app.commands") / "workstations"
+    return packed if packed.is_dir() else Path(__file__).parents[4] / "workstations"
+
+
+def _copied(source: Traversable, target: Path) -> None:
+    target.mkdir(exist_ok=True)
+    for entry in source.iterdir():
+        if not entry.is_dir():
+            (target / entry.name).write_bytes(entry.read_bytes())
+        elif entry.name != "runs":
+            _copied(entry, target / entry.name)

@@ -12,7 +12,7 @@ FILES = sorted(FOLDER.glob("[0-9]*.py"))
 
 def test_there_are_examples():
     assert [file.name[:2] for file in FILES] == [f"{i:02}" for i in range(1, len(FILES) + 1)]
-    assert len(FILES) >= 6
+    assert len(FILES) >= 10
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

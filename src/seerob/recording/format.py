@@ -80,7 +80,7 @@ def source_files(references: Iterable[str], *, folder: Path, outside: bool = Fal
         outside: Whether what lies outside it may be read.
     """
     found: dict[str, bytes] = {}
-    for reference in references:
+    for reference in filter(None, references):  # an empty one would be the folder itself
         path = folder / reference
         inside = _inside(PurePosixPath(os.path.relpath(path, folder).replace(os.sep, "/")))
         hashes = f"{SOURCES}{path.name}.sha256"

@@ -57,17 +57,18 @@ class MotionOrigin(StrEnum):
 
 
 def origin_finding(origin: MotionOrigin, subject: str, file: str) -> Finding:
-    """What whoever reads a result must know of where the motion comes from."""
+    """What whoever reads a result must know of where the motion comes from; points by hand are no file."""
+    named = f" ({file})" if file else ""
     if origin is MotionOrigin.CONTROLLER:
-        return Finding(level="note", subject=subject, text=f"motion logged from the controller ({file})")
+        return Finding(level="note", subject=subject, text=f"motion logged from the controller{named}")
     if origin is MotionOrigin.RECORDING:
-        return Finding(level="note", subject=subject, text=f"motion replayed from a recording ({file})")
+        return Finding(level="note", subject=subject, text=f"motion replayed from a recording{named}")
     what = {
         MotionOrigin.VENDOR_EMULATOR: "the maker's emulator",
         MotionOrigin.SIMULATOR: "a generic simulator",
         MotionOrigin.PLANNED: "a plan that was not executed",
     }[origin]
-    text = f"motion comes from {what} ({file}): preliminary until it is confirmed on the controller"
+    text = f"motion comes from {what}{named}: preliminary until it is confirmed on the controller"
     return Finding(level="assumed", subject=subject, text=text)
 
 

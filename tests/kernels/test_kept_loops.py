@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zlib
 from importlib import import_module
 
 import numpy as np
@@ -158,6 +159,9 @@ def test_loops_that_are_brought_are_run_only_of_this_source_and_by_a_processor_t
     assert asked("made", **made) == (42, 1, 0)  # as Numba itself keeps it
     (kept,) = (tmp_path / "made").iterdir()
     shutil.copytree(kept, tmp_path / "brought")
+    assert asked("not_packed")[:2] == (42, 0)
+    for file in (tmp_path / "brought").glob("*.nbc"):
+        file.write_bytes(zlib.compress(file.read_bytes()))
     value, hits, able = asked("own")
     assert (value, hits) == (42, able > 0)
     assert bool(list(tmp_path.glob("own/*/*.nbi"))) == (able == 0)  # nothing is compiled and kept then

@@ -10,8 +10,10 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
+import pickle
 import re
 import shutil
+import zlib
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryFile, mkdtemp
@@ -20,7 +22,7 @@ from typing import Any
 FOLDER = Path(__file__).parent
 IMPORTED = re.compile(rb"^from seerob\.kernels\.(\w+) import ", re.MULTILINE)
 BROUGHT = FOLDER / "compiled"
-"""What a wheel brings (`scripts/compile-loops`): as trusted as the sources beside it, and never written."""
+"""What a wheel brings, packed (`scripts/compile-loops`): as trusted as the sources beside it."""
 _TRIED: set[str] = set()
 """Folders into which a file was written already, for trial: once, not for each loop."""
 _V2 = "cmov cx8 cx16 fxsr mmx popcnt sahf sse sse2 sse3 sse4.1 sse4.2 ssse3"
@@ -128,6 +130,13 @@ def _reading_what_is_brought(caching: Any) -> Any:
     """What keeps a function for Numba, and looks into `BROUGHT` for those of this package that it lacks."""
     from numba.core.runtime.nrt import rtsys
 
+    class Packed(caching.IndexDataCacheFile):  # type: ignore[misc]
+        def _load_data(self, name: str) -> Any:
+            try:
+                return pickle.loads(zlib.decompress(Path(self._data_path(name)).read_bytes()))  # noqa: S301
+            except zlib.error as error:
+                raise OSError("not as scripts/compile-loops packs it") from error  # Numba then has none
+
     class Reading(caching.FunctionCache):  # type: ignore[misc]
         def load_overload(self, types: Any, context: Any) -> Any:
             place = self._impl.locator
@@ -142,7 +151,7 @@ def _reading_what_is_brought(caching: Any) -> Any:
             types, (triple, *_), code = self._index_key(types, context.codegen())
             for processor in stood_in_for():
                 name = self._impl.filename_base.replace(place.key(), place.key(processor))
-                brought = caching.IndexDataCacheFile(str(BROUGHT), name, place.get_source_stamp())
+                brought = Packed(str(BROUGHT), name, place.get_source_stamp())
                 if (data := brought.load((types, (triple, processor, ""), code))) is not None:
                     return self._impl.rebuild(context, data)
             return None

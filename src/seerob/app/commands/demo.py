@@ -22,6 +22,7 @@ SHIPPED = {
     "guarded_cell": "a UR5e behind a laser scanner and a light curtain",
     "two_robots": "a UR10 and a UR5e share a table with a person",
     "iiwa_bench": "an LBR iiwa 14 hands parts over a bench",
+    "imported_line": "a UR5e over the fixtures of a line that came as a STEP file",
     "ur10_rtde": "live: a UR10, emulated",
     "motor_station": "live: an LBR iiwa and a person with trackers, both emulated",
     "assembly_line": "live: a UR10 and a person whom a depth camera sees, both emulated",

@@ -693,6 +693,7 @@ def test_ten_positions_one_after_another_are_those_of_before():
     assert again([k for k in past * 2 for _ in range(2)])[0] == 58  # where it stands, it says nothing
     for other in (past[::-1], [*past[:9], 99, *past[9:18]], [*past[:9], *past[10:19]], past[::2]):
         assert again([*past, *other]) == []
+    assert again([*past, 99, *past[1:]])[0] == 30
     assert again([*past, 99, *past[:5], *past])[0] == 40  # of two pasts, the last
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -325,6 +327,11 @@ def test_of_a_file_its_valid_rows_are_compared(which: str, invalid: np.ndarray |
             assert found is None
     assert said.frame_known
     assert controller_log(log(**words, invalid=np.ones(4, bool)), "log.csv") is None
+    heard_of = np.array([True, True, False, True])
+    now_and_then = controller_log(log(**words, invalid=invalid, tcp_said=heard_of), "log.csv")
+    assert now_and_then is not None
+    if now_and_then.tcp is not None:
+        np.testing.assert_array_equal(np.isfinite(now_and_then.tcp), heard_of[rows, None].repeat(3, 1))
 
 
 @pytest.mark.parametrize("which", ["tau", "tcp", "tcp_speed", ""])
@@ -376,6 +383,10 @@ def test_of_a_long_file_rows_are_looked_at_evenly() -> None:
         for part in (thin.t, thin.q[:, 0], thin.tau[:, 0], thin.tcp_speed):
             np.testing.assert_array_equal(part, [*rows])
         assert (thin.qd, thin.tcp) == (None, None)
+    # Of those alone in which all of it is said.
+    tcp = np.zeros((10, 3))
+    tcp[:6, 0], tcp[9, 2] = math.nan, math.inf
+    np.testing.assert_array_equal(said.thinned(2, tcp).t, [6, 8])
 
 
 def told_by(folder, text: str = "", **words: object) -> list[str]:

@@ -80,6 +80,7 @@ class Visitor:
         | wire.Snapshot
         | wire.Draft
         | wire.Edited
+        | wire.Measured
     )
 
     def __init__(self, server, *, acknowledge=True, path="/ws", **options):

@@ -12,7 +12,7 @@ from seerob.app.console.loading import compiled
 from seerob.app.console.visiting import Visiting
 from seerob.app.server.access import Role, Tokens
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Change, Draft, Edit, Edited, Scene, Snapshot
+from seerob.core.snapshot import Change, Draft, Edit, Edited, Measure, Measured, Scene, Snapshot
 from seerob.workstation.allowed import NOTHING
 from server.frames import Visitor
 
@@ -295,6 +295,28 @@ def test_only_a_page_that_may_control_edits_and_only_where_the_command_line_says
             assert page.edit(MOVE).accepted
     assert desk.unsaved
     assert file.read_bytes() == CELL
+
+
+def test_a_distance_is_the_engine_s_and_follows_the_draft(desk):
+    (page,) = pages(desk[0], 1)
+    with page:
+
+        def measured(*between):
+            page.socket.send(msgspec.msgpack.encode(Measure(id=3, between=between)))
+            return page.of(Measured)
+
+        # The faces of two boxes, 0.8 m wide at 0.8 m and 0.2 m wide at 2 m.
+        found = measured("table", "rack")
+        assert found.result.value == pytest.approx(1.9 - 1.2, abs=1e-12)
+        assert found.result.limit is None
+        (line,) = found.result.markers
+        assert (line.start[0], line.end[0]) == pytest.approx((1.2, 1.9))
+        assert page.edit(MOVE).accepted
+        assert measured("table", "rack").result.value == pytest.approx(0.6, abs=1e-12)
+        for wrong in (("table", "nobody"), ("table", "table")):
+            found = measured(*wrong)
+            assert found.result is None
+            assert found.refusal
 
 
 def test_line_ends_and_forms_of_toml_stay_as_they_are(tmp_path):

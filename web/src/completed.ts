@@ -1,9 +1,23 @@
 // A snapshot with all its fields and their names: on the wire a field of the snapshot is left out when it is as
 // its default says, and results, rows, aspects and markers are arrays.
 
-import { type Aspect, DEFAULTS, FIELDS, type Marker, type Result, type Row, type Snapshot } from "./wire";
+import {
+  type Aspect,
+  DEFAULTS,
+  FIELDS,
+  type Marker,
+  type Measured,
+  type Result,
+  type Row,
+  type Snapshot,
+} from "./wire";
 
 type Sent = readonly unknown[];
+
+/** The result of a measurement that a decoder gives, as the types say it is. */
+export function completedMeasure(message: Measured): Measured {
+  return { ...message, result: message.result && result(message.result as unknown as Sent) };
+}
 
 /** What a decoder gives, as the types say it is. */
 export function completed(message: Snapshot): Snapshot {

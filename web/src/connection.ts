@@ -1,6 +1,7 @@
 // The page's end of the worker: what it says becomes signals, traces and poses.
 
 import { draft, heardEdited, lostDraft } from "./editing/draft";
+import { heardMeasured } from "./editing/measure";
 import type { Frame, FromWorker, ToWorker } from "./messages";
 import {
   beginScene,
@@ -109,6 +110,9 @@ export class Connection {
         return;
       case "draft":
         draft.value = message.draft;
+        return;
+      case "measured":
+        heardMeasured(message.measured);
         return;
       case "edited":
         heardEdited(message.edited);

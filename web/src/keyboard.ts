@@ -2,6 +2,7 @@
 
 import { ask, mayEdit } from "./editing/draft";
 import { gizmoMode } from "./editing/handles";
+import { measuring, toggleMeasure } from "./editing/measure";
 import { rows, select, selection, toggleMuted } from "./page_state";
 import type { Actions } from "./panels/app_context";
 import { keysShown } from "./panels/Keys";
@@ -74,12 +75,18 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
       return () => {
         gizmoMode.value = key.toLowerCase() === "m" ? "move" : "turn";
       };
+    case "d":
+    case "D":
+      return mayEdit.peek() ? toggleMeasure : null;
     case "?":
       return () => {
         keysShown.value = !keysShown.peek();
       };
     case "Escape":
-      return () => select(null);
+      return () => {
+        if (measuring.peek()) toggleMeasure();
+        else select(null);
+      };
     default:
       return overlay(key);
   }

@@ -5,6 +5,7 @@ import "./look/index.css";
 import { h, render } from "preact";
 import { Connection } from "./connection";
 import { connectDraft } from "./editing/draft";
+import { connectMeasure } from "./editing/measure";
 import { listenToKeys } from "./keyboard";
 import { now, selectedNodes } from "./page_state";
 import { App } from "./panels/App";
@@ -43,6 +44,7 @@ function begin(element: HTMLElement): void {
   actions.time.connect((message) => connection.send(message));
   actions.offer = (tracking) => connection.send({ kind: "tracking", tracking });
   connectDraft((edit) => connection.send({ kind: "edit", edit }));
+  connectMeasure((measure) => connection.send({ kind: "measure", measure }));
   actions.look = (preset) => viewer.viewpoint.go(preset);
   actions.frameSelection = () => {
     const names = selectedNodes.value;

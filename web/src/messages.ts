@@ -6,6 +6,8 @@ import type {
   Edited,
   Hello,
   History,
+  Measure,
+  Measured,
   Result,
   Scene,
   Snapshot,
@@ -57,6 +59,7 @@ export type FromWorker =
   | { kind: "draft"; draft: Draft }
   /** What became of what this page asked of the file. */
   | { kind: "edited"; edited: Edited }
+  | { kind: "measured"; measured: Measured }
   /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
   | { kind: "frame"; frame: Frame; heard: number; silent: boolean }
   /** A live run has said nothing for too long. */
@@ -72,5 +75,6 @@ export type ToWorker =
   | { kind: "command"; action: Action; value: number | null }
   | { kind: "tracking"; tracking: Tracking }
   | { kind: "edit"; edit: Edit }
+  | { kind: "measure"; measure: Measure }
   /** While live: show the kept snapshot of this run time, or follow the newest (null). */
   | { kind: "look"; t: number | null };

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "cdbc8cbd92495770";
+export const SCHEMA = "0e2334b16feed27d";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -279,6 +279,16 @@ export interface Result {
   muted: boolean;
   /** Whether there is nothing to judge now, and `reason` says why: nobody is near. */
   nothing: boolean;
+}
+
+/** What a page's `Measure` came to. */
+export interface Measured {
+  type: "measured";
+  id: number;
+  /** Least distance of the surfaces where everybody begins, with the line between them; it has no limit. */
+  result: Result | null;
+  /** Why there is none. */
+  refusal: string;
 }
 
 /** How a live source is heard, or where targets are sent to. */
@@ -595,6 +605,15 @@ export interface Edit {
   changes?: Change[];
 }
 
+/** What a page that may edit asks of the twin: how far two things are from one another. */
+export interface Measure {
+  type: "measure";
+  /** The page's own number, by which it knows the answer. */
+  id: number;
+  /** Full names of bodies, or of all that belongs to a robot, a person or another entry. */
+  between: [string, string];
+}
+
 /** One mistake that an edit would make, in the words of `seerob check-file`. */
 export interface Mistake {
   /** The place: `robots[0].base.position`; empty for the whole file. */
@@ -649,6 +668,6 @@ export const FIELDS = {
   highlight: ["type", "body", "verdict"],
 } as const;
 
-export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited;
+export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited | Measured;
 
-export type PageMessage = Command | Tracking | Edit;
+export type PageMessage = Command | Tracking | Edit | Measure;

@@ -2,7 +2,7 @@
 // waits for the network, and the network never waits for the screen.
 
 import { Decoder } from "@msgpack/msgpack";
-import { completed } from "./completed";
+import { completed, completedMeasure } from "./completed";
 import type { Frame, FromWorker, ToWorker } from "./messages";
 import { PointCollector } from "./points";
 import { FLOATS_PER_NODE, PoseWriter, poseBufferBytes } from "./poses";
@@ -71,6 +71,9 @@ function received(message: ServerMessage, raw: Uint8Array): void {
       return;
     case "draft":
       post({ kind: "draft", draft: message });
+      return;
+    case "measured":
+      post({ kind: "measured", measured: completedMeasure(message) });
       return;
     case "edited":
       post({ kind: "edited", edited: message });
@@ -184,6 +187,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "tracking":
       socket?.send(message.tracking);
+      return;
+    case "measure":
+      socket?.send(message.measure);
       return;
     case "edit":
       socket?.send(message.edit);

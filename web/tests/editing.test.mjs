@@ -169,6 +169,25 @@ test("what is dragged by a handle is where it was put, in steps, and undo gives 
   assert.equal(saved(), begun);
 });
 
+test("a distance that is measured is what a criterion says of the two, and Escape ends it", async () => {
+  await page.keyboard.press("Escape");
+  await page.getByRole("button", { name: "Measure" }).click();
+  const top = await page.evaluate(() => window.seerob.project([0.8, 0, 0.74]));
+  await page.mouse.click(...top);
+  await page.locator(".measure-note", { hasText: "table, and the second one" }).waitFor();
+  await page.locator(".tree").getByRole("button", { name: "operator", exact: true }).click();
+  await page.locator(".measure-note strong").waitFor();
+  const said = await page.locator(".measure-note strong").innerText();
+  // A criterion asks the same of the two.
+  await page.getByRole("tab", { name: "Criteria" }).click();
+  const row = await page.locator('tr[data-criterion="beside the table"]').innerText();
+  const asked = Number(row.match(/\d+\.\d+/)[0]);
+  assert.ok(Math.abs(Number.parseFloat(said) - asked) <= 0.011, `${said}; ${row}`);
+  await page.getByRole("tab", { name: "Edit" }).click();
+  await page.keyboard.press("Escape");
+  await page.locator(".measure-note").waitFor({ state: "detached" });
+});
+
 test("two pages edit at once and lose nothing of each other", async () => {
   const other = await browser.context.newPage();
   await showEdited(other, server.url);

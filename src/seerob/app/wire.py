@@ -36,9 +36,10 @@ FROM_SERVER = (
     snapshot.Tracked,
     snapshot.Draft,
     snapshot.Edited,
+    snapshot.Measured,
 )
 """Messages that a page receives."""
-FROM_PAGE = (snapshot.Command, snapshot.Tracking, snapshot.Edit)
+FROM_PAGE = (snapshot.Command, snapshot.Tracking, snapshot.Edit, snapshot.Measure)
 """Messages that a page sends; what has a default may be left out."""
 
 COMPLETED = (snapshot.Snapshot,)

@@ -140,6 +140,15 @@ class Edit(Struct, frozen=True, kw_only=True, tag="edit"):
     changes: tuple[Change, ...] = ()
 
 
+class Measure(Struct, frozen=True, kw_only=True, tag="measure"):
+    """What a page that may edit asks of the twin: how far two things are from one another."""
+
+    id: int
+    """The page's own number, by which it knows the answer."""
+    between: tuple[str, str]
+    """Full names of bodies, or of all that belongs to a robot, a person or another entry."""
+
+
 class Mistake(Struct, frozen=True, kw_only=True):
     """One mistake that an edit would make, in the words of ``seerob check-file``."""
 

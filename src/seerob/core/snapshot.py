@@ -38,6 +38,7 @@ from seerob.core.page_messages import (
     Edited,
     Hello,
     History,
+    Measure,
     Mistake,
     SoFar,
     Trace,
@@ -73,6 +74,8 @@ __all__ = [
     "Level",
     "LinkMass",
     "Marker",
+    "Measure",
+    "Measured",
     "MechanismInfo",
     "Mistake",
     "Node",
@@ -258,6 +261,16 @@ class Result(Struct, frozen=True, kw_only=True, array_like=True):
         value = "no figure" if self.value is None else f"{self.value:.6g} {self.unit}".rstrip()
         verdict = "no verdict" if self.verdict is None else self.verdict.value
         return f"<Result {self.name!r}: {value}, {verdict}>"
+
+
+class Measured(Struct, frozen=True, kw_only=True, tag="measured"):
+    """What a page's `Measure` came to."""
+
+    id: int
+    result: Result | None = None
+    """Least distance of the surfaces where everybody begins, with the line between them; it has no limit."""
+    refusal: str = ""
+    """Why there is none."""
 
 
 class SourceLine(Struct, frozen=True, kw_only=True):

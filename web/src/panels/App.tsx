@@ -7,6 +7,7 @@ import { scene } from "../page_state";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
 import { Legend } from "./Legend";
+import { MeasureNote } from "./MeasureNote";
 import { PageTools } from "./PageTools";
 import { Plots } from "./Plots";
 import { Properties } from "./Properties";
@@ -41,6 +42,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <main class="centre">
         <div class="room" ref={place} />
         <ViewTools />
+        <MeasureNote />
         <Legend />
         <VisitedInstant />
       </main>

@@ -13,6 +13,7 @@ const KEYS: readonly [keys: string, does: string][] = [
   ["W", "to the worst instant of the selected criterion, or of the one that is worst now"],
   ["L", "back to live"],
   ["F", "frame the selection"],
+  ["D", "while editing: measure a distance, or end that"],
   ["M R", "while editing: handles to move, to turn what is selected"],
   ["Ctrl+Z Ctrl+Y", "while editing: undo, redo"],
   ["1 … 9", "markers of a criterion on and off"],

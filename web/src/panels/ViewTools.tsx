@@ -1,6 +1,8 @@
 // Over the room: viewpoints, and what is drawn in it.
 
 import { useSignal } from "@preact/signals";
+import { mayEdit } from "../editing/draft";
+import { measuring, toggleMeasure } from "../editing/measure";
 import { scene } from "../page_state";
 import type { Preset } from "../scene/viewpoint";
 import { useActions } from "./app_context";
@@ -37,6 +39,18 @@ export function ViewTools() {
           <Icon name="frame" />
         </button>
       </fieldset>
+      {mayEdit.value && (
+        <div class="tools">
+          <button
+            type="button"
+            title="Distance of two surfaces (D); Escape ends it"
+            aria-pressed={measuring.value !== null}
+            onClick={toggleMeasure}
+          >
+            Measure
+          </button>
+        </div>
+      )}
       <fieldset
         class="tools overlays"
         onKeyDown={(event) => {

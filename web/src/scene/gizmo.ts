@@ -5,6 +5,7 @@ import { MathUtils, Matrix4, Object3D, Quaternion, Vector3 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { change, chosenEntry, draft, type Entry, mayEdit } from "../editing/draft";
 import { gizmoMode, STEPS, steps } from "../editing/handles";
+import { measuring } from "../editing/measure";
 import { moveTo, placing } from "../editing/pose";
 import type { Bodies, Body } from "./bodies";
 import type { Stage } from "./stage";
@@ -49,7 +50,7 @@ export class Gizmo {
     effect(() => {
       // A new draft may have moved it.
       void draft.value;
-      this.entry = mayEdit.value ? chosenEntry.value : null;
+      this.entry = mayEdit.value && !measuring.value ? chosenEntry.value : null;
       this.place();
     });
   }

@@ -11,7 +11,7 @@ const STILL_PX = 4;
 export function pickOnClick(
   stage: Stage,
   bodies: Bodies,
-  picked: (name: string | null) => void,
+  picked: (name: string | null, normal: [number, number, number] | null) => void,
   taken: () => boolean,
 ): void {
   const canvas = stage.renderer.domElement;
@@ -29,7 +29,9 @@ export function pickOnClick(
     );
     ray.setFromCamera(at, stage.camera);
     const hits = ray.intersectObject(bodies.root, true);
-    picked(hits.map((hit) => nodeOf(hit.object)).find((name) => name !== null) ?? null);
+    const hit = hits.find(({ object }) => nodeOf(object) !== null);
+    const normal = hit?.face?.normal.clone().transformDirection(hit.object.matrixWorld);
+    picked(hit ? nodeOf(hit.object) : null, normal ? [normal.x, normal.y, normal.z] : null);
   });
 }
 

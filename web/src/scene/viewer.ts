@@ -4,6 +4,7 @@ import { effect, signal } from "@preact/signals";
 import { Quaternion, Vector3 } from "three";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
+import { measuring, withFace } from "../editing/measure";
 import { Glide } from "../glide";
 import { MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
@@ -58,7 +59,10 @@ export class Viewer {
     pickOnClick(
       this.stage,
       this.bodies,
-      (name) => select(name === null ? null : { kind: "node", name }),
+      (name, normal) => {
+        if (name !== null) withFace(normal, () => select({ kind: "node", name }));
+        else if (!measuring.peek()) select(null);
+      },
       () => this.gizmo.held,
     );
     this.follow();
@@ -145,10 +149,12 @@ export class Viewer {
 
   private draw(): void {
     const chosen = selection.peek();
+    const measured = measuring.peek()?.result;
+    const results = this.frame?.results ?? [];
     this.markers.update(
-      this.frame?.results ?? [],
+      measured ? [measured, ...results] : results,
       mutedCriteria.peek(),
-      chosen?.kind === "criterion" ? chosen.name : null,
+      measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null),
       showCaptions.peek() ? this.labelled() : 0,
     );
     this.paint();
@@ -188,7 +194,7 @@ export class Viewer {
     });
     effect(() => {
       // Read to be told of changes.
-      void [mutedCriteria.value, selection.value, showCaptions.value];
+      void [mutedCriteria.value, selection.value, showCaptions.value, measuring.value];
       this.draw();
     });
     effect(() => {

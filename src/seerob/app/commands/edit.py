@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from seerob.app.console.interruption import Stopped
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from seerob.app.server.desk import Desk
     from seerob.app.server.serving import Server
+    from seerob.core.snapshot import Result, Scene
     from seerob.session.station import Station
     from seerob.workstation.allowed import Allowed
 
@@ -80,14 +81,14 @@ def serving(
         visits: Who may visit.
     """
     from seerob.app.commands.schema import schema
-    from seerob.app.server.desk import Desk, Still
+    from seerob.app.server.desk import Checked, Desk, Still
     from seerob.app.server.serving import Server
     from seerob.workstation.workstation import locate
 
     scene = station.scene()
     still = Still(station.first(scene))
 
-    def check(raw: bytes) -> Callable[[], None]:
+    def check(raw: bytes) -> Checked:
         edited = compiled(path, allow, quiet=True, raw=raw)
         scene = edited.scene()
         first = edited.first(scene)
@@ -96,9 +97,23 @@ def serving(
             server.begin(scene, edited.model.meshes)
             still.put(first)
 
-        return show
+        return Checked(show, partial(_distance, edited, scene))
 
-    desk = Desk(locate(path), check, json.dumps(schema()).encode())
+    begun = Checked(lambda: None, partial(_distance, station, scene))
+    desk = Desk(locate(path), begun, check, json.dumps(schema()).encode())
     meshes = station.model.meshes
     server = Server(scene=scene, meshes=meshes, feed=still, desk=desk, host=host, port=port, **visits)
     return server, desk
+
+
+def _distance(station: Station, scene: Scene, between: tuple[str, str]) -> Result:
+    """What a criterion of the least distance says of two things where everybody begins.
+
+    Raises:
+        SeerobError: A name leads nowhere, or they share a body.
+    """
+    from seerob.criteria.safety.minimum_distance import MinimumDistance
+
+    name = f"measured {between[0]} – {between[1]}"
+    asked = station.with_criteria(MinimumDistance(name=name, between=between))
+    return next(found for found in asked.first(scene).results if found.name == name)

@@ -34,7 +34,10 @@ from seerob.core.snapshot import (
     Edit,
     Edited,
     History,
+    Measure,
+    Measured,
     Mistake,
+    Result,
     Snapshot,
     SoFar,
     Transport,
@@ -47,9 +50,19 @@ _encode = msgspec.msgpack.Encoder().encode
 MOST_STEPS = 1000
 """That can be taken back, and revisions that an edit may be behind."""
 
-Check = Callable[[bytes], Callable[[], None]]
+
+class Checked(NamedTuple):
+    """A draft that is right."""
+
+    show: Callable[[], None]
+    """Makes pages see it; called in the server's loop."""
+    measure: Callable[[tuple[str, str]], Result]
+    """The distance of two things in it; called in a thread of its own."""
+
+
+Check = Callable[[bytes], Checked]
 """Reads a draft as ``seerob check-file`` does, in a thread of its own, and raises `InputError` of every
-mistake; what it returns makes pages see it, and is called in the server's loop."""
+mistake."""
 
 
 class _Step(NamedTuple):
@@ -76,6 +89,7 @@ class Desk:
 
     Args:
         file: The workstation file.
+        begun: What it is now.
         check: Says what is wrong with a draft.
         schema: JSON schema of the workstation file, for forms.
 
@@ -83,8 +97,8 @@ class Desk:
         InputError: The file cannot be read.
     """
 
-    def __init__(self, file: Path, check: Check, schema: bytes = b"") -> None:
-        self.schema = schema
+    def __init__(self, file: Path, begun: Checked, check: Check, schema: bytes = b"") -> None:
+        self.schema, self._now = schema, begun
         self._file, self._check = file, check
         self._tables, self._raw = read_toml(file)
         self._saved, self._saved_steps = self._raw, tuple[_Step, ...]()
@@ -123,6 +137,15 @@ class Desk:
                 _log.exception("an edit failed")
                 mistakes = (Mistake(key="", what=f"a fault of the program or of a plug-in: {error!r}"),)
         return Edited(id=edit.id, accepted=not mistakes, revision=self._revision, mistakes=mistakes)
+
+    async def measure(self, asked: Measure) -> Measured:
+        """How far two things are from one another in the draft, as the engine has it."""
+        async with self._lock:
+            try:
+                result = await asyncio.to_thread(self._now.measure, asked.between)
+            except SeerobError as error:
+                return Measured(id=asked.id, refusal=str(error))
+        return Measured(id=asked.id, result=result)
 
     async def _take(self, page: Client, edit: Edit) -> None:
         match edit.action:
@@ -210,19 +233,20 @@ class Desk:
         self, raw: bytes, steps: tuple[_Step, ...], events: Sequence[Event], saved: bytes | None = None
     ) -> None:
         """Make a draft the one that pages see, if it is right."""
-        show, tables, diff = await asyncio.to_thread(
+        now, tables, diff = await asyncio.to_thread(
             self._looked_at, raw, self._saved if saved is None else saved
         )
         self._raw, self._steps, self._tables, self._diff = raw, steps[-MOST_STEPS:], tables, diff
         self._revision += 1
         self._done.append((self._revision, tuple(events)))
-        show()
+        self._now = now
+        now.show()
 
-    def _looked_at(self, raw: bytes, saved: bytes) -> tuple[Callable[[], None], dict[str, object], str]:
-        show = self._check(raw)
+    def _looked_at(self, raw: bytes, saved: bytes) -> tuple[Checked, dict[str, object], str]:
+        now = self._check(raw)
         before, after = (text.decode("utf-8-sig").splitlines() for text in (saved, raw))
         diff = "\n".join(unified_diff(before, after, self._file.name, self._file.name, n=2, lineterm=""))
-        return show, parsed_toml(raw, self._file), diff
+        return now, parsed_toml(raw, self._file), diff
 
     def _own(self, step: _Step, page: Client) -> bool:
         return step.page is page or step.page not in self._redo

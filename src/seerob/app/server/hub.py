@@ -27,6 +27,8 @@ from seerob.core.snapshot import (
     Edited,
     Hello,
     History,
+    Measure,
+    Measured,
     Mistake,
     Scene,
     Snapshot,
@@ -43,7 +45,7 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
-Message = Command | Tracking | Edit
+Message = Command | Tracking | Edit | Measure
 """Of a page."""
 _decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(Message).decode
 LARGEST_COMMAND = 512
@@ -209,6 +211,8 @@ class Hub:
                     last_answer = self._offer(client, message, last_answer, visit, may=Role.TRACK in roles)
                 elif isinstance(message, Edit):
                     client.offer("Edited", _encode(await self._edit(client, message, visit, roles)))
+                elif isinstance(message, Measure):
+                    client.offer("Measured", _encode(await self._measure(message, visit, roles)))
                 elif kind == "ack":
                     client.acknowledge(int(message.value or 0))
                 else:
@@ -233,6 +237,14 @@ class Hub:
             what = "this run is not edited"
         refusal = Mistake(key="", what=what, remedy=remedy)
         return Edited(id=edit.id, accepted=False, revision=0, mistakes=(refusal,))
+
+    async def _measure(self, asked: Measure, visit: Visit, roles: frozenset[Role]) -> Measured:
+        if self._desk is not None and Role.CONTROL in roles:
+            return await asyncio.shield(self._desk.measure(asked))
+        visit.refuse("measure")
+        return Measured(
+            id=asked.id, refusal="nothing is measured here: seerob edit does, for who may control"
+        )
 
     def _offer(
         self, client: Client, tracking: Tracking, last_answer: Tracked | None, visit: Visit, *, may: bool

@@ -1,7 +1,9 @@
 """Two runs beside each other: what changed, which verdicts turned, and nothing that flatters the second."""
 
 import json
+import math
 import shutil
+import tomllib
 from dataclasses import replace
 
 import pytest
@@ -9,7 +11,7 @@ import pytest
 import seerob as sr
 from seerob.app import cli
 from seerob.core.snapshot import CriterionInfo, Finding, Scene, Snapshot
-from seerob.outputs.comparison import Side, Turn, compared, conditions
+from seerob.outputs.comparison import Comparison, Side, Turn, compared, conditions
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.result_log import log_of
 from seerob.session.comparing import _differing
@@ -93,6 +95,16 @@ def test_what_is_not_one_question_is_said():
         "the second run is shorter: what would come after its end is not judged",
         "only short: arm: moved",
     )
+
+
+def test_what_json_cannot_say_is_said_in_words():
+    changes = tuple(_differing(tomllib.loads("a = nan\nb = 2026-01-01"), {"a": [math.inf]}))
+    both = side(result(WITHIN))
+    said = Comparison(both, both, (), changes, (), compared(both, both)).json()
+    assert json.loads(json.dumps(said, allow_nan=False))["changes"] == [
+        {"key": "a", "before": "nan", "after": ["inf"]},
+        {"key": "b", "before": "2026-01-01", "after": None},
+    ]
 
 
 def test_keys_that_differ_are_named_as_they_are_written():

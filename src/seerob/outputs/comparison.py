@@ -58,8 +58,19 @@ class Change(NamedTuple):
 def _toml(value: object) -> str:
     if value is None:
         return "not there"
-    text = json.dumps(value, ensure_ascii=False, default=str)
+    text = json.dumps(_plain(value), ensure_ascii=False)
     return printable(text if len(text) <= 120 else f"{text[:119]}…")
+
+
+def _plain(value: object) -> object:
+    """What JSON can say: TOML has times, and numbers that are not finite, in words."""
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_plain(inner) for inner in value]
+    if value is None or isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    return str(value)
 
 
 @dataclass(frozen=True)
@@ -172,7 +183,9 @@ class Comparison:
         }
         changes = None
         if self.changes is not None:
-            changes = [{"key": c.key, "before": c.before, "after": c.after} for c in self.changes]
+            changes = [
+                {"key": c.key, "before": _plain(c.before), "after": _plain(c.after)} for c in self.changes
+            ]
         return {
             **sides,
             "turn": self.turn,

@@ -18,11 +18,16 @@ if TYPE_CHECKING:
 HELP = "compare two runs or workstations: what changed, which verdicts turned, margins side by side"
 EXAMPLE = "seerob compare runs/monday runs/tuesday --html compared.html"
 
+_ENDS = (
+    "ends with 0 when no verdict became worse, 1 when one turned to exceeded, 2 when one turned to undecided "
+    "or is not judged any more"
+)
 _STYLE = {"exceeded": "bold red", "undecided": "yellow", "within": "cyan", "same": "dim", "new": ""}
 
 
 def add(sub: argparse.ArgumentParser) -> None:
-    """Arguments."""
+    """Arguments, and how it ends, which is not as a verdict does."""
+    sub.description = f"{HELP}; {_ENDS}"
     for name, which in (("before", "a"), ("after", "the other")):
         text = f"{which} recording, folder of a run, or workstation, which is run"
         sub.add_argument(name, type=Path, help=text)
@@ -52,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     if options.html:
         write_whole(options.html, found.html().encode())
     if options.json:
-        OUT.print(json.dumps(found.json(), ensure_ascii=False, indent=1, default=str), markup=False)
+        OUT.print(json.dumps(found.json(), ensure_ascii=False, indent=1, allow_nan=False), markup=False)
     else:
         _tell(found)
         if options.html:

@@ -311,6 +311,16 @@ class _Home:
         ]
         return min(heights, default=0.0)
 
+    def box(self, bodies: Sequence[Body]) -> Array:
+        """Lowest and highest corner (2, 3) [m] of a box around bodies; one that meets nothing without any."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for b in bodies:
+            if len(b.corners):
+                corners = b.corners @ self.rotations[b.index].T + self.positions[b.index]
+                low = np.minimum(low, corners.min(axis=0) - b.radius - TOUCHES)
+                high = np.maximum(high, corners.max(axis=0) + b.radius + TOUCHES)
+        return np.array([low, high])
+
     def distance(self, a: Sequence[int], b: Sequence[int], cap: float, shift: Array | None = None) -> float:
         """Between two sets of bodies [m], at most ``cap``; the first one moved by ``shift`` [m]."""
         positions = self.positions
@@ -500,10 +510,14 @@ def _bases(model: Model, place: _Home) -> Iterator[Quantity]:
 def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
     """How deep parts that stand reach into each other."""
     every = [[b for b in _seen(model.bodies) if b.owner == part.name] for part in model.workstation.parts]
+    boxes = np.array([place.box(bodies) for bodies in every]).reshape(-1, 2, 3)
     for i, (part, own) in enumerate(zip(model.workstation.parts, every, strict=True)):
-        for other, bodies in zip(model.workstation.parts[:i], every, strict=False):
+        # Of hundreds of parts few are near each other; whose boxes are apart is not asked.
+        meets = (boxes[:i, 0] <= boxes[i, 1]).all(axis=1) & (boxes[:i, 1] >= boxes[i, 0]).all(axis=1)
+        for k in np.flatnonzero(meets):
+            other, bodies = model.workstation.parts[k], every[k]
             a, b = [body.index for body in own], [body.index for body in bodies]
-            if not own or not bodies or place.distance(a, b, 0.1) > 0:
+            if place.distance(a, b, 0.1) > 0:
                 continue
             deep = max(place.depth(y, x) for x in own for y in bodies)
             about = (part.name, other.name)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from made_postures import PERSON, made_angles, random_q
 
+from made_cell import made, person, results_at
 from seerob.core.errors import InputError
+from seerob.core.verdict import Verdict
 from seerob.criteria.scoring.spans import published
 from seerob.criteria.scoring.zones import MEASURES, ZoneMonitor, ZoneRow, mistakes, value_of, zones_of
 from seerob.description.humans.angles import angles
@@ -248,3 +250,20 @@ def test_zones_change_sides_in_a_mirror_and_not_with_heading_and_place(name):
         turned[JOINTS.index("pelvis_turn_left")] += 1.3
         assert said(turned) == own
     assert differ > 0
+
+
+@pytest.mark.parametrize("kind", ["iso_11226", "en_1005_4"])
+def test_what_is_open_without_an_accuracy_is_open_with_one(tmp_path, kind):
+    """How long it was held before nobody knows; that angles are known less well is no relief."""
+    bent = "[humans.joints_deg]\nneck_turn_left = 25\nhead_turn_left = 15\nright_shoulder_flexion = 30\n"
+    text = person("op") + bent
+    for name, more in (
+        ("exact", ""),
+        ("rough", "accuracy = 0.05\n"),
+        ("rested", "accuracy = 0.05\nfrom_rest = true\n"),
+    ):
+        text += f'[[ergonomics]]\nkind = "{kind}"\nname = "{name}"\nhuman = "op"\n{more}'
+    found = results_at(made(tmp_path, text))
+    assert found["exact"].verdict is Verdict.UNDECIDED
+    assert found["rough"].verdict is Verdict.UNDECIDED
+    assert found["rested"].verdict is None

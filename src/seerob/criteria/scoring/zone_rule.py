@@ -78,6 +78,9 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         rows, error = self.zones(model).rows, self.error(model)
         self._refuse_idle(rows)
         watch = ZoneMonitor(rows, from_rest=self.from_rest)
+        # Whether more than the accuracy leaves the score open, what was held before above all; with a limit
+        # both are in the interval that is judged.
+        exactly = ZoneMonitor(rows, from_rest=self.from_rest) if error and self.limit is None else watch
 
         def compute(twin: Twin) -> Figure:
             assert isinstance(twin, State)
@@ -87,12 +90,17 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
             low, high = max(ends[0] for ends in joined), max(ends[1] for ends in joined)
             absent = tuple(key for key in scores if math.isnan(value_of(*key, angles, 0.0)[0]))
             known = low == high and not absent
+            open_anyway = error is None and not known
+            if exactly is not watch:
+                alone = exactly.add(twin.t, angles, 0.0, _support(phase))
+                ends = [self._joined(alone, side) for side in range(2)]
+                open_anyway = max(low for low, _ in ends) != max(high for _, high in ends)
             return Figure(
                 low if known else None,
                 self.limit,
                 interval=None if known and error is None else (low, high),
-                # Without an accuracy it is what was before that nobody knows.
-                open=bool(absent) or (not known and error is None),
+                # It is what was before that nobody knows.
+                open=bool(absent) or open_anyway,
                 beside=Zoned(angles, scores, (low, high), absent),
             )
 

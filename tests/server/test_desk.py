@@ -313,7 +313,7 @@ def test_a_distance_is_the_engine_s_and_follows_the_draft(desk):
         assert (line.start[0], line.end[0]) == pytest.approx((1.2, 1.9))
         assert page.edit(MOVE).accepted
         assert measured("table", "rack").result.value == pytest.approx(0.6, abs=1e-12)
-        for wrong in (("table", "nobody"), ("table", "table")):
+        for wrong in (("table", "nobody"), ("table", "table"), ("", ""), ("*", "rack"), ("[", "rack")):
             found = measured(*wrong)
             assert found.result is None
             assert found.refusal

@@ -145,6 +145,9 @@ class Desk:
                 result = await asyncio.to_thread(self._now.measure, asked.between)
             except SeerobError as error:
                 return Measured(id=asked.id, refusal=str(error))
+            except Exception as error:
+                _log.exception("a measurement failed")
+                return Measured(id=asked.id, refusal=f"a fault of the program or of a plug-in: {error!r}")
         return Measured(id=asked.id, result=result)
 
     async def _take(self, page: Client, edit: Edit) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 import seerob as sr
 from seerob.core.extras import MissingPackage
-from seerob.core.snapshot import Snapshot
+from seerob.core.snapshot import CriterionInfo, Snapshot
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.series import BLOCK, CODES, Column, Spill
 
@@ -265,3 +265,12 @@ def test_a_column_of_any_length_is_read_back_and_grows(rows):
     again.append(8.0)
     assert np.frombuffer(back.tobytes()).tolist() == [*map(float, range(rows)), 7.0]
     assert np.frombuffer(again.tobytes()).tolist() == [*(-float(k) for k in range(rows)), 8.0]
+
+
+@pytest.mark.parametrize("form", ["wide", "long", "criteria", "parts"])
+def test_a_criterion_that_was_never_heard_is_undecided_in_every_table(form):
+    log = sr.ResultLog([CriterionInfo(name="a", kind="k", group="safety", title="t")])
+    frame = log.to_pandas(form)
+    assert frame.attrs["criteria"]["a"]["verdict"] == "undecided"
+    assert log.to_arrow(form).num_rows == len(frame) == (form == "criteria")
+    assert sr.ResultLog().to_pandas(form).attrs["verdict"] == "no verdict"

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from seerob.core.figures import figure, margin
 from seerob.core.printable import printable
 from seerob.core.snapshot import CriterionInfo, Finding, Scene, Verdict
-from seerob.outputs.html import Content, Html, table, tag
+from seerob.outputs.html import Content, Html, table, tag, whole
 from seerob.outputs.report.page import document
 from seerob.outputs.report.report import badge
 from seerob.outputs.sentences import bound, extremum, grouped, percent
@@ -234,7 +234,7 @@ class Comparison:
         if self.files:
             yield tag("ul", [tag("li", text) for text in self.files])
         yield tag("h2", "Criteria")
-        columns = ("criterion", "", "before", "after", "margin before", "margin after", "decided", "notes")
+        columns = ("criterion", "is now", "before", "after", "decided", "notes")
         yield table(columns, [self._row(one) for one in self.criteria], class_="overview")
         for one in self.criteria:
             if one.name in self.pictures:
@@ -245,13 +245,14 @@ class Comparison:
                         self.pictures[one.name], (one.before, one.after), ("before", "after"), strict=True
                     )
                 ]
-                yield tag("div", shown, class_="evidence")
+                yield tag("div", shown, class_="evidence", style="grid-template-columns: 1fr 1fr")
 
     def _row(self, one: Compared) -> tuple[Content, ...]:
-        both = one.before, one.after
-        verdicts = [badge(series.verdict) if series else "not asked" for series in both]
-        margins = [tag("span", margin_words(series), class_="whole") for series in both]
-        return one.name, one.turn.value, *verdicts, *margins, decided_words(one), "; ".join(one.notes)
+        said = [
+            [badge(series.verdict) if series else "not asked", tag("p", margin_words(series))]
+            for series in (one.before, one.after)
+        ]
+        return one.name, whole(one.turn.value), *said, decided_words(one), "; ".join(one.notes)
 
     def sentence(self) -> str:
         """What it comes to."""

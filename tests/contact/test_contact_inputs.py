@@ -13,6 +13,7 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.contact.limits import (
     ContactEnds,
+    Judged,
     RegionArrays,
     Speeds,
     area_verdict,
@@ -183,6 +184,10 @@ def test_a_drive_lowers_what_is_within_and_alone_exceeds_where_nobody_can_recoil
     ends = Spread(0.9 * v, 1.1 * v, np.ones((3, 1, 2))) if tolerant else None
     low, high = (0.9 * v, 1.1 * v) if tolerant else (v, v)
     clamped = np.array([[True, True]])
+    none = np.zeros(2, np.int64)
+    judged = Judged(v[0, :1], clamped[0, :1], v[0], clamped, v[0, :1], speeds, clamped, none, none, ends)
+    np.testing.assert_array_equal(judged.least, low)
+    np.testing.assert_array_equal(judged.v, [[2.0, 2.0]])
     nobody = pushed(speeds, ends, k, force, clamped, None)
     np.testing.assert_array_equal(nobody.low, 0 * v)
     np.testing.assert_array_equal(nobody.high, high)

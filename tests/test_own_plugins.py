@@ -333,6 +333,38 @@ def test_a_plug_in_that_ends_the_program_gives_it_no_exit_code(tmp_path, monkeyp
     assert "own_ending.imported' fails when it is imported: SystemExit: 0" in capfd.readouterr().err
 
 
+STANDING = """
+from seerob.api import JointSample, Opened, Source
+
+
+class Standing(Source, frozen=True, kw_only=True):
+    human: str
+
+    def target(self):
+        return self.human
+
+    def open(self, folder, target):
+        q = (0.0,) * len(target.joints)
+        samples = [JointSample(source="", seq=k, target=self.human, t=0.02 * k, q=q) for k in range(20)]
+        return Opened(samples=samples, duration=0.38)
+"""
+
+
+def test_how_far_angles_of_a_person_may_be_off_is_asked_of_a_source_of_ones_own(tmp_path, monkeypatch):
+    package = tmp_path / "path" / "own_person"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    (package / "stands.py").write_text(STANDING)
+    monkeypatch.syspath_prepend(str(tmp_path / "path"))
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    person = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+    cell(folder, f'{person}[[sources]]\nkind = "own_person.stands"\nhuman = "op"\n')
+    found = [f for _, one in sr.load(folder, allow_plugins=True).sources for f in one.findings]
+    text = "angles of a posture may be off that stands op captures nobody says"
+    assert [f.subject for f in found if text in f.text] == ["op"]
+
+
 def test_the_page_shows_each_file_as_it_is():
     page = (ROOT / "docs/extending.md").read_text()
     shown = re.findall(r"write-docs: file/(\S+)", page)

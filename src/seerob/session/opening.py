@@ -62,7 +62,8 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
             found = _opened(source, model.folder, driven, file, f"sources[{i}]")
             if not (_ships(source) or isinstance(source, LiveSource)):
                 found = looked_at(found, source.name or kind_of("sources", source), driven)
-            found = replace(found, findings=(*found.findings, *_lateness(model, source)))
+            said = (*_lateness(model, source), *_unknown_angles(model, source))
+            found = replace(found, findings=(*found.findings, *said))
             opened.append((source, _compared(model, i, source, found)))
             problems += _begun(source, i, file)
         except InputError as error:
@@ -179,6 +180,16 @@ def _too_short(model: Model, source: Source, delay: float) -> Iterator[Problem]:
             what = f"{variable.timeout:g} s is not longer than the delay of {delay:g} s of the slowest source"
             key = f"variables ({variable.name}).timeout"
             yield Problem(model.workstation.variables or "", key, what, "give a longer one")
+
+
+def _unknown_angles(model: Model, source: Source) -> tuple[Finding, ...]:
+    """What nobody knows of the angles of a person whom a source of one's own drives."""
+    people = {human.name for human in model.workstation.humans}
+    if _ships(source) or source.captured or source.target() not in people:
+        return ()  # one that captured them says so itself
+    from seerob.devices.capture.options import unknown_error
+
+    return unknown_error(source.posture_error(), source.name or kind_of("sources", source), source.target())
 
 
 def _lateness(model: Model, source: Source) -> Iterator[Finding]:

@@ -160,8 +160,8 @@ def captured_accuracy(model: Model, human: str) -> Accuracy | None:
 
 def _devices(model: Model, human: str) -> list[tuple[str, PostureError | None]]:
     """Names of sources that captured a person, and how far angles may be off."""
-    sources = [s for s in model.workstation.sources if s.captured and s.target() == human]
-    return [(source.name, source.posture_error()) for source in sources]
+    found = [(s, s.posture_error()) for s in model.workstation.sources if s.target() == human]
+    return [(source.name, error) for source, error in found if source.captured or error is not None]
 
 
 def _captured_errors(model: Model, human: str) -> list[Input]:

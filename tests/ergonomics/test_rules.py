@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_postures import PERSON
 
-from made_cell import heard, judged, made, results_at, state_at
+from made_cell import TWO_R, heard, judged, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, RowState, Verdict
 from seerob.criteria.ergonomics import reba, rula
@@ -426,13 +426,23 @@ HELD_TABLE = "angle,from_deg,to_deg,score,hold_s\ntrunk flexion,,20,0,\ntrunk fl
         ("", "end = 20", Verdict.WITHIN),
     ],
 )
+@pytest.mark.parametrize("moves", [False, True])
 def test_how_long_a_posture_is_held_that_nothing_moves_nobody_knows(
-    tmp_path, monkeypatch, kind, bent, more, verdict
+    tmp_path, monkeypatch, kind, bent, more, verdict, moves
 ):
-    """One instant is all of such a run, and at its first instant nothing is held yet."""
+    """One instant is all of a run in which nobody moves; a robot beside them that moves changes nothing."""
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
     cell = HUMAN.format(posture="standing") + f"joints_deg = {{ {bent} }}\n" + PHASE.format(more)
     cell += f'[[ergonomics]]\nkind = "{kind}"\nhuman = "op"\n{HELD_RULES[kind]}\n'
-    station = made(tmp_path, cell, {"held.csv": HELD_TABLE})
+    if moves:
+        cell += TWO_R + '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
+        cell = cell.replace(
+            "[[ergonomics]]\n", '[[ergonomics]]\nbetween_samples = "accepted: nobody moves"\n'
+        )
+    station = made(
+        tmp_path,
+        cell,
+        {"held.csv": HELD_TABLE, "m.csv": "t [s],J1 [rad],J2 [rad]\n0,0,0\n0.05,0,0\n", "arm.urdf": two_r()},
+    )
     (column,) = station.batch(threads=1).values()
     assert (station.run().verdict, column.verdict) == (verdict, verdict)

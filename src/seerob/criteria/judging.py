@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from copy import copy
 from functools import partial
 
@@ -25,7 +25,7 @@ from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import SLACK
 
 SHIFT = 28800.0
-"""How much later a run in which nobody moves is looked at again [s]."""
+"""How much later it is looked again at whom no source moves [s]."""
 
 _log = logging.getLogger(__name__)
 # To ask an enumeration for a member takes longer than all the rest of a judgement.
@@ -171,13 +171,15 @@ class Judge:
     Args:
         bound: The criteria.
         findings: Of sources and of the run, besides those of the model (`Finding.holds`).
-        still: Whether nobody ever moves, so that the first instant stands for all that come.
+        unmoved: Whom nothing moves; who is not heard at the first instant, and no source drives, when not
+            given.
     """
 
     def __init__(
-        self, bound: Sequence[Bound], findings: Iterable[Finding] = (), *, still: bool = False
+        self, bound: Sequence[Bound], findings: Iterable[Finding] = (), unmoved: Collection[str] | None = None
     ) -> None:
-        self._bound, self._still = bound, still
+        self._bound, self._unmoved = bound, unmoved
+        self._first = True
         self._questions: list[Question] = []
         """Of every criterion, once the model is known."""
         self._findings = tuple(findings)
@@ -211,8 +213,8 @@ class Judge:
             findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *self._worded)))
             self._hold(state.model, findings)
         results = [self._one(question, state) for question in self._questions]
-        if self._still:
-            self._still = False
+        if self._first:
+            self._first = False
             every = zip(self._questions, results, strict=True)
             results = [self._lasting(question, result, state) for question, result in every]
 
@@ -272,13 +274,19 @@ class Judge:
         return result
 
     def _lasting(self, question: Question, result: Result, state: State) -> Result:
-        """What is said of the first instant of nobody's motion, as far as it is said a shift later, too.
+        """What is said of the first instant of whom no source moves, as far as it is said a shift later, too.
 
-        How long something is held is a figure of methods that judge work: none at the first instant.
+        How long something is held is a figure of methods that judge work: none at the first instant, and
+        how long a motion of somebody else lasts says nothing of it.
         """
         criterion, model = question.criterion, state.model
         by_instant = not (question.own or question.bound.group == "ergonomics" or criterion.remembers(model))
         if by_instant or result.verdict is not _WITHIN:
+            return result
+        unmoved = self._unmoved
+        if unmoved is None:
+            unmoved = [name for name, said in state.hearings.items() if not said.driven and not said.heard]
+        if not question.declared <= {*unmoved, question.muted_by}:  # nor does a variable change
             return result
         later = State(model, copy(state.data), state.hearings, state.signals)
         later.attachments = state.attachments
@@ -291,8 +299,9 @@ class Judge:
         if said.verdict is _WITHIN or (said.verdict is _UNDECIDED and ends and keeps_it):
             return result
         why = "" if said.reason in result.reason else f" ({said.reason})"
-        text = f"nothing moves, and {later.t - state.t:g} s later it is {said.verdict or 'not judged'}{why}"
-        return undecided(result, f"{text}: give a motion that lasts as long as the work")
+        then = f"{later.t - state.t:g} s later it is {said.verdict or 'not judged'}{why}"
+        text = f"no source moves whom it judges, and {then}: give a motion that lasts as long as the work"
+        return undecided(result, text)
 
     def _at_least(self, question: Question, evaluate: Evaluate, state: State, reason: str) -> Result:
         """What the known masses of a robot exceed, when others are not known; else undecided."""

@@ -238,7 +238,7 @@ def judged(
         name = one.criterion.name
         if name in asked and (spans := again[name]).any():
             walked[name] = _with(walked[name], _walked(model, [one], motion, findings, spans)[name], spans)
-    columns, still = {}, _is_still(model, motion)
+    columns, still = {}, n == 1 and not model.workstation.sources
     for one in bound:
         name = one.criterion.name
         said, reasons = walked[name]
@@ -550,11 +550,6 @@ def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]
     return joined, np.concatenate([np.zeros(0, object), *(reasons for _, reasons in parts)])
 
 
-def _is_still(model: Model, motion: Motion) -> bool:
-    """Whether nobody ever moves, so that one instant is all there is."""
-    return len(motion.t) == 1 and not model.workstation.sources
-
-
 def _walked(
     model: Model,
     bound: Sequence[Bound],
@@ -580,7 +575,7 @@ def _walked(
         Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis, one.watch)
         for one in bound
     ]
-    judge = Judge(fresh, findings, still=_is_still(model, motion))
+    judge = Judge(fresh, findings, unmoved=motion.unmoved)
     many = settled() if only is None else nullcontext()
     if motion.foreseen:
         state.foresee, state.knots = partial(_foresee, model, motion, state), partial(_knots, motion)

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace as changed
 
+from seerob.core.samples import SignalSample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.criteria.plausible_places import PlausiblePlaces
@@ -36,9 +37,13 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     heard = list(feed)
     engine = engine_of(model, _PositionsAlone)
     still = frozenset(name for name in model.mechanisms if not engine.state.moved(name))
+    every = (sample for samples in heard for sample in samples)
+    told = {sample.target for sample in every if not isinstance(sample, SignalSample)}
+    driven = (name for name, hearing in engine.state.hearings.items() if hearing.driven)
+    unmoved = frozenset(model.mechanisms.keys() - told - {*driven})
     known = known_motion(engine, heard, end)
     if known is not None and _is_plausible(model, known):
-        return replace(known, still=still, coarse=coarse(model))
+        return replace(known, still=still, coarse=coarse(model), unmoved=unmoved)
     plausible_places, implausible = PlausiblePlaces(model), dict[Finding, None]()
     engine = engine_of(model, _PositionsAlone)
     engine.end = end
@@ -79,6 +84,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         foreseen=True,
         speed_errors=errors,
         still=still,
+        unmoved=unmoved,
         seen={name: every for name, every in seen.items() if any(each.once or each.said for each in every)},
         coarse=coarse(model),
         implausible=tuple(implausible),

@@ -31,7 +31,6 @@ from seerob.outputs.over_time import plotted
 from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
 from seerob.recording.frames import told_of
 from seerob.recording.result_log import ResultLog
-from seerob.recording.series import STILL
 from seerob.session.opening import coarse, signal_timeouts, untimed
 from seerob.session.scene import Looks, invalid_reasons
 from seerob.twin.engine import Engine, last_tick
@@ -399,8 +398,7 @@ def run(
             if isinstance(writer, KeepsResults):
                 writer.share(log)
         engine = engine_of(model)
-        still = any(info.between == STILL for info in scene.criteria)
-        judge: Callable[[State], tuple[Result, ...]] = Judge(bound, scene.findings, still=still)
+        judge: Callable[[State], tuple[Result, ...]] = Judge(bound, scene.findings)
         if before is not None:
             judge = no_greener(judge, *before)
         try:

@@ -82,6 +82,8 @@ class Motion:
     """Which of its instants is the first one here."""
     still: frozenset[str] = frozenset()
     """Robots whose speed nobody tells (`seerob.twin.validity.validity.Validity.moved`)."""
+    unmoved: frozenset[str] = frozenset()
+    """Robots, people and machines that neither a source nor an array moves: for how long, nobody says."""
     seen: Mapping[str, Sequence[Seen]] = field(default_factory=dict)
     """Of people whom devices see, and of who was heard once, what else is known of them at each instant: who
     depends on them is asked instant by instant."""
@@ -567,7 +569,8 @@ def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) ->
     robots = [m.name for m in model.mechanisms.values() if m.role == "robot"]
     still = {name for name in robots if given.keys().isdisjoint((name, *model.carriers_of(name)))}
     moved = frozenset(name for name in given if model.mechanisms[name].role == "machine")
-    return Motion(t, q, v, invalid_reasons, still=frozenset(still), unforeseen=moved)
+    unmoved = frozenset(model.mechanisms.keys() - given.keys())
+    return Motion(t, q, v, invalid_reasons, still=frozenset(still), unforeseen=moved, unmoved=unmoved)
 
 
 def _at_home(mechanism: Mechanism, n: int) -> tuple[Array, Array]:

@@ -337,6 +337,10 @@ def test_line_ends_and_forms_of_toml_stay_as_they_are(tmp_path):
     inline = b"parts = [ { name = 'a' }, { name = 'b' } ] # all\n"
     made, _ = changed(inline, [Change(kind="set", path=("parts", 1, "name"), value="c")], "")
     assert made == inline.replace(b"'b'", b'"c"')
+    # An entry in two pieces: without the first, the second would be another thing.
+    apart = b'[[parts]]\nname = "a"\n[other]\n[parts.more]\nk = 1\n'
+    with pytest.raises(InputError, match="cannot be edited here"):
+        changed(apart, [Change(kind="remove", path=("parts", 0))], "")
     with pytest.raises(InputError):
         changed(b"a = 1\r\nb = 2\n", [Change(kind="set", path=("a",), value=2)], "")
 

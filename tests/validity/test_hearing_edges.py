@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -232,3 +233,34 @@ def test_as_many_bones_are_named_as_one_reads() -> None:
     assert no_position_reason(six) == f"no device says where {', '.join(six)} are, only how bones are turned"
     assert f"{six[-1]} and 1 more are" in no_position_reason(seven)
     assert no_position_reason(BONES).startswith("no device says where the person is, only")
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_any_stream_is_in_doubt_where_one_of_its_samples_or_silences_is(seed: int) -> None:
+    """What is said of whole streams is what each of their samples says, looked at one by one."""
+    rng = np.random.default_rng(seed)
+    steps = rng.choice([REPEATED / 2, 0.01, 0.1, 0.3], size=12, p=[0.1, 0.6, 0.2, 0.1])
+    times = np.cumsum(steps).tolist()
+    spoiled = rng.random(len(times)) < rng.choice([0.0, 0.2])
+    hearing = Hearing(given=False, driven=True, timeout=0.2, leaves_at=1.0)
+    hearing.heard = [Heard(t, f"bad at {t}" * bool(bad)) for t, bad in zip(times, spoiled, strict=True)]
+    told = hearing.heard
+    instants = [
+        *times,
+        *(a + share * (b - a) for a, b in pairwise([0.0, *times, 9.0]) for share in (0.3, 0.5)),
+    ]
+    for t in instants:
+        past = [h for h in told if h.t <= t + SLACK]
+        assert hearing.around(t) == [*past[-1:], *told[len(past) : len(past) + 1]]
+        repeated = [k for k in range(1, len(told)) if told[k].t - told[k - 1].t < REPEATED]
+        last = max([len(past), *(k for k in repeated if k > len(past))])
+        reasons = [h.reason for h in told[max(len(past) - 1, 0) : last + 1] if h.reason]
+        found = hearing.invalid_reason(t)
+        if past and not ("not heard" in found or "ends in motion" in found):
+            assert found == next(iter(reasons), "")
+        for until in (t + 0.05, t + 1.0):
+            pairs = [(a, b) for a, b in pairwise(told) if t + SLACK < b.t and a.t < until - SLACK]
+            doubts = [b.reason or "nothing is heard" for a, b in pairs if b.reason or b.t - a.t > 0.2 + SLACK]
+            ends = ["its motion ends"] if told[-1].t < until - SLACK else []
+            assert hearing.invalid_ahead_reason(t, until).startswith(next(iter([*doubts, *ends]), ""))
+            assert bool(hearing.invalid_ahead_reason(t, until)) == bool(doubts or ends)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import repeat
 from math import isinf, isnan
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from msgspec import Struct, structs
@@ -109,7 +109,7 @@ class Figure(Struct, frozen=True, eq=False):
         return math.nan if self.value is None else float(self.value)
 
 
-class Shown(NamedTuple):
+class Shown(Struct, frozen=True, eq=False):
     """What is said and drawn of one instant, beside its figure."""
 
     reason: str = ""
@@ -210,8 +210,8 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         result: What is the same at all instants: name, unit, side of the limit.
     """
     limit: Any
-    reason, draw, parts, _, _, rows = shown
     value, limit, nothing = figure.value, figure.limit, figure.nothing
+    parts, draw = shown.parts, shown.draw
     interval: tuple[float, float] | None = None
     if type(value) is not float and type(value) is not int and value is not None:
         value = float(value)
@@ -239,11 +239,11 @@ def result_of(figure: Figure, verdict: Verdict | None, shown: Shown, result: Res
         limit=limit,
         at_most=result.at_most,
         verdict=verdict,
-        reason=reason,
+        reason=shown.reason,
         interval=interval,
         nothing=bool(nothing),
         parts=parts,
-        rows=rows,
+        rows=shown.rows,
         markers=() if draw is None else drawn(draw),
     )
 

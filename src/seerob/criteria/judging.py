@@ -379,12 +379,13 @@ class Judge:
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
-        if question.own and (what := _endless(result)):
-            raise Undecided(what)
-        if question.own and question.moves and state.late_reason(state.asked):
-            # What it says where it applies is so where it does not. Of those that ship none is greener by it.
-            late = state.late_reason(state.asked - {question.muted_by})
-            result = undecided(result, late) if late else result
+        if question.own:
+            if what := _endless(result):
+                raise Undecided(what)
+            if question.moves and state.late_reason(state.asked):
+                # What it says where it applies is so where it does not; none that ships is greener by it.
+                late = state.late_reason(state.asked - {question.muted_by})
+                result = undecided(result, late) if late else result
         if (state.speeds_asked and result.verdict is _WITHIN) or question.relied_on:
             for said in question.undecided_reasons(state):
                 if said:

@@ -200,7 +200,8 @@ def shown(
     """
     angles, ends, wide = cast("Scored", figure.beside)
     found, edges = _said(method, human, limit, ends, wide, verdict), _edges(method, thresholds)
-    return found._replace(
+    return replace(
+        found,
         parts=(*found.parts, *_parts(ends, wide, angles)),
         rows=(
             *found.rows,

@@ -34,6 +34,11 @@ def test_a_large_file_and_a_folder_are_kept_as_the_hashes_that_sha256sum_prints(
         f"{SOURCES}walk.sha256": "".join(parts).encode(),
     }
     assert source_files(named, folder=folder) == kept
+    # What is there by now counts, not what was unpacked; a file of just that size is kept.
+    (folder / SOURCES).mkdir(parents=True)
+    (folder / SOURCES / "large.bag.sha256").write_bytes(b"then")
+    (folder / "edge.csv").write_bytes(bytes(100))
+    assert source_files((*named, "edge.csv"), folder=folder) == kept | {"edge.csv": bytes(100)}
     beside = {f"{SOURCES}beside.csv.sha256": line("beside.csv", b"elsewhere").encode()}
     assert source_files(named, folder=folder, outside=True) == kept | beside
 

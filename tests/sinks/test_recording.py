@@ -213,6 +213,7 @@ def test_a_foreign_reader_understands_every_channel(path):
         attachments = {a.name: a.data for a in reader.iter_attachments()}
         # Nobody says when a file or the scene was made.
         assert {(a.create_time, a.log_time) for a in reader.iter_attachments()} == {(0, 0)}
+        assert [m.sequence for *_, m in reader.iter_messages(topics=[SNAPSHOT])] == [*range(N)]
         begun = reader.iter_messages(topics=[SCENE, "/scene"])
         assert [(c.topic, m.log_time, m.sequence) for _, c, m in begun] == [(SCENE, 0, 0), ("/scene", 0, 0)]
         assert {topics[topic].schema_id for topic in (SCENE, SAMPLES, SNAPSHOT)} == {0}

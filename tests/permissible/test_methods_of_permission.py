@@ -149,6 +149,19 @@ def test_contact_alone_permits_no_more_where_the_person_is_far(tmp_path, by):
     np.testing.assert_allclose(far.permissible, close.permissible, rtol=1e-9)
 
 
+def test_what_a_person_moves_is_taken_off_the_speed_that_contact_permits(tmp_path):
+    still, moves = (
+        maps(cell(tmp_path / str(v), PFL + KEPT_OUT + f"person_speed = {v}\n"), By.PFL)[By.PFL].ceilings[0]
+        for v in (0, 1.6)
+    )
+    assert {b.speed > 0 for b in moves} == {True, False}
+    for a, b in zip(still, moves, strict=True):
+        assert (a.region, a.reason) == (b.region, "")
+        assert b.speed == pytest.approx(max(a.speed - 1.6, 0))
+        assert b.share == pytest.approx(a.share * b.speed / a.speed)
+        assert b.reason == ("" if b.speed else "the person alone is faster than permitted")
+
+
 @pytest.mark.parametrize(
     ("criteria", "by", "message"),
     [

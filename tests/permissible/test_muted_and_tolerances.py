@@ -12,7 +12,13 @@ from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PERSON, PFL, SOURCE,
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.errors import Undecided
-from seerob.session.permissible.ceilings import By, Ceiling, Method, governing
+from seerob.core.snapshot import Result
+from seerob.core.verdict import Verdict
+from seerob.criteria.safety.kinetic_energy import KineticEnergy
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.safety.power_and_force import Contacts
+from seerob.criteria.safety.velocity import Velocity
+from seerob.session.permissible.ceilings import By, Ceiling, Method, ceilings_of, governing
 from seerob.session.permissible.witness import Posed, Witness
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.state import Hearing, State
@@ -109,6 +115,74 @@ def test_what_clamps_on_the_floor_says_so(tmp_path, floor):
     if floor:
         words = {c.words() for each in found.ceilings for c in each if c.region == "Chest"}
         assert any(word.startswith("F: Chest, clamped on the floor, ") for word in words)
+    # The figure that is told is the one of the table: of areas that are hit alike that of the least pressure.
+    of = Contacts(station.model.workstation.safety[0], station.model)
+    limited = [c for each in found.ceilings for c in each if c.governs in ("force", "pressure")]
+    assert {c.contact.split()[0] for c in limited} == ({"free", "clamped"} if floor else {"free"})
+    for c in limited:
+        region = of.arrays.regions[of.columns[c.region]]
+        factor = 1 if c.contact.startswith("clamped") else of.arrays.multiplier[of.columns[c.region]]
+        least = min(area.pressure.value for area in region.areas)
+        assert c.limit.value == pytest.approx(
+            factor * (least if c.governs == "pressure" else region.force.value)
+        )
+
+
+class Told(Velocity, frozen=True, kw_only=True):
+    """What it is to say of any state."""
+
+    says: dict
+
+    def bind(self, model):
+        return lambda state: Result(name=self.name, unit="m/s", limit=self.limit, **self.says)
+
+
+UNDECIDED = {"verdict": Verdict.UNDECIDED, "reason": "who knows"}
+
+
+@pytest.mark.parametrize(
+    ("says", "share", "reason"),
+    [
+        ({"reason": "who knows"}, math.nan, "who knows"),
+        ({}, math.nan, "V says no figure"),
+        ({"value": 0.2, **UNDECIDED}, math.nan, "who knows"),  # it is the least that it may be
+        ({"value": 0.2, "interval": (0.1, 0.5), **UNDECIDED}, math.nan, "who knows"),
+        ({"value": 0.4, "interval": (0.3, 1.0), **UNDECIDED}, 0.5, ""),
+        ({"value": 1.0, "verdict": Verdict.EXCEEDED}, 0.5, ""),
+        ({"value": 0.25, "verdict": Verdict.WITHIN}, 2.0, ""),
+        ({"value": 0.0, "verdict": Verdict.WITHIN}, math.inf, ""),
+    ],
+)
+def test_a_speed_that_nobody_knows_permits_nothing(tmp_path, says, share, reason):
+    model = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model
+    ask = ceilings_of(Told(name="V", at="arm", limit=0.5, says=says), model, "arm", anywhere=False)
+    (found,) = ask.ceilings(None)
+    assert found.share == pytest.approx(share, rel=1e-6, nan_ok=True)
+    assert found.reason == reason
+    assert found.speed == pytest.approx(math.nan if reason else 0.5, nan_ok=True)
+    assert found.governs == ("" if reason else "speed")
+
+
+def test_only_what_limits_the_speed_of_this_robot_is_asked(tmp_path):
+    both = TWO_R + TWO_R.replace('"arm"', '"two"') + "base = { position = [0, 9, 0] }\n"
+    model = made(tmp_path, FLOATING + both + PERSON.format(x=4) + KNOWN, {"arm.urdf": two_r()}).model
+    for kind, of in (
+        (KineticEnergy, {"robot": "arm"}),
+        (Velocity, {"at": "arm"}),
+        (Velocity, {"of": "arm"}),
+        (MinimumDistance, {"between": ("arm", "op")}),
+    ):
+        speed = kind is not MinimumDistance
+        for limit in (0.5, None):
+            asks = [
+                ceilings_of(kind(name="C", limit=limit, **of), model, robot, anywhere=False)
+                for robot in ("arm", "two")
+            ]
+            assert [ask is not None for ask in asks] == [speed and limit is not None, False]
+    for by, alone, beside in ((By.ALL, True, False), (By.PFL, True, True), (By.EITHER, True, True),
+                              (By.SSM, False, False), (By.BOTH, False, False)):  # fmt: skip
+        asked = [by.contact_anywhere(model.workstation.safety, robot) for robot in ("two", "arm")]
+        assert [by.contact_anywhere([], "arm"), *asked] == [alone, alone, beside]
 
 
 def test_where_somebody_is_is_as_sure_as_in_the_run(tmp_path):

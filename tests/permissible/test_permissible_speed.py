@@ -75,6 +75,8 @@ def test_separation_permits_the_speed_of_the_closed_form(tmp_path):
         if expected < 10:
             seen += 1
             assert stations.permissible[k] == pytest.approx(max(expected, 0), rel=1e-9)
+            governs = stations.governing[k]
+            assert governs.speed == pytest.approx(max(v[int(governs.surface[5]) - 1], 0), rel=1e-9)
     assert seen > 3
 
 

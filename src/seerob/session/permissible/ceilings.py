@@ -264,7 +264,7 @@ def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer,
     return ask, look if fixed else None
 
 
-def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: bool = False) -> Ask | None:
+def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: bool) -> Ask | None:
     """How to ask a criterion; None for one that does not limit the speed of the robot.
 
     Args:
@@ -337,10 +337,10 @@ def _power(criterion: Criterion, model: Model, robot: str, limit: float, power: 
 
     def ask(state: State) -> tuple[Ceiling, ...]:
         result = evaluate(state)
-        value = 0.0 if result.value is None else result.value
-        if result.interval is not None:
-            # What may be off counts in full, as in the criterion's own verdict.
-            value = result.interval[1]
+        # What may be off counts in full, as in the criterion's own verdict.
+        value = result.value if result.interval is None else result.interval[1]
+        if value is None or (result.verdict is Verdict.UNDECIDED and value <= limit):
+            raise Undecided(result.reason or f"{criterion.name} says no figure")
         share = math.inf if value <= 0 else (max(0.0, admitted(limit)) / value) ** (1 / power)
         speed = limit if power == 1 else math.nan
         governs = "speed" if power == 1 else "kinetic energy"

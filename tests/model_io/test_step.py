@@ -2,6 +2,7 @@
 
 import math
 import random
+import re
 import runpy
 from pathlib import Path
 
@@ -94,6 +95,17 @@ def test_no_point_of_the_surface_is_farther_outside_than_said(tmp_path, toleranc
     nodes, links, T = build_tree(mesh.vertices, mesh.faces)
     far = outside(nodes, links, T, points).max()
     assert 0 < far <= shape.deviation <= 1.5 * tolerance + 1e-7
+
+
+def test_a_face_against_the_sense_of_its_surface_has_its_outside_outside(tmp_path):
+    made = Step()
+    made.box("block", (4.0, 2.0, 1.0))
+    text = made.text().replace("(0.0,0.0,-1.0)", "(0.0,0.0,1.0)")
+    text, count = re.subn(r"(ADVANCED_FACE\([^;]*),\.T\.\)", r"\1,.F.)", text, count=1)
+    assert count == 1
+    (shape,) = read(tmp_path / "a.step", text).shapes
+    assert is_closed(whole(shape))
+    assert signed_volume(whole(shape)) == pytest.approx(8e-9)
 
 
 def test_flat_solids_deviate_by_nothing_but_rounding(tmp_path):

@@ -12,6 +12,8 @@ import { App } from "./panels/App";
 import { type Actions, ActionsContext } from "./panels/app_context";
 import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
+import type { Tracking } from "./wire";
+import { Visit } from "./xr/visit";
 
 declare global {
   interface Window {
@@ -29,6 +31,8 @@ declare global {
       project(point: [number, number, number]): [number, number];
       /** Whether the pointer is on a handle of what is edited, or drags one. */
       readonly held: boolean;
+      /** Where a point of a visitor's room [m] is in three.js's own world, y up; null without a visit. */
+      visited(point: [number, number, number]): [number, number, number] | null;
     };
   }
 }
@@ -42,17 +46,26 @@ function begin(element: HTMLElement): void {
     frame: (frame) => viewer.show(frame),
   });
   actions.time.connect((message) => connection.send(message));
-  actions.offer = (tracking) => connection.send({ kind: "tracking", tracking });
   connectDraft((edit) => connection.send({ kind: "edit", edit }));
   connectMeasure((measure) => connection.send({ kind: "measure", measure }));
+  let visit: Visit | null = null;
+  actions.enter = async (mode, human) => {
+    const offer = (tracking: Tracking) => connection.send({ kind: "tracking", tracking });
+    visit = await Visit.begin(viewer, mode, human, offer);
+    visit.session.addEventListener("end", () => {
+      visit = null;
+    });
+    return visit.session;
+  };
   actions.look = (preset) => viewer.viewpoint.go(preset);
   actions.frameSelection = () => {
     const names = selectedNodes.value;
     viewer.viewpoint.frame(names.size > 0 ? names : null);
   };
-  viewer.stage.run((time) => {
+  viewer.stage.run((time, frame) => {
     connection.tick(time);
     viewer.tick(time);
+    visit?.tick(time, frame);
   });
   window.seerob = {
     get t() {
@@ -65,13 +78,14 @@ function begin(element: HTMLElement): void {
     get held() {
       return viewer.gizmo.held;
     },
+    visited: (point) => visit?.inWorld(point) ?? null,
   };
 }
 
 const actions: Actions = {
   time: new TimeControl(),
   look: () => {},
-  offer: () => {},
+  enter: () => Promise.reject(new Error("there is no room yet")),
   frameSelection: () => {},
 };
 listenToKeys(actions);

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "0e2334b16feed27d";
+export const SCHEMA = "053c1bda0f53418f";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -459,6 +459,11 @@ export interface Scene {
   mechanisms: MechanismInfo[];
   criteria: CriterionInfo[];
   findings: Finding[];
+  /**
+   * Person whom a page's headset drives → where the floor of its room lies: position [m], quaternion with w
+   * first; x is ahead there, z up.
+   */
+  headsets: Record<string, [number, number, number, number, number, number, number]>;
 }
 
 /** What a limit says of a value. An evaluation, never a certificate. */

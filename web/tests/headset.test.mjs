@@ -5,7 +5,6 @@ import { test } from "node:test";
 import { load } from "./source.mjs";
 
 const { sight, handName } = await load("xr/sight");
-const { Offering } = await load("xr/offering");
 
 const pose = (x, emulatedPosition = false) => ({
   emulatedPosition,
@@ -66,37 +65,4 @@ test("hands have the names of Body Tracking, and a body wins over a hand", () =>
 test("a body and two hands are not more than the server takes", () => {
   const body = new Map(Array.from({ length: 300 }, (_, k) => [`joint-${k}`, { x: k }]));
   assert.equal(sight(frameOf({ body }), FLOOR, [], "anna", 0).names.length, 160);
-});
-
-test("a session sends one message per picture, and none after its end", async () => {
-  const asked = [];
-  const session = {
-    inputSources: [grip("left", 1)],
-    handlers: {},
-    callback: null,
-    requestReferenceSpace: async (kind) => {
-      asked.push(kind);
-      return FLOOR;
-    },
-    requestAnimationFrame: (callback) => {
-      session.callback = callback;
-      return 1;
-    },
-    cancelAnimationFrame: () => {
-      session.callback = null;
-    },
-    addEventListener: (name, handler) => {
-      session.handlers[name] = handler;
-    },
-  };
-  const sent = [];
-  await Offering.during(session, "anna", (seen) => sent.push(seen));
-  for (const t of [10, 20, 30]) session.callback(t, frameOf());
-  session.handlers.end();
-  assert.deepEqual(asked, ["local-floor"]);
-  assert.deepEqual(
-    sent.map((s) => s.t),
-    [0.01, 0.02, 0.03],
-  );
-  assert.equal(session.callback, null);
 });

@@ -1,54 +1,119 @@
-// A page with a headset that is made up: from the button to the real server and its answer.
+// The page in an emulated headset: into the room by a button, around in it, and out again as one came.
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
+import { HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { open } from "./expect.mjs";
 
+const NEAR = 1e-3;
 let opened;
 let browser;
 let page;
 
-/** Runs in the page, before its own code: a headset that does 20 pictures a second and has one controller. */
-function madeUpHeadset() {
-  const at = (x, y, z) => ({
-    emulatedPosition: false,
-    transform: { position: { x, y, z }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-  });
-  const frame = { getViewerPose: () => at(0, 1.7, 0), getPose: () => at(0.3, 1, -0.4) };
-  class Session extends EventTarget {
-    inputSources = [{ handedness: "right", gripSpace: {}, hand: undefined }];
-    requestReferenceSpace = async () => ({});
-    requestAnimationFrame = (callback) => setTimeout(() => callback(performance.now(), frame), 50);
-    cancelAnimationFrame = (handle) => clearTimeout(handle);
-  }
-  const xr = {
-    isSessionSupported: async (mode) => mode === "immersive-vr",
-    requestSession: async () => {
-      window.session = new Session();
-      return window.session;
-    },
-  };
-  Object.defineProperty(navigator, "xr", { value: xr });
-}
-
 before(async () => {
-  opened = await open(["--mode", "live"], { width: 1280, before: madeUpHeadset });
+  opened = await open(["--mode", "live"], { width: 1280, before: HEADSET });
   ({ browser, page } = opened);
 });
 
 after(() => opened?.close());
 
-test("whoever wears it offers to be the person, and hears when nothing waits for it", async () => {
-  await page.getByRole("button", { name: "be operator", exact: true }).click({ timeout: 120_000 });
-  const answer = page.getByText("nothing in this run waits for a headset of 'operator'");
-  await answer.waitFor({ timeout: 120_000 });
-  assert.equal(await page.getByRole("button", { name: "headset on" }).isDisabled(), true);
+const press = (name) => page.getByRole("button", { name, exact: true }).click({ timeout: 120_000 });
+const visited = (point) => page.evaluate((p) => window.seerob.visited(p), point);
+const leave = async () => {
+  await page.evaluate(() => window.headset.activeSession.end());
+  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 120_000 });
+};
+const push = (side, x, y) =>
+  page.evaluate(([s, a, b]) => window.headset.controllers[s].updateAxes("thumbstick", a, b), [side, x, y]);
+const close = (found, expected, name) => {
+  const off = Math.hypot(...found.map((v, i) => v - expected[i]));
+  assert.ok(off < NEAR, `${name}: ${found} instead of ${expected}`);
+};
+
+test("who looks stands where the page looked from, turns and goes, and comes back to it", async () => {
+  const shown = () => page.evaluate(() => window.seerob.project([0.4, 0.2, 0.9]));
+  // Everything is in view only when everything is there.
+  await page.waitForFunction(() => window.seerob.pose("operator/head") !== null);
+  let seen = await shown();
+  for (let before = null; String(before) !== String(seen); seen = await shown()) {
+    before = seen;
+    await page.waitForTimeout(1000);
+  }
+  await press("enter VR");
+  await page.getByRole("status").getByText("headset on").waitFor({ timeout: 120_000 });
+  await put(page, [0.3, 1.7, 0.2], [0.3, 1.2, 0.2], [0, -1, -1]);
+  await pictures(page, 3);
+  const head = await visited([0.3, 1.7, 0.2]);
+  assert.ok(Math.abs(head[1] - 1.7) < NEAR, "one stands on the floor");
+  const ahead = async () => {
+    const [from, to] = [await visited([0.3, 1.7, 0.2]), await visited([0.3, 1.7, -0.8])];
+    return to.map((v, i) => v - from[i]);
+  };
+  const before = await ahead();
+  await push("right", 1, 0);
+  await pictures(page, 3);
+  close(await visited([0.3, 1.7, 0.2]), head, "the head stays where it is in a turn");
+  const [cos, sin] = [Math.cos(Math.PI / 6), Math.sin(Math.PI / 6)];
+  const turned = [before[0] * cos - before[2] * sin, 0, before[0] * sin + before[2] * cos];
+  close(await ahead(), turned, "30 degrees to the right, once");
+  await push("right", 0, 0);
+  await pictures(page, 2);
+  // The hand is 1.2 m high and points down by 45 degrees: 1.2 m ahead of it.
+  const landing = await visited([0.3, 0, -1.0]);
+  await push("right", 0, -1);
+  await pictures(page, 3);
+  await push("right", 0, 0);
+  await pictures(page, 3);
+  close(await visited([0.3, 0, 0.2]), landing, "one stands where one pointed");
+  await leave();
+  assert.equal(await page.evaluate(() => window.seerob.visited([0, 0, 0])), null);
+  await page.waitForFunction(
+    ([x, y]) => {
+      const [a, b] = window.seerob.project([0.4, 0.2, 0.9]);
+      return Math.hypot(a - x, b - y) < 0.5;
+    },
+    seen,
+    { timeout: 60_000 },
+  );
   assert.deepEqual(browser.complaints, []);
 });
 
-test("when the session ends it can be begun again", async () => {
-  await page.evaluate(() => window.session.dispatchEvent(new Event("end")));
-  const again = page.getByRole("button", { name: "be operator", exact: true });
-  await again.waitFor({ timeout: 120_000 });
-  assert.equal(await again.isEnabled(), true);
+test("what one points at is selected with the trigger", async () => {
+  await press("enter VR");
+  await pictures(page, 4);
+  const at = await page.evaluate(() => window.seerob.pose("operator/head").position);
+  const [floor, right, back] = await Promise.all([
+    visited([0, 0, 0]),
+    visited([1, 0, 0]),
+    visited([0, 0, 1]),
+  ]);
+  const off = at.map((v, i) => v - floor[i]);
+  const along = (to) => to.reduce((sum, v, i) => sum + (v - floor[i]) * off[i], 0);
+  const inRoom = [along(right), off[1], along(back)];
+  // From above the person, straight down; the robot may be over it just then.
+  await put(page, [0, 1.6, 0], [inRoom[0], 2.6, inRoom[2]], [0, -1, 0]);
+  await pictures(page, 4);
+  await page.evaluate(() => window.headset.controllers.right.updateButtonValue("trigger", 1));
+  await pictures(page, 4);
+  await page.evaluate(() => window.headset.controllers.right.updateButtonValue("trigger", 0));
+  await pictures(page, 4);
+  await page.locator(".properties h2", { hasText: /^(operator|ur10)\// }).waitFor({ timeout: 60_000 });
+  await leave();
+});
+
+test("whoever is a person offers what the headset sees, and hears when nothing waits for it", async () => {
+  await press("be operator in VR");
+  const answer = page.getByText("nothing in this run waits for a headset of 'operator'");
+  await answer.waitFor({ timeout: 120_000 });
+  await leave();
+  assert.deepEqual([browser.complaints, browser.outside], [[], []]);
+});
+
+test("through the glasses the room has no background of its own", async () => {
+  await press("enter AR");
+  await pictures(page, 2);
+  const mode = await page.evaluate(() => window.headset.activeSession.environmentBlendMode);
+  assert.equal(mode, "alpha-blend");
+  await leave();
+  assert.deepEqual(browser.complaints, []);
 });

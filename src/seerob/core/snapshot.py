@@ -458,6 +458,9 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     mechanisms: tuple[MechanismInfo, ...] = ()
     criteria: tuple[CriterionInfo, ...] = ()
     findings: tuple[Finding, ...] = ()
+    headsets: dict[str, tuple[float, float, float, float, float, float, float]] = {}
+    """Person whom a page's headset drives → where the floor of its room lies: position [m], quaternion with w
+    first; x is ahead there, z up."""
 
     def __repr__(self) -> str:
         count = f"{len(self.nodes)} bodies, {len(self.criteria)} criteria, {len(self.findings)} findings"

@@ -7,9 +7,13 @@ from importlib.metadata import version
 
 from seerob.core.plugin import kind_of
 from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
+from seerob.core.transforms import wxyz_from_rotation
 from seerob.criteria.question import Bound
 from seerob.criteria.scoring.phases import entered_for
 from seerob.description.norms.editions import headline
+from seerob.devices.capture.options import placement
+from seerob.devices.capture.stream_source import CaptureStream
+from seerob.devices.live.headset_offers import TakesOffers
 from seerob.model.model import Model
 from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
@@ -17,7 +21,7 @@ from seerob.session.opening import coarse
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import no_position_reason
 from seerob.workstation.variables import Value, WhenStale
-from seerob.workstation.workstation import Workstation
+from seerob.workstation.workstation import Pose, Workstation
 
 
 def unmet_phases(model: Model, bound: Sequence[Bound], end: float) -> Iterator[Finding]:
@@ -103,7 +107,20 @@ def scene_of(
             for b in bound
         ),
         findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
+        headsets={
+            source.human: _floor(source.at)
+            for source in station.sources
+            if isinstance(source, TakesOffers) and isinstance(source, CaptureStream)
+        },
     )
+
+
+def _floor(at: Pose) -> tuple[float, float, float, float, float, float, float]:
+    """Where a device's world lies: position [m], quaternion with w first."""
+    placed = placement(at)
+    x, y, z = placed[:3, 3].tolist()
+    w, i, j, k = wxyz_from_rotation(placed[:3, :3])
+    return x, y, z, w, i, j, k
 
 
 def _between(bound: Bound, station: Workstation, *, fed: bool) -> str:

@@ -1,26 +1,29 @@
-// Lets whoever wears a headset be the person of the workstation: shown where there is one, in a live run.
+// Lets whoever wears a headset into the room: to look, or, in a live run, as a person of the workstation.
 
 import { useEffect, useState } from "preact/hooks";
 import { isLive, mayTrack, scene, tracked } from "../page_state";
-import { Offering, sessionMode } from "../xr/offering";
+import { type Mode, sessionModes } from "../xr/visit";
 import { useActions } from "./app_context";
 
+const WORDS: Record<Mode, string> = { "immersive-vr": "VR", "immersive-ar": "AR" };
+
 export function HeadsetOffer() {
-  const [there, setThere] = useState(false);
-  const [offering, setOffering] = useState<Offering | null>(null);
+  const [modes, setModes] = useState<readonly Mode[]>([]);
+  const [inside, setInside] = useState(false);
   const [failure, setFailure] = useState("");
-  const { offer } = useActions();
+  const { enter } = useActions();
   useEffect(() => {
-    sessionMode().then((mode) => setThere(mode !== null));
+    sessionModes().then(setModes);
   }, []);
-  if (!there || !isLive.value || !mayTrack.value) return null;
+  if (modes.length === 0) return null;
   const people = new Set(scene.value?.nodes.filter((n) => n.role === "human").map((n) => n.owner));
-  const begin = async (human: string): Promise<void> => {
+  const may = isLive.value && mayTrack.value;
+  const begin = async (mode: Mode, human: string | null): Promise<void> => {
     setFailure("");
     try {
-      const begun = await Offering.begin(human, offer);
-      begun.session.addEventListener("end", () => setOffering(null));
-      setOffering(begun);
+      const session = await enter(mode, human);
+      session.addEventListener("end", () => setInside(false));
+      setInside(true);
     } catch (error) {
       setFailure(error instanceof Error ? error.message : String(error));
     }
@@ -29,12 +32,29 @@ export function HeadsetOffer() {
   const said = failure || (answer && !answer.accepted ? answer.reason : "");
   return (
     <div class="headset-offer">
-      {[...people].map((human) => (
-        <button key={human} type="button" disabled={offering !== null} onClick={() => void begin(human)}>
-          {offering ? "headset on" : `be ${human}`}
-        </button>
-      ))}
+      {inside && <span role="status">headset on</span>}
+      {!inside &&
+        modes.map((mode) => (
+          <button key={mode} type="button" title={TITLES[mode]} onClick={() => void begin(mode, null)}>
+            enter {WORDS[mode]}
+          </button>
+        ))}
+      {!inside &&
+        may &&
+        [...people].flatMap((human) =>
+          modes.map((mode) => (
+            <button key={human + mode} type="button" onClick={() => void begin(mode, human)}>
+              be {human}
+              {modes.length > 1 && ` in ${WORDS[mode]}`}
+            </button>
+          )),
+        )}
       {said && <span role="alert">{said}</span>}
     </div>
   );
 }
+
+const TITLES: Record<Mode, string> = {
+  "immersive-vr": "Stand in the twin",
+  "immersive-ar": "See the twin where you are",
+};

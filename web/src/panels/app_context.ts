@@ -4,14 +4,14 @@ import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Preset } from "../scene/viewpoint";
 import type { TimeControl } from "../time_control";
-import type { Tracking } from "../wire";
+import type { Mode } from "../xr/visit";
 
 export interface Actions {
   time: TimeControl;
   /** Go to a viewpoint. */
   look(preset: Preset): void;
-  /** Offer what a headset sees to the run. */
-  offer(seen: Tracking): void;
+  /** Enter the room with a headset: as a person of the twin, or to look (null). */
+  enter(mode: Mode, human: string | null): Promise<XRSession>;
   /** Fill the view with the selection, or with everything. */
   frameSelection(): void;
 }

@@ -1,6 +1,6 @@
 // A click (not a drag) on a body selects it.
 
-import { type Object3D, Raycaster, Vector2 } from "three";
+import { type Intersection, type Object3D, Raycaster, Vector2 } from "three";
 import type { Bodies } from "./bodies";
 import type { Stage } from "./stage";
 
@@ -28,11 +28,19 @@ export function pickOnClick(
       1 - ((event.clientY - box.top) / box.height) * 2,
     );
     ray.setFromCamera(at, stage.camera);
-    const hits = ray.intersectObject(bodies.root, true);
-    const hit = hits.find(({ object }) => nodeOf(object) !== null);
+    const hit = hitAlong(ray, bodies);
     const normal = hit?.face?.normal.clone().transformDirection(hit.object.matrixWorld);
     picked(hit ? nodeOf(hit.object) : null, normal ? [normal.x, normal.y, normal.z] : null);
   });
+}
+
+/** Name of the node that a ray of the world meets first; null for none. */
+export function nodeAlong(ray: Raycaster, bodies: Bodies): string | null {
+  return nodeOf(hitAlong(ray, bodies)?.object ?? null);
+}
+
+function hitAlong(ray: Raycaster, bodies: Bodies): Intersection | undefined {
+  return ray.intersectObject(bodies.root, true).find(({ object }) => nodeOf(object) !== null);
 }
 
 // Hidden bodies are hit by rays all the same.

@@ -78,9 +78,9 @@ export class Stage {
   }
 
   /** Call `each` once per display frame, before drawing. */
-  run(each: (time: number) => void): void {
-    this.renderer.setAnimationLoop((time: number) => {
-      each(time);
+  run(each: (time: number, frame?: XRFrame) => void): void {
+    this.renderer.setAnimationLoop((time: number, frame?: XRFrame) => {
+      each(time, frame);
       if (this.renderer.xr.isPresenting) {
         this.renderer.render(this.scene, this.camera);
         return;
@@ -102,9 +102,10 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
   }
 
-  private resize(): void {
+  /** Fit the element; what is seen in a headset has a size of its own. */
+  resize(): void {
     const { clientWidth: width, clientHeight: height } = this.element;
-    if (width === 0 || height === 0) return;
+    if (width === 0 || height === 0 || this.renderer.xr.isPresenting) return;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.renderer.setSize(width, height);

@@ -1,7 +1,7 @@
 // The middle of the page: bodies, markers and viewpoint, told by signals what to show.
 
 import { effect, signal } from "@preact/signals";
-import { Quaternion, Vector3 } from "three";
+import { Quaternion, type Raycaster, Vector3 } from "three";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
 import { measuring, withFace } from "../editing/measure";
@@ -16,7 +16,7 @@ import { Bodies } from "./bodies";
 import { DoubtCaptions } from "./doubt_captions";
 import { Gizmo } from "./gizmo";
 import { Outline } from "./outline";
-import { pickOnClick } from "./picking";
+import { nodeAlong, pickOnClick } from "./picking";
 import { Stage } from "./stage";
 import { Viewpoint } from "./viewpoint";
 
@@ -110,12 +110,18 @@ export class Viewer {
       this.framed = true;
       this.viewpoint.go("corner");
     }
-    this.viewpoint.update();
+    if (!this.stage.renderer.xr.isPresenting) this.viewpoint.update();
     const { camera, element } = this.stage;
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
     this.view.margins = !this.stage.renderer.xr.isPresenting;
     camera.updateWorldMatrix(true, false);
     this.markers.face(this.view, [...this.doubts.shown()]);
+  }
+
+  /** Select the body that a ray of the world meets first, or nothing. */
+  pick(ray: Raycaster): void {
+    const name = nodeAlong(ray, this.bodies);
+    select(name === null ? null : { kind: "node", name });
   }
 
   /** Pose of a body in three.js's own world, y up. */

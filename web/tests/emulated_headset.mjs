@@ -1,0 +1,59 @@
+// A headset without a headset: iwer, in the page before its own code; and what a visitor does with it.
+
+import fs from "node:fs";
+
+const RUNTIME = fs.readFileSync(new URL("../node_modules/iwer/build/iwer.min.js", import.meta.url), "utf8");
+
+/** What runs in the page before its own code: a Quest 3, also where the browser has WebXR of its own. */
+export const HEADSET = `${RUNTIME}
+;(() => {
+  const device = new IWER.XRDevice(IWER.metaQuest3);
+  device.installRuntime({ forceInstall: true });
+  window.headset = device;
+  // Who stands still moves by a fraction of a millimetre; what is the same to the last bit is frozen.
+  const shaken = [device, device.controllers.left, device.controllers.right];
+  const still = shaken.map((each) => [...each.position.vec3]);
+  const noise = () => 4e-4 * (Math.random() - 0.5);
+  window.put = (i, at) => {
+    still[i] = at;
+    shaken[i].position.set(...at);
+  };
+  setInterval(() => shaken.forEach((each, i) => each.position.set(...still[i].map((v) => v + noise()))), 10);
+})();`;
+
+/** Wait for so many pictures of the session. */
+export function pictures(page, count) {
+  return page.evaluate(
+    (n) =>
+      new Promise((done) => {
+        const each = () => {
+          n -= 1;
+          if (n < 0) done();
+          else window.headset.activeSession.requestAnimationFrame(each);
+        };
+        each();
+      }),
+    count,
+  );
+}
+
+/** Put the head, and the right controller with where it points, in the room (y up) [m]. */
+export function put(page, head, hand = null, direction = [0, 0, -1]) {
+  return page.evaluate(
+    ([h, c, d]) => {
+      const { headset } = window;
+      window.put(0, h);
+      if (!c) return;
+      const { right } = headset.controllers;
+      window.put(2, c);
+      // From -z to d: half way between both.
+      const [x, y, z] = d;
+      const far = Math.hypot(x, y, z);
+      const w = 1 - z / far;
+      const q = [y / far, -x / far, 0, w];
+      const long = Math.hypot(...q);
+      right.quaternion.set(...q.map((v) => v / long));
+    },
+    [head, hand, direction],
+  );
+}

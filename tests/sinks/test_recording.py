@@ -66,6 +66,7 @@ def test_everything_comes_back_bit_for_bit(path):
 
 def test_who_looked_on_has_one_channel_that_other_recordings_lack(path, tmp_path):
     tape = McapTape(tmp_path / "run.mcap", made_run.scene(), {}, {})
+    assert [nanoseconds(t) for t in (-1.0, 0.0, 0.2, 1.5)] == [0, 0, 200_000_000, 1_500_000_000]
     came = [Visitor(event=event, role="view", address="", since="") for event in ("came", "left")]
     for t, visitors in ((0.1, ()), (0.2, came[:1]), (0.3, came[1:])):
         tape.visitors(t, tuple(visitors))

@@ -26,12 +26,9 @@ SHIPPED = {
     "ur10_rtde": "live: a UR10, emulated",
     "motor_station": "live: an LBR iiwa and a person with trackers, both emulated",
     "assembly_line": "live: a UR10 and a person whom a depth camera sees, both emulated",
-    "plc_cell": "live: a UR10 and a PLC with a belt, a light curtain and a door",
+    "plc_cell": "live: a UR10 and a PLC with a belt, a light curtain and a door, both emulated",
 }
 """What each shows; the first is run when none is named."""
-
-_BESIDE = {"plc_cell": ("seerob emulate rtde --robot ur10", "seerob emulate opcua")}
-"""What has to run beside, where no device does and the file names no emulators."""
 
 
 def add(sub: argparse.ArgumentParser) -> None:
@@ -41,6 +38,8 @@ def add(sub: argparse.ArgumentParser) -> None:
     text = "where to copy it (default: its name, here); one that is there is run as it is"
     sub.add_argument("folder", type=Path, nargs="?", help=text)
     sub.add_argument("--list", action="store_true", help="list them, and run none")
+    text = "its devices are there: start no emulators, and say where the addresses stand"
+    sub.add_argument("--real", action="store_true", help=text)
     live.add_live(sub)
     sub.set_defaults(allow_plugins=False, allow_outside=False, allow_writing=False, replay=None)
 
@@ -67,10 +66,14 @@ def run(options: argparse.Namespace) -> int:
     else:
         copy(name, folder)
         line("wrote", f"{folder}: yours to change; seerob run {folder} runs it again")
-    for command in _BESIDE.get(name, ()):
-        line("beside", f"{command}   in a terminal of its own, where no device is")
     options.workstation = folder
-    options.emulated = "emulators" in tomllib.loads((folder / "workstation.toml").read_text("utf-8"))
+    named = "emulators" in tomllib.loads((folder / "workstation.toml").read_text("utf-8"))
+    options.emulated = named and not options.real
+    if named and options.real:
+        line(
+            "real",
+            f"the addresses below stand in {folder / 'workstation.toml'}: put those of your devices there",
+        )
     return live.run(options)
 
 

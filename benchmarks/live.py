@@ -98,11 +98,11 @@ class Post:
             receivers.Receivers.take = take
         for notes in self._notes.iterdir():
             for name, signals, seq, instant, device, posted in json.loads(notes.read_bytes()):
-                self.posted[name, seq] = posted
+                self.posted[name, signals, seq] = posted
                 self.came[name, signals].append((seq, instant, device))
 
-    def arrived(self, written: dict[float, float]) -> dict[tuple[str, int], float]:
-        """When each sample came in at the earliest, by source and sequence number [s].
+    def arrived(self, written: dict[float, float]) -> dict[tuple[str, bool, int], float]:
+        """When each sample came in at the earliest, by source, whether it is of signals, and number [s].
 
         Signals that are told again while nothing is heard are no packet.
 
@@ -117,15 +117,15 @@ class Post:
             came = list(firsts.values()) if signals else said
             for k, (seq, instant, device) in enumerate(came):
                 together = k + 1 < len(came) and came[k + 1][1] == instant
-                found[source, seq] = min(instant, written[device]) if together else instant
+                found[source, signals, seq] = min(instant, written[device]) if together else instant
         return found
 
     def mailbox(self, written: dict[float, float], since: float) -> dict[str, list[float]]:
         """Between arrival and mailbox, by source [s]; of what arrived since everybody had begun."""
         found = defaultdict(list)
-        for (source, seq), instant in self.arrived(written).items():
+        for (source, signals, seq), instant in self.arrived(written).items():
             if instant >= since:
-                found[source].append(self.posted[source, seq] - instant)
+                found[source].append(self.posted[source, signals, seq] - instant)
         return found
 
     def together(self) -> dict[str, float]:
@@ -160,7 +160,7 @@ class States:
         found, arrived = defaultdict(list), post.arrived(written)
         for instant, samples in self.ticks[1:]:  # the first waits for the beginning
             for sample in samples:
-                came = arrived.get((sample.source, sample.seq))
+                came = arrived.get((sample.source, isinstance(sample, SignalSample), sample.seq))
                 if came is not None:
                     found[sample.source].append(instant - came)
         return found
@@ -196,11 +196,13 @@ def listen(notes: str) -> int:
     hear, noted = Listener.take, []
 
     def heard(listener, sample):
-        seq = listener._seq
+        signals = isinstance(sample, SignalSample)
+        what = ("signal", listener.name) if signals else key(sample)
+        before = listener._posted.get(what)
         hear(listener, sample)
-        if listener._seq > seq:
-            signals = isinstance(sample, SignalSample)
-            noted.append((listener.name, signals, seq, sample.t, sample.t_device, time.monotonic()))
+        posted = listener._posted.get(what)
+        if posted is not None and posted is not before:
+            noted.append((listener.name, signals, posted.seq, sample.t, sample.t_device, time.monotonic()))
 
     Listener.take = heard
     code = listening_process.main()
@@ -257,8 +259,8 @@ def used_late(post: Post, period: float) -> int:
     """Ticks that used a sample older than one tick while a newer one had been in the mailbox."""
     count, newest, after = 0, {}, {}
     for (source, signals), came in post.came.items():
-        if not signals:  # which are counted together with the others, and take no place from them
-            after |= {(source, one[0]): post.posted[source, two[0]] for one, two in pairwise(came)}
+        if not signals:
+            after |= {(source, one[0]): post.posted[source, False, two[0]] for one, two in pairwise(came)}
     for now, samples in post.taken:
         for sample in samples:
             if not isinstance(sample, SignalSample):

@@ -112,7 +112,7 @@ def main() -> int:
         print(f"seerob, with the jerk limit: {found.duration:.3f} s; toppra alone: {alone:.3f} s, which uses "
               f"{beyond:.1f} times the jerk limit; ratio {found.duration / alone:.3f}, "
               f"{found.duration - alone:+.3f} s")  # fmt: skip
-        free = rescale(_without_jerk(found), margin=found.margin)
+        free = rescale(_without_jerk(found), not_faster=False, margin=found.margin)
         print(
             f"seerob, jerk limit that does not bind: {free.duration:.3f} s; ratio {free.duration / alone:.3f}"
         )

@@ -98,7 +98,7 @@ def test_a_path_as_another_system_writes_it_is_named(tmp_path):
 def test_proprietary_files_say_which_export_to_ask_for(tmp_path, name):
     with pytest.raises(InputError) as caught:
         load_meshes(tmp_path / name)
-    assert "export it as GLB or STL" in caught.value.problems[0].remedy
+    assert f"seerob import {name} FOLDER reads it or says what to export" in caught.value.problems[0].remedy
 
 
 def test_wrong_options_name_the_right_ones(tmp_path):

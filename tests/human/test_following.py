@@ -15,6 +15,7 @@ from seerob.description.capture.following import Following
 from seerob.description.capture.smoothing import POINT_SPEED
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 from seerob.session.station import Station
+from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
 
 HAND = BONES.index("right_hand")
@@ -306,3 +307,34 @@ def test_who_is_seen_for_the_first_time_during_a_run_is_put_there():
         assert np.abs(state.data.qvel[mechanism.v_address]).max() < 10, state.t
         assert bool(state.invalid_reason("operator")) == (state.t < late - 1e-9), state.t
     assert state.joint_positions(mechanism)[0] > 2.9
+
+
+def test_who_turns_back_while_nothing_is_heard_is_no_farther_from_the_twin_than_is_said():
+    """The twin of a live person goes on at its speed until the time-out; the person need not."""
+    station = Station(workstation(source(captured(frames_of(*walking(1.2))))))
+    said = [sample for _, opened in station.sources for sample in opened.samples]
+    turns = next(k for k, sample in enumerate(said) if sample.t > 0.6)
+    back = [
+        replace(now, points=then.points)
+        for now, then in zip(said[turns:], said[turns - 1 :: -1], strict=False)
+    ]
+    bodies = tuple(b.index for b in station.model.bodies if b.owner == "operator")
+    off = TrackingError(station.model, bodies)
+    places, errors, waits = [], [], []
+    for heard in ([*said[:turns], *back], said[:turns]):
+        engine = Engine(station.model, driven={"operator": 0.5}, live=["operator"])
+        places.append(last := [])
+        errors.append(around := [])
+        for tick in range(100):
+            engine.take([s for s in heard if (tick - 1) * 0.01 < s.t - 0.02 <= tick * 0.01])
+            state = engine.tick() if tick else engine.start()
+            if state.t > 0.1:
+                last.append(state.positions[list(bodies)].copy())
+                around.append(off.at(state))
+                if 0.1 < state.t < 0.5:
+                    waits.append(state.hearing("operator").slack(state.t))
+    apart = np.linalg.norm(np.subtract(*places), axis=2)
+    known = np.add(*errors)
+    assert (apart <= known + 0.005).all(), (apart - known).max()
+    assert apart[-1].max() > 0.2
+    assert not any(waits)  # who is heard in time is held nowhere

@@ -19,7 +19,7 @@ import numpy as np
 from seerob.core.samples import REPEATED
 from seerob.core.transforms import Array
 from seerob.description.capture.estimated import estimated
-from seerob.description.capture.following import Followed, InvalidPart
+from seerob.description.capture.following import Followed, InvalidPart, held_speed
 from seerob.description.humans.skeleton import BONES
 from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 from seerob.model.model import Model
@@ -298,10 +298,16 @@ class Hearing:
         return no_position_reason(tuple(bone for bone in BONES if bone in found)) if found else ""
 
     def slack(self, t: float) -> dict[str, float]:
-        """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m]."""
+        """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m].
+
+        Of whom nothing is heard meanwhile each bone is held: the twin goes on, the person may turn back.
+        """
         found: dict[str, float] = {}
-        for said in self._said_of_bones(t):
+        around = self._said_of_bones(t)
+        for said in around:
             found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in said.places.slack.items()}
+        if len(around) == 1 and (age := t - around[0].t) > SLACK and around[0].observed:
+            found = {bone: held_speed(bone) * age + found.get(bone, 0.0) for bone in BONES}
         return found
 
     def undetermined_angles(self, t: float) -> frozenset[tuple[str, int]]:

@@ -11,7 +11,7 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
 from seerob.criteria.contact.clamped_regions import Clamping
-from seerob.criteria.stopping.onset import Foreseen
+from seerob.criteria.stopping.onset import Foreseen, _Window
 from seerob.session.run import Judge, engine_of, pump, ticks
 from seerob.twin.engine import Engine
 
@@ -470,6 +470,11 @@ def test_what_is_picked_up_speeds_up_with_the_hand_until_it_brakes(tmp_path):
     gap = model.gap(model.select("post"), robot.moving)
     rod = gap.b.index(next(body.index for body in model.bodies if body.name == "rod"))
     kept = Foreseen(model, robot, gap, 0.2, joints=False)
+    # Memory that was somebody else's, with the motion that comes: nothing of it is taken for a tick before.
+    kept._window = _Window(64, 4, len(gap.b), 2)
+    for array in kept._window._arrays[2:]:
+        array[:] = 0.0
+    kept._window._arrays.last[:] = 9.0
 
     def judge(state):
         known, anew = (each.at(state)(1.0) for each in (kept, Foreseen(model, robot, gap, 0.2, joints=False)))
@@ -481,5 +486,5 @@ def test_what_is_picked_up_speeds_up_with_the_hand_until_it_brakes(tmp_path):
 
     for _ in ticks(engine_of(model), judge, pump(station.sources, TICK, ahead={"arm": 0.3})):
         pass
-    assert min(held) < 1e-6
+    assert held[0] < 1e-6
     assert max(held) > 0.5

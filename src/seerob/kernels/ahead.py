@@ -17,6 +17,8 @@ from seerob.kernels.speed import fastest_of
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 _ROW, _ROWS, _PAIR = "f8[::1]", "f8[:,::1]", "f8[:,:,::1]"
+UNKNOWN = -(1 << 62)
+"""Instead of the number of a tick: it is that of none, nor is the next one."""
 
 
 class Window(NamedTuple):
@@ -26,7 +28,7 @@ class Window(NamedTuple):
     """
 
     number: Indices
-    """Which tick is known there, -1 where none is, shape (s,)."""
+    """Which tick is known there, `UNKNOWN` where none is, shape (s,)."""
     instants: Indices
     """How many instants it has, shape (s,)."""
     q: Array
@@ -122,7 +124,7 @@ def window(ticks: int, instants: int, parts: int, joints: int) -> Window:
     """Room for so many ticks, and instants of each; nothing is known."""
     s, m, n, j = ticks, ticks * instants, parts, joints
     return Window(
-        np.full(s, -1), np.zeros(s, np.int64), np.empty((m, j)), np.empty((m, j)),
+        np.full(s, UNKNOWN), np.zeros(s, np.int64), np.empty((m, j)), np.empty((m, j)),
         np.empty((m, 2, n)), np.empty((m, 2, j)), np.empty((s, n)), np.empty((instants, n)),
     )  # fmt: skip
 
@@ -354,7 +356,7 @@ def moved_on(window: Indices, again: bool, first: int, rows: Indices, q: Array, 
     if len(rows) > s:
         return -1
     if not again:
-        now.number[:] = -1
+        now.number[:] = UNKNOWN
     for i in range(len(rows) - 1):
         slot = (first + i) % s
         begin, count = slot * r, rows[i + 1] - rows[i] + 1
@@ -367,7 +369,7 @@ def moved_on(window: Indices, again: bool, first: int, rows: Indices, q: Array, 
         if same:
             continue
         missing += 1
-        now.number[slot], now.instants[slot] = -1, count
+        now.number[slot], now.instants[slot] = UNKNOWN, count
         for row in range(count):
             for j in range(q.shape[1]):
                 now.q[begin + row, j], now.qd[begin + row, j] = q[rows[i] + row, j], qd[rows[i] + row, j]

@@ -25,7 +25,7 @@ from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import SLACK
 
 SHIFT = 28800.0
-"""How much later it is looked again at whom no source moves [s]."""
+"""How much later it is looked again at whom no source moves [s]: a shift of eight hours. Own choice."""
 
 _log = logging.getLogger(__name__)
 # To ask an enumeration for a member takes longer than all the rest of a judgement.

@@ -27,6 +27,8 @@ declare global {
       tint(name: string): number | null;
       /** Whether a body is shown as one that may be elsewhere. */
       doubted(name: string): boolean;
+      /** Whether a body is not drawn, as it is real, and hides what is behind it. */
+      occludes(name: string): boolean;
       /** Where a point of the world (z up) [m] is on the screen [px]. */
       project(point: [number, number, number]): [number, number];
       /** Whether the pointer is on a handle of what is edited, or drags one. */
@@ -74,6 +76,7 @@ function begin(element: HTMLElement): void {
     pose: (name) => viewer.poseOf(name),
     tint: (name) => viewer.bodies.byName.get(name)?.tint ?? null,
     doubted: (name) => viewer.bodies.byName.get(name)?.doubted ?? false,
+    occludes: (name) => viewer.bodies.byName.get(name)?.occludes ?? false,
     project: (point) => viewer.project(point),
     get held() {
       return viewer.gizmo.held;

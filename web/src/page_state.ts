@@ -57,6 +57,8 @@ export const reach = signal<{ start: number; end: number }>({ start: 0, end: 0 }
 export const selection = signal<Selection | null>(null);
 /** Nodes that are not drawn. */
 export const hidden = signal<ReadonlySet<string>>(new Set());
+/** Whether the twin is shown over the real cell: what is real is not drawn there, and hides what is behind it. */
+export const overReality = signal(false);
 /** Criteria whose markers are not drawn. */
 export const mutedCriteria = signal<ReadonlySet<string>>(new Set());
 

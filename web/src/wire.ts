@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "053c1bda0f53418f";
+export const SCHEMA = "16d4a4715f817ebb";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -371,6 +371,8 @@ export interface Node {
   mass_origin: Origin;
   /** What to know of its geometry: `envelope, not the maker's mesh`. */
   note: string;
+  /** Whether it exists in the real cell: over that it is not drawn, and hides what is behind it. */
+  real: boolean;
 }
 
 /** A class of scores that a method acts upon, such as an action level. */

@@ -109,11 +109,16 @@ test("whoever is a person offers what the headset sees, and hears when nothing w
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });
 
-test("through the glasses the room has no background of its own", async () => {
+test("through the glasses the room has no background of its own, and what is real is not drawn", async () => {
+  const occluding = () =>
+    page.evaluate(() => ["table", "line/fixture/pin_1"].filter((name) => window.seerob.occludes(name)));
+  assert.deepEqual(await occluding(), [], "in a room of its own the twin is drawn as a whole");
   await press("enter AR");
   await pictures(page, 2);
   const mode = await page.evaluate(() => window.headset.activeSession.environmentBlendMode);
   assert.equal(mode, "alpha-blend");
+  assert.deepEqual(await occluding(), ["table"]);
   await leave();
+  assert.deepEqual(await occluding(), []);
   assert.deepEqual(browser.complaints, []);
 });

@@ -154,7 +154,10 @@ def workstation() -> tuple[Scene, dict[str, bytes]]:
     for name, lower, upper, color in PARTS:
         mesh = keep(box_mesh(lower, upper, color=color))
         owner = name.split("/")[0]
-        nodes.append(Node(name=name, role="part", owner=owner, mesh=mesh, triangles=12, moves=False))
+        real = name == "table"
+        nodes.append(
+            Node(name=name, role="part", owner=owner, mesh=mesh, triangles=12, moves=False, real=real)
+        )
     room = keep(box_mesh((-0.7, -0.8, 0.7), (0.1, 0.8, 1.9)))
     nodes.append(
         Node(name="robot side", role="area", owner="robot side", mesh=room, triangles=12, moves=False)

@@ -369,6 +369,8 @@ class Node(Struct, frozen=True, kw_only=True):
     mass_origin: Origin = Origin.MISSING
     note: str = ""
     """What to know of its geometry: ``envelope, not the maker's mesh``."""
+    real: bool = False
+    """Whether it exists in the real cell: over that it is not drawn, and hides what is behind it."""
 
 
 class Level(Struct, frozen=True, kw_only=True):

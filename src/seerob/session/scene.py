@@ -21,7 +21,7 @@ from seerob.session.opening import coarse
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import no_position_reason
 from seerob.workstation.variables import Value, WhenStale
-from seerob.workstation.workstation import Pose, Workstation
+from seerob.workstation.workstation import Pose, Workstation, real_names
 
 
 def unmet_phases(model: Model, bound: Sequence[Bound], end: float) -> Iterator[Finding]:
@@ -56,6 +56,7 @@ def scene_of(
     """
     station = model.workstation
     too_coarse = coarse(model)
+    there = real_names(station)
     return Scene(
         title=station.title,
         edition=headline((b.basis for b in bound), station.edition),
@@ -74,6 +75,7 @@ def scene_of(
                 mass=None if body.mass is None else body.mass.value,
                 mass_origin=model.mass_origin(body),
                 note=body.note,
+                real=body.owner in there,
             )
             for body in model.bodies
         ),

@@ -155,6 +155,9 @@ class Robot(_Table, frozen=True, kw_only=True):
     compared with it."""
     published_mass_source: Annotated[str, Meta(min_length=1, max_length=200)] | None = None
     """Where the maker says so: data sheet, edition, page."""
+    real: bool = False
+    """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
+    there, hides what is behind it, and counts in every figure as before."""
 
     def __post_init__(self) -> None:
         if (self.published_mass is None) != (self.published_mass_source is None):
@@ -227,6 +230,9 @@ class Mounted(Thing, frozen=True, kw_only=True):
     """How far its ``density`` may be off, as a share, and with it its mass."""
     com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
     """How far its centre of mass may be from where it is, in any direction [m]."""
+    real: bool = False
+    """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
+    there, hides what is behind it, and counts in every figure as before."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -252,6 +258,10 @@ class Workpiece(Mounted, frozen=True, kw_only=True):
 class Part(Thing, frozen=True, kw_only=True):
     """Something of the environment that stands still."""
 
+    real: bool = False
+    """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
+    there, hides what is behind it, and counts in every figure as before."""
+
 
 class Machine(Thing, frozen=True, kw_only=True):
     """Something that moves: an axis, a door, a turntable, what a belt carries, a cart, a gripper."""
@@ -270,6 +280,9 @@ class Machine(Thing, frozen=True, kw_only=True):
     """It goes along a way that is drawn on the floor."""
     grip: Fingers | None = None
     """It is a gripper with these fingers."""
+    real: bool = False
+    """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
+    there, hides what is behind it, and counts in every figure as before."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -366,6 +379,9 @@ class Human(_Table, frozen=True, kw_only=True):
     """Named posture when no source moves the person."""
     joints: dict[str, Radian] = {}
     """Joint angles on top of the posture [rad]; ``joints_deg`` for degrees."""
+    real: bool = False
+    """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
+    there, hides what is behind it, and counts in every figure as before."""
 
     def __post_init__(self) -> None:
         small = not isinstance(self.stature, str) and self.stature < 1.2
@@ -444,6 +460,13 @@ class Workstation(_Table, frozen=True, kw_only=True):
     def __repr__(self) -> str:
         tables = [f"{name} {len(there)}" for name in (*TABLES, *PLUGINS) if (there := getattr(self, name))]
         return f"<Workstation {self.title!r}: {', '.join(tables) or 'empty'}>"
+
+
+def real_names(station: Workstation) -> frozenset[str]:
+    """Names of what exists in the real cell: robots, people, parts and what else says so."""
+    entries = (station.robots, station.tools, station.workpieces, station.parts, station.machines)
+    named = (entry for group in (*entries, station.humans) for entry in group)
+    return frozenset(entry.name for entry in named if entry.real)
 
 
 TABLES: dict[str, type[Struct]] = {

@@ -31,6 +31,12 @@ export function Properties() {
             <dd class="unknown">{doubt}</dd>
           </>
         )}
+        {nodes.every((node) => node.real) && (
+          <>
+            <dt>Real</dt>
+            <dd>not drawn over the real cell</dd>
+          </>
+        )}
         {chosen.kind === "node" && first.owner !== first.name && (
           <>
             <dt>Belongs to</dt>

@@ -13,6 +13,7 @@ import {
   glow,
   lineMaterial,
   markerMaterial,
+  occluderMaterial,
   ownMaterial,
   scoreMaterial,
 } from "./materials";
@@ -20,6 +21,9 @@ import { veilMaterial } from "./veil";
 
 /** Role of what is only room: a safety area. */
 const AREA = "area";
+
+/** Drawn before everything else: what is behind it fails the test of depth. */
+const FIRST = -1;
 
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
@@ -40,6 +44,12 @@ export class Body {
   /** Colour that a variable gives it; undefined for its own. */
   private worn: number | undefined = undefined;
   private lit = false;
+  /** Whether it is seen as it is, behind the picture: the twin is over the real cell. */
+  private behind = false;
+  /** Whether nothing of it is drawn and it hides what is behind it all the same. */
+  get occludes(): boolean {
+    return this.behind && !this.doubted;
+  }
   /** Whether it may be elsewhere. */
   doubted = false;
 
@@ -60,8 +70,6 @@ export class Body {
         this.enclose(part);
         continue;
       }
-      part.castShadow = true;
-      part.receiveShadow = true;
       // Its own copy: bodies that share a mesh are selected one by one.
       part.material = Array.isArray(part.material)
         ? part.material.map(ownMaterial)
@@ -117,6 +125,14 @@ export class Body {
     this.repaint();
   }
 
+  /** Show it over the real cell: what exists there only hides what is behind it. */
+  overReality(on: boolean): void {
+    const behind = on && this.node.real;
+    if (behind === this.behind) return;
+    this.behind = behind;
+    this.repaint();
+  }
+
   /** Make it stand out as selected. */
   light(on: boolean): void {
     if (on === this.lit) return;
@@ -131,7 +147,11 @@ export class Body {
       edges.material = lineMaterial(verdict);
     }
     for (const { mesh, own } of this.dressed) {
-      if (this.doubted) mesh.material = doubtMaterial();
+      // Where it may be elsewhere the eye cannot tell: that is drawn over the real one, too.
+      mesh.renderOrder = this.occludes ? FIRST : 0;
+      mesh.castShadow = mesh.receiveShadow = !this.occludes;
+      if (this.occludes) mesh.material = occluderMaterial();
+      else if (this.doubted) mesh.material = doubtMaterial();
       else if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
       else if (this.painted !== undefined) mesh.material = bodyMaterial(this.painted);
       else mesh.material = this.worn === undefined ? own : scoreMaterial(this.worn);
@@ -146,6 +166,7 @@ export class Bodies {
   private list: Body[] = [];
   private hidden: ReadonlySet<string> = new Set();
   private absent: ReadonlySet<string> = new Set();
+  private real = false;
   private generation = 0;
   /** Meshes of this scene and the one before: an edit changes few. */
   private models = new Map<string, Promise<Object3D>>();
@@ -163,6 +184,7 @@ export class Bodies {
     this.root.clear();
     this.byName.clear();
     this.list = scene.nodes.map((node) => new Body(node));
+    this.overReality(this.real);
     for (const body of this.list) {
       this.byName.set(body.node.name, body);
       this.root.add(body.group);
@@ -201,6 +223,12 @@ export class Bodies {
       group.matrix.compose(this.position, this.orientation, ONE);
       group.matrixWorldNeedsUpdate = true;
     }
+  }
+
+  /** Show them over the real cell, or in a room of their own. */
+  overReality(on: boolean): void {
+    this.real = on;
+    for (const body of this.list) body.overReality(on);
   }
 
   hide(names: ReadonlySet<string>): void {

@@ -193,6 +193,11 @@ export function doubtMaterial(): Material {
   });
 }
 
+/** The shared material of what is real, over the real cell: nothing is drawn, and what is behind it is hidden. */
+export function occluderMaterial(): Material {
+  return once("occluder", () => new MeshBasicMaterial({ colorWrite: false, side: DoubleSide }));
+}
+
 /** Score colours in use; scales have few steps. */
 const MOST_SCORES = 256;
 

@@ -9,7 +9,16 @@ import { Glide } from "../glide";
 import { MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
 import type { Frame } from "../messages";
-import { hidden, mutedCriteria, scene as run, select, selectedNodes, selection, stale } from "../page_state";
+import {
+  hidden,
+  mutedCriteria,
+  overReality,
+  scene as run,
+  select,
+  selectedNodes,
+  selection,
+  stale,
+} from "../page_state";
 import { manikinTints } from "../posture/coloring";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
@@ -195,7 +204,11 @@ export class Viewer {
       this.stage.moved();
     });
     effect(() => {
-      this.stage.grid.visible = showGrid.value;
+      this.bodies.overReality(overReality.value);
+      this.stage.moved();
+    });
+    effect(() => {
+      this.stage.grid.visible = showGrid.value && !overReality.value;
       this.stage.invalidate();
     });
     effect(() => {

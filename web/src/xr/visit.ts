@@ -16,7 +16,7 @@ import {
   SphereGeometry,
   Vector3,
 } from "three";
-import { hidden, rows, scene } from "../page_state";
+import { hidden, overReality, rows, scene } from "../page_state";
 import type { Viewer } from "../scene/viewer";
 import type { Tracking } from "../wire";
 import { Board } from "./board";
@@ -279,11 +279,11 @@ export class Visit {
   /** What the room changes outside, and how to put it back. */
   private remember(): () => void {
     const { stage, viewpoint } = this.viewer;
-    const { camera, scene: room, grid } = stage;
+    const { camera, scene: room } = stage;
     const { fov } = camera;
     const [place, turn] = [camera.position.clone(), camera.quaternion.clone()];
     const { background, fog } = room;
-    const ground = grid.visible;
+    const over = overReality.peek();
     const head = this.human === null ? null : `${this.human}/head`;
     viewpoint.controls.enabled = false;
     // Nobody sees their own head from within.
@@ -291,12 +291,12 @@ export class Visit {
     if (this.mode === "immersive-ar") {
       room.background = null;
       room.fog = null;
-      grid.visible = false;
+      overReality.value = true;
     }
     return () => {
       room.background = background;
       room.fog = fog;
-      grid.visible = ground;
+      overReality.value = over;
       if (head !== null) hidden.value = new Set([...hidden.peek()].filter((name) => name !== head));
       camera.position.copy(place);
       camera.quaternion.copy(turn);

@@ -100,6 +100,8 @@ class RawMesh:
     """Equal for instances of one geometry; empty when there are none."""
     part: int | None = None
     """Equal for meshes that are one part, split by colour; None for a part of one mesh."""
+    nodes: tuple[str, ...] = ()
+    """Of COLLADA, identifiers of the nodes that lead to it, by which kinematics name it."""
 
     def placed(self) -> RawMesh:
         """The mesh where its instance is; what is mirrored keeps its outside."""
@@ -239,13 +241,20 @@ def _plain(read: Reader, path: Path, data: bytes, max_bytes: int, max_faces: int
     for m in raw.meshes:
         where = None if m.file_from_mesh is None else m.file_from_mesh.tolist()
         arrays = np.asarray(m.vertices, "<f8").tobytes(), np.asarray(m.faces, "<i8").tobytes()
-        meshes.append((m.name, *arrays, m.color, where, m.geometry, m.part))
+        meshes.append((m.name, *arrays, m.color, where, m.geometry, m.part, m.nodes))
     findings = [(finding.level, finding.subject, finding.text) for finding in source.findings]
     return meshes, raw.meters, raw.up, findings, source.files
 
 
 def _mesh(
-    name: str, vertices: bytes, faces: bytes, color: Any, where: Any, geometry: str, part: int | None
+    name: str,
+    vertices: bytes,
+    faces: bytes,
+    color: Any,
+    where: Any,
+    geometry: str,
+    part: int | None,
+    nodes: tuple[str, ...],
 ) -> RawMesh:
     return RawMesh(
         name,
@@ -255,4 +264,5 @@ def _mesh(
         None if where is None else np.array(where, float),
         geometry,
         part,
+        nodes,
     )

@@ -118,10 +118,10 @@ def _revise(folder: Path, before: dict[str, Any], made: Files) -> None:
 
     file = folder / "workstation.toml"
     try:
-        revision = revised(file.read_bytes(), before, made.parts, str(file))
-        (folder / "cad").mkdir(exist_ok=True)
+        revision = revised(file.read_bytes(), before, made.rows(), str(file))
         contents = {file.name: revision.text, **made.meshes, TABLE: made.texts[TABLE].encode()}
         for name, content in contents.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             with whole_file(folder / name) as hidden:
                 hidden.write_bytes(content)
         for name in revision.unused:
@@ -163,13 +163,20 @@ def _read(options: argparse.Namespace, ending: str) -> Assembly:
 
 
 def _say(file: Path, assembly: Assembly, made: Files) -> None:
-    low = [min(row["box"][0][axis] for row in made.parts) for axis in range(3)]
-    high = [max(row["box"][1][axis] for row in made.parts) for axis in range(3)]
-    size = " × ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))
-    triangles = sum(row["triangles"] for row in made.parts)
     line("read", f"{file.name}: {assembly.format}, unit {assembly.unit}")
-    parts = f"{len(made.parts)} part{'' if len(made.parts) == 1 else 's'} of {len(assembly.shapes)} shapes"
-    line("found", f"{parts}, {triangles} triangles, {size} m")
+    if made.parts:
+        low = [min(row["box"][0][axis] for row in made.parts) for axis in range(3)]
+        high = [max(row["box"][1][axis] for row in made.parts) for axis in range(3)]
+        size = " × ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))
+        triangles = sum(row["triangles"] for row in made.parts)
+        several = "" if len(made.parts) == 1 else "s"
+        parts = f"{len(made.parts)} part{several} of {len(assembly.shapes)} shapes"
+        line("found", f"{parts}, {triangles} triangles, {size} m")
+    for row in made.robots:
+        mass = "no mass stated" if row["mass"] is None else f"{row['mass']:.4g} kg"
+        missing = f", no mass of {', '.join(row['without_mass'][:5])}" if row["without_mass"] else ""
+        joints = f"{len(row['joints'])} joint{'' if len(row['joints']) == 1 else 's'}"
+        line("found", f"robot {row['name']}: {row['links']} links, {joints}, {mass}{missing}")
     for finding in made.findings:
         word = "guessed" if finding.level == "assumed" else finding.level
         line(word, f"{finding.subject}: {finding.text}", "yellow" if word == "warning" else "dim")
@@ -205,8 +212,8 @@ def _plant(file: Path, folder: Path) -> Exit:
 def _write(folder: Path, texts: Mapping[str, str], meshes: Mapping[str, bytes]) -> None:
     try:
         with whole_folder(folder) as working:
-            (working / "cad").mkdir()
             for name, data in meshes.items():
+                (working / name).parent.mkdir(parents=True, exist_ok=True)
                 (working / name).write_bytes(data)
             for name, text in texts.items():
                 (working / name).write_text(text, encoding="utf-8")

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -16,8 +16,10 @@ from seerob.core.errors import InputError
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
-from seerob.description.cad.assembly import Assembly, Instance, Shape
-from seerob.description.cad.names import plain_name
+from seerob.description.cad.assembly import Assembly, Instance, Moving, Shape
+from seerob.description.cad.names import plain_name, told_apart
+from seerob.description.description import Inertial
+from seerob.description.formats.urdf_writing import written
 from seerob.description.mesh_files import Color
 from seerob.description.shapes.glb import glb_y_up
 from seerob.description.shapes.mesh_bodies import is_closed, joined
@@ -55,6 +57,12 @@ class Files:
     parts: tuple[dict[str, Any], ...]
     """Rows of the table: one for each part."""
     findings: tuple[Finding, ...]
+    robots: tuple[dict[str, Any], ...] = ()
+    """Rows of the table: one for each mechanism."""
+
+    def rows(self) -> dict[str, tuple[dict[str, Any], ...]]:
+        """Rows by the table of the workstation file that they are written to."""
+        return {"parts": self.parts, "robots": self.robots}
 
 
 def files(
@@ -96,8 +104,14 @@ def files(
             "world": instance.world_from_shape,
         }
         row["written"] = part_values(row, instance.color)
+        if instance.inertial is not None and density is None:
+            row["written"] |= _stated_mass(instance.inertial)
         del row["world"]
         parts.append(row)
+    robots = [
+        _robot(moving, name, meshes)
+        for moving, name in zip(assembly.mechanisms, _robot_names(assembly), strict=True)
+    ]
     unknown = sorted(set(densities.by_material) - {shape.material for shape in assembly.shapes})
     if unknown:
         text = f"no part is of {', '.join(unknown)}: its density is not used"
@@ -109,16 +123,63 @@ def files(
         "unit": assembly.unit,
         "options": dict(options),
         "parts": parts,
+        "robots": robots,
         "left_out": [{"name": name, "why": why} for name, why in assembly.left_out],
         "findings": [{"level": f.level, "subject": f.subject, "text": f.text} for f in findings],
     }
     texts = {
         "workstation.toml": "\n".join(
-            [*_head(assembly, source), "", *(part_text(row["written"]) for row in parts)]
+            [
+                *_head(assembly, source),
+                "",
+                *(table_text("robots", row["written"]) for row in robots),
+                *(table_text("parts", row["written"]) for row in parts),
+            ]
         ),
         TABLE: json.dumps(table, indent=1, ensure_ascii=False) + "\n",
     }
-    return Files(texts, meshes, tuple(parts), tuple(findings))
+    return Files(texts, meshes, tuple(parts), tuple(findings), tuple(robots))
+
+
+def _robot_names(assembly: Assembly) -> list[str]:
+    return told_apart(plain_name(moving.description.name) for moving in assembly.mechanisms)
+
+
+def _robot(moving: Moving, name: str, files: dict[str, bytes]) -> dict[str, Any]:
+    """Row of a mechanism, whose files join those given."""
+    folder = f"robots/{name}"
+    text, meshes = written(replace(moving.description, name=name), mimics=True)
+    own = {f"{folder}/{name}.urdf": text.encode(), **{f"{folder}/{k}": v for k, v in meshes.items()}}
+    files.update(own)
+    model = next(iter(own))
+    values: dict[str, Any] = {"name": name, "model": model, "base": place(moving.world_from_base)}
+    if moving.q:
+        values["q"] = [_number(q, 12) for q in moving.q]
+    links = moving.description.links
+    masses = [link.inertial.mass for link in links if link.inertial is not None]
+    digest = hashlib.sha256()
+    for content in own.values():
+        digest.update(hashlib.sha256(content).digest())
+    return {
+        "name": name,
+        "joints": [joint.name for joint in moving.description.joints()],
+        "links": len(links),
+        "mass": sum(masses) if masses else None,
+        "without_mass": [link.name for link in links if link.inertial is None and link.solids],
+        "shape": digest.hexdigest()[:16],
+        "files": list(own),
+        "written": values,
+    }
+
+
+def _stated_mass(inertial: Inertial) -> dict[str, Any]:
+    i = inertial.inertia
+    six = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+    return {
+        "mass": _number(inertial.mass, 12),
+        "com": [_number(x, 12) for x in inertial.com],
+        "inertia": [_number(x, 12) for x in six],
+    }
 
 
 def _head(assembly: Assembly, source: Path) -> list[str]:
@@ -145,14 +206,14 @@ def part_values(row: Mapping[str, Any], color: Color | None) -> dict[str, Any]:
     return values
 
 
-def part_text(values: Mapping[str, Any]) -> str:
-    """A part's table in the workstation file."""
-    return "\n".join(["[[parts]]", *(f"{key} = {literal(value)}" for key, value in values.items()), ""])
+def table_text(group: str, values: Mapping[str, Any]) -> str:
+    """One table of a group, as ``parts``, in the workstation file."""
+    return "\n".join([f"[[{group}]]", *(f"{key} = {literal(value)}" for key, value in values.items()), ""])
 
 
 def place(world: Array) -> dict[str, list[float]]:
     """A rigid place (4, 4) [m] as a workstation file has it."""
-    position = [_number(x) for x in world[:3, 3].round(12)]
+    position = [_number(x, 12) for x in world[:3, 3].round(12)]
     wxyz = wxyz_from_rotation(world[:3, :3])
     if abs(wxyz[0]) > 1 - 1e-14:
         return {"position": position}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
@@ -18,8 +18,8 @@ from seerob.core.errors import InputError
 from seerob.core.page_messages import Change
 from seerob.workstation.editing import changed
 
-_MESH = re.compile(r"cad/[A-Za-z0-9_.\-]+\.glb")
-"""Names of mesh files that an import makes; nothing else is removed, whatever a stranger's table says."""
+_MESH = re.compile(r"cad/[\w.\-]+\.glb|robots/[\w\-][\w.\-]*/(?:meshes/)?[\w.\-]+\.(?:stl|urdf)", re.ASCII)
+"""Names of files that an import makes; nothing else is removed, whatever a stranger's table says."""
 NEAR = 1e-6
 """Places that differ by less are one [m]."""
 
@@ -35,64 +35,85 @@ class Revision(NamedTuple):
     """Mesh files of the older revision that no table names any more."""
 
 
-def revised(raw: bytes, before: Mapping[str, Any], rows: tuple[dict[str, Any], ...], file: str) -> Revision:
-    """The workstation file with the parts of a new revision.
+def revised(
+    raw: bytes, before: Mapping[str, Any], rows: Mapping[str, tuple[dict[str, Any], ...]], file: str
+) -> Revision:
+    """The workstation file with the parts and mechanisms of a new revision.
 
     Args:
         raw: The workstation file.
         before: The table of the older revision.
-        rows: Of the table of the new one.
+        rows: Of the table of the new one, by the table of the workstation file that they are written to.
         file: Name of the workstation file, for messages.
 
     Raises:
-        InputError: It cannot be read or edited, or a new part has the name of one of the user's.
+        InputError: It cannot be read or edited, or something new has the name of one of the user's.
     """
     try:
         table = tomllib.loads(raw.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", f"cannot be read: {error}", "mend it first") from error
-    entries = [entry for entry in table.get("parts", []) if isinstance(entry, dict)]
-    at = {entry.get("name"): number for number, entry in enumerate(entries)}
-    old = {row["name"]: row for row in before["parts"]}
-    new = {row["name"]: row for row in rows}
     changes: list[Change] = []
     told: list[tuple[str, str]] = []
+    for group, of_group in rows.items():
+        _revise_group(group, table, before.get(group, ()), of_group, file, changes, told)
+    text, _ = changed(raw, changes, file)
+    named = {entry.get("mesh") for entry in _tables(tomllib.loads(text.decode("utf-8-sig")))}
+    now = {name for of_group in rows.values() for row in of_group for name in _files(row)}
+    made = {name for group in rows for row in before.get(group, ()) for name in _files(row)}
+    unused = sorted(name for name in made - named - now if _MESH.fullmatch(name))
+    return Revision(text, tuple(told), tuple(unused))
+
+
+def _files(row: Mapping[str, Any]) -> list[str]:
+    return [str(name) for name in (row.get("mesh"), *row.get("files", ())) if name]
+
+
+def _revise_group(
+    group: str,
+    table: Mapping[str, Any],
+    former: Iterable[Mapping[str, Any]],
+    rows: tuple[dict[str, Any], ...],
+    file: str,
+    changes: list[Change],
+    told: list[tuple[str, str]],
+) -> None:
+    """Adds what becomes of one list of tables, and what is told of it."""
+    entries = [entry for entry in table.get(group, []) if isinstance(entry, dict)]
+    at = {entry.get("name"): number for number, entry in enumerate(entries)}
+    old = {row["name"]: row for row in former}
+    new = {row["name"]: row for row in rows}
 
     def tell(word: str, name: str, what: str = "") -> None:
-        touched = ", ".join(_touched(table, name))
+        touched = ", ".join(_touched(table, group, name))
         told.append((word, f"{name}{what}" + (f": touches {touched}" if touched else "")))
 
     for name, row in new.items():
         if name not in old:
             if name in at:
-                what = f"a part of yours is called {name}, as a new one of the CAD file"
-                raise InputError.at(file, f"parts[{at[name]}].name", what, "give yours another name")
-            changes.append(Change(kind="add", path=("parts",), value=row["written"]))
+                what = f"one of yours is called {name}, as a new one of the CAD file"
+                raise InputError.at(file, f"{group}[{at[name]}].name", what, "give yours another name")
+            changes.append(Change(kind="add", path=(group,), value=row["written"]))
             tell("added", name)
         elif name not in at:
             tell("left out", name, ", whose table was taken out by hand")
         else:
-            kept = list(_changes(at[name], entries[at[name]], old[name]["written"], row["written"], changes))
+            where = group, at[name]
+            kept = list(_changes(where, entries[at[name]], old[name]["written"], row["written"], changes))
             if how := _differs(old[name], row):
                 tell(how, name)
             told += [("kept", f"{name}: {key} as it was changed by hand") for key in kept]
     lost = [name for name in old if name not in new]
     # From the end, so that numbers of entries stay what they are.
     for name in sorted((n for n in lost if n in at), key=lambda n: -at[n]):
-        changes.append(Change(kind="remove", path=("parts", at[name])))
+        changes.append(Change(kind="remove", path=(group, at[name])))
     for name in lost:
         tell("lost", name)
     told += [("renamed?", text) for text in _renamed(old, new, lost)]
-    text, _ = changed(raw, changes, file)
-    named = {entry.get("mesh") for entry in _tables(tomllib.loads(text.decode("utf-8-sig")))}
-    now = {row["mesh"] for row in rows}
-    made = {row["mesh"] for row in old.values() if _MESH.fullmatch(str(row["mesh"]))}
-    unused = sorted(made - named - now)
-    return Revision(text, tuple(told), tuple(unused))
 
 
 def _changes(
-    number: int,
+    where: tuple[str, int],
     entry: Mapping[str, Any],
     old: Mapping[str, Any],
     new: Mapping[str, Any],
@@ -105,18 +126,20 @@ def _changes(
         if entry.get(key) != old.get(key):
             yield key
         elif key in new:
-            changes.append(Change(kind="set", path=("parts", number, key), value=new[key]))
+            changes.append(Change(kind="set", path=(*where, key), value=new[key]))
         else:
-            changes.append(Change(kind="remove", path=("parts", number, key)))
+            changes.append(Change(kind="remove", path=(*where, key)))
 
 
 def _differs(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     """``moved``, ``resized``, both, or nothing."""
     words = []
-    if old["written"]["at"] != new["written"]["at"]:
+    if any(old["written"].get(key) != new["written"].get(key) for key in ("at", "base")):
         words.append("moved")
     if old["shape"] != new["shape"]:
-        words.append("resized" if np.abs(_size(old) - _size(new)).max() > NEAR else "reshaped")
+        words.append(
+            "resized" if "box" in old and np.abs(_size(old) - _size(new)).max() > NEAR else "reshaped"
+        )
     return " and ".join(words)
 
 
@@ -131,6 +154,10 @@ def _renamed(old: Mapping[str, Any], new: Mapping[str, Any], lost: list[str]) ->
         alike = [other for other in free if new[other]["shape"] == old[name]["shape"]]
         if not alike:
             continue
+        if "box" not in old[name]:
+            free.remove(alike[0])
+            yield f"{name} is perhaps {alike[0]} now: the same links and joints"
+            continue
 
         def away(other: str, name: str = name) -> float:
             middles = [np.mean(row["box"], axis=0) for row in (old[name], new[other])]
@@ -142,11 +169,11 @@ def _renamed(old: Mapping[str, Any], new: Mapping[str, Any], lost: list[str]) ->
         yield f"{name} is perhaps {best} now: the same shape, {where}"
 
 
-def _touched(table: Mapping[str, Any], name: str) -> Iterator[str]:
+def _touched(table: Mapping[str, Any], of: str, name: str) -> Iterator[str]:
     """Tables that name a part, by pattern or as what lies above it."""
     for group, rows in table.items():
         for number, row in enumerate(rows if isinstance(rows, list) else ()):
-            if group == "parts" or not isinstance(row, dict):
+            if group == of or not isinstance(row, dict):
                 continue
             if any(_means(text, name) for text in _texts(row)):
                 label = row.get("name") or row.get("kind") or number

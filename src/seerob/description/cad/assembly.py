@@ -10,6 +10,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.cad.names import full_name, told_apart
+from seerob.description.description import Description, Inertial
 from seerob.description.mesh_files import Color
 
 RIGID = 1e-6
@@ -46,6 +47,20 @@ class Instance:
     """Shape (4, 4) [m], z up."""
     color: Color | None = None
     """Of this instance, instead of its shape's."""
+    inertial: Inertial | None = None
+    """Mass properties that the file states, in the shape's frame; None where it states none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """Links and joints that the file has: a robot, or any other mechanism."""
+
+    description: Description
+    """Its meshes in the links' frames [m]."""
+    world_from_base: Array
+    """Shape (4, 4) [m], z up."""
+    q: tuple[float, ...] = ()
+    """Where the file shows it, one for each of its joints that can be commanded [rad or m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +78,7 @@ class Assembly:
     """Full names of what became no part, and why."""
     files: dict[str, bytes] = field(default_factory=dict)
     """Every file that was read, by its path from the folder of the first."""
+    mechanisms: tuple[Moving, ...] = ()
 
     def names(self) -> list[str]:
         """Full name of each instance, unique and as names may be here."""
@@ -77,7 +93,7 @@ def baked(assembly: Assembly) -> Assembly:
     instances = []
     for instance in assembly.instances:
         linear = instance.world_from_shape[:3, :3]
-        rotation = _nearest_rotation(linear)
+        rotation = nearest_rotation(linear)
         if np.linalg.norm(linear - rotation, 2) * reach[instance.shape] <= RIGID:
             turned = instance.world_from_shape.copy()
             turned[:3, :3] = rotation
@@ -99,7 +115,8 @@ def baked(assembly: Assembly) -> Assembly:
     )
 
 
-def _nearest_rotation(linear: Array) -> Array:
+def nearest_rotation(linear: Array) -> Array:
+    """The rotation that is nearest to a matrix (3, 3)."""
     u, _, v = np.linalg.svd(linear)
     u[:, 2] *= np.linalg.det(u @ v)
     return np.asarray(u @ v)

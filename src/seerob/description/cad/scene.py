@@ -12,10 +12,14 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import TooLarge, unpacked
+from seerob.core.files.parser_process import parsed
 from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape
-from seerob.description.mesh import MAX_BYTES, by_color, file_content, opened, parts
+from seerob.description.cad import collada_kinematics
+from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Moving, Shape
+from seerob.description.cad.linked import moving
+from seerob.description.mesh import MAX_BYTES, OpenedFile, by_color, file_content, opened, parts
 from seerob.description.mesh_files import RawMesh
 from seerob.description.shapes.mesh_bodies import joined
 from seerob.description.xml_values import parse_xml
@@ -56,7 +60,11 @@ def read(path: Path, ending: str, *, units: str | None = None, up: str | None = 
     known: dict[tuple[str, ...], int] = {}
     instances: list[Instance] = []
     left_out: list[tuple[str, str]] = []
-    for group in parts(file.meshes):
+    groups = parts(file.meshes)
+    mechanisms: tuple[Moving, ...] = ()
+    if ending == ".dae" and collada_kinematics.MARK in file.source.data:
+        groups, mechanisms = _kinematics(file, groups, meters, turned)
+    for group in groups:
         first = group[0]
         names = tuple(filter(None, first.name.split("/"))) or (path.stem,)
         key = tuple(mesh.geometry for mesh in group)
@@ -69,13 +77,61 @@ def read(path: Path, ending: str, *, units: str | None = None, up: str | None = 
             shapes.append(shape)
         world = turned @ _metric(first.file_from_mesh, meters) @ turned.T
         instances.append(Instance(names, known[key], world))
-    if not instances:
+    if not instances and not mechanisms:
         file.source.fail("holds nothing but triangles without area", "export it again")
     findings = tuple(file.source.findings)
     unit = f"{meters:g} m" if units is None else units
     return Assembly(
-        FORMATS[ending], unit, tuple(shapes), tuple(instances), findings, tuple(left_out), file.source.files
+        FORMATS[ending],
+        unit,
+        tuple(shapes),
+        tuple(instances),
+        findings,
+        tuple(left_out),
+        file.source.files,
+        mechanisms,
     )
+
+
+def _kinematics(
+    file: OpenedFile, groups: list[list[RawMesh]], meters: float, turned: Array
+) -> tuple[list[list[RawMesh]], tuple[Moving, ...]]:
+    """Meshes that no mechanism of a COLLADA file has, and its mechanisms with those that they have."""
+    source = file.source
+    arguments = source.path, source.data, source.max_bytes, source.max_faces
+    rows, told = parsed(collada_kinematics.plain, *arguments, file=str(source.path))
+    source.findings += [Finding(level=level, subject=subject, text=text) for level, subject, text in told]
+    owners = {
+        link["node"]: (number, link["name"])
+        for number, row in enumerate(rows)
+        for link in row["links"]
+        if link["node"]
+    }
+    free: list[list[RawMesh]] = []
+    owned: dict[tuple[int, str], list[RawMesh]] = {}
+    for group in groups:
+        node = next((node for node in reversed(group[0].nodes) if node in owners), None)
+        if node is None:
+            free.append(group)
+        else:
+            owned.setdefault(owners[node], []).extend(group)
+    mechanisms = []
+    for number, row in enumerate(rows):
+        for link in row["links"]:
+            # From the scene's frame into the link's, in metres.
+            from_world = np.array(link["link_from_world"], float)
+            found = [mesh.placed() for mesh in owned.get((number, link["name"]), ())]
+            link["meshes"] = tuple(
+                Mesh(
+                    (m.vertices @ from_world[:3, :3].T + from_world[:3, 3]) * meters,
+                    m.faces.astype(np.int32),
+                    m.color or Mesh.color,
+                )
+                for m in found
+            )
+        world = _metric(np.array(row["world"], float), meters)
+        mechanisms.append(moving(source, row, meters, turned @ world))
+    return free, tuple(mechanisms)
 
 
 def _packed(path: Path) -> bytes:

@@ -91,15 +91,24 @@ class Shapes:
         found: list[Solid] = []
         for i, (key, element, kind, link_from_shape) in enumerate(self._elements(link, name, tag)):
             label = element.get("name") or (f"{tag}_{i}" if i else tag)
+            deviation = self._deviation(element, key)
             if kind.tag == "mesh":
                 for named in self._meshes(kind, key, name):
                     exact = physics_mesh(named.mesh.moved(link_from_shape))
-                    found.append(Solid(mesh=exact, name=f"{label}/{named.name}"))
+                    found.append(Solid(mesh=exact, name=f"{label}/{named.name}", deviation=deviation))
             else:
                 solid = self._primitive(kind, key)
                 if solid is not None:
                     found.append(moved(replace(solid[0], name=label), link_from_shape))
         return with_insides(found)
+
+    def _deviation(self, element: Element, key: str) -> float:
+        """How far the real surface may lie outside a mesh [m], as an import of ours writes it."""
+        value = float(self.reader.numbers(element, "deviation", key, (0.0,))[0])
+        if not 0 <= value <= 1:
+            self.reader.problem(f"{key}.deviation", f"is {value:g} m", "must be from 0 to 1 m")
+            return 0.0
+        return value
 
     def _elements(self, link: Element, name: str, tag: str) -> Iterator[tuple[str, Element, Element, Array]]:
         for i, element in enumerate(link.findall(tag)):

@@ -31,22 +31,22 @@ def read(source: MeshSource) -> RawFile:
     ignored = [collada.common.DaeUnsupportedError, collada.common.DaeBrokenRefError]
     with source.parsing("COLLADA file"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        document = collada.Collada(io.BytesIO(source.data), ignore=ignored)
+        document = collada.Collada(io.BytesIO(_with_own_ids(source.data, root)), ignore=ignored)
         for error in document.errors:
             source.note(f"ignored: {type(error).__name__}: {str(error)[:200]}", level="warning")
         meshes: list[RawMesh] = []
         count = visited = 0
         # A stack instead of recursion: depth is the file's choice.
-        stack: list[tuple[object, Array, tuple[str, ...]]] = (
-            [] if document.scene is None else [(n, np.eye(4), ()) for n in reversed(document.scene.nodes)]
+        stack: list[tuple[object, Array, tuple[str, ...], tuple[str, ...]]] = (
+            [] if document.scene is None else [(n, np.eye(4), (), ()) for n in reversed(document.scene.nodes)]
         )
         while stack:
-            node, matrix, names = stack.pop()
+            node, matrix, names, nodes = stack.pop()
             visited += 1
             if len(names) > _MAX_DEPTH or visited > _MAX_NODES:
                 source.fail(f"has more than {_MAX_NODES} nodes, or nests them deeper than {_MAX_DEPTH}")
             if isinstance(node, collada.scene.GeometryNode):
-                for mesh in _meshes(source, node, matrix, names, visited):
+                for mesh in _meshes(source, node, matrix, names, nodes, visited):
                     count += len(mesh.faces)
                     if count > source.max_faces:
                         source.fail(f"has more than {source.max_faces} triangles", "raise max_faces")
@@ -56,10 +56,30 @@ def read(source: MeshSource) -> RawFile:
                 below = matrix @ np.asarray(inner.matrix, float)
                 label = inner.xmlnode.get("name") or inner.id or ""
                 path = (*names, label) if label else names
-                stack.extend((child, below, path) for child in reversed(inner.children))
+                ids = (*nodes, inner.id) if inner.id else nodes
+                stack.extend((child, below, path, ids) for child in reversed(inner.children))
             elif isinstance(node, collada.scene.ControllerNode):
                 source.note("a skinned or morphed geometry was left out", level="warning")
     return RawFile(tuple(meshes), meters, up)
+
+
+def _with_own_ids(data: bytes, root: Any) -> bytes:
+    """The document with identifiers for vertices that COLLADA 1.5 may name as ``#geometry/vertices``."""
+    from xml.etree.ElementTree import tostring
+
+    changed = False
+    for geometry in root.iter(f"{{{root.tag[1:].partition('}')[0]}}}geometry"):
+        prefix = f"#{geometry.get('id')}/"
+        inputs = [e for e in geometry.iter() if e.get("source", "").startswith(prefix)]
+        named = {e.get("source")[len(prefix) :] for e in inputs}
+        own = {name: f"{geometry.get('id')}-{name}" for name in named}
+        for element in geometry.iter() if named else ():
+            if element.get("id") in own or element.get("sid") in own:
+                element.set("id", own.get(element.get("id")) or own[element.get("sid")])
+        for element in inputs:
+            element.set("source", f"#{own[element.get('source')[len(prefix) :]]}")
+            changed = True
+    return tostring(root) if changed else data
 
 
 def _unit_and_axis(source: MeshSource, root: Any) -> tuple[float, str]:
@@ -86,7 +106,14 @@ def _unit_and_axis(source: MeshSource, root: Any) -> tuple[float, str]:
     return meters, up
 
 
-def _meshes(source: MeshSource, node: Any, matrix: Array, names: tuple[str, ...], part: int) -> list[RawMesh]:
+def _meshes(
+    source: MeshSource,
+    node: Any,
+    matrix: Array,
+    names: tuple[str, ...],
+    nodes: tuple[str, ...],
+    part: int,
+) -> list[RawMesh]:
     import collada
 
     materials = {m.symbol: m.target for m in node.materials}
@@ -105,7 +132,7 @@ def _meshes(source: MeshSource, node: Any, matrix: Array, names: tuple[str, ...]
         faces = np.asarray(surface.vertex_index, np.int64).reshape(-1, 3)
         color = _color(materials.get(primitive.material))
         label = f"{node.geometry.name or ''}#{node.geometry.id}.{len(meshes)}.{color}"
-        meshes.append(RawMesh(name, vertices, faces, color, matrix, label, part))
+        meshes.append(RawMesh(name, vertices, faces, color, matrix, label, part, nodes))
     return meshes
 
 

@@ -86,7 +86,7 @@ def file(tmp_path):
 @pytest.fixture
 def desk(file):
     how = Visiting(tokens=None, tls=None, clear_text=False)
-    server, desk = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
+    server, desk, _ = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
     with server:
         yield server, desk
 
@@ -282,7 +282,7 @@ def test_discarding_ends_at_the_file_and_a_file_that_somebody_else_saved_is_not_
 def test_only_a_page_that_may_control_edits_and_only_where_the_command_line_says_so(file):
     tokens = Tokens.made()
     how = Visiting(tokens=tokens, tls=None, clear_text=False)
-    server, desk = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
+    server, desk, _ = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
     edit = msgspec.msgpack.encode(Edit(id=7, action="change", revision=1, changes=(MOVE,)))
     with server:
         for role in (Role.VIEW, Role.TRACK):

@@ -151,7 +151,7 @@ function toggled(set: ReadonlySet<string>, names: readonly string[]): ReadonlySe
 export function beginScene(next: Scene): void {
   batch(() => {
     // What is edited is called as before; another run is another run.
-    if (scene.value?.workstation_hash !== next.workstation_hash && hello.value?.mode !== "edit") {
+    if (scene.value?.workstation_hash !== next.workstation_hash && !hello.value?.may.includes("edit")) {
       selection.value = null;
       hidden.value = new Set();
       mutedCriteria.value = new Set();

@@ -13,6 +13,7 @@ export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
 export const SCHEMA = "16d4a4715f817ebb";
+export const SCHEMA = "46092f8f864f1b04";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -605,7 +606,7 @@ export interface Edit {
   type: "edit";
   /** The page's own number, by which it knows the answer. */
   id: number;
-  /** `change`, `undo`, `redo`, `save` or `discard`. */
+  /** `change`, `undo`, `redo`, `save`, `discard`, `run` or `stop`. */
   action: string;
   /** `Draft.revision` that the page saw. */
   revision: number;
@@ -652,6 +653,10 @@ export interface Draft {
   /** Whether this page has a change to take back. */
   undo: boolean;
   redo: boolean;
+  /** Whether the draft is tried: its run begins anew with every edit, and nothing of it is recorded. */
+  runs: boolean;
+  /** Why the newest of its runs ended or was not begun; empty otherwise. */
+  ended: string;
 }
 
 export const DEFAULTS = {

@@ -205,6 +205,27 @@ test("two pages edit at once and lose nothing of each other", async () => {
   await other.close();
 });
 
+test("a draft is run, its run follows an edit, and the file stays", async () => {
+  const begun = saved();
+  await page.getByRole("button", { name: "Run", exact: true }).click();
+  await page.locator(".source", { hasText: "a draft, not recorded" }).waitFor();
+  await page.waitForFunction(() => window.seerob.t > 0.2);
+  assert.match(await page.locator(".pill strong").innerText(), /DRAFT/);
+  await pick("table");
+  const before = await page.evaluate(() => window.seerob.pose("table").position[0]);
+  await fill(page.getByLabel("x [m]"), "1.1");
+  await page.waitForFunction(
+    (x) => window.seerob.pose("table").position[0] > x + 0.2 && window.seerob.t > 0.05,
+    before,
+  );
+  await page.locator(".entry h2", { hasText: "table" }).waitFor();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await page.locator(".not-run").waitFor();
+  await page.getByRole("button", { name: "Undo" }).click();
+  await page.waitForFunction((x) => window.seerob.pose("table").position[0] === x, before);
+  assert.equal(saved(), begun);
+});
+
 test("what others speak of is removed with them, or not at all", async () => {
   const begun = saved();
   await pick("zone");

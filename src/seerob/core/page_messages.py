@@ -134,7 +134,7 @@ class Edit(Struct, frozen=True, kw_only=True, tag="edit"):
     id: int
     """The page's own number, by which it knows the answer."""
     action: str
-    """``change``, ``undo``, ``redo``, ``save`` or ``discard``."""
+    """``change``, ``undo``, ``redo``, ``save``, ``discard``, ``run`` or ``stop``."""
     revision: int
     """`Draft.revision` that the page saw."""
     changes: tuple[Change, ...] = ()
@@ -181,3 +181,7 @@ class Draft(Struct, frozen=True, kw_only=True, tag="draft"):
     undo: bool
     """Whether this page has a change to take back."""
     redo: bool
+    runs: bool = False
+    """Whether the draft is tried: its run begins anew with every edit, and nothing of it is recorded."""
+    ended: str = ""
+    """Why the newest of its runs ended or was not begun; empty otherwise."""

@@ -42,6 +42,8 @@ export const asking = signal(false);
 export const mayEdit = computed(() => hello.value?.may.includes("edit") ?? false);
 /** Whether there is no run, only a file that is edited. */
 export const notRun = computed(() => hello.value?.mode === "edit");
+/** Whether a draft is run: what it comes to is of no file, and nothing of it is kept. */
+export const onTrial = computed(() => mayEdit.value && !notRun.value);
 
 export const entries = computed<Entry[]>(() => {
   const found: Entry[] = [];

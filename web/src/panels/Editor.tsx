@@ -72,8 +72,30 @@ export function Editor() {
         >
           Review and save{changedLines > 0 && ` (${changedLines})`}
         </button>
+        <button
+          type="button"
+          title={
+            now.runs
+              ? "End the run: everybody is shown where they begin"
+              : "Run the draft from its beginning; every edit begins it anew, and nothing is recorded"
+          }
+          onClick={() => void ask(now.runs ? "stop" : "run")}
+        >
+          {now.runs ? "Stop" : "Run"}
+        </button>
         <span role="status">{asking.value ? "checking …" : now.diff === "" ? "saved" : "not saved"}</span>
       </div>
+      {now.runs && (
+        <p class="trial">
+          The draft is run, from its beginning with every edit: time, motions, connections and what criteria
+          counted. Nothing is recorded.
+        </p>
+      )}
+      {now.ended !== "" && (
+        <p class="trial" role="alert">
+          The run has ended: {now.ended}
+        </p>
+      )}
       <div class="edit-bar">
         <select
           aria-label="What is edited"

@@ -1,6 +1,6 @@
 // What is shown, from where, and what the run came to.
 
-import { notRun } from "../editing/draft";
+import { notRun, onTrial } from "../editing/draft";
 import { against, percent, withUnit } from "../figures";
 import {
   elsewhere,
@@ -53,7 +53,9 @@ function SourceState() {
       : isLive.value
         ? stale.value
           ? "live – nothing heard"
-          : "live"
+          : onTrial.value
+            ? "live – a draft, not recorded"
+            : "live"
         : "replay",
   }[state];
   const look = lost || stale.value ? "off" : isLive.value ? "live" : "replay";
@@ -112,6 +114,7 @@ function StatusPill() {
       <strong>
         {HEADLINES[run]}
         {told?.whole !== true && " SO FAR"}
+        {onTrial.value && ", DRAFT"}
       </strong>
       {run === "within" && <span class="pill-more">all {judgedCount()} with a limit</span>}
       {run === "within" && told?.decided != null && told.decided < 1 && (

@@ -57,6 +57,8 @@ def add(sub: argparse.ArgumentParser) -> None:
     )
     text = "start what stands for its devices ([[emulators]]), and end it afterwards"
     sub.add_argument("--emulated", action="store_true", help=text)
+    text = "let pages edit the file meanwhile: every edit begins the run anew, nothing is recorded or written"
+    sub.add_argument("--edit", action="store_true", help=text)
     sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
 
 
@@ -95,11 +97,28 @@ def run(options: argparse.Namespace) -> int:
         )
         scene = replace(scene, findings=(*scene.findings, *said))
         tell(scene.findings, verbose=options.verbose)
-        found = live(station, scene, options)
+        found = _edited(station, options) if options.edit else live(station, scene, options)
         for each in running:
             if each.ended:
                 line("warning", f"{each.key}: the emulator ({each.kind}) ended by itself", "yellow")
     return found
+
+
+def _edited(station: Station, options: argparse.Namespace) -> int:
+    """Run the draft that pages edit; what it came to is of no file and no verdict.
+
+    Raises:
+        InputError: Something is asked for that only a run of one workstation has.
+    """
+    from seerob.app.commands.edit import edited
+
+    for name in ("output", "pdf", "allow_writing"):
+        if getattr(options, name):
+            option = f"--{name.replace('_', '-')}"
+            raise InputError.at("seerob run", option, "not with --edit", "leave one of them out")
+    line("note", "a trial: nothing is recorded, reported or written to machines; edits begin it anew")
+    edited(station, options, running=True)
+    return Exit.WITHIN
 
 
 @contextmanager

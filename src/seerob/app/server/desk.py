@@ -15,32 +15,24 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from difflib import unified_diff
-from math import inf
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import msgspec
-from msgspec.structs import replace
 
 from seerob.app.server.client import Client
-from seerob.app.server.feed import Audience
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.files.toml_file import parsed_toml, read_toml
 from seerob.core.snapshot import (
     Change,
-    Command,
     Draft,
     Edit,
     Edited,
-    History,
     Measure,
     Measured,
     Mistake,
     Result,
-    Snapshot,
-    SoFar,
-    Transport,
 )
 from seerob.workstation import editing
 from seerob.workstation.editing import Event, Overlap, exchanged, undone
@@ -63,6 +55,24 @@ class Checked(NamedTuple):
 Check = Callable[[bytes], Checked]
 """Reads a draft as ``seerob check-file`` does, in a thread of its own, and raises `InputError` of every
 mistake."""
+
+
+class Trying(Protocol):
+    """Where drafts are tried: `seerob.app.server.trial.Trial`."""
+
+    @property
+    def running(self) -> bool:
+        """Whether the draft is tried."""
+
+    @property
+    def ended(self) -> str:
+        """Why the newest run ended or was not begun; empty otherwise."""
+
+    def start(self) -> str:
+        """Try the draft from its beginning; why not, empty when it is done."""
+
+    def stop(self) -> None:
+        """End the run."""
 
 
 class _Step(NamedTuple):
@@ -92,13 +102,16 @@ class Desk:
         begun: What it is now.
         check: Says what is wrong with a draft.
         schema: JSON schema of the workstation file, for forms.
+        trial: Where drafts are tried; None where none is.
 
     Raises:
         InputError: The file cannot be read.
     """
 
-    def __init__(self, file: Path, begun: Checked, check: Check, schema: bytes = b"") -> None:
-        self.schema, self._now = schema, begun
+    def __init__(
+        self, file: Path, begun: Checked, check: Check, schema: bytes = b"", trial: Trying | None = None
+    ) -> None:
+        self.schema, self._now, self._trial = schema, begun, trial
         self._file, self._check = file, check
         self._tables, self._raw = read_toml(file)
         self._saved, self._saved_steps = self._raw, tuple[_Step, ...]()
@@ -171,8 +184,21 @@ class Desk:
                 self._diff = ""
             case "discard":
                 await self._discard(page)
+            case "run" if self._trial is not None:
+                if refusal := self._trial.start():
+                    raise self._refusal(refusal)
+            case "stop" if self._trial is not None:
+                self._trial.stop()
+            case "run" | "stop":
+                raise self._refusal("nothing is run here")
             case _:
-                raise self._refusal(f"{edit.action!r} is no action", "change, undo, redo, save or discard")
+                raise self._refusal(
+                    f"{edit.action!r} is no action", "change, undo, redo, save, discard, run or stop"
+                )
+        self.tell()
+
+    def tell(self) -> None:
+        """Tell every page of the draft."""
         for other in tuple(self._redo):
             other.offer("Draft", _encode(self._draft(other)))
 
@@ -292,6 +318,8 @@ class Desk:
             tables=self._tables,
             undo=any(self._own(step, page) for step in self._steps),
             redo=bool(self._redo.get(page)),
+            runs=self._trial is not None and self._trial.running,
+            ended="" if self._trial is None else self._trial.ended,
         )
 
     def _refusal(self, what: str, remedy: str = "") -> InputError:
@@ -305,45 +333,3 @@ class Desk:
             "changed meanwhile by another page" if text else "taken away meanwhile by another page"
         )
         return InputError(Problem(str(self._file), str(overlap), what, "look at it, then change it again"))
-
-
-class Still:
-    """A feed that shows one snapshot, until there is another: a workstation that is edited and not run.
-
-    Args:
-        snapshot: What is shown first.
-    """
-
-    mode = "edit"
-    duration = None
-
-    def __init__(self, snapshot: Snapshot) -> None:
-        self._snapshot, self._new = snapshot, asyncio.Event()
-        self._new.set()
-
-    def put(self, snapshot: Snapshot) -> None:
-        """Show another one; only to be called in the server's loop."""
-        self._snapshot = replace(snapshot, seq=self._snapshot.seq + 1)
-        self._new.set()
-
-    def history(self) -> History:
-        """Nothing happened."""
-        return History(traces=())
-
-    def so_far(self) -> SoFar | None:
-        """Nothing was run."""
-        return None
-
-    def transport(self) -> Transport:
-        """Not playing."""
-        return Transport(playing=False, t=self._snapshot.t)
-
-    def command(self, command: Command) -> None:
-        """Nothing can be played."""
-
-    async def run(self, audience: Audience) -> None:
-        """Show the snapshot whenever it is another."""
-        while True:
-            await self._new.wait()
-            self._new.clear()
-            audience.show(self._snapshot, inf)

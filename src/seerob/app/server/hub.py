@@ -105,6 +105,7 @@ class Hub:
         self._feed, self._patience, self._offers, self._desk = feed, patience, offers, desk
         self._visits = Visits() if visits is None else visits
         self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
+        self._may: dict[Client, tuple[str, ...]] = {}
         self._scene = _encode(scene)
         self._shared = {kind: Allowance(*rate) for kind, rate in SHARED.items()}
         self._newest: Snapshot | None = None
@@ -115,8 +116,13 @@ class Hub:
     def begin(self, scene: Scene) -> None:
         """Send another scene to every page, of which snapshots are from now on."""
         self._scene, self._newest = _encode(scene), None
+        turned = self._hello.mode != self._feed.mode
+        self._hello = replace(self._hello, mode=self._feed.mode)
         for client in self.clients:
+            if turned:
+                client.offer("Hello", _encode(replace(self._hello, may=self._may[client])))
             client.begin(self._scene)
+            client.offer("Transport", _encode(self._feed.transport()))
 
     def show(self, snapshot: Snapshot, until: float = inf) -> None:
         """Send a snapshot to every page, if it is sent before ``until`` [s], monotonic time."""
@@ -163,8 +169,8 @@ class Hub:
             return
         client = Client(socket, patience=self._patience)
         edits = self._desk is not None and Role.CONTROL in state["roles"]
-        hello = replace(self._hello, may=(*sorted(state["roles"]), *(("edit",) if edits else ())))
-        client.offer("Hello", _encode(hello))
+        self._may[client] = (*sorted(state["roles"]), *(("edit",) if edits else ()))
+        client.offer("Hello", _encode(replace(self._hello, may=self._may[client])))
         client.offer("Scene", self._scene)
         client.offer("History", _encode(self._feed.history()))
         if (so_far := self._feed.so_far()) is not None:
@@ -182,6 +188,7 @@ class Hub:
             closing = await client.over
         finally:
             self.clients.discard(client)
+            self._may.pop(client, None)
             self._offers.gone(client)
             if self._desk is not None:
                 self._desk.gone(client)

@@ -21,6 +21,7 @@ from seerob.app.server.serving import Server
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Command, History, Result, Scene, Snapshot, SoFar, Trace, Transport
 from seerob.core.transforms import Array
+from seerob.devices.live.headset_offers import Offers
 from seerob.outputs.sink import Closing
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES
@@ -234,7 +235,32 @@ class Live:
             await asyncio.sleep(self._pause)
 
 
-class LiveView(Closing):
+class Shown(Closing):
+    """A run as pages see it: an open `seerob.outputs.sink.Writer` that hands each tick to a feed.
+
+    Args:
+        live: The feed.
+        offers: What headsets that show a page see: `Station.run` hands it to the sources that take it.
+    """
+
+    def __init__(self, live: Live, offers: Offers) -> None:
+        self._live = live
+        self.offers = offers
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Show one tick; never waits for a page."""
+        self._live.publish(snapshot)
+
+    def share(self, log: ResultLog) -> None:
+        """Show what the run comes to, too."""
+        self._live.log = log
+
+    def close(self) -> None:
+        """Say that no more comes."""
+        self._live.finish()
+
+
+class LiveView(Shown):
     """The live view as a sink: an open `seerob.outputs.sink.Writer` that pages in a browser look at.
 
     Args:
@@ -261,29 +287,20 @@ class LiveView(Closing):
         tls: Tls | None = None,
         clear_text: bool = False,
     ) -> None:
-        self._live = Live()
+        live = Live()
         self.server = Server(
             scene=scene,
             meshes=meshes,
-            feed=self._live,
+            feed=live,
             host=host,
             port=port,
             tokens=tokens,
             tls=tls,
             clear_text=clear_text,
         )
-        self.offers = self.server.offers
-        """What headsets that show a page see: `Station.run` hands it to the sources that take it."""
+        super().__init__(live, self.server.offers)
         self.url = self.server.start()
         """What to open in a browser."""
-
-    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
-        """Show one tick; never waits for a page."""
-        self._live.publish(snapshot)
-
-    def share(self, log: ResultLog) -> None:
-        """Show what the run comes to, too."""
-        self._live.log = log
 
     def finish(self) -> None:
         """The run is over; pages may go on looking at what happened until `close`."""

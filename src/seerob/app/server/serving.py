@@ -250,6 +250,12 @@ class Server:
         self._meshes.update(meshes)
         self.hub.begin(scene)
 
+    def call(self, act: Callable[[], None]) -> None:
+        """Do something in the server's own loop, once it comes to it; nothing when it has stopped."""
+        if self._loop is not None:
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(act)
+
     def start(self) -> str:
         """Listen, and return `url`; connections are answered as soon as this returns.
 

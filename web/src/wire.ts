@@ -12,8 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "16d4a4715f817ebb";
-export const SCHEMA = "46092f8f864f1b04";
+export const SCHEMA = "ebb8fca55330db72";
 
 /** A vector at a point. */
 export interface Arrow {

@@ -137,6 +137,18 @@ ORIENTATION_SCALE = 0.1
 """Error of an orientation of weight 1 [rad]."""
 
 
+class Placing(Struct, frozen=True, kw_only=True):
+    """How well it is known where the world of a device lies in the cell."""
+
+    covariance: tuple[float, ...] = ()
+    """Of the error of that place, translation [m] before rotation [rad], in the cell's axes about ``about``:
+    36 numbers row by row; none where it is exact by definition, or not known."""
+    about: Vec3 = (0.0, 0.0, 0.0)
+    """[m]"""
+    reason: str = ""
+    """Why nobody knows where it lies, or not well enough; empty when it is known."""
+
+
 class BodySample(SampleBase, frozen=True, kw_only=True, tag="body"):
     """What one device sees of one person; several devices may speak of the same one."""
 
@@ -158,6 +170,9 @@ class BodySample(SampleBase, frozen=True, kw_only=True, tag="body"):
     smoothing: float = 0.0
     """Cut-off frequency of the low-pass filter through which the twin sees it [Hz]; 0 for none. The points
     here are raw, and ``latency`` holds the filter's delay, too."""
+    placing: Placing | None = None
+    """How well it is known where the device's world lies in the cell; None where the file says where, and
+    that is taken as exact."""
 
 
 class SignalSample(SampleBase, frozen=True, kw_only=True, tag="signal"):

@@ -19,7 +19,6 @@ from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
 from seerob.session.opening import coarse
 from seerob.twin.state import State
-from seerob.twin.validity.hearing import no_position_reason
 from seerob.workstation.variables import Value, WhenStale
 from seerob.workstation.workstation import Pose, Workstation, real_names
 
@@ -212,7 +211,7 @@ def invalid_reasons(state: State) -> dict[str, str]:
             hearing = state.hearings[name]
             found |= {f"{name}/{bone}": "no device sees it" for bone in hearing.unobserved(state.t)}
             unplaced = hearing.unplaced(state.t)
-            found |= {f"{name}/{bone}": no_position_reason(unplaced) for bone in unplaced}
+            found |= {f"{name}/{bone}": hearing.unplaced_reason(state.t) for bone in unplaced}
             found |= {
                 f"{name}/{bone}": why for why, bones in hearing.invalid_parts(state.t) for bone in bones
             }

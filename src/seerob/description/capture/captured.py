@@ -16,6 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
+from seerob.core.samples import Placing
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 
@@ -117,6 +118,8 @@ class CaptureFrame:
     """The person, as the device names it: an id that may change when it loses somebody."""
     pose: str = ""
     """``tpose`` or ``npose`` when this is no motion but a calibration pose that the file contains."""
+    placing: Placing | None = None
+    """How well it is known where the device's world lies in the cell; None where the file says where."""
 
 
 @dataclass(frozen=True, eq=False)

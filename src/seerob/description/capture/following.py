@@ -15,13 +15,13 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 from msgspec import structs
 
-from seerob.core.samples import BodyPoint, BodySample, Quality, Vec3
+from seerob.core.samples import BodyPoint, BodySample, Placing, Quality, Vec3
 from seerob.core.transforms import Array, inverse
 from seerob.description.capture.estimated import (
     ENDS,
@@ -114,6 +114,8 @@ class Followed:
     slack: Mapping[str, float] = field(default_factory=dict)
     """Bone → how much farther a point of it may be than the newest of what is seen shows [m]: what is held
     may have moved, and another device may see it elsewhere."""
+    placings: tuple[Placing, ...] = ()
+    """How well it is known where the worlds of devices lie that were heard, where that is not exact."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,8 @@ class _DeviceReading:
     part: InvalidPart | None = None
     jumped: bool = False
     """Something was left out because it jumped."""
+    placing: Placing | None = None
+    """Of its sample."""
 
 
 class _Waist:
@@ -321,6 +325,7 @@ class Following:
             t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed,
             undetermined(turns, leaning=leaning),
             unplaced, displaced, slack,
+            tuple(each.placing for each in readings if each.points and each.placing is not None),
         )  # fmt: skip
 
     def _eased(self, found: Pulls, before: Array | None, t: float) -> Pulls:
@@ -349,6 +354,7 @@ class Following:
         if sample.quality is Quality.INVALID:
             return _DeviceReading([], reason)
         reading = self._believed(device, points, instant, reason, placed=sample.placed)
+        reading = replace(reading, placing=sample.placing)
         if not sample.upright:
             device.leaning |= {point.bone: instant for point in reading.points}
         return reading

@@ -243,6 +243,7 @@ class BodySamples:
                 placed=self.captured.placed,
                 upright=self.upright,
                 quality=Quality.GOOD,
+                placing=frame.placing,
             )
             seq += 1
 

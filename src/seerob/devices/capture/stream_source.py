@@ -160,6 +160,7 @@ class _Hearing:
             hold=self._source.hold,
             smoothing=self._source.smoothing or 0.0,
             quality=_quality(points, changed),
+            placing=frame.placing,
         )
 
     def _bind(self, layout: Layout) -> Observer:

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import Undecided
+from seerob.core.samples import Placing
 from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
@@ -25,6 +26,8 @@ class Seen(NamedTuple):
     """Hands, feet and heads of which only the joint was seen, each with a bound [rad]."""
     slack: Mapping[str, float]
     """Bones that are held or seen elsewhere, too, each with how much farther they may be [m]."""
+    placings: tuple[Placing, ...] = ()
+    """How well it is known where the worlds of devices lie, where that is not exact."""
 
 
 class Witness:
@@ -53,7 +56,9 @@ class Witness:
         self._heard.append({name: _heard(state, name) for name in asked})
         people = {name: h for name, h in state.hearings.items() if h.bones}
         t = state.t
-        self._seen.append({name: Seen(dict(h.bones), h.unaimed(t), h.slack(t)) for name, h in people.items()})
+        self._seen.append(
+            {name: Seen(dict(h.bones), h.unaimed(t), h.slack(t), h.placings(t)) for name, h in people.items()}
+        )
         return self._judge(state)
 
     def _tick(self, t: float) -> int:
@@ -136,8 +141,8 @@ class Posed(State):
         self.invalid_reasons = {**invalid_reasons, robot.name: own_reason}
         self._said, seen = self._witness.heard(others_at)
         for name, hearing in self.hearings.items():
-            hearing.bones, unaimed, slack = seen.get(name, Seen({}, {}, {}))
-            places = EVERYWHERE._replace(slack=slack)
+            hearing.bones, unaimed, slack, placings = seen.get(name, Seen({}, {}, {}))
+            places = EVERYWHERE._replace(slack=slack, placings=placings)
             hearing.bones_heard = [BonesHeard(t, unaimed=unaimed, places=places)]
         self.asked.clear()
         self.refresh(t)

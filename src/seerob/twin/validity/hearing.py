@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seerob.core.samples import REPEATED
+from seerob.core.samples import REPEATED, Placing
 from seerob.core.transforms import Array
 from seerob.description.capture.estimated import estimated
 from seerob.description.capture.following import Followed, InvalidPart, held_speed
@@ -65,6 +65,8 @@ class Places(NamedTuple):
     where anything is."""
     slack: Mapping[str, float]
     """Bone → how much farther a point of it may be, as it is held or seen elsewhere, too [m]."""
+    placings: tuple[Placing, ...] = ()
+    """How well it is known where the worlds of devices lie, where that is not exact."""
 
 
 EVERYWHERE = Places(frozenset(), frozenset(), MappingProxyType({}))
@@ -188,7 +190,9 @@ class Hearing:
     def follow(self, found: Followed) -> None:
         """Take what devices told of a person at one instant."""
         self.take(Heard(found.t, found.reason))
-        places = Places(found.unplaced, found.displaced, found.slack)
+        places = Places(found.unplaced, found.displaced, found.slack, found.placings)
+        if any(placing.reason for placing in found.placings):
+            places = NOWHERE._replace(slack=found.slack, placings=found.placings)
         self.bones_heard.append(
             BonesHeard(
                 found.t, found.parts, found.observed, found.bare, found.unaimed, found.undetermined, places
@@ -295,7 +299,21 @@ class Hearing:
     def displaced(self, t: float) -> str:
         """Why nobody may rely any more on where bones are that were placed before; empty when all may."""
         found = {bone for said in self._said_of_bones(t) for bone in said.places.displaced}
-        return no_position_reason(tuple(bone for bone in BONES if bone in found)) if found else ""
+        return self._no_place(t, tuple(bone for bone in BONES if bone in found)) if found else ""
+
+    def unplaced_reason(self, t: float) -> str:
+        """Why nobody knows where bones are whose directions are known at ``t`` [s]; empty when all are."""
+        return self._no_place(t, self.unplaced(t))
+
+    def _no_place(self, t: float, bones: Sequence[str]) -> str:
+        if bones and (reasons := [placing.reason for placing in self.placings(t) if placing.reason]):
+            return reasons[0]
+        return no_position_reason(bones)
+
+    def placings(self, t: float) -> tuple[Placing, ...]:
+        """How well it is known at ``t`` [s] where the worlds of devices lie, where that is not exact."""
+        every = (placing for said in self._said_of_bones(t) for placing in said.places.placings)
+        return tuple(dict.fromkeys(every))
 
     def slack(self, t: float) -> dict[str, float]:
         """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m].

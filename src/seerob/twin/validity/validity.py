@@ -16,7 +16,7 @@ from seerob.core.errors import NotAsked, Undecided
 from seerob.model.model import Model
 from seerob.twin.attachments import Attachments
 from seerob.twin.signals import Signals
-from seerob.twin.validity.hearing import Hearing, bones_of, no_position_reason, unobserved_reason
+from seerob.twin.validity.hearing import Hearing, bones_of, unobserved_reason
 from seerob.workstation.variables import VARIABLE, Value
 
 MOST = 4096
@@ -188,7 +188,7 @@ class Validity:
             return ""
         if reason := unobserved_reason(name, hearing.unobserved(self.t)):
             return reason
-        reason = no_position_reason(hearing.unplaced(self.t))
+        reason = hearing.unplaced_reason(self.t)
         return f"{name}: {reason}" if reason else ""
 
     def input_reason(self, name: str) -> str:

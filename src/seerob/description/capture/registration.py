@@ -68,7 +68,7 @@ def turn(v: Array) -> Array:
     """Rotation matrix of a rotation vector [rad], shape (..., 3, 3)."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     K = skew(v)
-    return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K
+    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K)
 
 
 def vector(R: Array) -> Array:
@@ -256,7 +256,7 @@ def _of_the_tip(
 
 
 def _strange(room: Array, cell: Array, place_error: Array, touch_error: float | None, level: float) -> Array:
-    """See `Registration.strange`: each touch against the registration from all others."""
+    """How far each touch is from the registration of all others, as `Registration.strange`, (..., n)."""
     n = room.shape[-2]
     found = np.zeros(room.shape[:-1])
     place_error = np.broadcast_to(np.asarray(place_error, float), (n,))

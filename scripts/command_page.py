@@ -42,6 +42,8 @@ def commands_page() -> str:
     for name, sub in _subcommands(cli.parser()):
         example = (sub.epilog or "").removeprefix("example: ").split("   ")[0]
         parts += [f"\n## {name}\n\n", _sentence(sub.description), f"\n```\n{example}\n```\n", _options(sub)]
+        for action, inner in _subcommands(sub):
+            parts += [f"\n### {name} {action}\n\n", _sentence(inner.description), _options(inner)]
         for kind in kinds(emulate.PACKAGE) if name == "emulate" else ():
             inner = emulate.parser_of(kind)
             parts += [f"\n### {name} {kind}\n\n", _sentence(inner.description), _options(inner)]

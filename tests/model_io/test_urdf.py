@@ -454,3 +454,77 @@ def test_a_link_larger_than_20_m_speaks_of_a_wrong_unit(tmp_path):
         found = [f for f in load_robot("r.urdf", folder=tmp_path).findings if "largest extent" in f.text]
         assert [(f.level, f.subject) for f in found] == [("warning", "robot/a")] * expected
     assert "read as mm it would be 0.12 m" in found[0].text
+
+
+# -- what only the eye needs ---------------------------------------------------------------------
+
+SOLID = '<collision><geometry><box size="0.1 0.1 0.3"/></geometry></collision>'
+ABSENT = '<visual><geometry><mesh filename="gone.stl"/></geometry></visual>'
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        ABSENT,
+        '<visual><geometry><box size="1 1"/></geometry></visual>',
+        '<visual><geometry><mesh filename="${part}.stl"/></geometry></visual>',
+        '<visual><origin xyz="${x} 0 0"/><geometry><box size="1 1 1"/></geometry></visual>',
+        "<visual/>",
+    ],
+)
+def test_an_unreadable_look_holds_a_robot_until_the_user_says_that_it_does_not_count(tmp_path, shown):
+    text = arm(INERTIAL + SOLID + shown)
+    held = read(tmp_path, text, name="a")
+    assert [f.holds for f in held.findings if f.holds] == [("a",)]
+    assert 'visuals = "ignore"' in texts(held)
+    ignored = read(tmp_path, text, name="a", visuals=False)
+    assert not [f for f in ignored.findings if f.holds]
+    assert "assumed a: shapes for the eye are not read" in texts(ignored)
+    for with_look, without in zip(held.links, ignored.links, strict=True):
+        assert len(with_look.solids) == len(without.solids)
+        assert without.visual == ()
+
+
+def test_what_distances_need_is_refused_all_the_same(tmp_path):
+    for visuals in (True, False):
+        for inner in (ABSENT, SOLID.replace("0.1 0.1 0.3", "${x}"), ABSENT.replace("visual", "collision")):
+            assert problems(tmp_path, arm(INERTIAL + inner), visuals=visuals)
+
+
+def test_a_look_that_is_ignored_makes_no_distance_uncertain(tmp_path):
+    """The one that is read, and stands out, does: by as much as it stands out."""
+    shown = '<visual><geometry><box size="0.12 0.1 0.3"/></geometry></visual>'
+    text = arm(INERTIAL + SOLID + shown)
+    (solid,) = read(tmp_path, text).link("arm").solids
+    assert solid.deviation == pytest.approx(0.01)
+    (solid,) = read(tmp_path, text, visuals=False).link("arm").solids
+    assert solid.deviation == 0
+
+
+def test_colours_and_elements_for_others_refuse_no_robot(tmp_path):
+    text = robot(
+        '<material name="m"><color rgba="1 0"/></material>',
+        '<material name="n"><color rgba="${grey}"/></material>',
+        '<gazebo reference="arm"><x y="$(arg x)"/></gazebo>',
+        '<transmission name="${t}"/>',
+        '<link name="base"/>',
+        f'<link name="arm">{INERTIAL}{SOLID}<visual><geometry><box size=".1 .1 .3"/></geometry>'
+        '<material name="m"/></visual></link>',
+        joint("j", "base", "arm"),
+    )
+    made = read(tmp_path, text)
+    assert "shown in grey" in texts(made)
+    assert not [f for f in made.findings if f.holds]
+    assert len(made.link("arm").visual) == 1
+
+
+def test_visuals_of_an_mjcf_are_left_out_too(tmp_path):
+    geoms = '<geom type="box" size=".1 .1 .1"/><geom type="box" size=".2 .1 .1" contype="0" conaffinity="0"/>'
+    body = f'<body name="arm"><joint name="j" axis="0 0 1" range="-1 1"/>{geoms}</body>'
+    text = f'<mujoco><compiler angle="radian"/><worldbody>{body}</worldbody></mujoco>'
+    seen = read(tmp_path, text, "r.xml")
+    assert seen.link("arm").visual
+    ignored = read(tmp_path, text, "r.xml", visuals=False)
+    assert ignored.link("arm").visual == ()
+    assert len(ignored.link("arm").solids) == len(seen.link("arm").solids)
+    assert "shapes for the eye are not read" in texts(ignored)

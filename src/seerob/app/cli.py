@@ -34,6 +34,7 @@ COMMANDS = (
     "permissible",
     "plan",
     "kinds",
+    "robots",
     "schema",
     "completion",
     "emulate",

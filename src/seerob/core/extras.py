@@ -26,6 +26,7 @@ EXTRAS = {
     "xr": "openxr",
     "cryptography": "tls",
     "OCP": "cad",
+    "robot_descriptions": "robots",
 }
 """Package as it is imported → the extra that brings it."""
 

@@ -1,4 +1,4 @@
-"""One loader for every robot: the library, a file of an installed package, or a path."""
+"""One loader for every robot: library, published description, file of an installed package, or path."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from pathlib import Path
 
 from seerob.core.errors import InputError, suggestion
 from seerob.core.files.bounded import TooLarge, content, missing_file
+from seerob.core.snapshot import Finding
 from seerob.description.description import Description
 from seerob.description.formats import mjcf, urdf
 from seerob.description.formats.resolve import Resolver, as_written_or_in_other_case, of_distribution
 from seerob.description.formats.xacro_files import expanded
-from seerob.description.robots import library
+from seerob.description.robots import library, published
 from seerob.description.robots.maker_geometry import with_geometry_of
 from seerob.description.xml_values import MAX_BYTES, parse_xml
 
@@ -26,12 +27,14 @@ def load_robot(
     arguments: Mapping[str, str] | None = None,
     name: str = "robot",
     outside: bool = False,
+    visuals: bool = True,
 ) -> Description:
     """A robot, read, repaired where it can be, and checked.
 
     Args:
-        model: ``library:ur10``; ``package:<distribution>/<path in it>``, a file of an installed
-            Python distribution; or a path to a URDF, xacro or MJCF file.
+        model: ``library:ur10``; ``description:ur5e_description``, one of the package robot_descriptions;
+            ``package:<distribution>/<path in it>``, a file of an installed Python distribution; or a path
+            to a URDF, xacro or MJCF file.
         folder: What relative paths are relative to: the folder of the workstation file.
         packages: Folder of each ROS package that ``package://`` names.
         meshes: A description (as ``model``) whose geometry replaces the library's envelope.
@@ -39,6 +42,7 @@ def load_robot(
         name: Name of the robot; findings speak of ``name/link``.
         outside: Whether a description may name files outside ``folder``, its own folder and what is
             installed.
+        visuals: Whether shapes that only the eye needs are read.
 
     Raises:
         InputError: The file is missing, not a robot, or wrong beyond repair; all mistakes at once.
@@ -47,14 +51,14 @@ def load_robot(
     if model.startswith("library:"):
         description = library.load(model.removeprefix("library:"), name=name)
     else:
-        description = _from_file(model, folder, packages or {}, arguments or {}, name, outside)
+        description = _from_file(model, folder, packages or {}, arguments or {}, name, outside, visuals)
         # Numba is imported only where a file brings shapes of its own.
         from seerob.description.robots.maker_geometry import with_protrusions
 
         description = with_protrusions(description)
     if meshes is None:
         return description
-    maker = load_robot(meshes, folder=folder, packages=packages, name=name, outside=outside)
+    maker = load_robot(meshes, folder=folder, packages=packages, name=name, outside=outside, visuals=visuals)
     return with_geometry_of(description, maker)
 
 
@@ -65,13 +69,47 @@ def _from_file(
     arguments: Mapping[str, str],
     name: str,
     outside: bool,
+    visuals: bool,
 ) -> Description:
+    if model.startswith("description:"):
+        return _from_published(model, folder, packages, arguments, name, outside, visuals)
     path, home = _path(model, folder)
     roots = {package: folder / root for package, root in packages.items()}
     resolver = Resolver(model, path.parent, roots, within=(folder, home), outside=outside)
+    return _read(path, resolver, arguments, name, visuals)
+
+
+def _from_published(
+    model: str,
+    folder: Path,
+    packages: Mapping[str, str],
+    arguments: Mapping[str, str],
+    name: str,
+    outside: bool,
+    visuals: bool,
+) -> Description:
+    found = published.find(model.removeprefix("description:"))
+    if arguments and found.path.suffix != ".xacro":
+        raise InputError.at(model, "arguments", "is not a xacro file and takes none", "leave them out")
+    roots = {found.package.name: found.package, **{key: folder / root for key, root in packages.items()}}
+    within = (folder, found.repository)
+    resolver = Resolver(model, found.path.parent, roots, within=within, outside=outside)
+    read = _read(found.path, resolver, {**found.arguments, **arguments}, name, visuals)
+    source = f"{model}: {found.address} {found.commit[:12]}"
+    said = f"licence {found.licence}" if found.licence else "whose licence is not known to the package"
+    finding = Finding(level="note", subject=name, text=f"read from {source}, {said}")
+    licence = {f"{found.name}/LICENSE": found.licence_text} if found.licence_text else {}
+    files = {found.path.name if key == model else key: content for key, content in read.files.items()}
+    return replace(read, source=source, findings=(finding, *read.findings), files={**files, **licence})
+
+
+def _read(
+    path: Path, resolver: Resolver, arguments: Mapping[str, str], name: str, visuals: bool
+) -> Description:
+    model = resolver.file
     if path.suffix.lower() == ".xacro":
         text, files = expanded(path, resolver, arguments)
-        robot = urdf.from_text(text, resolver=resolver, name=name)
+        robot = urdf.from_text(text, resolver=resolver, name=name, visuals=visuals)
         return replace(robot, files={**robot.files, **files})
     if path.suffix.lower() not in {".urdf", ".xml"}:
         readable = ".urdf, .xacro and .xml (URDF or MJCF) are read"
@@ -82,12 +120,22 @@ def _from_file(
         raise InputError.at(model, "", f"cannot be read: {error}", f"at most {MAX_BYTES} are read") from None
     root = parse_xml(text, str(path)).tag
     if root == "robot":
-        return urdf.from_text(text, resolver=resolver, name=name)
+        return urdf.from_text(text, resolver=resolver, name=name, visuals=visuals)
     if root == "mujoco":
-        return mjcf.read_mjcf(path, resolver=resolver, name=name)
+        read = mjcf.read_mjcf(path, resolver=resolver, name=name)
+        return read if visuals else _without_visuals(read)
     raise InputError.at(
         model, "", f"the root element is <{root}>", "<robot> (URDF) or <mujoco> (MJCF) is expected"
     )
+
+
+def _without_visuals(description: Description) -> Description:
+    """The description with the shapes alone that distances use."""
+    if not any(link.solids and link.visual for link in description.links):
+        return description
+    links = tuple(replace(link, visual=()) if link.solids else link for link in description.links)
+    finding = Finding(level="assumed", subject=description.name, text=urdf.IGNORED_VISUALS)
+    return replace(description, links=links, findings=(*description.findings, finding))
 
 
 def _path(model: str, folder: Path) -> tuple[Path, Path]:

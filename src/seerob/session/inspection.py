@@ -112,6 +112,8 @@ def _files(table: Mapping[str, object], file: Path, folder: Path) -> Iterator[Fa
     for key, text in texts(table):
         if text.startswith("package:"):
             yield Fact("reads", f"files of the installed package {text.split(':')[1].split('/')[0]} ({key})")
+        elif text.startswith("description:"):
+            yield Fact("reads", f"a repository in the cache of robot_descriptions, {text} ({key})")
         if key in away or not 0 < len(text) <= 4096:
             continue
         try:

@@ -285,7 +285,7 @@ def _renamed(value: Any, words: _Words, key: str = "") -> Any:
     if isinstance(value, str):
         if key in _FREE:
             return "left out"
-        shipped = key == "kind" or value.startswith(("library:", "package:"))
+        shipped = key == "kind" or value.startswith(("library:", "package:", "description:"))
         return value if shipped else words.named(value)
     if isinstance(value, Mapping):
         return {words.named(name): _renamed(inner, words, name) for name, inner in value.items()}

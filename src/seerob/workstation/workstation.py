@@ -110,13 +110,17 @@ class Robot(_Table, frozen=True, kw_only=True):
     name: Name
     """Its name, by which criteria and sources ask for it."""
     model: str
-    """``library:ur10``, ``package:…/ur10_robot.urdf``, or a path to URDF, xacro or MJCF."""
+    """``library:ur10``, ``description:ur5e_description``, ``package:…/ur10_robot.urdf``, or a path to URDF,
+    xacro or MJCF."""
     on: str | None = None
     """Machine that carries it, an axis, a turntable or a cart; it stands in the world when not given."""
     base: Pose = Pose()
     """Pose of its root link in the world, or in the frame of the machine it is on."""
     meshes: str | None = None
     """The maker's description (as ``model``) whose shapes replace the library's envelope."""
+    visuals: Literal["read", "ignore"] = "read"
+    """``ignore``: what a description shows besides its collision shapes is not read, and distances take it
+    that nothing stands out of those; where a link has no other shape, it is read all the same."""
     calibration: str | None = None
     """File with the kinematics of this very robot, as ``seerob probe`` writes it."""
     packages: dict[str, str] = {}

@@ -45,6 +45,8 @@ class Shapes:
         default_factory=dict
     )
     """By name and scale: the meshes, or what is wrong with the file."""
+    visuals: bool = True
+    """Whether shapes that only the eye needs are read."""
 
     def read_colors(self, robot: Element) -> None:
         """Remembers the materials that the robot declares for all its links."""
@@ -55,15 +57,18 @@ class Shapes:
         """What can be read of the link's ``<visual>`` elements where others are there for distances.
 
         What cannot is left out of the pictures. How far it stands out of what distances see is unknown then,
-        so a finding holds the robot.
+        so a finding holds the robot. Where the user says that they are not to be read, none is.
         """
+        if not self.visuals:
+            return ()
         problems = self.reader.problems
         before = len(problems)
         found = self.visual(link, name)
         for problem in problems[before:]:
             text = (
                 f"{problem.key.partition('.')[2]} is left out of pictures ({problem.what}), and how far it "
-                "stands out of the collision shape is unknown: mend it, or take it out of the description"
+                "stands out of the collision shape is unknown: mend it, take it out of the description, or "
+                'say visuals = "ignore" where the collision shapes hold all of the link'
             )
             about = f"{self.reader.robot}/{name}"
             held = Finding(level="warning", subject=about, text=text, holds=(self.reader.robot,))
@@ -213,9 +218,12 @@ class Shapes:
         name, color = material.get("name", ""), material.find("color")
         if color is None:
             return self.colors.get(name)
-        r, g, b, a = np.clip(
-            self.reader.numbers(color, "rgba", f"{key}.color", (0.7, 0.72, 0.75, 1.0)), 0, 1
-        ).tolist()
+        before = len(self.reader.problems)
+        rgba = self.reader.numbers(color, "rgba", f"{key}.color", (0.7, 0.72, 0.75, 1.0))
+        for problem in self.reader.problems[before:]:
+            self.reader.finding("note", "", f"{problem.key} {problem.what}, {problem.remedy}: shown in grey")
+        del self.reader.problems[before:]
+        r, g, b, a = np.clip(rgba, 0, 1).tolist()
         if name:
             self.colors[name] = (r, g, b, a)
         return (r, g, b, a)
@@ -288,13 +296,16 @@ ONCE = {
 """What a link, its mass properties or a joint has one of."""
 
 
-def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Description:
+def from_text(
+    content: bytes, *, resolver: Resolver, name: str = "robot", visuals: bool = True
+) -> Description:
     """A robot from the text of a URDF file.
 
     Args:
         content: The text.
         resolver: Finds the meshes it names.
         name: Name of the robot; findings speak of ``name/link``.
+        visuals: Whether shapes that only the eye needs are read.
 
     Raises:
         InputError: Every mistake in the file at once.
@@ -318,8 +329,9 @@ def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Des
     _refuse_repeated(reader, links, joints)
     reader.raise_problems()
 
-    geometry = Shapes(reader, resolver)
+    geometry = Shapes(reader, resolver, visuals=visuals)
     geometry.read_colors(root)
+    _say_what_is_not_read(reader, links, visuals)
     made = [_link(reader, geometry, link, links[link], parents.get(link), joints) for link in order]
     reader.raise_problems()
     if any(joint.find("safety_controller") is not None for joint in joints.values()):
@@ -337,8 +349,40 @@ def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Des
     return lint.checked(description, reader)
 
 
+IGNORED_VISUALS = (
+    'shapes for the eye are not read (visuals = "ignore"): how far they stand out of the collision shapes '
+    "is not looked at, and distances take it that they do not"
+)
+
+UNREAD = ("gazebo", "transmission", "ros2_control", "material")
+"""Elements of a robot of which nothing is read, or colours alone."""
+
+
+def _say_what_is_not_read(reader: Reader, links: Mapping[str, Element], visuals: bool) -> None:
+    if not visuals and any(_for_the_eye(link) for link in links.values()):
+        reader.finding("assumed", "", IGNORED_VISUALS)
+
+
+def _for_the_eye(link: Element) -> list[Element]:
+    """Elements of a link of which no distance and no mass comes: it has collision shapes beside them."""
+    return [] if all(map(_is_void, link.findall("collision"))) else link.findall("visual")
+
+
+def _read_elements(root: Element) -> Iterator[Element]:
+    """Elements of which something but a look comes, depth first."""
+    unread = {id(each) for tag in UNREAD for each in root.findall(tag)}
+    unread |= {id(visual) for link in root.findall("link") for visual in _for_the_eye(link)}
+    unread |= {id(each) for each in root.findall("link/visual/material")}
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        if id(element) not in unread:
+            yield element
+            waiting += reversed(element)
+
+
 def _refuse_xacro(reader: Reader, root: Element) -> None:
-    for element in root.iter():
+    for element in _read_elements(root):
         tag = str(element.tag)
         if "xacro" in tag.partition("}")[0] and "}" in tag:
             what = f"holds <xacro:{tag.rpartition('}')[2]}>"

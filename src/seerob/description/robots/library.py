@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -120,6 +121,35 @@ def names() -> tuple[str, ...]:
     """Names of the robots in the library, sorted."""
     files = resources.files(__package__).iterdir()
     return tuple(sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml")))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the library says of a robot besides its links."""
+
+    title: str
+    maker: str
+    payload: Quantity | None
+    """Rated [kg]; None when no source was read."""
+    reach: Quantity | None
+    """Its maker's figure [m]; None when no source was read."""
+
+
+def entry(robot: str) -> Entry:
+    """What the library says of a robot besides its links.
+
+    Args:
+        robot: One of `names`.
+    """
+    _, table, _ = _read(robot)
+
+    def quantity(key: str) -> Quantity | None:
+        if key not in table:
+            return None
+        block = table[key]
+        return Quantity(float(block["value"]), Origin(block["origin"]), block["source"])
+
+    return Entry(table["title"], table["maker"], quantity("payload"), quantity("reach"))
 
 
 def load(robot: str, *, name: str | None = None) -> Description:

@@ -200,7 +200,8 @@ class _Compiler:
 
     def _robot(self, robot: Robot) -> None:
         self.progress(f"reading {robot.name} ({robot.model})")
-        if robot.arguments and not robot.model.lower().endswith(".xacro"):
+        takes = robot.model.lower().endswith(".xacro") or robot.model.startswith("description:")
+        if robot.arguments and not takes:
             what = f"{robot.model} is not a xacro file and takes none"
             raise InputError.at(self.file, "arguments", what, "leave them out, or name the .xacro file")
         description = load_robot(
@@ -211,6 +212,7 @@ class _Compiler:
             arguments=robot.arguments,
             name=robot.name,
             outside=self.station.outside,
+            visuals=robot.visuals == "read",
         )
         description = overridden(description, robot, self.file)
         if robot.calibration is not None:

@@ -81,6 +81,8 @@ class Visitor:
         | wire.Draft
         | wire.Edited
         | wire.Measured
+        | wire.Visitors
+        | wire.Presences
     )
 
     def __init__(self, server, *, acknowledge=True, path="/ws", **options):

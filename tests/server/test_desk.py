@@ -3,6 +3,7 @@
 import os
 import stat
 import tomllib
+from contextlib import ExitStack
 
 import msgspec
 import pytest
@@ -12,7 +13,19 @@ from seerob.app.console.loading import compiled
 from seerob.app.console.visiting import Visiting
 from seerob.app.server.access import Role, Tokens
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Change, Draft, Edit, Edited, Measure, Measured, Scene, Snapshot
+from seerob.core.snapshot import (
+    Change,
+    Draft,
+    Edit,
+    Edited,
+    Hold,
+    Introduction,
+    Measure,
+    Measured,
+    Scene,
+    Snapshot,
+    Visitors,
+)
 from seerob.workstation.allowed import NOTHING
 from server.frames import Visitor
 
@@ -351,3 +364,46 @@ def _saved(page, file):
         if answer.accepted:
             return file.read_bytes()
         page.of(Draft)
+
+
+def test_what_one_holds_no_other_changes_nor_takes_back(desk):
+    server, _ = desk
+    shift = Change(kind="set", path=("parts", 1, "at", "position_mm"), value=[2100, 0, 500])
+    with ExitStack() as stack:
+        first, second = (stack.enter_context(page) for page in pages(server, 2))
+        say = {
+            page: lambda m, page=page: page.socket.send(msgspec.msgpack.encode(m)) for page in (first, second)
+        }
+
+        def held(page, *expected):
+            """Wait until what is held, by name of the holder, is that."""
+
+            def is_so(m):
+                return isinstance(m, Visitors) and {(v.name, v.holds) for v in m.visitors if v.holds} == {
+                    *expected
+                }
+
+            page.until(is_so)
+
+        say[first](Introduction(name="Anna"))
+        say[second](Introduction(name="Berta"))
+        say[first](Hold(names=("table",)))
+        held(second, ("Anna", ("table",)))
+        say[second](Hold(names=("table", "rack")))
+        held(second, ("Anna", ("table",)), ("Berta", ("rack",)))
+        assert "table is in the hands of Anna" in second.edit(MOVE).mistakes[0].what
+        assert second.edit(shift).accepted
+        assert first.edit(MOVE).accepted  # whoever holds it may
+        say[first](Hold(names=()))
+        say[second](Hold(names=()))
+        held(second)
+        assert second.edit(Change(kind="set", path=MOVE.path, value=[1, 0, 0.37])).accepted
+        # What is held is not taken back either, and what is not said again is let go.
+        say[first](Hold(names=("table",)))
+        held(second, ("Anna", ("table",)))
+        assert "Anna" in second.edit(action="undo").mistakes[0].what
+        held(second)
+        assert second.edit(action="undo").accepted
+    server.stop()
+    refused = [reason for v in server.visits.take(end=True) if v.event == "left" for reason in v.refused]
+    assert any(reason.startswith("hold: table, held by visitor") for reason in refused)

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "ebb8fca55330db72";
+export const SCHEMA = "2079760c131ef21f";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -130,10 +130,6 @@ export interface Sphere {
   label: string;
   verdict: Verdict | null;
 }
-
-export type Vec3 = [number, number, number];
-
-export type Vec4 = [number, number, number, number];
 
 /**
  * Where a number comes from, best first.
@@ -468,6 +464,10 @@ export interface Scene {
   headsets: Record<string, [number, number, number, number, number, number, number]>;
 }
 
+export type Vec3 = [number, number, number];
+
+export type Vec4 = [number, number, number, number];
+
 /** What a limit says of a value. An evaluation, never a certificate. */
 export type Verdict =
   | "within"
@@ -489,6 +489,8 @@ export interface Hello {
    * (play, pause, seek), `edit` (change the workstation file).
    */
   may: string[];
+  /** Number of this visitor, which no other has. */
+  visitor: number;
 }
 
 /** One criterion over a stretch of time, for plots and the timeline's lanes. */
@@ -658,6 +660,103 @@ export interface Draft {
   ended: string;
 }
 
+/**
+ * Who a visitor is, and where and how large they stand; sent first, and when it changes.
+ *
+ * A point of their room p [m] (x right, y up, z backward) is in the world at
+ * `scale · R(turn) · p + position`.
+ */
+export interface Introduction {
+  type: "introduction";
+  /** What others read; `visitor` and a number when empty. Recorded only where the run was told to. */
+  name?: string;
+  /** `#rrggbb`; one of the server's when empty. */
+  color?: string;
+  /** Of the head: `ball`, `box`, `cone` or `drop`; one of the server's when empty. */
+  shape?: string;
+  /** `desk`, `vr`, `ar` or `program`. */
+  device?: string;
+  /** Person of the workstation file whom they are; empty for nobody. */
+  human?: string;
+  /** Metres of the world in a metre of theirs: 10 for a visitor ten times as large. */
+  scale?: number;
+  /** Where the floor of their room lies in the world [m]. */
+  position?: Vec3;
+  /** How the axes of their room are turned in the world, unit quaternion, w first. */
+  turn?: Vec4;
+  /** Whether they ask the others to follow them. */
+  calls?: boolean;
+}
+
+/** Where a visitor is now, in the world. */
+export interface Presence {
+  type: "presence";
+  /**
+   * Little-endian float32, seven each of head, left and right hand: x, y, z [m], w, x, y, z; the axes of
+   * each are right, up and backward; NaN for what is not there.
+   */
+  poses: Uint8Array;
+  /** Little-endian float32, x, y, z [m] of joints of body and hands that the device sees. */
+  points?: Uint8Array;
+  /** Little-endian float32: from where to where they point, six numbers [m]; empty when they do not. */
+  laser?: Uint8Array;
+}
+
+/**
+ * What a page of `seerob edit` has in its hands: all of it, said again every second.
+ *
+ * What is not said again for two seconds is let go.
+ */
+export interface Hold {
+  type: "hold";
+  /** Entries of the workstation file by name, such as `ur10`; none when nothing is held. */
+  names: string[];
+}
+
+/** One visitor, as all others know them. */
+export interface VisitorInfo {
+  /** As in `Hello.visitor`; never given twice. */
+  id: number;
+  /**
+   * `viewer`, `operator` or `supervisor`, as the token says; where none is asked for, `operator` of
+   * whoever is a person and `supervisor` of others.
+   */
+  role: string;
+  /** Whether they said who they are; if not, name, colour and shape are the server's. */
+  introduced: boolean;
+  name: string;
+  color: string;
+  shape: string;
+  device: string;
+  human: string;
+  scale: number;
+  position: Vec3;
+  turn: Vec4;
+  calls: boolean;
+  /** What nobody else may change meanwhile. */
+  holds: string[];
+}
+
+/** Who is there; to whoever has introduced themselves, then and on every change. */
+export interface Visitors {
+  type: "visitors";
+  visitors: VisitorInfo[];
+}
+
+/** Where one visitor is; what they said last, see `Presence`. */
+export interface VisitorPresence {
+  id: number;
+  poses: Uint8Array;
+  points: Uint8Array;
+  laser: Uint8Array;
+}
+
+/** Where all are who said so, in the order of `Visitors`; of several only the newest is sent. */
+export interface Presences {
+  type: "presences";
+  visitors: VisitorPresence[];
+}
+
 export const DEFAULTS = {
   snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {}, sources: {} },
 };
@@ -679,6 +778,6 @@ export const FIELDS = {
   highlight: ["type", "body", "verdict"],
 } as const;
 
-export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited | Measured;
+export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited | Measured | Visitors | Presences;
 
-export type PageMessage = Command | Tracking | Edit | Measure;
+export type PageMessage = Command | Tracking | Edit | Measure | Introduction | Presence | Hold;

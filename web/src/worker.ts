@@ -16,6 +16,8 @@ const POINTS_EVERY_MS = 80;
 /** A live run that says nothing for so long is not trusted any more; a slow one, for three of its ticks. */
 const SILENCE_MS = 300;
 const LISTEN_EVERY_MS = 50;
+/** Snapshots that are acknowledged together: a fifth of what may be on its way. */
+const ACKNOWLEDGED = 4;
 
 let socket: Socket | null = null;
 let mayShare = false;
@@ -33,6 +35,8 @@ let silence = SILENCE_MS;
 /** Whether the newest came soon after another: one that was on its way when the run was stopped is old. */
 let steady = false;
 let saidSilent = false;
+/** Snapshots since the last acknowledgement. */
+let unheard = 0;
 /** A live run that has ended: no present any more. */
 let ended = false;
 const spare: ArrayBuffer[] = [];
@@ -97,7 +101,11 @@ function begin(scene: Scene): void {
 }
 
 function heard(snapshot: Snapshot, raw: Uint8Array): void {
-  socket?.send({ type: "command", action: "ack", value: snapshot.seq });
+  unheard += 1;
+  if (unheard >= ACKNOWLEDGED) {
+    unheard = 0;
+    socket?.send({ type: "command", action: "ack", value: snapshot.seq });
+  }
   if (snapshot.poses.byteLength !== poseBytes) return; // belongs to another scene
   newest = snapshot.t;
   const at = clock();

@@ -37,9 +37,19 @@ FROM_SERVER = (
     snapshot.Draft,
     snapshot.Edited,
     snapshot.Measured,
+    snapshot.Visitors,
+    snapshot.Presences,
 )
 """Messages that a page receives."""
-FROM_PAGE = (snapshot.Command, snapshot.Tracking, snapshot.Edit, snapshot.Measure)
+FROM_PAGE = (
+    snapshot.Command,
+    snapshot.Tracking,
+    snapshot.Edit,
+    snapshot.Measure,
+    snapshot.Introduction,
+    snapshot.Presence,
+    snapshot.Hold,
+)
 """Messages that a page sends; what has a default may be left out."""
 
 COMPLETED = (snapshot.Snapshot,)

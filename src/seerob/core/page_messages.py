@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from seerob.core.markers import Vec3, Vec4
 from seerob.core.verdict import Verdict
 
 
@@ -20,6 +21,8 @@ class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
     may: tuple[str, ...] = ()
     """What this page may do, as its token says: ``view``, ``track`` (offer what a headset sees), ``control``
     (play, pause, seek), ``edit`` (change the workstation file)."""
+    visitor: int = 0
+    """Number of this visitor, which no other has."""
 
 
 class Trace(Struct, frozen=True, kw_only=True):
@@ -185,3 +188,96 @@ class Draft(Struct, frozen=True, kw_only=True, tag="draft"):
     """Whether the draft is tried: its run begins anew with every edit, and nothing of it is recorded."""
     ended: str = ""
     """Why the newest of its runs ended or was not begun; empty otherwise."""
+
+
+class Introduction(Struct, frozen=True, kw_only=True, tag="introduction"):
+    """Who a visitor is, and where and how large they stand; sent first, and when it changes.
+
+    A point of their room p [m] (x right, y up, z backward) is in the world at
+    ``scale · R(turn) · p + position``.
+    """
+
+    name: str = ""
+    """What others read; ``visitor`` and a number when empty. Recorded only where the run was told to."""
+    color: str = ""
+    """``#rrggbb``; one of the server's when empty."""
+    shape: str = ""
+    """Of the head: ``ball``, ``box``, ``cone`` or ``drop``; one of the server's when empty."""
+    device: str = "desk"
+    """``desk``, ``vr``, ``ar`` or ``program``."""
+    human: str = ""
+    """Person of the workstation file whom they are; empty for nobody."""
+    scale: float = 1.0
+    """Metres of the world in a metre of theirs: 10 for a visitor ten times as large."""
+    position: Vec3 = (0.0, 0.0, 0.0)
+    """Where the floor of their room lies in the world [m]."""
+    turn: Vec4 = (1.0, 0.0, 0.0, 0.0)
+    """How the axes of their room are turned in the world, unit quaternion, w first."""
+    calls: bool = False
+    """Whether they ask the others to follow them."""
+
+
+class Presence(Struct, frozen=True, kw_only=True, tag="presence"):
+    """Where a visitor is now, in the world."""
+
+    poses: bytes
+    """Little-endian float32, seven each of head, left and right hand: x, y, z [m], w, x, y, z; the axes of
+    each are right, up and backward; NaN for what is not there."""
+    points: bytes = b""
+    """Little-endian float32, x, y, z [m] of joints of body and hands that the device sees."""
+    laser: bytes = b""
+    """Little-endian float32: from where to where they point, six numbers [m]; empty when they do not."""
+
+
+class Hold(Struct, frozen=True, kw_only=True, tag="hold"):
+    """What a page of `seerob edit` has in its hands: all of it, said again every second.
+
+    What is not said again for two seconds is let go.
+    """
+
+    names: tuple[str, ...]
+    """Entries of the workstation file by name, such as ``ur10``; none when nothing is held."""
+
+
+class VisitorInfo(Struct, frozen=True, kw_only=True):
+    """One visitor, as all others know them."""
+
+    id: int
+    """As in `Hello.visitor`; never given twice."""
+    role: str
+    """``viewer``, ``operator`` or ``supervisor``, as the token says; where none is asked for, ``operator`` of
+    whoever is a person and ``supervisor`` of others."""
+    introduced: bool
+    """Whether they said who they are; if not, name, colour and shape are the server's."""
+    name: str
+    color: str
+    shape: str
+    device: str
+    human: str
+    scale: float
+    position: Vec3
+    turn: Vec4
+    calls: bool
+    holds: tuple[str, ...]
+    """What nobody else may change meanwhile."""
+
+
+class Visitors(Struct, frozen=True, kw_only=True, tag="visitors"):
+    """Who is there; to whoever has introduced themselves, then and on every change."""
+
+    visitors: tuple[VisitorInfo, ...]
+
+
+class VisitorPresence(Struct, frozen=True, kw_only=True):
+    """Where one visitor is; what they said last, see `Presence`."""
+
+    id: int
+    poses: bytes
+    points: bytes
+    laser: bytes
+
+
+class Presences(Struct, frozen=True, kw_only=True, tag="presences"):
+    """Where all are who said so, in the order of `Visitors`; of several only the newest is sent."""
+
+    visitors: tuple[VisitorPresence, ...]

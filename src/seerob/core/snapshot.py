@@ -38,13 +38,20 @@ from seerob.core.page_messages import (
     Edited,
     Hello,
     History,
+    Hold,
+    Introduction,
     Measure,
     Mistake,
+    Presence,
+    Presences,
     SoFar,
     Trace,
     Tracked,
     Tracking,
     Transport,
+    VisitorInfo,
+    VisitorPresence,
+    Visitors,
 )
 from seerob.core.printable import printable
 from seerob.core.verdict import Verdict, worst
@@ -67,8 +74,10 @@ __all__ = [
     "Hello",
     "Highlight",
     "History",
+    "Hold",
     "Hull",
     "Input",
+    "Introduction",
     "JointInfo",
     "Label",
     "Level",
@@ -81,6 +90,8 @@ __all__ = [
     "Node",
     "Origin",
     "Polyline",
+    "Presence",
+    "Presences",
     "Prism",
     "Rays",
     "Result",
@@ -98,6 +109,9 @@ __all__ = [
     "Vec3",
     "Vec4",
     "Verdict",
+    "VisitorInfo",
+    "VisitorPresence",
+    "Visitors",
 ]
 
 PROTOCOL = "seerob.v2.msgpack"

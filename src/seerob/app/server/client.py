@@ -17,7 +17,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 WINDOW = 20
 """Frames in flight at most."""
+TOGETHER = 4
+"""Messages that are written at once at most."""
 FRAME = "snapshot"
+PRESENCES = "presences"
+"""Where visitors are; like a frame, it waits while too many are in flight."""
 
 
 class Closing(NamedTuple):
@@ -99,9 +103,11 @@ class Client:
 
     def _next(self) -> bytes | None:
         for kind in self._waiting:
-            if kind != FRAME:
+            if kind not in (FRAME, PRESENCES):
                 return self._waiting.pop(kind)
             if len(self._in_flight) < WINDOW:
+                if kind == PRESENCES:
+                    return self._waiting.pop(kind)
                 if monotonic() > self._until:
                     # The process was stopped, or held up: what it had begun to send is no longer the present.
                     del self._waiting[kind]
@@ -120,7 +126,11 @@ class Client:
             while True:
                 self._wake.clear()
                 while (payload := self._next()) is not None:
-                    await self._socket.send({"type": "websocket.send", "bytes": payload})
+                    together = [payload]
+                    while len(together) < TOGETHER and (payload := self._next()) is not None:
+                        together.append(payload)
+                    # Several at once: each write of its own costs more than all they hold.
+                    await self._socket.send({"type": "websocket.send", "every": together})
                     # A turn of the loop, in which it may learn that the page is gone.
                     await asyncio.sleep(0)
                 await self._wake.wait()

@@ -136,6 +136,10 @@ class PromptRequests(H11Protocol):
             self.transport.abort()
 
 
+AHEAD = 2
+"""Messages that wait to be taken, from which on no more are read."""
+
+
 class WholeBinaryFrames(WebSocketsSansIOProtocol):
     """Takes whole binary messages only, and gives up on a peer that no longer reads.
 
@@ -179,7 +183,15 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
         self._read_on()
 
     async def send(self, message: Any) -> None:
-        """Send; who was refused has been answered, too, which is no error for the log."""
+        """Send; who was refused has been answered, too, which is no error for the log.
+
+        A ``websocket.send`` may have ``every``: messages that are written at once.
+        """
+        for payload in message.get("every", ())[:-1]:
+            if self.conn.state is State.OPEN:
+                self.conn.send_binary(payload)
+        if "every" in message:
+            message = {"type": message["type"], "bytes": message["every"][-1]}
         await super().send(message)
         if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
             self.handshake_complete = True
@@ -198,7 +210,12 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
     def handle_bytes(self, event: Frame) -> None:
         """Take a message that is whole."""
         if event.fin:
+            # Of a peer that says one thing at a time reading is not paused: that costs more than to read it.
+            few, held = self.queue.qsize() < AHEAD, self.read_paused
+            self.read_paused = held or few
             super().handle_bytes(event)
+            if few:
+                self.read_paused = held
         else:
             self._refuse()
 

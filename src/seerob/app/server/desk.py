@@ -11,7 +11,7 @@ import asyncio
 import logging
 import os
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from difflib import unified_diff
@@ -75,6 +75,25 @@ class Trying(Protocol):
         """End the run."""
 
 
+Held = Callable[[set[str]], str]
+"""Says why entries may not be changed."""
+
+
+def changed_entries(before: Mapping[str, object], after: Mapping[str, object]) -> set[str]:
+    """Names of the entries that are others, are gone or are new in a second reading of a workstation file."""
+    first, second = _entries(before), _entries(after)
+    return {name for name in first.keys() | second.keys() if first.get(name) != second.get(name)}
+
+
+def _entries(tables: Mapping[str, object]) -> dict[str, list[object]]:
+    found: dict[str, list[object]] = {}
+    for entries in tables.values():
+        for entry in entries if isinstance(entries, list) else ():
+            if isinstance(entry, dict) and isinstance(name := entry.get("name"), str):
+                found.setdefault(name, []).append(entry)
+    return found
+
+
 class _Step(NamedTuple):
     """An edit that was made."""
 
@@ -121,6 +140,7 @@ class Desk:
         self._revision = 1
         self._diff = ""
         self._lock = asyncio.Lock()
+        self._held: Held = lambda _: ""
 
     @property
     def unsaved(self) -> bool:
@@ -136,10 +156,17 @@ class Desk:
         """A page has left; what it did is anybody's to take back."""
         self._redo.pop(page, None)
 
-    async def take(self, page: Client, edit: Edit) -> Edited:
-        """Do what a page asks, all of it or nothing."""
+    async def take(self, page: Client, edit: Edit, held: Held = lambda _: "") -> Edited:
+        """Do what a page asks, all of it or nothing.
+
+        Args:
+            page: It.
+            edit: What it asks.
+            held: Why entries of these names may not be changed, as somebody else holds one; else empty.
+        """
         mistakes: tuple[Mistake, ...] = ()
         async with self._lock:
+            self._held = held
             try:
                 await self._take(page, edit)
             except InputError as error:
@@ -265,6 +292,8 @@ class Desk:
         now, tables, diff = await asyncio.to_thread(
             self._looked_at, raw, self._saved if saved is None else saved
         )
+        if saved is None and (why := self._held(changed_entries(self._tables, tables))):
+            raise self._refusal(why, "wait until they let go of it")
         self._raw, self._steps, self._tables, self._diff = raw, steps[-MOST_STEPS:], tables, diff
         self._revision += 1
         self._done.append((self._revision, tuple(events)))

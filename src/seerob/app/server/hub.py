@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from math import inf, isfinite
@@ -16,6 +16,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from seerob.app.server.access import Role, Visit, Visits
 from seerob.app.server.allowance import Allowance
 from seerob.app.server.client import Client, Closing
+from seerob.app.server.company import Company
 from seerob.app.server.desk import Desk
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
 from seerob.app.wire import schema
@@ -27,9 +28,12 @@ from seerob.core.snapshot import (
     Edited,
     Hello,
     History,
+    Hold,
+    Introduction,
     Measure,
     Measured,
     Mistake,
+    Presence,
     Scene,
     Snapshot,
     SoFar,
@@ -45,8 +49,14 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
-Message = Command | Tracking | Edit | Measure
+Message = Command | Tracking | Edit | Measure | Introduction | Presence | Hold
 """Of a page."""
+_KINDS: dict[type, str] = {
+    Tracking: "tracking",
+    Presence: "presence",
+    Introduction: "introduction",
+    Hold: "introduction",
+}
 _decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(Message).decode
 LARGEST_COMMAND = 512
 """[B]; one has less than 100."""
@@ -55,12 +65,18 @@ RATES: dict[str, tuple[float, float]] = {
     "tracking": (160.0, 320.0),
     "command": (40.0, 80.0),
     "edit": (10.0, 20.0),
+    "presence": (60.0, 120.0),
+    "introduction": (5.0, 20.0),
 }
 """What one page may send: per second, and at once. Beyond that it is read no faster."""
+LARGEST: dict[Role, int] = {Role.VIEW: 4096, Role.TRACK: 16384, Role.CONTROL: 16384}
+"""Of a message [B], by what a visitor may: a presence has 2000, what a headset sees of a body 10 000."""
 SHARED: dict[str, tuple[float, float]] = {
     "tracking": (640.0, 1280.0),
     "command": (100.0, 200.0),
     "edit": (20.0, 40.0),
+    "presence": (1920.0, 3840.0),
+    "introduction": (40.0, 200.0),
 }
 """What all pages together may send."""
 
@@ -105,13 +121,15 @@ class Hub:
         self._feed, self._patience, self._offers, self._desk = feed, patience, offers, desk
         self._visits = Visits() if visits is None else visits
         self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
-        self._may: dict[Client, tuple[str, ...]] = {}
+        self._greeted: dict[Client, Hello] = {}
         self._scene = _encode(scene)
         self._shared = {kind: Allowance(*rate) for kind, rate in SHARED.items()}
         self._newest: Snapshot | None = None
         self._until = inf
         self._ended: Closing | None = None
         self.clients: set[Client] = set()
+        self.company = Company()
+        """Visitors as they see each other."""
 
     def begin(self, scene: Scene) -> None:
         """Send another scene to every page, of which snapshots are from now on."""
@@ -120,7 +138,7 @@ class Hub:
         self._hello = replace(self._hello, mode=self._feed.mode)
         for client in self.clients:
             if turned:
-                client.offer("Hello", _encode(replace(self._hello, may=self._may[client])))
+                client.offer("Hello", _encode(replace(self._greeted[client], mode=self._feed.mode)))
             client.begin(self._scene)
             client.offer("Transport", _encode(self._feed.transport()))
 
@@ -130,6 +148,7 @@ class Hub:
         if not self.clients:
             return
         payload = _encode(snapshot)
+        self.company.show()
         for client in self.clients:
             client.offer_frame(snapshot.seq, payload, until)
 
@@ -169,8 +188,9 @@ class Hub:
             return
         client = Client(socket, patience=self._patience)
         edits = self._desk is not None and Role.CONTROL in state["roles"]
-        self._may[client] = (*sorted(state["roles"]), *(("edit",) if edits else ()))
-        client.offer("Hello", _encode(replace(self._hello, may=self._may[client])))
+        may, number = (*sorted(state["roles"]), *(("edit",) if edits else ())), self.company.number()
+        self._greeted[client] = replace(self._hello, may=may, visitor=number)
+        client.offer("Hello", _encode(self._greeted[client]))
         client.offer("Scene", self._scene)
         client.offer("History", _encode(self._feed.history()))
         if (so_far := self._feed.so_far()) is not None:
@@ -182,14 +202,16 @@ class Hub:
         if self._desk is not None and edits:
             self._desk.come(client)
         visit = self._visits.come(state["role"], address)
+        self.company.come(client, visit, state["roles"], number)
         listening = self._listen(client, socket, visit, state["roles"])
         tasks = [asyncio.create_task(client.send()), asyncio.create_task(listening)]
         try:
             closing = await client.over
         finally:
             self.clients.discard(client)
-            self._may.pop(client, None)
+            self._greeted.pop(client, None)
             self._offers.gone(client)
+            self.company.gone(client)
             if self._desk is not None:
                 self._desk.gone(client)
             for task in tasks:
@@ -201,13 +223,17 @@ class Hub:
     async def _listen(self, client: Client, socket: WebSocket, visit: Visit, roles: frozenset[Role]) -> None:
         last_answer: Tracked | None = None
         own = {kind: Allowance(*rate) for kind, rate in RATES.items()}
+        most = max(LARGEST[role] for role in roles)
         try:
             while True:
-                message = read_message(await socket.receive_bytes())
+                data = await socket.receive_bytes()
+                if len(data) > most:
+                    raise ValueError(f"a message of {len(data)} bytes; this page may send {most}")
+                message = read_message(data)
                 if isinstance(message, Command):
                     kind = "ack" if message.action == "ack" else "command"
                 else:
-                    kind = "tracking" if isinstance(message, Tracking) else "edit"
+                    kind = _KINDS.get(type(message), "edit")
                 shared = self._shared.get(kind)
                 wait = max(own[kind].take(), 0.0 if shared is None else shared.take())
                 if wait:
@@ -216,6 +242,13 @@ class Hub:
                     await asyncio.sleep(wait)
                 if isinstance(message, Tracking):
                     last_answer = self._offer(client, message, last_answer, visit, may=Role.TRACK in roles)
+                elif isinstance(message, Presence):
+                    self.company.move(client, message)
+                elif isinstance(message, Introduction):
+                    self.company.introduce(client, message)
+                elif isinstance(message, Hold):
+                    may = self._desk is not None and Role.CONTROL in roles
+                    self.company.hold(client, message, may=may)
                 elif isinstance(message, Edit):
                     client.offer("Edited", _encode(await self._edit(client, message, visit, roles)))
                 elif isinstance(message, Measure):
@@ -237,13 +270,16 @@ class Hub:
     async def _edit(self, client: Client, edit: Edit, visit: Visit, roles: frozenset[Role]) -> Edited:
         """Make an edit, to its end also when the page leaves meanwhile."""
         if self._desk is not None and Role.CONTROL in roles:
-            return await asyncio.shield(self._desk.take(client, edit))
+            return await asyncio.shield(self._desk.take(client, edit, self._held_from(client)))
         visit.refuse(f"edit: {edit.action[:20]}")
         what, remedy = "this page may not edit", "start seerob edit, and open its address to control"
         if self._desk is None:
             what = "this run is not edited"
         refusal = Mistake(key="", what=what, remedy=remedy)
         return Edited(id=edit.id, accepted=False, revision=0, mistakes=(refusal,))
+
+    def _held_from(self, client: Client) -> Callable[[Collection[str]], str]:
+        return lambda names: self.company.held_by_another(client, names)
 
     async def _measure(self, asked: Measure, visit: Visit, roles: frozenset[Role]) -> Measured:
         if self._desk is not None and Role.CONTROL in roles:

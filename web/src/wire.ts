@@ -715,7 +715,7 @@ export interface Hold {
 
 /** One visitor, as all others know them. */
 export interface VisitorInfo {
-  /** As in `Hello.visitor`; never given twice. */
+  /** Number that `Hello.visitor` told them; no other visitor of this server ever has it. */
   id: number;
   /**
    * `viewer`, `operator` or `supervisor`, as the token says; where none is asked for, `operator` of

@@ -243,7 +243,7 @@ class VisitorInfo(Struct, frozen=True, kw_only=True):
     """One visitor, as all others know them."""
 
     id: int
-    """As in `Hello.visitor`; never given twice."""
+    """Number that `Hello.visitor` told them; no other visitor of this server ever has it."""
     role: str
     """``viewer``, ``operator`` or ``supervisor``, as the token says; where none is asked for, ``operator`` of
     whoever is a person and ``supervisor`` of others."""

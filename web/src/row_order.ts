@@ -6,12 +6,20 @@ import { margin, STATE_ORDER } from "./verdicts";
 
 /** Shortest time between two changes of order. */
 const REORDER_MS = 500;
+/** Rows stay below a pointer that moved so recently. */
+const AIMING_MS = 2_000;
 
 const order = signal<readonly string[]>([]);
 let orderedAt = Number.NEGATIVE_INFINITY;
+let aimedAt = Number.NEGATIVE_INFINITY;
 let due: ReturnType<typeof setTimeout> | null = null;
 
-/** Rows of the table, worst first, in an order that changes at most twice a second. */
+/** Say that a pointer moves over the table (`true`), or has left it. */
+export function aim(over: boolean): void {
+  aimedAt = over ? performance.now() : Number.NEGATIVE_INFINITY;
+}
+
+/** Rows of the table, worst first, in an order that changes at most twice a second, and not below a pointer. */
 export const orderedRows = computed<Row[]>(() => {
   const byName = new Map(rows.value.map((row) => [row.info.name, row]));
   const ordered = order.value.flatMap((name) => byName.get(name) ?? []);
@@ -19,18 +27,27 @@ export const orderedRows = computed<Row[]>(() => {
 });
 
 effect(() => {
-  const next = sorted(rows.value).map((row) => row.info.name);
+  const next = namesSorted(rows.value);
   if (untracked(() => same(next, order.value))) return;
-  const wait = orderedAt + REORDER_MS - performance.now();
-  if (wait <= 0) apply(next);
-  else due ??= setTimeout(() => apply(sorted(rows.value).map((row) => row.info.name)), wait);
+  reorder();
 });
 
-function apply(next: readonly string[]): void {
-  if (due !== null) clearTimeout(due);
-  due = null;
+function reorder(): void {
+  if (due !== null) return;
+  const wait = Math.max(orderedAt + REORDER_MS, aimedAt + AIMING_MS) - performance.now();
+  if (wait > 0) {
+    due = setTimeout(() => {
+      due = null;
+      reorder();
+    }, wait);
+    return;
+  }
   orderedAt = performance.now();
-  order.value = next;
+  order.value = namesSorted(rows.peek());
+}
+
+function namesSorted(all: readonly Row[]): string[] {
+  return sorted(all).map((row) => row.info.name);
 }
 
 function sorted(all: readonly Row[]): Row[] {

@@ -3,6 +3,7 @@
 
 import type { Action, ToWorker } from "./messages";
 import { isLive, lookingAt, mayControl, now, reach, scene, traces, transport } from "./page_state";
+import { stopAxis } from "./plots/axis";
 import { neighbourViolation } from "./traces";
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
@@ -22,6 +23,7 @@ export class TimeControl {
     const newest = isLive.value && now.value > end ? now.value : end;
     const to = Math.min(Math.max(t, start), newest);
     if (isLive.value) {
+      stopAxis(to);
       lookingAt.value = to;
       this.send({ kind: "look", t: to });
     } else {

@@ -6,7 +6,7 @@ import { against, between, gap, percent, steady, withUnit } from "../figures";
 import { formatTime } from "../format";
 import { mutedCriteria, type Row, scene, select, selection, soFar, stale, toggleMuted } from "../page_state";
 import { worstOf } from "../posture/instants";
-import { orderedRows } from "../row_order";
+import { aim, orderedRows } from "../row_order";
 import { margin, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo, Result } from "../wire";
 import { BasisView } from "./BasisView";
@@ -47,7 +47,7 @@ export function CriteriaTable() {
             </th>
           </tr>
         </thead>
-        <tbody>
+        <tbody onPointerMove={() => aim(true)} onPointerLeave={() => aim(false)}>
           {orderedRows.value.map((row) => (
             <Fragment key={row.info.name}>
               <CriterionRow

@@ -4,7 +4,7 @@ import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { against, steady, withUnit } from "../figures";
 import { now, type Row, rows, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
-import { shownRange, WIDTHS, width } from "../plots/axis";
+import { setWidth, shownRange, WIDTHS, width } from "../plots/axis";
 import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
@@ -24,9 +24,7 @@ export function Plots({ count }: { count: number }) {
             type="button"
             aria-pressed={width.value === title}
             class={width.value === title ? "on" : ""}
-            onClick={() => {
-              width.value = title;
-            }}
+            onClick={() => setWidth(title)}
           >
             {title}
           </button>

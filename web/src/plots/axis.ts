@@ -22,22 +22,40 @@ export const width = remembered<Width>("seerob.axis", WIDTHS, "All");
 /** What the axis shows while somebody drags on it: it must not run away below the pointer. */
 export const held = signal<TimeRange | null>(null);
 
+// While somebody looks back at a live run its axis stands still: it must not run away below the pointer.
+const stopped = signal<{ range: TimeRange; width: Width } | null>(null);
+
+/** Stop the axis of a live run where it is, or with `t` [s] in its middle when that lies outside. */
+export function stopAxis(t: number): void {
+  let { start, end } = shownRange();
+  if (t < start || t > end) {
+    const span = end - start;
+    start = Math.max(t - span / 2, firstTime());
+    end = start + span;
+  }
+  stopped.value = { range: { start, end }, width: width.value };
+}
+
+/** Choose how wide the axis is. */
+export function setWidth(chosen: Width): void {
+  width.value = chosen;
+  if (lookingAt.value !== null) stopAxis(lookingAt.value);
+}
+
 /** What is shown; read inside a component or an effect, it is kept up to date. */
 export function shownRange(): TimeRange {
   if (held.value) return held.value;
+  if (lookingAt.value !== null && stopped.value?.width === width.value) return stopped.value.range;
   const seconds = SECONDS[width.value];
   const { start, end } = reach.value;
-  const at = now.value;
   if (isLive.value) {
     const first = firstTime();
     const span = seconds ?? Math.max(end - first, LIVE_LEAST_S);
     const newest = Math.max(end, first + span);
-    const back = lookingAt.value !== null;
-    const right = back ? Math.min(Math.max(at + span / 2, first + span), newest) : newest;
-    return { start: right - span, end: right };
+    return { start: newest - span, end: newest };
   }
   if (seconds === null || seconds >= end - start) return { start, end: Math.max(end, start + 1e-3) };
-  const middle = Number.isFinite(at) ? at : start;
+  const middle = Number.isFinite(now.value) ? now.value : start;
   const left = Math.min(Math.max(middle - seconds / 2, start), end - seconds);
   return { start: left, end: left + seconds };
 }

@@ -27,9 +27,9 @@ export class Chart {
     seek: (t: number) => void,
   ) {
     this.plot = new uPlot(this.options(), [[], [], []], element);
-    this.plot.over.addEventListener("click", () => {
-      const { left } = this.plot.cursor;
-      if (left !== undefined && left >= 0) seek(this.plot.posToVal(left, "x"));
+    // uPlot's own cursor was placed at the last move, and a row that opened since may have moved the plot.
+    this.plot.over.addEventListener("click", ({ clientX }) => {
+      seek(this.plot.posToVal(clientX - this.plot.over.getBoundingClientRect().left, "x"));
     });
     this.resized = new ResizeObserver(() => this.fit());
     this.resized.observe(element);

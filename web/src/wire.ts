@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "2079760c131ef21f";
+export const SCHEMA = "6b1ce0caae1d73e1";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -346,6 +346,8 @@ export interface Snapshot {
    * tenth of one, empty in between.
    */
   sources: Record<string, SourceLine>;
+  /** What happened to loose workpieces since the last tick. */
+  events: Event[];
 }
 
 /** One body of the scene; its index is its slot in `Snapshot.poses`. */
@@ -464,6 +466,26 @@ export interface Scene {
   headsets: Record<string, [number, number, number, number, number, number, number]>;
 }
 
+/** What happened to a loose workpiece. */
+export interface Event {
+  /** Run time [s]. */
+  t: number;
+  /**
+   * `taken`, `handed` (another hand has it now), `torn` (out of a hand), `placed`, `dropped`,
+   * `refused` (a hand could not take it) or `round` (a round of work ended).
+   */
+  what: string;
+  piece: string;
+  /** Hand that did it, such as `operator/right_hand`. */
+  by?: string;
+  /** Place where it was put, or from which it was taken; empty where it is none. */
+  where?: string;
+  /** Of `placed` and `dropped` the time since it was taken [s], of `round` its cycle time [s]. */
+  took?: number | null;
+  /** Why it was refused or torn out. */
+  reason?: string;
+}
+
 export type Vec3 = [number, number, number];
 
 export type Vec4 = [number, number, number, number];
@@ -540,6 +562,8 @@ export interface SoFar {
   criteria: Record<string, CriterionSoFar>;
   /** Whether that is all of the run. */
   whole: boolean;
+  /** What happened to loose workpieces, the newest 200 at most. */
+  events: Event[];
 }
 
 /** State of the player; sent on every change. */
@@ -758,7 +782,7 @@ export interface Presences {
 }
 
 export const DEFAULTS = {
-  snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {}, sources: {} },
+  snapshot: { joints: {}, tracking: {}, bones: {}, late: {}, results: [], looks: {}, doubts: {}, sources: {}, events: [] },
 };
 
 export const FIELDS = {

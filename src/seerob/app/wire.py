@@ -23,7 +23,7 @@ from typing import get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Struct
 
-from seerob.core import markers, page_messages, snapshot, verdict
+from seerob.core import events, markers, page_messages, snapshot, verdict
 from seerob.core.errors import InputError
 
 FROM_SERVER = (
@@ -57,7 +57,7 @@ COMPLETED = (snapshot.Snapshot,)
 ARRAYS = (snapshot.Result, snapshot.Row, snapshot.Aspect, *get_args(snapshot.Marker))
 """These are arrays on the wire; the page puts back the names, before anything else looks at them."""
 
-SOURCES = (verdict, markers, snapshot, page_messages)
+SOURCES = (verdict, markers, events, snapshot, page_messages)
 """Modules whose types go over the wire; `seerob.core.snapshot` has the names of all of them."""
 
 FILE = Path(__file__).resolve().parents[3] / "web" / "src" / "wire.ts"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from seerob.core.events import Event
 from seerob.core.markers import Vec3, Vec4
 from seerob.core.verdict import Verdict
 
@@ -72,6 +73,8 @@ class SoFar(Struct, frozen=True, kw_only=True, tag="so_far"):
     criteria: dict[str, CriterionSoFar]
     whole: bool = False
     """Whether that is all of the run."""
+    events: tuple[Event, ...] = ()
+    """What happened to loose workpieces, the newest 200 at most."""
 
 
 class Transport(Struct, frozen=True, kw_only=True, tag="transport"):

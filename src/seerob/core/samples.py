@@ -186,7 +186,16 @@ class SignalSample(SampleBase, frozen=True, kw_only=True, tag="signal"):
     stand, or the delay that the file allows; no older where nothing is said."""
 
 
-Sample = JointSample | PoseSample | BodySample | SignalSample
+class GrabSample(SampleBase, frozen=True, kw_only=True, tag="grab"):
+    """What a hand holds from now on."""
+
+    target: str
+    """Full name of the hand: ``operator/right_hand``."""
+    piece: str = ""
+    """Loose workpiece that it takes; empty when it lets go."""
+
+
+Sample = JointSample | PoseSample | BodySample | SignalSample | GrabSample
 
 
 def printable_sample(sample: Sample) -> Sample:
@@ -197,6 +206,8 @@ def printable_sample(sample: Sample) -> Sample:
         texts += [value for value in sample.values.values() if isinstance(value, str)]
     else:
         texts.append(sample.target)
+    if isinstance(sample, GrabSample):
+        texts.append(sample.piece)
     if isinstance(sample, BodySample):
         texts.append(sample.subject)
         texts += [point.name for point in sample.points]

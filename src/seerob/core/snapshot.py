@@ -13,6 +13,7 @@ from enum import StrEnum
 import msgspec
 from msgspec import Struct
 
+from seerob.core.events import Event as Event  # noqa: PLC0414
 from seerob.core.markers import (
     Arrow,
     Box,
@@ -353,6 +354,8 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot", omit_defaults=
     sources: dict[str, SourceLine] = {}
     """How live sources are heard, and targets sent, by name; told about once a second and for a
     tenth of one, empty in between."""
+    events: tuple[Event, ...] = ()
+    """What happened to loose workpieces since the last tick."""
 
     def __repr__(self) -> str:
         verdict = worst([result.verdict for result in self.results])

@@ -56,7 +56,8 @@ class Body:
     triangles: int
     note: str
     holder: str = ""
-    """The gripper that picks it up and lets it go: where it is, or whether it is here, depends on it."""
+    """The gripper that picks it up and lets it go, or its own name where people do: where it is, or whether
+    it is here, depends on it."""
 
     def __repr__(self) -> str:
         return f"<Body {self.index} {self.name!r}: {self.role}, {len(self.solids)} solids>"
@@ -89,7 +90,7 @@ class Mechanism:
 
     name: str
     role: str
-    """``robot`` or ``human``."""
+    """``robot``, ``human``, ``machine``, or ``workpiece`` for one that is loose."""
     description: Description
     joints: tuple[Joint, ...]
     """The n joints that are commanded."""
@@ -248,7 +249,7 @@ class Model:
             bodies, frames, mechanisms = deepcopy((self.bodies, self.frames, self.mechanisms))
             self._owned[author] = copy(self.mj), self.shapes.copied(), {}, bodies, frames, mechanisms
         mj, shapes, gaps, bodies, frames, mechanisms = self._owned[author]
-        if any(piece.rest is not None for piece in self.workstation.workpieces):
+        if any(piece.rest is not None or piece.loose for piece in self.workstation.workpieces):
             mj = copy(self.mj)  # what is picked up changes masses from tick to tick
         dictionary = {**self.dictionary}
         return replace(

@@ -24,7 +24,7 @@ from pathlib import Path, PurePosixPath
 from msgspec import Struct
 
 from seerob.core.files.bounded import leads_outside
-from seerob.core.samples import BodySample, JointSample, PoseSample, SignalSample
+from seerob.core.samples import Sample
 
 OUTSIDE = "outside"
 
@@ -197,7 +197,7 @@ class Tick(Struct, frozen=True, kw_only=True):
     seq: int
     t: float
     """Run time [s]."""
-    samples: tuple[JointSample | PoseSample | BodySample | SignalSample, ...] = ()
+    samples: tuple[Sample, ...] = ()
 
 
 class Visitor(Struct, frozen=True, kw_only=True):

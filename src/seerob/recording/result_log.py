@@ -12,7 +12,16 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from seerob.core.errors import UnknownName
-from seerob.core.snapshot import CriterionInfo, CriterionSoFar, History, Result, Snapshot, SoFar, Verdict
+from seerob.core.snapshot import (
+    CriterionInfo,
+    CriterionSoFar,
+    Event,
+    History,
+    Result,
+    Snapshot,
+    SoFar,
+    Verdict,
+)
 from seerob.recording import frames
 from seerob.recording.bone_errors import BoneErrors
 from seerob.recording.series import Series, Spill, Spread, Worst, WorstTracker, worst_verdict
@@ -22,6 +31,11 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 __all__ = ["JointLog", "ResultLog", "Series", "Spread", "Worst"]
+
+
+MOST_EVENTS = 10_000
+TOLD = 200
+"""Events that a page is told of, the newest."""
 
 
 class JointLog(NamedTuple):
@@ -49,6 +63,8 @@ class ResultLog(Mapping[str, Series]):
         self._spill = Spill()
         self._last: Snapshot | None = None
         self._worse: tuple[str, ...] = ()
+        self.events: list[Event] = []
+        """What happened to loose workpieces, the first `MOST_EVENTS`."""
         self.ticks = 0
         """Snapshots that were added."""
         self.start: float | None = None
@@ -74,6 +90,7 @@ class ResultLog(Mapping[str, Series]):
         self.ticks += 1
         if self.start is None:
             self.start = snapshot.t
+        self.events += snapshot.events[: MOST_EVENTS - len(self.events)]
         passed = max(snapshot.t - self.end, 0.0) if self.end is not None else 0.0
         self.end = snapshot.t
         worse = []
@@ -178,7 +195,13 @@ class ResultLog(Mapping[str, Series]):
                 open=times.open,
                 reason=series.gap(),
             )
-        return SoFar(verdict=self.verdict, decided=self.decided, criteria=criteria, whole=whole)
+        return SoFar(
+            verdict=self.verdict,
+            decided=self.decided,
+            criteria=criteria,
+            whole=whole,
+            events=tuple(self.events[-TOLD:]),
+        )
 
     @property
     def tracking(self) -> tuple[JointLog, ...]:

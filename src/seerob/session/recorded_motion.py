@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace as changed
 
-from seerob.core.samples import SignalSample
+from seerob.core.samples import GrabSample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.criteria.plausible_places import PlausiblePlaces
@@ -38,7 +38,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     engine = engine_of(model, _PositionsAlone)
     still = frozenset(name for name in model.mechanisms if not engine.state.moved(name))
     every = (sample for samples in heard for sample in samples)
-    told = {sample.target for sample in every if not isinstance(sample, SignalSample)}
+    told = {sample.target for sample in every if not isinstance(sample, SignalSample | GrabSample)}
     driven = (name for name, hearing in engine.state.hearings.items() if hearing.driven)
     unmoved = frozenset(model.mechanisms.keys() - told - {*driven})
     known = known_motion(engine, heard, end)

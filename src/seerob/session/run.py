@@ -179,6 +179,7 @@ def snapshot(
         looks={} if looks is None else looks.at(state),
         doubts=invalid_reasons(state),
         sources=sources or {},
+        events=state.events,
     )
 
 

@@ -26,7 +26,7 @@ from seerob.core.errors import InputError, Problem
 from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.files.toml_file import parsed_toml
 from seerob.core.files.whole_file import whole_file
-from seerob.core.samples import BodySample, Sample, SignalSample
+from seerob.core.samples import BodySample, GrabSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.files.tables.mapping import toml_value
 from seerob.outputs.sinks.recorder import Recorder
@@ -364,6 +364,8 @@ class Renamed:
             more = {"values": values, "doubts": _each(sample.doubts, without_paths)}
         else:
             more = {"target": named(sample.target)}
+        if isinstance(sample, GrabSample):
+            more |= {"piece": named(sample.piece)}
         if isinstance(sample, BodySample):
             points = tuple(replace(p, name=self._count(self._names, p.name, "point")) for p in sample.points)
             subject = self._count(self._people, sample.subject, "subject") if sample.subject else ""

@@ -12,7 +12,16 @@ from pathlib import Path
 from msgspec.structs import replace as changed
 
 from seerob.core.errors import SeerobError
-from seerob.core.samples import BodySample, JointSample, Mailbox, PoseSample, Quality, Sample, SignalSample
+from seerob.core.samples import (
+    BodySample,
+    GrabSample,
+    JointSample,
+    Mailbox,
+    PoseSample,
+    Quality,
+    Sample,
+    SignalSample,
+)
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import Judge
 from seerob.criteria.question import declared
@@ -52,6 +61,8 @@ def _numberless(sample: Sample, since: float, last: Sample) -> Sample:
             for point in sample.points
         ]
         return changed(sample, points=tuple(points))
+    if isinstance(sample, GrabSample):
+        return sample
     # What can be no number; of the rest it says nothing.
     return changed(sample, values={n: math.nan for n, v in sample.values.items() if type(v) is float})
 

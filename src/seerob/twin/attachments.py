@@ -16,6 +16,8 @@ Indices = NDArray[np.int64]
 
 def unknown_place(body: Body) -> str:
     """Why nobody knows where a body is that a gripper picks up, without a run."""
+    if body.holder == body.owner:
+        return f"{body.owner}: people take it and put it down, and only a run tells where it is"
     return f"{body.owner}: {body.holder} picks it up and lets it go, and only a run tells where it is"
 
 

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import InputError, SimulationDiverged
-from seerob.core.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
+from seerob.core.samples import BodySample, GrabSample, JointSample, PoseSample, Sample, SignalSample
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.description.capture.following import Following
 from seerob.devices.live.differentiation import PositionNoise
@@ -41,6 +41,7 @@ from seerob.twin.control.sample_values import beyond_limits, is_possible, larges
 from seerob.twin.control.unheard import QUICKEST, Unheard
 from seerob.twin.machines.following import HOLD, Machines, Moved
 from seerob.twin.machines.gripping import Grips, own_masses
+from seerob.twin.machines.loose import Loose
 from seerob.twin.moving_base import moved_by_poses
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
@@ -229,6 +230,9 @@ class Engine:
         self.state = state(model, self._shown, self._hearings, self.signals)
         self.state.foresee, self.state.knots = self._foresee, self._knots_of
         self._grips = Grips(self.state, self._mj)
+        self._loose = Loose(model, self._mj, self._data, self._shown)
+        for index in self._loose.bodies():
+            self.state.attachments.unknown.pop(index, None)
         self._tick = 0
         self._now = 0.0
         """Instant of the last tick [s]."""
@@ -281,6 +285,9 @@ class Engine:
                 self.signals.take(sample)
                 for moved in self._machines.hear(sample):
                     self._move(moved)
+                continue
+            if isinstance(sample, GrabSample):
+                self._loose.hear(sample)
                 continue
             untimed = sample.late if sample.t_device is None else 0.0
             if isinstance(sample, BodySample):
@@ -454,6 +461,8 @@ class Engine:
     def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
         """Tell what a robot or human will do (`seerob.twin.state.Foresee`): by its file, or it stands."""
         hearing, mechanism = self._hearings[name], self.model.mechanisms[name]
+        if name in self._loose.names:
+            return None
         if not hearing.driven:
             if not (self.controllers and hearing.given):
                 return None
@@ -508,6 +517,7 @@ class Engine:
             hearing.forget(start)
         self.signals.forget(start)
         self._broken.clear()
+        self._loose.begin(self._before)
         if self.physics:
             self._step(start, t)
         else:
@@ -515,6 +525,8 @@ class Engine:
         self._tick += 1
         self._now = t
         self._show(t)
+        self._loose.end(t)
+        self.state.events = self._loose.said()
         strayed = self._strayed
         self._note_errors()
         self.state.path = self._path(start, t, captured=strayed or self._strayed)
@@ -582,6 +594,8 @@ class Engine:
         for step in range(self._steps):
             if not begun or self._landing or self._task_pulls:
                 self._pull(step, start + step * self._dt)
+            if self._loose.names:
+                self._loose.pull(start + step * self._dt, self._dt)
             try:
                 mujoco.mj_step(self._mj, self._data)
             except FAULTS as error:
@@ -637,6 +651,10 @@ class Engine:
         """Put what the physics has lost back to where it should be; its verdicts wait until it follows."""
         for mechanism in self._mechanisms:
             if not kernel.tame(self._data.qvel[mechanism.v_address], WILD):
+                if mechanism.name in self._loose.names:
+                    self._loose.stop(mechanism.name, self._before)
+                    self._broken.add(mechanism.name)
+                    continue
                 self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
                 self._data.qacc_warmstart[mechanism.v_address] = 0.0
                 self._hearings[mechanism.name].reset_at = t
@@ -661,6 +679,8 @@ class Engine:
             self.state.touches = self._touches()
         found = zip(self._hearings.items(), *(each.tolist() for each in self._found), strict=True)
         for (name, hearing), error, saturated, unlike in found:
+            if name in self._loose.names:
+                continue
             if pulled:
                 hearing.error, hearing.saturated = error, saturated
                 if name in self._people:

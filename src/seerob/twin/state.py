@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import Undecided, Unweighed
+from seerob.core.snapshot import Event
 from seerob.core.transforms import Array
 from seerob.distance.least import Closest, Closests, Per, Query, Surveyor
 from seerob.kernels.axes import felt, principal_axes, quaternion
@@ -132,6 +133,8 @@ class State(Validity):
         self._ahead: Foresee = lambda name, t: None
         self.knots: Knots = lambda name, begin, end: ()
         """Instants between which what `foresee` tells is one cubic, besides the ticks."""
+        self.events: tuple[Event, ...] = ()
+        """What happened to loose workpieces since the last tick."""
         self.touches: list[tuple[int, int, float]] | None = None
         """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
         self._quicker: dict[str, Array] = {}

@@ -72,6 +72,8 @@ def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pro
     carriers = [*robots, *people, *machines]
     for group in ("tools", "workpieces", "areas", "sensors"):
         for i, thing in entries.get(group, {}).items():
+            if getattr(thing, "loose", False):
+                continue
             at, steps = thing.on, 0
             while at in on and steps <= len(on):
                 at, steps = on[at], steps + 1

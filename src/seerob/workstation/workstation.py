@@ -31,6 +31,7 @@ from seerob.core.quantities import (
 from seerob.core.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.core.quantities import Pose as Pose  # noqa: PLC0414
 from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
+from seerob.workstation.tables.places import Place as Place  # noqa: PLC0414
 from seerob.workstation.tables.sensors import Sensor
 from seerob.workstation.tables.simple_shape import Shape as Shape  # noqa: PLC0414
 from seerob.workstation.tables.task_phase import TaskPhase
@@ -252,11 +253,32 @@ class Tool(Mounted, frozen=True, kw_only=True):
 
 
 class Workpiece(Mounted, frozen=True, kw_only=True):
-    """A payload: something a tool carries."""
+    """A payload: something a tool carries, or a loose part that people take and put down."""
 
+    on: str = ""
+    """Full name of the link that carries it, such as ``ur10/tool0``, or of another tool. Without it, it is
+    loose: it lies where ``at`` says, gravity and what touches it move it, and people take it."""
     rest: Pose | None = None
     """Where it lies first, in the world: the gripper that ``on`` names picks it up and lets it go.
     Without it, it is on what carries it all the time."""
+    friction: Annotated[float, unit("1", gt=0, le=2)] = 0.5
+    """Coefficient of friction of a loose one on everything that it touches; the default is our choice."""
+    torn: Annotated[float, unit("m", gt=0, le=1)] = 0.15
+    """A loose one is torn out of a hand that is farther than this from where it took it [m]; our choice."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.loose and self.rest is not None:
+            raise ValueError("rest is of what a gripper picks up: name the gripper as on, or leave rest out")
+        if self.loose and "/" in self.name:
+            raise ValueError(f"name = {self.name!r}: the name of a loose workpiece has no /")
+        if self.loose and self.mass is None and self.density is None:
+            raise ValueError("a loose workpiece is moved by forces: give its mass or density")
+
+    @property
+    def loose(self) -> bool:
+        """Whether nothing carries it all the time."""
+        return not self.on
 
 
 class Part(Thing, frozen=True, kw_only=True):
@@ -434,6 +456,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     workpieces: tuple[Workpiece, ...] = ()
     parts: tuple[Part, ...] = ()
     machines: tuple[Machine, ...] = ()
+    places: tuple[Place, ...] = ()
     areas: tuple[Area, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     humans: tuple[Human, ...] = ()
@@ -479,6 +502,7 @@ TABLES: dict[str, type[Struct]] = {
     "workpieces": Workpiece,
     "parts": Part,
     "machines": Machine,
+    "places": Place,
     "areas": Area,
     "sensors": Sensor,
     "humans": Human,

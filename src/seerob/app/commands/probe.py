@@ -397,7 +397,7 @@ def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, obj
 
 
 def _tell(sample: Sample) -> None:
-    from seerob.core.samples import BodySample, JointSample, PoseSample, SignalSample
+    from seerob.core.samples import BodySample, GrabSample, JointSample, PoseSample, SignalSample
 
     if isinstance(sample, BodySample):
         seen = [point for point in sample.points if point.position is not None or point.wxyz is not None]
@@ -419,6 +419,8 @@ def _tell(sample: Sample) -> None:
         place = " ".join(f"{x:+.4f}" for x in sample.position)
         turn = " ".join(f"{x:+.4f}" for x in sample.wxyz)
         line("pose", f"{sample.target}: {place} m, w x y z {turn}")
+    elif isinstance(sample, GrabSample):
+        line("grab", f"{sample.target}: {sample.piece or 'nothing'}")
     elif isinstance(sample, SignalSample):
         for name, value in sample.values.items():
             line("signal", f"{name} = {value:.4f}" if isinstance(value, float) else f"{name} = {value}")

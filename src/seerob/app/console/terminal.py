@@ -11,17 +11,19 @@ import logging
 import math
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+import msgspec
 from rich.console import Console as RichConsole
 
 from seerob.core.figures import against, with_unit
 from seerob.core.printable import printable
-from seerob.core.snapshot import Finding, Verdict
+from seerob.core.snapshot import Event, Finding, Verdict
 from seerob.workstation.allowed import Allowed
 
 if TYPE_CHECKING:
@@ -256,8 +258,20 @@ def tell_results(summary: Summary) -> None:
         line(word, f"{name:<{width}}  {text}", style)
     for person, errors in summary.results.bones.items():
         line("bones", f"{person}: {_missing(errors)}")
+    if summary.results.events:
+        line("events", _happened(summary.results.events))
     if summary.verdict is None:
         line("nothing judged", _why_nothing(summary), WORDS[Verdict.UNDECIDED][1])
+
+
+def _happened(events: Sequence[Event]) -> str:
+    """How often what happened to workpieces: ``3 taken, 2 placed, 2 rounds of 4.1 s on average``."""
+    count = Counter(event.what for event in events)
+    rounds = [event.took or 0.0 for event in events if event.what == "round"]
+    parts = [f"{n} {what}" for what, n in count.items() if what != "round"]
+    if rounds:
+        parts.append(f"{len(rounds)} rounds of {sum(rounds) / len(rounds):.1f} s on average")
+    return ", ".join(parts)
 
 
 def _why_nothing(summary: Summary) -> str:
@@ -359,6 +373,7 @@ def results_json(summary: Summary, **more: object) -> str:
             name: [error._asdict() for error in (*errors.all(), *errors.bones())]
             for name, errors in summary.results.bones.items()
         },
+        "events": [msgspec.to_builtins(event) for event in summary.results.events],
         "findings": [
             {"level": f.level, "subject": f.subject, "text": f.text} for f in summary.scene.findings
         ],

@@ -222,7 +222,7 @@ class Live:
             now = monotonic()
             if (
                 self.log is not None
-                and (verdicts := self.log.verdicts())
+                and (verdicts := (*self.log.verdicts(), len(self.log.events))) != (0,)
                 and (verdicts != sent or now > again or (finished and not said_finished))
             ):
                 sent, again = verdicts, now + TELL_EVERY

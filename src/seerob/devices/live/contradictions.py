@@ -30,7 +30,16 @@ from typing import NamedTuple, get_args
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, SeerobError
-from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample, key
+from seerob.core.samples import (
+    BodySample,
+    GrabSample,
+    JointSample,
+    PoseSample,
+    Quality,
+    Sample,
+    SignalSample,
+    key,
+)
 from seerob.devices.live.device_clock import HOLD
 from seerob.files.trajectories.checks import disagreement
 from seerob.files.trajectories.trajectory import TrajectorySamples
@@ -285,7 +294,7 @@ class Contradictions:
 
     def find(self, sample: Sample) -> str:
         """Why this sample and those before it are no one motion; empty when they may be."""
-        if isinstance(sample, SignalSample):
+        if isinstance(sample, SignalSample | GrabSample):
             return ""
         t = sample.t if sample.t_device is None else sample.t_device
         step, before = t - self._at, self._before

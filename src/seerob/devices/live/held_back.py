@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from seerob.core.samples import BodySample, JointSample, Sample, SignalSample
+from seerob.core.samples import BodySample, GrabSample, JointSample, Sample, SignalSample
 
 TOGETHER = 0.02
 """Samples that arrive within this time may be of one tick, of which the newest is taken [s]."""
@@ -92,8 +92,8 @@ class HeldBack:
 
 
 def said_by(sample: Sample) -> Said:
-    """What a sample says of places and speeds; nothing of signals, which are told one by one."""
-    if isinstance(sample, SignalSample):
+    """What a sample says of places and speeds; nothing of signals and grabs, which are told one by one."""
+    if isinstance(sample, SignalSample | GrabSample):
         return {}
     if isinstance(sample, JointSample):
         found = {f"{j}": value for j, value in enumerate(sample.q)}

@@ -35,7 +35,7 @@ from seerob.core.errors import InputError, SeerobError
 from seerob.core.extras import need
 from seerob.core.host_name import check_host, check_url
 from seerob.core.printable import printable
-from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
+from seerob.core.samples import BodySample, GrabSample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding, SourceLine
 from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
@@ -487,7 +487,7 @@ class Listener:
         """
         if not math.isfinite(sample.t):
             raise SeerobError(f"it yields a sample without the time of its arrival (t is {sample.t})")
-        if isinstance(sample, SignalSample):
+        if isinstance(sample, SignalSample | GrabSample):
             self._news(replace(sample, source=self.name), sample.t, self.drives)
             return
         sample = replace(sample, source=self.name)
@@ -618,7 +618,7 @@ class _Person:
 
 def _content(sample: Sample) -> int:
     """What tells a sample's content from that of others."""
-    if isinstance(sample, SignalSample):
+    if isinstance(sample, SignalSample | GrabSample):
         return 0
     said: tuple[tuple[float, ...] | None, ...]
     if isinstance(sample, JointSample):

@@ -24,6 +24,7 @@ from seerob.description.loader import load_robot
 from seerob.description.robots.calibration import calibrated_by
 from seerob.distance.least import Shapes
 from seerob.model.model import Body, Frame, Mechanism, Model
+from seerob.model.mounting import loose as loose_mounting
 from seerob.model.mounting import machines as machine_mounting
 from seerob.model.mounting.chains import assumed, payload, placeholder
 from seerob.model.mounting.contacts import add_contacts
@@ -51,6 +52,7 @@ from seerob.workstation.workstation import (
     Machine,
     Mounted,
     Part,
+    Place,
     Robot,
     Thing,
     Tool,
@@ -142,6 +144,9 @@ class _Compiler:
         for i, machine in enumerate(self.station.machines):
             if machine.on is None:
                 self._try(f"machines[{i}]", partial(self._machine, machine))
+        for i, piece in enumerate(self.station.workpieces):
+            if piece.loose:
+                self._try(f"workpieces[{i}]", partial(self._loose, piece))
         if not self.problems:
             self._mount_all()
         if not self.problems:
@@ -149,11 +154,16 @@ class _Compiler:
                 self._try(f"areas[{i}]", partial(self._area, area))
             for i, sensor in enumerate(self.station.sensors):
                 self._try(f"sensors[{i}]", partial(mount_sensor, self.mounting, self.carriers, sensor))
+            for i, place in enumerate(self.station.places):
+                self._try(f"places[{i}]", partial(self._place, place))
         if self.problems:
             raise InputError(self.problems)
         bodies = listed(self.mounting)
         self._actuators()
-        add_contacts(self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache)
+        loose = {piece.name: piece.friction for piece in self.station.workpieces if piece.loose}
+        add_contacts(
+            self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache, loose=loose
+        )
         self.progress("compiling")
         try:
             with warnings.catch_warnings(record=True) as said:
@@ -299,6 +309,30 @@ class _Compiler:
             machine.name, thing.files, folder=self.folder, references=(machine.mesh,)
         )
 
+    def _loose(self, piece: Workpiece) -> None:
+        if not self.station.engine.physics:
+            what = f"{piece.name} is loose, and only physics moves it"
+            raise InputError.at(self.file, "on", what, "set engine.physics = true, or say what carries it")
+        self.progress(f"reading {piece.name}")
+        description, thing = loose_mounting.loaded(piece, self.folder, file=self.file)
+        self._chain(
+            piece.name, MechanismDraft(description, "workpiece", np.zeros(6), True), pose_matrix(piece.at)
+        )
+        for entry in self.mounting.entries:
+            if entry.owner == piece.name:
+                entry.holder = piece.name
+        self.mounting.files |= filed(piece.name, thing.files, folder=self.folder, references=(piece.mesh,))
+
+    def _place(self, place: Place) -> None:
+        if place.on is not None and not self.mounting.has(self._body(place.on)):
+            raise UnknownName("part, machine or link", place.on, [*self.carriers, *self._parts()])
+        if sum(other.name == place.name for other in self.station.places) > 1:
+            what = f"the name {place.name!r} is taken by another place"
+            raise InputError.at(self.file, "name", what, "choose another")
+
+    def _parts(self) -> list[str]:
+        return [part.name for part in self.station.parts]
+
     def _area(self, area: Area) -> None:
         on = None if area.on is None else self._body(area.on)
         if on is not None and not self.mounting.has(on):
@@ -328,6 +362,7 @@ class _Compiler:
             *(
                 (f"workpieces[{i}]", w.on, partial(self._mount, "workpiece", w))
                 for i, w in enumerate(self.station.workpieces)
+                if not w.loose
             ),
         ]
         while waiting:
@@ -415,8 +450,12 @@ class _Compiler:
     # -- the model --------------------------------------------------------------------------
 
     def _actuators(self) -> None:
-        """One per degree of freedom, in the same order; the engine sets gains and limits."""
+        """One per degree of freedom of all but loose workpieces, in the same order; the engine sets them."""
+        loose = (piece.name for piece in self.station.workpieces if piece.loose)
+        free = {f"{name}/{joint}" for name in loose for joint in loose_mounting.JOINTS}
         for joint in self.mounting.spec.joints:
+            if joint.name in free:
+                continue
             self.mounting.spec.add_actuator(
                 name=joint.name,
                 target=joint.name,

@@ -7,8 +7,9 @@ one set never touch each other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -21,20 +22,38 @@ from seerob.model.model import Body
 from seerob.model.mounting.specification import Mounting
 from seerob.workstation.workstation import Contact
 
+FLOOR = "floor of loose workpieces"
 MAX_PAIRS = 31
 """MuJoCo's masks have 32 bits; the sign bit is left alone."""
 
 
 def add_contacts(
-    mounting: Mounting, bodies: Sequence[Body], contacts: Sequence[Contact], *, file: str, cache: Path | None
+    mounting: Mounting,
+    bodies: Sequence[Body],
+    contacts: Sequence[Contact],
+    *,
+    file: str,
+    cache: Path | None,
+    loose: Mapping[str, float],
 ) -> None:
     """Give the bodies that may touch their contact shapes.
+
+    Loose workpieces touch the floor, one another and everything but people, whose hands hold them.
+
+    Args:
+        mounting: Gets them.
+        bodies: Of the workstation.
+        contacts: What the file asks for.
+        file: The workstation file, for messages.
+        cache: Folder that keeps convex pieces.
+        loose: Coefficient of friction of each loose workpiece, by name.
 
     Raises:
         InputError: More pairs than there are bits, or a name that means no body.
     """
-    if len(contacts) > MAX_PAIRS:
-        raise InputError.at(file, "contacts", f"{len(contacts)} pairs", f"give at most {MAX_PAIRS}")
+    most = MAX_PAIRS - bool(loose)
+    if len(contacts) > most:
+        raise InputError.at(file, "contacts", f"{len(contacts)} pairs", f"give at most {most}")
     masks: dict[int, list[int]] = {}
     for i, contact in enumerate(contacts):
         for side, name in enumerate(contact.between):
@@ -44,8 +63,23 @@ def add_contacts(
                 raise InputError.at(file, f"contacts[{i}].between[{side}]", str(error)) from error
             for body in chosen:
                 masks.setdefault(body.index, [0, 0])[side] |= 1 << i
+    if loose:
+        bit = 1 << (MAX_PAIRS - 1)
+        for body in bodies:
+            if body.role == "workpiece" and body.owner in loose:
+                masks[body.index] = [bit, bit]
+            elif body.role not in ("area", "human") and not body.holder:
+                masks.setdefault(body.index, [0, 0])[1] |= bit
+        mounting.spec.worldbody.add_geom(
+            name=FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=0, conaffinity=bit, group=3
+        )
+        text = "loose workpieces fall onto z = 0, and pass through people; robots touch them as hulls"
+        mounting.findings.append(Finding(level="note", subject=next(iter(loose)), text=text))
     for index, (contype, conaffinity) in masks.items():
-        _add_geoms(mounting, bodies[index], contype, conaffinity, cache)
+        body = bodies[index]
+        friction = loose.get(body.owner) if body.role == "workpiece" else None
+        hull = bool(loose) and body.role == "robot" and not contype and conaffinity == bit
+        _add_geoms(mounting, body, contype, conaffinity, cache, friction=friction, hull=hull)
 
 
 def select(bodies: Sequence[Body], name: str) -> list[Body]:
@@ -62,19 +96,32 @@ def select(bodies: Sequence[Body], name: str) -> list[Body]:
     return chosen
 
 
-def _add_geoms(mounting: Mounting, body: Body, contype: int, conaffinity: int, cache: Path | None) -> None:
+def _add_geoms(
+    mounting: Mounting,
+    body: Body,
+    contype: int,
+    conaffinity: int,
+    cache: Path | None,
+    *,
+    friction: float | None = None,
+    hull: bool = False,
+) -> None:
     mj_body = mounting.get(body.name)
     for i, solid in enumerate(body.solids):
         name = f"{body.name}#{i}"
-        masks = {"contype": contype, "conaffinity": conaffinity, "mass": 0.0, "group": 3}
+        masks: dict[str, Any] = {"contype": contype, "conaffinity": conaffinity, "mass": 0.0, "group": 3}
+        if friction is not None:
+            # Its own coefficient counts, whatever it touches.
+            masks |= {"friction": [friction, 0.005, 0.0001], "priority": 1, "condim": 4}
         if solid.points is not None and len(solid.points) == 2:
             _capsule(mj_body, name, solid, masks)
         else:
-            for k, mesh in enumerate(_convex(mounting, body, solid, cache)):
+            whole = (solid.mesh,) if hull and solid.mesh is not None else None
+            for k, mesh in enumerate(whole or _convex(mounting, body, solid, cache)):
                 _mesh(mounting, mj_body, f"{name}.{k}", mesh, masks)
 
 
-def _capsule(mj_body: mujoco.MjsBody, name: str, solid: Solid, masks: dict[str, float]) -> None:
+def _capsule(mj_body: mujoco.MjsBody, name: str, solid: Solid, masks: dict[str, Any]) -> None:
     assert solid.points is not None
     start, end = solid.points
     length = float(np.linalg.norm(end - start))
@@ -116,9 +163,7 @@ def _convex(mounting: Mounting, body: Body, solid: Solid, cache: Path | None) ->
     return meshes
 
 
-def _mesh(
-    mounting: Mounting, mj_body: mujoco.MjsBody, name: str, mesh: Mesh, masks: dict[str, float]
-) -> None:
+def _mesh(mounting: Mounting, mj_body: mujoco.MjsBody, name: str, mesh: Mesh, masks: dict[str, Any]) -> None:
     mounting.spec.add_mesh(
         name=name,
         uservert=np.ascontiguousarray(mesh.vertices, np.float32).ravel(),

@@ -75,7 +75,8 @@ class Riders:
         riders = self.of(name)
         things: dict[str, float | None] = {}
         for entry in self._entries:
-            if entry.owner in riders or (entry.carrier in (name, *riders) and entry.role in THINGS):
+            mounted = entry.carrier in (name, *riders) and entry.role in THINGS and entry.owner != name
+            if entry.owner in riders or mounted:
                 mass = None if entry.mass is None else entry.mass.value
                 known = things.setdefault(entry.owner, 0.0)
                 things[entry.owner] = None if known is None or mass is None else known + mass

@@ -12,6 +12,7 @@ from seerob.core.snapshot import Basis, CriterionInfo, Verdict
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.palette import DARK_HEX, HEX
 from seerob.outputs.report import plots as _plots
+from seerob.outputs.report.events import events_section
 from seerob.outputs.report.evidence import assumed, evaluated, not_covered
 from seerob.outputs.report.posture_safety import posture_safety_section
 from seerob.outputs.report.report import DOUBTFUL, Report, ReportSection, ReportTable, badge, grouped_inputs
@@ -160,6 +161,7 @@ def page(report: Report) -> str:
         ("Verdicts", _verdicts(report)),
         ("Criterion by criterion", _criteria(report)),
         ("Posture against safety", posture_safety_section(scene, report.log)),
+        ("What happened to workpieces", events_section(report.log)),
         *((section.title, _section(section)) for section in report.sections),
         ("What is not covered and must be measured", not_covered(report)),
         ("What was assumed, and by whom", assumed(report)),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seerob.core.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
+from seerob.core.samples import BodySample, GrabSample, JointSample, PoseSample, Sample, SignalSample
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.core.transforms import Array
 from seerob.description.humans.skeleton import AXES, PARENTS, ROOT
@@ -67,6 +67,8 @@ def cells(sample: Sample, joints: Mapping[str, tuple[tuple[str, str], ...]]) -> 
             found |= _pose(f"{point.name} ", point.position, point.wxyz)
             if point.confidence is not None:
                 found[f"{point.name} confidence"] = point.confidence
+    elif isinstance(sample, GrabSample):
+        found["holds"] = sample.piece
     else:
         found |= sample.values
     return found

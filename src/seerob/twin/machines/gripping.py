@@ -45,7 +45,7 @@ class Held:
         hearings = {name: Hearing(given=True, driven=False) for name in own.mechanisms}
         self._data = mujoco.MjData(own.mj)
         self._state = State(own, self._data, hearings)
-        self._loose = any(body.holder for body in own.bodies)
+        self._loose = any(body.holder not in ("", body.owner) for body in own.bodies)
         self._grips = Grips(self._state, own.mj)
 
     def follow(self, qpos: Array) -> None:
@@ -80,9 +80,9 @@ LET_GO = 2.0
 
 
 def own_masses(model: Model) -> Model:
-    """Copy the MuJoCo model, so that its masses may change, when there is something that is picked up."""
-    loose = any(piece.rest is not None for piece in model.workstation.workpieces)
-    return replace(model, mj=model.mj.__copy__()) if loose else model
+    """Copy the MuJoCo model, so that masses and places may change, when something is picked up."""
+    changes = any(piece.rest is not None or piece.loose for piece in model.workstation.workpieces)
+    return replace(model, mj=model.mj.__copy__()) if changes else model
 
 
 class Grips:

@@ -1,0 +1,24 @@
+"""What happens to loose workpieces, with times: the list that a run, its report and its page show."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+
+class Event(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What happened to a loose workpiece."""
+
+    t: float
+    """Run time [s]."""
+    what: str
+    """``taken``, ``handed`` (another hand has it now), ``torn`` (out of a hand), ``placed``, ``dropped``,
+    ``refused`` (a hand could not take it) or ``round`` (a round of work ended)."""
+    piece: str
+    by: str = ""
+    """Hand that did it, such as ``operator/right_hand``."""
+    where: str = ""
+    """Place where it was put, or from which it was taken; empty where it is none."""
+    took: float | None = None
+    """Of ``placed`` and ``dropped`` the time since it was taken [s], of ``round`` its cycle time [s]."""
+    reason: str = ""
+    """Why it was refused or torn out."""

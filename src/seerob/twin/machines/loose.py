@@ -1,0 +1,405 @@
+r"""Loose workpieces: people take, carry, hand over and put them down, and the physics moves them.
+
+A workpiece that a hand holds hangs on it by a spring: on its centre of mass and about it act
+
+.. math:: F = \min(m, 1\,\mathrm{kg}) (\omega^2 \Delta x + 2 \omega \Delta v) - m g,\quad
+          \tau = I (\omega^2 \Delta\varphi + 2 \omega \Delta w)
+
+toward where it would be if it were fixed to the hand as it was when it was taken. The opposite force acts on
+the hand's joint, so that arm and trunk carry its weight; the moment about the wrist is left out, since what
+pulls a twin's wrist is set for a hand without a load. It is never put anywhere: a table that is in the way
+stops it, and farther than ``torn`` from where it should be it is torn out. One that was taken from afar comes
+to the hand with `REEL`. In a place with ``snap`` the same spring pulls it into the place's pose.
+
+Its joints are three ways and three turns. The frame they are counted from is put anew between two ticks
+before the second turn comes near a right angle, where the others would be one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.samples import GrabSample
+from seerob.core.snapshot import Event
+from seerob.core.transforms import (
+    Array,
+    inverse,
+    rotation_from_rpy,
+    rotation_from_wxyz,
+    transform,
+    wxyz_from_rotation,
+)
+from seerob.model.model import Model
+from seerob.model.mounting.compilation import pose_matrix
+from seerob.model.mounting.machines import BODY
+from seerob.workstation.workstation import Place
+
+STIFFNESS = 8.0
+"""Natural frequency of the spring [Hz]: as stiff as arms that hold something; our choice."""
+HEAVY = 1.0
+"""What weighs more is pulled no harder [kg], beside its weight: the spring stays stable on a light hand."""
+NEAR = 0.25
+"""A hand whose wrist is no farther from a workpiece's surface takes it where it is [m]: a hand's length and
+what a ball about the workpiece has too much; our choice."""
+FARTHEST = 3.0
+"""From farther nothing is taken [m]; our choice."""
+REEL = 1.5
+"""Speed at which what was taken from afar comes to the hand [m/s]; our choice."""
+TILTED = math.pi / 4
+"""From this second turn on the frame is put anew [rad]."""
+STILL, STILL_FOR = 0.02, 0.1
+"""Slower than this [m/s] for so long [s] it lies."""
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]."""
+Indices = NDArray[np.int64]
+HANDS = ("left_hand", "right_hand")
+WAITING = 256
+"""Grabs that lie ahead of the tick, at most."""
+
+
+@dataclass
+class _Spring:
+    """What pulls a workpiece: a hand, or a place."""
+
+    carrier: int
+    """MuJoCo's body that it is fixed to."""
+    carrier_from_piece: Array
+    """Where it pulls to, shape (4, 4)."""
+    reels: bool = False
+    """Whether the workpiece is still on its way to the hand."""
+
+
+@dataclass
+class _Piece:
+    """A loose workpiece at one instant."""
+
+    name: str
+    body: int
+    q: Indices
+    """Columns of its joints in ``qpos``, shape (6,)."""
+    v: Indices
+    """In ``qvel``, shape (6,)."""
+    mass: float
+    torn: float
+    radius: float
+    """Of the ball about its centre of mass that contains it [m]."""
+    hands: dict[str, _Spring] = field(default_factory=dict)
+    place: str = ""
+    """Where it lies, or whose spring pulls it."""
+    pulled: _Spring | None = None
+    """Spring of that place."""
+    falls: bool = False
+    """Whether it was let go and does not lie yet."""
+    taken: float = 0.0
+    """When it was taken last [s]."""
+    since: float = math.inf
+    """Since when it is still [s]."""
+    by: str = ""
+    """Hand that let it go."""
+
+
+class Loose:
+    """The loose workpieces of a twin.
+
+    Args:
+        model: The compiled workstation, with a `mujoco.MjModel` of its own.
+        physics: The `mujoco.MjModel` that is stepped.
+        data: Of that.
+        shown: Data of the other one.
+
+    Attributes:
+        names: Of the workpieces.
+        events: What happened since the last tick.
+    """
+
+    def __init__(
+        self, model: Model, physics: mujoco.MjModel, data: mujoco.MjData, shown: mujoco.MjData
+    ) -> None:
+        self._model, self._mj, self._data, self._shown = model, physics, data, shown
+        self.events: list[Event] = []
+        self._pieces = {
+            piece.name: _piece(model, piece.name, piece.torn)
+            for piece in model.workstation.workpieces
+            if piece.loose
+        }
+        self.names = frozenset(self._pieces)
+        self._places = {place.name: (place, *_fixed(model, place)) for place in model.workstation.places}
+        self._hands = {
+            f"{human.name}/{hand}": model.frames[f"{human.name}/{hand}"].mj
+            for human in model.workstation.humans
+            for hand in HANDS
+        }
+        self._omega = min(2 * math.pi * STIFFNESS, 0.2 / physics.opt.timestep)
+        self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
+        self._rounds: dict[str, float] = {}
+        """When the last round ended at each place [s]."""
+        self._first: float | None = None
+        """When anything was taken first [s]."""
+        self._before: dict[str, tuple[Array, Array]] = {}
+        self._pulls = False
+
+    def bodies(self) -> frozenset[int]:
+        """Bodies of all of them, by index."""
+        return frozenset(b.index for b in self._model.bodies if b.owner in self._pieces)
+
+    def hear(self, sample: GrabSample) -> None:
+        """Hear what a hand holds, from the sample's instant on."""
+        self._waiting.append(sample)
+
+    # -- the physics' steps -----------------------------------------------------------------
+
+    def pull(self, t: float, dt: float) -> None:
+        """Before a step: take and let go what was heard until ``t`` [s], and set the springs' forces."""
+        while self._waiting and self._waiting[0].t <= t + SLACK:
+            self._grab(self._waiting.popleft(), t)
+        if not self._pulls:
+            return
+        self._data.xfrc_applied[:] = 0.0
+        self._pulls = False
+        for piece in self._pieces.values():
+            for hand, spring in tuple(piece.hands.items()):
+                self._pulls = True
+                if self._pull(piece, spring, dt) > piece.torn:
+                    del piece.hands[hand]
+                    reason = f"farther than {piece.torn:g} m from where the hand has it"
+                    self._say(t, "torn", piece, by=hand, reason=reason)
+                    self._let_go(piece, hand)
+            if piece.pulled is not None and not piece.hands:
+                self._pulls = True
+                if self._pull(piece, piece.pulled, dt) > 2 * piece.torn + self._places[piece.place][3]:
+                    piece.pulled, piece.place = None, ""
+
+    def _pull(self, piece: _Piece, spring: _Spring, dt: float) -> float:
+        """Set the forces of a spring; how far the workpiece is from where it pulls [m]."""
+        mj, data, omega = self._mj, self._data, self._omega
+        carrier = _pose(data, spring.carrier)
+        wanted = carrier @ spring.carrier_from_piece
+        here = _pose(data, piece.body)
+        com = data.xipos[piece.body].copy()
+        to = wanted[:3, :3] @ mj.body_ipos[piece.body] + wanted[:3, 3]
+        if spring.reels:
+            away = to - carrier[:3, 3]
+            far, least = float(np.linalg.norm(away)), piece.radius + 0.5 * NEAR
+            rest = max(far - REEL * dt, least)
+            shift = away * (rest / far - 1) if far > least else np.zeros(3)
+            spring.carrier_from_piece[:3, 3] += carrier[:3, :3].T @ shift
+            spring.reels = rest > least
+            to = to + shift
+        velocity, of_carrier = np.zeros(6), np.zeros(6)
+        mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
+        if spring.carrier:
+            mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_XBODY, spring.carrier, of_carrier, 0)
+        spin = of_carrier[:3]
+        speed = of_carrier[3:] + np.cross(spin, to - carrier[:3, 3])
+        gap = to - com
+        pulled = min(piece.mass, HEAVY)
+        force = pulled * (omega**2 * gap + 2 * omega * (speed - velocity[3:])) - piece.mass * mj.opt.gravity
+        turn = wanted[:3, :3] @ here[:3, :3].T
+        axes = data.ximat[piece.body].reshape(3, 3)
+        inertia = axes @ np.diag(mj.body_inertia[piece.body]) @ axes.T
+        torque = inertia @ (omega**2 * _rotation_vector(turn) + 2 * omega * (spin - velocity[:3]))
+        data.xfrc_applied[piece.body] += np.concatenate([force, torque])
+        if spring.carrier:
+            lever = carrier[:3, 3] - data.xipos[spring.carrier]
+            data.xfrc_applied[spring.carrier] += np.concatenate([-force, -np.cross(lever, force)])
+        return float(np.linalg.norm(gap))
+
+    # -- hands ------------------------------------------------------------------------------
+
+    def _grab(self, sample: GrabSample, t: float) -> None:
+        hand = sample.target
+        held = next((piece for piece in self._pieces.values() if hand in piece.hands), None)
+        if held is not None and held.name == sample.piece:
+            return
+        if held is not None:
+            del held.hands[hand]
+            self._let_go(held, hand)
+            self._pulls = True  # forces are to be taken back
+        if not sample.piece:
+            return
+        piece = self._pieces.get(sample.piece)
+        body = self._hands.get(hand)
+        if piece is None or body is None:
+            what = f"no loose workpiece {sample.piece!r}" if piece is None else f"no hand {hand!r}"
+            self.events.append(Event(t=t, what="refused", piece=sample.piece, by=hand, reason=what))
+            return
+        far = float(np.linalg.norm(self._data.xipos[piece.body] - self._data.xpos[body])) - piece.radius
+        if not far <= FARTHEST:
+            reason = f"{far:.2f} m away: nothing is taken from farther than {FARTHEST:g} m"
+            self._say(t, "refused", piece, by=hand, reason=reason)
+            return
+        fixed = inverse(_pose(self._data, body)) @ _pose(self._data, piece.body)
+        if piece.hands:
+            self._say(t, "handed", piece, by=hand)
+        else:
+            self._say(t, "taken", piece, by=hand, where=piece.place)
+            piece.taken = t
+            self._first = t if self._first is None else self._first
+        piece.hands[hand] = _Spring(body, fixed, reels=far > NEAR)
+        piece.pulled, piece.place, piece.falls, self._pulls = None, "", False, True
+
+    def _let_go(self, piece: _Piece, hand: str) -> None:
+        if piece.hands:
+            return
+        piece.falls, piece.since, piece.by = True, math.inf, hand
+        for place, body, fixed, _ in self._places.values():
+            taken = any(other.place == place.name for other in self._pieces.values())
+            if place.snap and not taken and self._in(place, body, fixed, piece):
+                piece.place, piece.pulled = place.name, _Spring(body, fixed)
+                return
+
+    def _in(self, place: Place, body: int, fixed: Array, piece: _Piece) -> bool:
+        """Whether the origin of a workpiece is in a place."""
+        if not fnmatchcase(piece.name, place.of):
+            return False
+        local = inverse(_pose(self._data, body) @ fixed) @ _pose(self._data, piece.body)
+        return bool((np.abs(local[:3, 3]) <= 0.5 * np.array(place.size)).all())
+
+    # -- ticks ------------------------------------------------------------------------------
+
+    def begin(self, before: Array) -> None:
+        """Before a tick: forget what happened, and put frames anew.
+
+        Args:
+            before: Velocities before the last step, shape (nv,); written.
+        """
+        self.events.clear()
+        for piece in self._pieces.values():
+            if abs(self._data.qpos[piece.q[4]]) > TILTED:
+                self._put_frame_anew(piece, before)
+
+    def _put_frame_anew(self, piece: _Piece, before: Array) -> None:
+        mj, q, v = self._mj, piece.q, piece.v
+        base = rotation_from_wxyz(mj.body_quat[piece.body])
+        origin = mj.body_pos[piece.body].copy()
+        at = self._data.qpos[q].copy()
+        turned = base.copy()
+        axes = np.empty((3, 3))
+        for k in range(3):
+            axes[:, k] = turned[:, k]
+            turned = turned @ _about(k, float(at[3 + k]))
+        origin = origin + base @ at[:3]
+        wxyz = wxyz_from_rotation(turned)
+        turned = rotation_from_wxyz(np.array(wxyz))
+        for rates in (self._data.qvel, before, self._shown.qvel):
+            rates[v[:3]] = turned.T @ base @ rates[v[:3]]
+            rates[v[3:]] = turned.T @ axes @ rates[v[3:]]
+        for positions in (self._data.qpos, self._shown.qpos):
+            positions[q] = 0.0
+        for model in (mj, self._model.mj):
+            model.body_pos[piece.body], model.body_quat[piece.body] = origin, wxyz
+        self._data.qacc_warmstart[v] = 0.0
+
+    def stop(self, name: str, before: Array) -> None:
+        """Let one stand that the physics has lost, where it is; its way is not known.
+
+        Args:
+            name: Of the workpiece.
+            before: Velocities before the last step, shape (nv,); written.
+        """
+        piece = self._pieces[name]
+        self._data.qvel[piece.v] = before[piece.v] = self._data.qacc_warmstart[piece.v] = 0.0
+
+    def end(self, t: float) -> None:
+        """After a tick at ``t`` [s]: look what lies, and where."""
+        for piece in self._pieces.values():
+            here = _pose(self._shown, piece.body)
+            carrier = 0 if piece.pulled is None else piece.pulled.carrier
+            local = inverse(_pose(self._shown, carrier)) @ here
+            last = self._before.get(piece.name)
+            self._before[piece.name] = local[:3, 3], np.array([t, carrier])
+            if not piece.falls:
+                continue
+            span = math.inf if last is None or last[1][1] != carrier else t - float(last[1][0])
+            if last is None or float(np.linalg.norm(local[:3, 3] - last[0])) > STILL * span:
+                piece.since = math.inf
+                continue
+            piece.since = min(piece.since, t)
+            if t - piece.since >= STILL_FOR - SLACK:
+                self._lies(piece, t)
+
+    def _lies(self, piece: _Piece, t: float) -> None:
+        piece.falls = False
+        inside = [
+            place for place, body, fixed, _ in self._places.values() if self._in(place, body, fixed, piece)
+        ]
+        # Of places within one another the smallest is meant.
+        place = min(inside, key=lambda one: math.prod(one.size), default=None)
+        took = t - piece.taken
+        if place is None:
+            piece.place = ""
+            self._say(t, "dropped", piece, by=piece.by, took=took)
+            return
+        piece.place = place.name
+        self._say(t, "placed", piece, by=piece.by, where=place.name, took=took)
+        if place.ends_round:
+            begun = self._rounds.get(place.name, self._first)
+            assert begun is not None
+            self._rounds[place.name] = t
+            self._say(t, "round", piece, by=piece.by, where=place.name, took=t - begun)
+
+    def _say(
+        self,
+        t: float,
+        what: str,
+        piece: _Piece,
+        *,
+        by: str = "",
+        where: str = "",
+        took: float | None = None,
+        reason: str = "",
+    ) -> None:
+        said = Event(t=t, what=what, piece=piece.name, by=by, where=where, took=took, reason=reason)
+        self.events.append(said)
+
+    def said(self) -> tuple[Event, ...]:
+        """What happened in the last tick."""
+        return tuple(self.events)
+
+
+def _piece(model: Model, name: str, torn: float) -> _Piece:
+    mechanism = model.mechanisms[name]
+    body = model.frames[f"{name}/{BODY}"].mj
+    com = model.mj.body_ipos[body]
+    own = [b for b in model.bodies if b.owner == name]
+    reach = [float(np.linalg.norm(b.corners - com, axis=1).max(initial=0.0)) + b.radius for b in own]
+    mass = float(model.mj.body_mass[body])
+    return _Piece(name, body, mechanism.q_address, mechanism.v_address, mass, torn, max(reach, default=0.0))
+
+
+def _fixed(model: Model, place: Place) -> tuple[int, Array, float]:
+    """MuJoCo's body that a place moves with, its pose there, and half its diagonal [m].
+
+    Raises:
+        UnknownName: It is on nothing that there is.
+    """
+    half = 0.5 * math.hypot(*place.size)
+    if place.on is None:
+        return 0, pose_matrix(place.at), half
+    moving = model.mechanisms.get(place.on)
+    machine = moving is not None and moving.role == "machine"
+    frame = model.frame(f"{place.on}/{BODY}" if machine else place.on)
+    return frame.mj, frame.body_from_frame @ pose_matrix(place.at), half
+
+
+def _pose(data: mujoco.MjData, body: int) -> Array:
+    """World from body, shape (4, 4)."""
+    return transform(data.xmat[body].reshape(3, 3), data.xpos[body])
+
+
+def _about(axis: int, angle: float) -> Array:
+    return rotation_from_rpy(np.array([angle if k == axis else 0.0 for k in range(3)]))
+
+
+def _rotation_vector(turn: Array) -> Array:
+    """Axis times angle of a rotation [rad], shape (3,)."""
+    found, wxyz = np.zeros(3), np.array(wxyz_from_rotation(turn))
+    mujoco.mju_quat2Vel(found, wxyz, 1.0)
+    return found

@@ -11,7 +11,8 @@ these is changed:
 - each verdict, and each name with an opposite, such as ``min``.
 
 No verdict hangs on what only draws or describes, and that is left alone by name: markers and what they are
-made with, bases and inputs, messages (`DRAWN`, `SPOKEN`), what is raised or asserted, text with fields in it.
+made with (classes of markers are named so), bases and inputs, messages, how much of the work is done
+(`DRAWN`, `SPOKEN`), what is raised or asserted, text with fields in it.
 So are indices and shapes of arrays, where a wrong one is another array and no other limit. Options, with
 their bounds and defaults, are fixed when their class is made and cannot be changed in a living process: the
 tables of docs/ say them a second time, and ``tests/test_docs.py`` fails where the two differ.
@@ -63,7 +64,7 @@ UNITS = frozenset(("m", "s", "kg", "N", "J", "Pa", "m/s", "rad", "rad/s", "N/m",
 
 DRAWN = ("Arrow", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "markers.Rays", "Segment", "Sphere",
          "Basis", "Input", "provenance.given", "InputError", "InputError.at", "Undecided", "ValueError",
-         "UnknownName", "Meta", "np.errstate")  # fmt: skip
+         "UnknownName", "Meta", "np.errstate", "say", "progress", "self._progress")  # fmt: skip
 """Calls whose arguments no verdict depends on."""
 SPOKEN = ("basis", "subjects", "inputs", "_markers", "_fan", "_shells", "_line", "_vector", "_rounded",
           "_Way.hull", "_Curtain.shown", "_Scan._hidden", "Presence._worst_sight", "_limits_given",
@@ -137,6 +138,8 @@ def _choices(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _left_alone(node: ast.AST, function: str) -> bool:
+    if function.partition(".")[0].endswith("Markers"):
+        return True
     if isinstance(node, ast.Call):
         return _called(node) in DRAWN
     if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):

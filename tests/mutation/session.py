@@ -14,12 +14,11 @@ import inspect
 import os
 import signal
 import sys
-import threading
-import time
 import types
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,10 +27,11 @@ from _pytest.runner import runtestprotocol
 
 import seerob
 from mutation.operators import Mutant, assigned, mutated
+from mutation.traces import Traces
 
 PACKAGE = Path(inspect.getfile(seerob)).parent
 LEAST = 20
-"""Seconds that a mutant may take at least before it counts as one that never ends."""
+"""Seconds that a test of a mutant may take at least before the mutant counts as one that never ends."""
 NOT_PUT_IN = 1
 """Exit code of a process that could not change its code: nothing is known of the mutant."""
 FIRST = 3
@@ -61,12 +61,22 @@ class Mutation:
         mutants: To be tried.
         jobs: Processes at a time.
         tell: Called with each outcome.
+        quick: How long the tests of one mutant may take unchanged, in all [s]; its quickest are run.
+        kept: File of `Traces`, of all sources then; None keeps none.
     """
 
     def __init__(
-        self, sources: dict[str, str], mutants: Sequence[Mutant], jobs: int, tell: Callable[[Outcome], None]
+        self,
+        sources: dict[str, str],
+        mutants: Sequence[Mutant],
+        jobs: int,
+        tell: Callable[[Outcome], None],
+        *,
+        quick: float = float("inf"),
+        kept: Path | None = None,
     ) -> None:
         self.sources, self.mutants, self.jobs, self.tell = sources, mutants, jobs, tell
+        self.quick, self.kept = quick, kept
         self.failed: list[str] = []
         """Tests that fail without any change, and mutants that could not be put in."""
         self.detour: dict[str, float] = {}
@@ -98,13 +108,16 @@ class Mutation:
             raise session.Interrupted(f"{session.testsfailed} errors while tests were collected")
         _interpret({mutant.file for mutant in self.mutants})
         callers, lines, seconds = self._unchanged(session)
-        statements = {file: _statements(source) for file, source in self.sources.items()}
+        changed = {mutant.file for mutant in self.mutants}
+        statements = {file: _statements(self.sources[file]) for file in changed}
         queue = []
         for mutant in self.mutants:
             tests = self._tests(mutant, session, callers, seconds)
             if (statement := statements[mutant.file].get(mutant.node)) and mutant.function != "<module>":
                 runs = set().union(*(lines[mutant.file, line] for line in statement))
                 tests = [item for item in tests if item.nodeid in runs]
+            spent = accumulate(seconds[item.nodeid] for item in tests)
+            tests = [item for item, until in zip(tests, spent, strict=True) if until <= self.quick]
             queue.append((mutant, tests))
         running: dict[int, tuple[Mutant, list[Any]]] = {}
         kills: Counter[tuple[str, str, str]] = Counter()
@@ -117,8 +130,8 @@ class Mutation:
                 if items:
                     # What killed others of the same function kills this one, mostly.
                     items.sort(key=lambda item: -kills[mutant.file, mutant.function, item.nodeid])
-                    limit = LEAST + int(10 * sum(seconds[item.nodeid] for item in items))
-                    running[_forked(mutant, self.sources[mutant.file], items, limit)] = mutant, items
+                    limits = [_limit(seconds[item.nodeid]) for item in items]
+                    running[_forked(mutant, self.sources[mutant.file], items, limits)] = mutant, items
                 else:
                     self.tell(Outcome(mutant, False, 0))
             if running:
@@ -140,7 +153,7 @@ class Mutation:
     def _passes(self, item: Any, seconds: Mapping[str, float]) -> bool:
         """Whether a test passes in a forked process if nothing is changed: else it tells of no mutant."""
         if item.nodeid not in self.passing:
-            pid = _forked(None, "", [item], LEAST + int(10 * seconds[item.nodeid]))
+            pid = _forked(None, "", [item], [_limit(seconds[item.nodeid])])
             self.passing[item.nodeid] = os.waitpid(pid, 0)[1] == 0
             if not self.passing[item.nodeid]:
                 self.failed.append(f"{item.nodeid} (in a forked process)")
@@ -148,54 +161,37 @@ class Mutation:
 
     def _unchanged(self, session: pytest.Session) -> tuple[Callers, Lines, dict[str, float]]:
         """Tests that call each function and run each line, and how long each takes."""
-        files = {str(PACKAGE / mutant.file): mutant.file for mutant in self.mutants}
-        modules = {_module(mutant.file) for mutant in self.mutants}
-        bound = {mutant.assigned for mutant in self.mutants}
+        changed = {mutant.file for mutant in self.mutants}
+        modules = {_module(file) for file in changed}
+        sources = {file: text for file, text in self.sources.items() if self.kept or file in changed}
+        loops = [file for file in changed if file.startswith("kernels/")]
+        traces = Traces(sources, PACKAGE, self.kept, loops)
         callers: Callers = defaultdict(list)
         lines: Lines = defaultdict(set)
         seconds = {}
-        for item in session.items:
-            seen: set[types.CodeType] = set()
-            run: set[tuple[types.CodeType, int]] = set()
 
-            def follow(frame: types.FrameType, event: str, _: object, run: set[Any] = run) -> Any:
-                run.add((frame.f_code, frame.f_lineno))
-                return follow
-
-            # Lines are followed in what is changed; of all else a tracer is told calls of Python's functions.
-            def note(frame: types.FrameType, event: str, _: object, seen: set[Any] = seen) -> Any:
-                seen.add(frame.f_code)
-                return follow if frame.f_code.co_filename in files else None
-
+        def passes(item: pytest.Item) -> bool:
             # Else only the first test that asks would be seen to call what is behind the cache.
             for cached in _cached(modules):
                 cached.cache_clear()
-            threading.settrace(note)
-            sys.settrace(note)
-            start = time.perf_counter()
-            try:
-                reports = runtestprotocol(item, log=False, nextitem=None)
-            finally:
-                sys.settrace(None)
-                threading.settrace(None)
-            seconds[item.nodeid] = time.perf_counter() - start
-            # A thread of the test may live on and add to them.
-            seen, run = seen.copy(), run.copy()
-            if any(report.failed for report in reports):
+            return not any(report.failed for report in runtestprotocol(item, log=False, nextitem=None))
+
+        for item in session.items:
+            trace = traces.of(item.nodeid, item.path, partial(passes, item))
+            if trace is None:
                 self.failed.append(item.nodeid)
                 continue
-            self.detour[item.nodeid] = seconds[item.nodeid] * len(seen)
-            called = {
-                (files[code.co_filename], code.co_qualname.split(".<")[0])
-                for code in seen
-                if code.co_filename in files
-            }
-            for where in called:
-                callers[where].append(item)
-            for name in bound.intersection(name for code in seen for name in code.co_names):
+            seconds[item.nodeid] = trace.seconds
+            self.detour[item.nodeid] = trace.seconds * trace.called
+            for file, functions in trace.functions.items():
+                for function in set(functions):
+                    callers[file, function].append(item)
+            for name in trace.names:
                 self.naming[name].append(item)
-            for code, line in run:
-                lines[files[code.co_filename], line].add(item.nodeid)
+            for file, run in trace.lines.items():
+                for line in run:
+                    lines[file, line].add(item.nodeid)
+        traces.write()
         return callers, lines, seconds
 
     def _tests(
@@ -247,12 +243,18 @@ def _names(item: pytest.Item) -> set[str]:
     return {name for code in codes for name in code.co_names}
 
 
-def _forked(mutant: Mutant | None, source: str, items: Sequence[Any], limit: int) -> int:
+def _limit(seconds: float) -> int:
+    """Within which a test ends that took so long while its calls were followed [s]."""
+    return LEAST + int(10 * seconds)
+
+
+def _forked(mutant: Mutant | None, source: str, items: Sequence[Any], limits: Sequence[int]) -> int:
+    """Number of a process that runs tests, each of which has its own limit [s], until one fails."""
     pid = os.fork()
     if pid:
         return pid
     try:
-        signal.alarm(limit)
+        signal.alarm(LEAST)
         silence = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silence, 1)
         os.dup2(silence, 2)
@@ -261,8 +263,11 @@ def _forked(mutant: Mutant | None, source: str, items: Sequence[Any], limit: int
                 put_in(mutant, source)
         except (LookupError, StopIteration, AttributeError):
             os._exit(NOT_PUT_IN)
-        for k, item in enumerate(items):
-            if any(report.failed for report in runtestprotocol(item, log=False, nextitem=None)):
+        for k, (item, limit) in enumerate(zip(items, limits, strict=True)):
+            signal.alarm(limit)
+            # What a file's tests share is made once where they follow each other.
+            following = items[k + 1] if k + 1 < len(items) else None
+            if any(report.failed for report in runtestprotocol(item, log=False, nextitem=following)):
                 os._exit(min(FIRST + k, 255))
         os._exit(0)
     except BaseException:

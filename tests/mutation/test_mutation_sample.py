@@ -54,6 +54,7 @@ def test_each_mutant_is_one_change():
 
 def test_what_is_left_alone_is_left_alone_by_its_own_name():
     text = "def basis(v): return v < 1\nclass Presence:\n    def _worst_sight(self, v): return v < 1\n"
+    text += "class RowMarkers:\n    def of(self, v): return v < 1\ndef told(v): say('so much', v / 2)\n"
     other = "class Other:\n    def _worst_sight(self, v): return v < 1\n"
     assert mutants(text, "made.py") == []
     assert {m.function for m in mutants(text + other, "made.py")} == {"Other._worst_sight"}

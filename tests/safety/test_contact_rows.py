@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace as replaced
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.core.snapshot import Result, Row, RowState, Verdict
-from seerob.criteria.contact.limits import Judged
+from seerob.criteria.contact.limits import Judged, Spread
 from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.contact.rows import area_results
 from seerob.criteria.safety.power_and_force import Contacts
 from seerob.session.station import Station
 
@@ -136,6 +140,62 @@ def test_a_value_below_its_limit_is_within_and_one_on_it_is_not(tmp_path: Path) 
             )
             (found,) = [r for r in rows if r.name == least.name]
             assert (found.limit, found.verdict) == (least.limit, expected)
+
+
+@pytest.mark.parametrize("whole", [Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED])
+@pytest.mark.parametrize("off", [False, True])
+@pytest.mark.parametrize("F", [0.3, 0.6])
+@pytest.mark.parametrize("E", [0.4, 0.5])
+@pytest.mark.parametrize("P", [0.2, 0.7, math.nan])
+def test_an_area_is_judged_by_the_least_speed_that_is_known(chest_judged, whole, off, F, E, P) -> None:
+    """Its own pressure, and force and energy of its region; what a tolerance leaves open is as the region."""
+    contacts, judged, chest, row = chest_judged
+    arrays, column = contacts.arrays, contacts.columns["Chest"]
+    speeds = judged.speeds
+    speeds = replaced(speeds, force=np.full_like(speeds.force, F), energy=np.full_like(speeds.energy, E))
+    ends = Spread(speeds.permissible, speeds.permissible, ()) if off else None
+    judged = replaced(judged, speeds=speeds, ends=ends)
+    known = [x for x in (F, E, P) if not math.isnan(x)]
+    body, how = contacts.names[row], "clamped" if judged.clamped[row, column] else "free"
+    for v in (0.1, 0.25, 0.35, 0.45, 0.55, 0.65):
+        beyond, open_ = v >= min(known), math.isnan(P)
+        expected = Verdict.EXCEEDED if beyond else Verdict.UNDECIDED if open_ else Verdict.WITHIN
+        if off and expected is not whole:
+            expected = Verdict.UNDECIDED
+        part = replace(chest, value=v, verdict=whole, reason="that of the region")
+        rows = contacts.rows.of([(part, row)], judged, lambda _: (), pressed=[P] * len(arrays.owner))
+        assert {(found.limit, found.verdict, found.value) for found in rows} == {(min(known), expected, v)}
+        if expected is not Verdict.UNDECIDED:
+            by = {F: "force", E: "energy", P: "pressure"}[min(known)]
+            reason = f"{by}, {how}, {body}"
+        else:
+            reason = f"contact pressure of {body} ({how}): " if open_ else "that of the region"
+        assert {found.reason for found in rows} == {reason}
+        for unknown in ("", "nobody knows"):
+            found = area_results(arrays, [P, P], (row, column), judged, whole=whole, unknown=unknown, v=v)
+            assert {(a.limit, a.verdict, a.value, a.unit) for a in found} == {
+                (min(known), expected, v, "m/s")
+            }
+            undecided = unknown or "decided as its region is"
+            assert {a.reason for a in found} == {undecided if expected is Verdict.UNDECIDED else ""}
+
+
+@pytest.fixture(scope="module")
+def chest_judged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Contacts, Judged, Result, int]:
+    return judged_chest(tmp_path_factory.mktemp("chest"))
+
+
+def test_what_was_measured_counts_where_it_is_worse(chest_judged) -> None:
+    contacts, judged, chest, row = chest_judged
+    pressed = contacts.rows.by_pressure(judged)
+    slow = replace(chest, value=1e-3, verdict=Verdict.WITHIN)
+    for said, expected in ((Verdict.EXCEEDED, Verdict.EXCEEDED), (Verdict.WITHIN, Verdict.WITHIN)):
+        measured = {"Chest": (Result(name="M", verdict=said),), "Face": (Result(name="N"),)}
+        rows = contacts.rows.of([(slow, row)], judged, lambda _: (), pressed=pressed, measured=measured)
+        assert {found.verdict for found in rows} == {expected}
+        assert all(
+            found.reason.startswith("M: above") == (said is expected is Verdict.EXCEEDED) for found in rows
+        )
 
 
 def test_what_a_tolerance_leaves_open_says_which(tmp_path: Path) -> None:

@@ -170,9 +170,12 @@ class Survey:
         state, robot = self._state, self._robot
         # Whether its place may be relied on is the criteria's question, not the drawing's.
         invalid_reasons, state.invalid_reasons = state.invalid_reasons, {}
+        state.heard()  # What was found of its place is kept, and would be said of it again.
         J = state.jacobian(self._tip, robot)[:3]
+        place = state.pose(self._tip)[1]
         state.invalid_reasons = invalid_reasons
-        return state.pose(self._tip)[1], float(np.linalg.norm(J @ along))
+        state.heard()
+        return place, float(np.linalg.norm(J @ along))
 
 
 def _asks(model: Model, robot: str, criteria: Sequence[Criterion], by: By) -> dict[str, Ask]:

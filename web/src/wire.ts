@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "6b1ce0caae1d73e1";
+export const SCHEMA = "d0c21aaaaffac79a";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -404,6 +404,20 @@ export interface CriterionInfo {
   levels: Level[];
 }
 
+/** A lever, button or switch that people pull in the twin. */
+export interface ControlInfo {
+  name: string;
+  /** `lever`, `switch`, `button` or `enabling`. */
+  kind: string;
+  /** What is pulled: an owner of nodes, or a node's full name. */
+  of: string;
+  /** Variable. */
+  sets: string;
+  lower: number;
+  upper: number;
+  start: number;
+}
+
 /** One joint of a robot or human. */
 export interface JointInfo {
   name: string;
@@ -459,6 +473,8 @@ export interface Scene {
   mechanisms: MechanismInfo[];
   criteria: CriterionInfo[];
   findings: Finding[];
+  /** What people pull. */
+  controls: ControlInfo[];
   /**
    * Person whom a page's headset drives → where the floor of its room lies: position [m], quaternion with w
    * first; x is ahead there, z up.
@@ -761,6 +777,31 @@ export interface VisitorInfo {
   holds: string[];
 }
 
+/** What a hand of the person whose headset a page is holds from now on. */
+export interface Grab {
+  type: "grab";
+  /** Full name: `operator/right_hand`. */
+  hand: string;
+  /** Loose workpiece; empty where it lets go. */
+  piece?: string;
+}
+
+/** A control that somebody pulls, presses or lets go; while it is held, said four times a second. */
+export interface Pull {
+  type: "pull";
+  control: string;
+  /** In SI; 1 and 0 of a bool. */
+  value: number;
+}
+
+/** Why a `Grab` or `Pull` of a page is not taken. */
+export interface Refused {
+  type: "refused";
+  /** Hand or control. */
+  what: string;
+  reason: string;
+}
+
 /** Who is there; to whoever has introduced themselves, then and on every change. */
 export interface Visitors {
   type: "visitors";
@@ -802,6 +843,6 @@ export const FIELDS = {
   highlight: ["type", "body", "verdict"],
 } as const;
 
-export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited | Measured | Visitors | Presences;
+export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited | Measured | Visitors | Presences | Refused;
 
-export type PageMessage = Command | Tracking | Edit | Measure | Introduction | Presence | Hold;
+export type PageMessage = Command | Tracking | Edit | Measure | Introduction | Presence | Hold | Grab | Pull;

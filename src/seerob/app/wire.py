@@ -39,6 +39,7 @@ FROM_SERVER = (
     snapshot.Measured,
     snapshot.Visitors,
     snapshot.Presences,
+    snapshot.Refused,
 )
 """Messages that a page receives."""
 FROM_PAGE = (
@@ -49,6 +50,8 @@ FROM_PAGE = (
     snapshot.Introduction,
     snapshot.Presence,
     snapshot.Hold,
+    snapshot.Grab,
+    snapshot.Pull,
 )
 """Messages that a page sends; what has a default may be left out."""
 

@@ -265,6 +265,31 @@ class VisitorInfo(Struct, frozen=True, kw_only=True):
     """What nobody else may change meanwhile."""
 
 
+class Grab(Struct, frozen=True, kw_only=True, tag="grab"):
+    """What a hand of the person whose headset a page is holds from now on."""
+
+    hand: str
+    """Full name: ``operator/right_hand``."""
+    piece: str = ""
+    """Loose workpiece; empty where it lets go."""
+
+
+class Pull(Struct, frozen=True, kw_only=True, tag="pull"):
+    """A control that somebody pulls, presses or lets go; while it is held, said four times a second."""
+
+    control: str
+    value: float
+    """In SI; 1 and 0 of a bool."""
+
+
+class Refused(Struct, frozen=True, kw_only=True, tag="refused"):
+    """Why a `Grab` or `Pull` of a page is not taken."""
+
+    what: str
+    """Hand or control."""
+    reason: str
+
+
 class Visitors(Struct, frozen=True, kw_only=True, tag="visitors"):
     """Who is there; to whoever has introduced themselves, then and on every change."""
 

@@ -37,6 +37,7 @@ from seerob.core.page_messages import (
     Draft,
     Edit,
     Edited,
+    Grab,
     Hello,
     History,
     Hold,
@@ -45,6 +46,8 @@ from seerob.core.page_messages import (
     Mistake,
     Presence,
     Presences,
+    Pull,
+    Refused,
     SoFar,
     Trace,
     Tracked,
@@ -65,13 +68,16 @@ __all__ = [
     "Box",
     "Change",
     "Command",
+    "ControlInfo",
     "CriterionInfo",
     "CriterionSoFar",
     "Draft",
     "Edit",
     "Edited",
     "Ellipsoid",
+    "Event",
     "Finding",
+    "Grab",
     "Hello",
     "Highlight",
     "History",
@@ -94,7 +100,9 @@ __all__ = [
     "Presence",
     "Presences",
     "Prism",
+    "Pull",
     "Rays",
+    "Refused",
     "Result",
     "Row",
     "RowState",
@@ -421,6 +429,21 @@ class CriterionInfo(Struct, frozen=True, kw_only=True):
     """Classes of the scores, the lowest first; empty when the method has none."""
 
 
+class ControlInfo(Struct, frozen=True, kw_only=True):
+    """A lever, button or switch that people pull in the twin."""
+
+    name: str
+    kind: str
+    """``lever``, ``switch``, ``button`` or ``enabling``."""
+    of: str
+    """What is pulled: an owner of nodes, or a node's full name."""
+    sets: str
+    """Variable."""
+    lower: float
+    upper: float
+    start: float
+
+
 class JointInfo(Struct, frozen=True, kw_only=True):
     """One joint of a robot or human."""
 
@@ -477,6 +500,8 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     mechanisms: tuple[MechanismInfo, ...] = ()
     criteria: tuple[CriterionInfo, ...] = ()
     findings: tuple[Finding, ...] = ()
+    controls: tuple[ControlInfo, ...] = ()
+    """What people pull."""
     headsets: dict[str, tuple[float, float, float, float, float, float, float]] = {}
     """Person whom a page's headset drives → where the floor of its room lies: position [m], quaternion with w
     first; x is ahead there, z up."""

@@ -11,8 +11,9 @@ from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.files.bounded import content
 from seerob.core.files.toml_file import MAX_FILE_SIZE
 from seerob.core.snapshot import Finding
+from seerob.workstation.tables.controls import ControlKind
 from seerob.workstation.variables import Kind, Variable, read
-from seerob.workstation.workstation import Workstation
+from seerob.workstation.workstation import Robot, Thing, Workstation
 
 MOST_NAMED = 20
 """In one finding."""
@@ -110,6 +111,7 @@ def _uses(station: Workstation, variables: dict[str, Variable], file: str) -> li
             problem = f"{name} is {_said(_sort(variable))}, {_said(what)} is needed"
             problems.append(Problem(file, key, problem, "name another, or mend its type or unit"))
     problems += _triggers(station, variables, file)
+    problems += _controls(station, variables, file)
     driven = {source.target() for source in station.sources}
     for i, machine in enumerate(station.machines):
         if machine.motion.variables() and machine.name in driven:
@@ -128,9 +130,46 @@ def _triggers(station: Workstation, variables: dict[str, Variable], file: str) -
             what = f"no variable {trigger.variable!r} that is a bool with write = true"
             fits = [v.name for v in variables.values() if v.write and v.type is Kind.BOOL]
             problems.append(Problem(file, f"{key}.variable", what, suggestion(trigger.variable, fits)))
-        if trigger.criterion not in criteria:
+        if trigger.control is not None:
+            found = next((c for c in station.controls if c.name == trigger.control), None)
+            if found is None or found.kind is ControlKind.LEVER:
+                what = f"no control named {trigger.control!r} that is true or false"
+                known = [c.name for c in station.controls if c.kind is not ControlKind.LEVER]
+                problems.append(Problem(file, f"{key}.control", what, suggestion(trigger.control, known)))
+        elif trigger.criterion not in criteria:
             what = f"no criterion named {trigger.criterion!r}"
             problems.append(Problem(file, f"{key}.criterion", what, suggestion(trigger.criterion, criteria)))
+    return problems
+
+
+def _controls(station: Workstation, variables: dict[str, Variable], file: str) -> list[Problem]:
+    rooms = {source.name for source in station.sources if source.pulled}
+    names = [control.name for control in station.controls]
+    things: tuple[Thing | Robot, ...] = (*station.parts, *station.machines, *station.tools, *station.robots)
+    known = [thing.name for thing in things]
+    problems = []
+    for i, control in enumerate(station.controls):
+        key = f"controls[{i}]"
+        variable = variables.get(control.sets)
+        if variable is None or variable.source not in rooms or variable.write:
+            fits = [v.name for v in variables.values() if v.source in rooms]
+            remedy = suggestion(control.sets, fits)
+            if variable is not None and variable.write:
+                remedy = "a machine is written by a [[triggers]] of this control, and nothing else"
+            what = f"no variable {control.sets!r} of a source of kind room"
+            problems.append(Problem(file, f"{key}.sets", what, remedy))
+        elif variable.type not in (Kind.BOOL, Kind.NUMBER) or (
+            (variable.type is Kind.NUMBER) != (control.kind is ControlKind.LEVER)
+        ):
+            what = f"{control.sets} is {_said(_sort(variable))}, and {control.name} a {control.kind}"
+            problems.append(Problem(file, f"{key}.sets", what, "a lever sets a number, others set a bool"))
+        if control.of.split("/")[0] not in known and control.of not in known:
+            what = f"nothing named {control.of!r} to pull"
+            problems.append(Problem(file, f"{key}.of", what, suggestion(control.of, known)))
+        if names.count(control.name) > 1:
+            problems.append(
+                Problem(file, f"{key}.name", f"the name {control.name!r} is taken", "choose another")
+            )
     return problems
 
 

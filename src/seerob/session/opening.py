@@ -19,6 +19,7 @@ from seerob.criteria.question import worded
 from seerob.description.description import Description
 from seerob.devices.live.contradictions import looked_at
 from seerob.devices.live.listening import LiveSource, delay_of
+from seerob.devices.sources.room import Room
 from seerob.devices.variables.live_source import VariablesSource
 from seerob.files.trajectories.checks import RESTS, STARTS
 from seerob.files.trajectories.trajectory import Trajectory, TrajectorySamples, derived_noise
@@ -339,7 +340,9 @@ def source_target(model: Model, source: Source) -> Target | None:
     variables = tuple(v for v in model.dictionary.values() if v.source == source.name)
     if not source.reads_variables:
         return driven
-    return replace(driven or Target(), variables=variables, folder=str(model.folder))
+    controls = model.workstation.controls if isinstance(source, Room) else ()
+    own = replace(driven or Target(), variables=variables, controls=controls)
+    return replace(own, folder=str(model.folder))
 
 
 def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from importlib.metadata import version
 
 from seerob.core.plugin import kind_of
-from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
+from seerob.core.snapshot import ControlInfo, CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
 from seerob.core.transforms import wxyz_from_rotation
 from seerob.criteria.question import Bound
 from seerob.criteria.scoring.phases import entered_for
@@ -108,6 +108,18 @@ def scene_of(
             for b in bound
         ),
         findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
+        controls=tuple(
+            ControlInfo(
+                name=control.name,
+                kind=str(control.kind),
+                of=control.of,
+                sets=control.sets,
+                lower=control.lower,
+                upper=control.upper,
+                start=control.start,
+            )
+            for control in station.controls
+        ),
         headsets={
             source.human: _floor(source.at)
             for source in station.sources

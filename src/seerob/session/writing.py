@@ -26,7 +26,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, SeerobError, UnknownName
-from seerob.core.samples import PoseSample, Quality, Sample
+from seerob.core.samples import PoseSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Snapshot, SourceLine
 from seerob.core.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.devices.live.listening import because
@@ -65,11 +65,14 @@ class Writes(Protocol):
 class _Edge:
     """One trigger at work."""
 
-    def __init__(self, trigger: Trigger, variable: Variable, writer: Writes) -> None:
+    def __init__(self, trigger: Trigger, variable: Variable, writer: Writes, sets: str) -> None:
         self.trigger, self.variable, self.writer = trigger, variable, writer
         self.wanted: bool | None = None
         """None before the first verdict, which is no edge."""
         self.written: bool | None = None
+        self.sets = sets
+        """Variable of the twin that its control sets; empty where it follows a verdict."""
+        self.is_set = False
         self.due = 0.0
         """Not written before this instant, host's monotonic time [s]."""
         self.failing = False
@@ -105,11 +108,13 @@ class Triggers(Closing):
             )
         sources = {source.name: source for source in model.workstation.sources}
         self._folder = model.folder
+        pulls = {control.name: control.sets for control in model.workstation.controls}
         self._edges: Sequence[_Edge] = [
-            _Edge(trigger, variable, _writer(sources, variable))
+            _Edge(trigger, variable, _writer(sources, variable), pulls.get(trigger.control or "", ""))
             for trigger in model.workstation.triggers
             for variable in [model.dictionary[trigger.variable]]
         ]
+        self._pulled = any(edge.sets for edge in self._edges)
         self._sent = Counter[str]()
         """Bools that were written, by source."""
         self._condition = Condition()
@@ -123,9 +128,18 @@ class Triggers(Closing):
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Note which verdicts came or went; returns at once."""
         verdicts = {result.name: result.verdict for result in snapshot.results}
+        pulled = [s.values for s in samples if isinstance(s, SignalSample)] if self._pulled else []
+        for edge in self._edges:
+            if edge.sets:
+                edge.is_set = next(
+                    (bool(v[edge.sets]) for v in reversed(pulled) if edge.sets in v), edge.is_set
+                )
         with self._condition:
             for edge in self._edges:
-                wanted = edge.trigger.when.holds(verdicts.get(edge.trigger.criterion))
+                if edge.sets:
+                    wanted = edge.is_set
+                else:
+                    wanted = edge.trigger.when.holds(verdicts.get(edge.trigger.criterion))
                 if edge.wanted is None:
                     edge.written = wanted  # how it was at the start is no edge
                 edge.wanted = wanted
@@ -156,8 +170,8 @@ class Triggers(Closing):
                 elif not reason:
                     edge.written = wanted
                     self._sent[edge.variable.source] += 1
-                    word = str(wanted).lower()
-                    _log.info("%s: %s written (%s)", edge.variable.name, word, edge.trigger.criterion)
+                    word, by = str(wanted).lower(), edge.trigger.control or edge.trigger.criterion
+                    _log.info("%s: %s written (%s)", edge.variable.name, word, by)
                 edge.failing = bool(reason)
 
     def _next(self) -> tuple[_Edge, bool] | None:

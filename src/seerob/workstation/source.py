@@ -22,6 +22,7 @@ from seerob.core.quantities import NotBefore, Seconds
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
 from seerob.description.description import Description
+from seerob.workstation.tables.controls import Control
 from seerob.workstation.variables import Variable
 
 Row4 = tuple[float, float, float, float]
@@ -57,6 +58,8 @@ class Target(Struct, frozen=True, kw_only=True):
     """Full names of what its joints move and a `PoseSample` may drive; empty when nobody says."""
     variables: tuple[Variable, ...] = ()
     """Variables of the workstation's dictionary that this source reads."""
+    controls: tuple[Control, ...] = ()
+    """Of a source of kind ``room``: what people pull."""
     folder: str = ""
     """Folder of the workstation file, where relative paths start."""
 
@@ -108,6 +111,8 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How it captured a person's motion, ``live`` from a device or from a ``file``; empty when it did not."""
     live: ClassVar[bool] = False
     """Whether nobody knows its future: a controller, a machine, a tracker."""
+    pulled: ClassVar[bool] = False
+    """Whether its variables are set by ``[[controls]]`` that people pull."""
     reads_variables: ClassVar[bool] = False
     """Whether it reads variables of the workstation's dictionary."""
 

@@ -30,6 +30,7 @@ from seerob.core.quantities import (
 )
 from seerob.core.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.core.quantities import Pose as Pose  # noqa: PLC0414
+from seerob.workstation.tables.controls import Control as Control  # noqa: PLC0414
 from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.workstation.tables.places import Place as Place  # noqa: PLC0414
 from seerob.workstation.tables.sensors import Sensor
@@ -457,6 +458,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     parts: tuple[Part, ...] = ()
     machines: tuple[Machine, ...] = ()
     places: tuple[Place, ...] = ()
+    controls: tuple[Control, ...] = ()
     areas: tuple[Area, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     humans: tuple[Human, ...] = ()
@@ -503,6 +505,7 @@ TABLES: dict[str, type[Struct]] = {
     "parts": Part,
     "machines": Machine,
     "places": Place,
+    "controls": Control,
     "areas": Area,
     "sensors": Sensor,
     "humans": Human,

@@ -26,6 +26,7 @@ from seerob.core.snapshot import (
     Command,
     Edit,
     Edited,
+    Grab,
     Hello,
     History,
     Hold,
@@ -34,6 +35,8 @@ from seerob.core.snapshot import (
     Measured,
     Mistake,
     Presence,
+    Pull,
+    Refused,
     Scene,
     Snapshot,
     SoFar,
@@ -49,13 +52,15 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
-Message = Command | Tracking | Edit | Measure | Introduction | Presence | Hold
+Message = Command | Tracking | Edit | Measure | Introduction | Presence | Hold | Grab | Pull
 """Of a page."""
 _KINDS: dict[type, str] = {
     Tracking: "tracking",
     Presence: "presence",
     Introduction: "introduction",
     Hold: "introduction",
+    Grab: "doing",
+    Pull: "doing",
 }
 _decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(Message).decode
 LARGEST_COMMAND = 512
@@ -67,6 +72,7 @@ RATES: dict[str, tuple[float, float]] = {
     "edit": (10.0, 20.0),
     "presence": (60.0, 120.0),
     "introduction": (5.0, 20.0),
+    "doing": (60.0, 120.0),
 }
 """What one page may send: per second, and at once. Beyond that it is read no faster."""
 LARGEST: dict[Role, int] = {Role.VIEW: 4096, Role.TRACK: 16384, Role.CONTROL: 16384}
@@ -77,6 +83,7 @@ SHARED: dict[str, tuple[float, float]] = {
     "edit": (20.0, 40.0),
     "presence": (1920.0, 3840.0),
     "introduction": (40.0, 200.0),
+    "doing": (240.0, 480.0),
 }
 """What all pages together may send."""
 
@@ -242,6 +249,9 @@ class Hub:
                     await asyncio.sleep(wait)
                 if isinstance(message, Tracking):
                     last_answer = self._offer(client, message, last_answer, visit, may=Role.TRACK in roles)
+                elif isinstance(message, Grab | Pull):
+                    pulls = isinstance(message, Pull) and Role.CONTROL in roles
+                    self._do(client, message, visit, may=pulls or Role.TRACK in roles)
                 elif isinstance(message, Presence):
                     self.company.move(client, message)
                 elif isinstance(message, Introduction):
@@ -277,6 +287,20 @@ class Hub:
             what = "this run is not edited"
         refusal = Mistake(key="", what=what, remedy=remedy)
         return Edited(id=edit.id, accepted=False, revision=0, mistakes=(refusal,))
+
+    def _do(self, client: Client, what: Grab | Pull, visit: Visit, *, may: bool) -> None:
+        """Pass on what a visitor does in the room; the page is told when nobody takes it.
+
+        Raises:
+            ValueError: It is too long, or no number.
+        """
+        refusal = "this page may not: open the address for tracking that seerob printed"
+        if may:
+            refusal = self._offers.do(client, what)
+        if refusal:
+            name = what.hand if isinstance(what, Grab) else what.control
+            visit.refuse(f"doing: {refusal[:120]}")
+            client.offer("Refused", _encode(Refused(what=name, reason=refusal)))
 
     def _held_from(self, client: Client) -> Callable[[Collection[str]], str]:
         return lambda names: self.company.held_by_another(client, names)

@@ -68,7 +68,9 @@ def turn(v: Array) -> Array:
     """Rotation matrix of a rotation vector [rad], shape (..., 3, 3)."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     K = skew(v)
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K)
+    return np.asarray(
+        np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K
+    )
 
 
 def vector(R: Array) -> Array:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from seerob.core.snapshot import Tracking
+from seerob.core.snapshot import Grab, Pull, Tracking
 from seerob.core.transforms import Array
+from seerob.devices.live.doings import Doings
 
 if TYPE_CHECKING:
     from seerob.devices.live.listening import LiveSource
@@ -78,6 +79,8 @@ class Offers:
         self._lock = Lock()
         self._waiting: dict[str, dict[object, Callable[[Offer], None]]] = {}
         self._held: dict[str, Held] = {}
+        self.doings = Doings()
+        """What visitors do besides."""
 
     def wait(self, human: str, key: object, take: Callable[[Offer], None]) -> None:
         """Have every offer for a person given to ``take``, in the server's thread; it must not block."""
@@ -117,8 +120,26 @@ class Offers:
             take(offer)
         return ""
 
+    def do(self, visitor: object, what: Grab | Pull) -> str:
+        """Give what a visitor does in the room to whoever waits for it.
+
+        Returns:
+            Why nobody takes it; empty when somebody does.
+
+        Raises:
+            ValueError: It is too long, or no number.
+        """
+        if isinstance(what, Grab):
+            human = what.hand.partition("/")[0]
+            with self._lock:
+                held = self._held.get(human)
+            if held is None or held.visitor is not visitor:
+                return f"this page is not the headset of {human!r}, whose hand that is"
+        return self.doings.do(visitor, what)
+
     def gone(self, visitor: object) -> None:
         """A page has left: its places are free."""
+        self.doings.gone(visitor)
         with self._lock:
             self._held = {human: held for human, held in self._held.items() if held.visitor is not visitor}
 

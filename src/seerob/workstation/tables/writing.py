@@ -91,9 +91,15 @@ class Trigger(Table, frozen=True, kw_only=True):
 
     variable: str
     """Variable of the dictionary, a bool with ``write = true``."""
-    criterion: str
+    criterion: str = ""
     """Name of the criterion whose verdict it follows."""
+    control: str | None = None
+    """Instead: control that it follows, a switch, button or enabling switch; true while that is."""
     when: When = When.EXCEEDED
     """Which verdicts set the variable."""
     every: Annotated[float, unit("s", ge=0.1, le=3600)] = 0.5
     """Least time between two writings [s]; what changes faster is written as it is then."""
+
+    def __post_init__(self) -> None:
+        if (self.control is None) == (not self.criterion):
+            raise ValueError("it follows a verdict or a control: give criterion or control")

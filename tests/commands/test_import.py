@@ -217,7 +217,7 @@ def test_options_that_a_file_has_no_use_for_are_refused(tmp_path, capsys):
     (tmp_path / "a.step").write_text(MADE["line"]().text())
     trimesh.creation.box((1, 1, 1)).export(tmp_path / "a.glb")
     for file, option, says in (
-        ("a.step", ("--units", "mm"), "says its unit"),
+        ("a.step", ("--units", "mm"), "only a mesh file"),
         ("a.step", ("--tolerance", "0"), "from 0.001 to 50 mm"),
         ("a.glb", ("--tolerance", "1"), "has triangles already"),
         ("a.glb", ("--density", "steel"), "is no density"),
@@ -244,7 +244,6 @@ CONTENTS = {
     "NX": b"SPLMSSTR\0\0",
     "JT": b"Version 9.5 JT  DM 6.3.0.1",
     "Parasolid": b"**ABCDEFGHIJKLMNOPQRSTUVWXYZ***",
-    "USD": zipped("scene.usdc"),
 }
 
 

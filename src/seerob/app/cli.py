@@ -45,6 +45,7 @@ COMMANDS = (
     "measure",
     "capture",
     "import_",
+    "export",
 )
 """One module each in `seerob.app.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
 

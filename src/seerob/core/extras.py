@@ -27,6 +27,7 @@ EXTRAS = {
     "cryptography": "tls",
     "OCP": "cad",
     "robot_descriptions": "robots",
+    "pxr": "usd",
 }
 """Package as it is imported → the extra that brings it."""
 

@@ -51,11 +51,12 @@ _IMPORTED = {
     **dict.fromkeys((".fbx", ".blend", ".max", ".skp"), "FBX, Blender, 3ds Max or SketchUp"),
 }
 
-_Z_FROM = {
+Z_FROM = {
     "z": np.eye(3),
     "y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "x": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
 }
+"""Rotation (3, 3) from the axes of a file to z up, by the axis that points up in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +181,7 @@ def opened(
     raws = [m.placed() for m in meshes]
     _check(source, raws)
     _check_reach(source, raws, min(LENGTHS.values()))
-    matrix = _Z_FROM[_up(source, raw, up)] * _meters(source, raw, raws, units)
+    matrix = Z_FROM[_up(source, raw, up)] * _meters(source, raw, raws, units)
     _check_reach(source, raws, float(np.abs(matrix).max()))
     return OpenedFile(source, meshes, matrix)
 
@@ -188,7 +189,7 @@ def opened(
 def _check_options(path: Path, units: str | None, up: str | None, scale: tuple[float, ...]) -> None:
     if units is not None and units not in LENGTHS:
         raise InputError.at(path, "units", f"{units!r} is not a unit of length", suggestion(units, LENGTHS))
-    if up is not None and up not in _Z_FROM:
+    if up is not None and up not in Z_FROM:
         raise InputError.at(path, "up", f"{up!r} is not an axis", "x, y or z")
     if len(scale) != 3 or not np.all(np.isfinite(scale)) or np.any(np.asarray(scale) == 0):
         raise InputError.at(path, "scale", f"{scale!r}", "three finite factors, none of them zero")

@@ -21,6 +21,7 @@ EXAMPLE = "seerob import line.step my_line"
 
 _KEPT = ("density", "tolerance", "units", "up")
 """Options that a new revision takes over where they are not given again."""
+_TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 _SHOWN = 20
 """Lines about what was left out."""
 FINEST, COARSEST = 1e-3, 50.0
@@ -29,7 +30,7 @@ FINEST, COARSEST = 1e-3, 50.0
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    text = "STEP, IGES, 3DXML, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA or AutomationML file"
+    text = "STEP, IGES, 3DXML, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA, USD, SDF, URDF, MJCF or AutomationML"
     sub.add_argument("file", type=Path, help=text)
     sub.add_argument("folder", type=Path, help="folder to make, or one that an older revision made")
     text = "how far triangles may be from a STEP or IGES surface [mm] (default: 0.1); counts as uncertainty"
@@ -137,7 +138,7 @@ def _revise(folder: Path, before: dict[str, Any], made: Files) -> None:
 
 
 def _read(options: argparse.Namespace, ending: str) -> Assembly:
-    from seerob.description.cad import scene, step, threedxml
+    from seerob.description.cad import described, scene, sdf, step, threedxml, usd
     from seerob.description.mesh import MAX_BYTES, MAX_FACES, file_content
     from seerob.description.mesh_files import MeshSource
 
@@ -147,14 +148,16 @@ def _read(options: argparse.Namespace, ending: str) -> Assembly:
             raise InputError.at("--tolerance", "", f"a {scene.FORMATS[ending]} file has triangles already")
         return scene.read(file, ending, units=options.units, up=options.up)
     if options.units or options.up:
-        what = "a STEP, IGES or 3DXML file says its unit, and its z is up"
+        what = "only a mesh file does not say its unit or which axis is up"
         raise InputError.at("--units" if options.units else "--up", "", what, "leave it out")
     source = MeshSource(file, file_content(file, MAX_BYTES), MAX_BYTES, MAX_FACES)
     source.files[file.name] = source.data
-    if ending == ".3dxml":
+    if ending in _TRIANGLES:
         if options.tolerance is not None:
-            raise InputError.at("--tolerance", "", "a 3DXML file has triangles already")
-        return threedxml.read(source)
+            what = f"a {_TRIANGLES[ending]} file has triangles already"
+            raise InputError.at("--tolerance", "", what)
+        read = {".3dxml": threedxml.read, ".usd": usd.read, ".sdf": sdf.read}
+        return read[ending](source) if ending in read else described.read(source, ending)
     tolerance = step.TOLERANCE * 1e3 if options.tolerance is None else options.tolerance
     if not FINEST <= tolerance <= COARSEST:
         what = f"{tolerance:g} mm"

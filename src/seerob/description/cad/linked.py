@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from seerob.core.errors import InputError
 from seerob.core.shapes import Mesh, Solid
-from seerob.core.snapshot import Origin
+from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
-from seerob.description.cad.assembly import SINGLE, Moving
+from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Moving, Shape
 from seerob.description.cad.names import plain_name, told_apart
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
+from seerob.description.mesh import FARTHEST
 from seerob.description.mesh_files import MeshSource
+from seerob.description.shapes import mass_properties
 from seerob.description.shapes.mesh_bodies import joined
 
 MOST_TURNS = 1e3
@@ -53,14 +57,95 @@ def moving(source: MeshSource, row: Mapping[str, Any], meters: float, world_from
         matrix = np.array(link["matrix"], float)
         matrix[:3, 3] *= meters
         parent = None if link["parent"] < 0 else names[link["parent"]]
-        inertial = _inertial(source, names[number], link["inertial"], meters)
         solids, visual = shaped(link["meshes"])
+        if link.get("collision"):
+            solids = shaped(link["collision"])[0]
+        shape = [solid.mesh for solid in solids if solid.mesh is not None]
+        inertial = _inertial(source, names[number], link["inertial"], meters, shape)
         links.append(
             Link(names[number], parent, matrix, tuple(joints), inertial, visual=visual, solids=solids)
         )
     name = plain_name(row["name"]).replace("/", "_")
     description = Description(name, tuple(links), lint.guessed_tip(links), str(source.path))
     return Moving(description, world_from_base, tuple(values) if any(values) else ())
+
+
+def assembled(
+    source: MeshSource, told: Mapping[str, Any], form: str, world_from_file: Array, meters: float
+) -> Assembly:
+    """An assembly of what a reader of scenes tells in plain data.
+
+    Args:
+        source: The file.
+        told: ``parts`` (``path``, ``pieces``, ``world``, ``inertial``), ``mechanisms`` as `moving` takes
+            them, with ``pieces`` and ``collision`` for ``meshes``, ``left_out``, ``findings`` and ``files``.
+        form: What the file is.
+        world_from_file: Axes of the file to z up, (3, 3), without a scale.
+        meters: Metres per unit.
+
+    Raises:
+        InputError: There is nothing in it.
+    """
+    source.files.update(told["files"])
+    source.findings += [Finding(level=a, subject=b, text=c) for a, b, c in told["findings"]]
+    turned = np.eye(4)
+    turned[:3, :3] = world_from_file
+
+    def placed(matrix: Any) -> Array:
+        world = np.array(matrix, float)
+        world[:3, 3] *= meters
+        if not np.isfinite(world).all() or np.abs(world[:3, 3]).max() > FARTHEST:
+            source.fail(f"a place is {world[:3, 3].tolist()} m", "check its unit and its transforms")
+        return np.asarray(turned @ world)
+
+    shapes: list[Shape] = []
+    known: dict[bytes, int] = {}
+    instances: list[Instance] = []
+    left_out = [(name, why) for name, why in told["left_out"]]
+    for part in told["parts"]:
+        pieces = tuple(mesh for mesh in _meshes(part["pieces"], meters) if len(mesh.faces))
+        label = part["path"][-1]
+        if not pieces or not len(joined(pieces)[0].faces):
+            left_out.append(("/".join(part["path"]), "nothing but triangles without area"))
+            continue
+        key = hashlib.sha256()
+        for mesh in pieces:
+            key.update(mesh.vertices.round(9).tobytes() + mesh.faces.tobytes() + repr(mesh.color).encode())
+        number = known.setdefault(key.digest(), len(shapes))
+        if number == len(shapes):
+            largest = max(float(np.abs(mesh.vertices).max()) for mesh in pieces)
+            shapes.append(Shape(label, pieces, SINGLE * largest))
+        inertial = _inertial(source, "/".join(part["path"]), part["inertial"], meters, pieces)
+        instances.append(Instance(tuple(part["path"]), number, placed(part["world"]), inertial=inertial))
+    mechanisms = []
+    for row in told["mechanisms"]:
+        for link in row["links"]:
+            shown = _meshes(link["pieces"], meters)
+            link["collision"] = _meshes(link["collision"], meters)
+            link["meshes"] = shown
+        mechanisms.append(moving(source, row, meters, placed(row["world"])))
+    if not instances and not mechanisms:
+        why = f"; it refers to {', '.join(name for name, _ in left_out[:5])}" if left_out else ""
+        source.fail(f"holds no surface{why}", "export meshes or simple shapes")
+    return Assembly(
+        form,
+        f"{meters:g} m",
+        tuple(shapes),
+        tuple(instances),
+        tuple(source.findings),
+        tuple(left_out),
+        dict(source.files),
+        tuple(mechanisms),
+    )
+
+
+def _meshes(pieces: Any, meters: float) -> tuple[Mesh, ...]:
+    return tuple(
+        Mesh(
+            np.frombuffer(v, "<f8").reshape(-1, 3) * meters, np.frombuffer(f, "<i4").reshape(-1, 3), tuple(c)
+        )
+        for v, f, c in pieces
+    )
 
 
 def shaped(meshes: Sequence[Mesh]) -> tuple[tuple[Solid, ...], tuple[Mesh, ...]]:
@@ -115,13 +200,25 @@ def _joint(
     )
 
 
-def _inertial(source: MeshSource, link: str, row: Mapping[str, Any] | None, meters: float) -> Inertial | None:
+def _inertial(
+    source: MeshSource, link: str, row: Mapping[str, Any] | None, meters: float, shape: Sequence[Mesh]
+) -> Inertial | None:
     if row is None:
         return None
+    if row.get("density") is not None or row["moments"] is None:
+        try:
+            if row.get("density"):
+                made, findings = mass_properties.from_shape(shape, density=row["density"], subject=link)
+            else:
+                made, findings = mass_properties.from_shape(shape, mass=row["mass"], subject=link)
+        except InputError as error:
+            source.note(f"link {link}: no inertia from its shape ({error}): unknown", level="warning")
+            return None
+        source.findings += findings
+        text = f"link {link}: {made.mass:.4g} kg, inertia from its shape at uniform density"
+        source.note(text, level="assumed")
+        return made
     frame = np.array(row["frame"], float)
-    if row["moments"] is None:
-        source.note(f"link {link}: a mass of {row['mass']:g} kg without an inertia: unknown", level="warning")
-        return None
     rotation = frame[:3, :3]
     moments = np.array(row["moments"], float)
     inertia = rotation @ (np.diag(moments) if moments.ndim == 1 else moments) @ rotation.T

@@ -47,7 +47,6 @@ CLOSED = {
     "Blender": Closed("Blender", "File > Export > glTF 2.0 (.glb)"),
     "SketchUp": Closed("SketchUp", "File > Export > 3D Model > COLLADA (.dae) or glTF"),
     "Rhino": Closed("Rhino", f"File > Export Selected > {_STEP}"),
-    "USD": Closed("USD", "in the program that wrote it: export as glTF 2.0 (.glb)"),
 }
 _BEGINS = (
     (b"V5_CFV2", "CATIA V5"),
@@ -61,8 +60,6 @@ _BEGINS = (
     (b"BLENDER", "Blender"),
     (b"\xff\xfe\xff\x0eS\x00k\x00e\x00t\x00c\x00h", "SketchUp"),
     (b"3D Geometry File Format", "Rhino"),
-    (b"PXR-USDC", "USD"),
-    (b"#usda", "USD"),
 )
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _STREAMS = (
@@ -92,7 +89,14 @@ _ENDINGS = {
     ".dwg": "DWG",
 }
 """Where the content says nothing; some programs leave no mark."""
-_XML = {"COLLADA": ".dae", "CAEXFile": ".aml", "Model_3dxml": ".3dxml"}
+_XML = {
+    "COLLADA": ".dae",
+    "CAEXFile": ".aml",
+    "Model_3dxml": ".3dxml",
+    "sdf": ".sdf",
+    "robot": ".urdf",
+    "mujoco": ".mjcf",
+}
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
@@ -116,6 +120,8 @@ def recognised(path: Path, data: bytes) -> str:
         raise refused(path, _compound(path, data))
     if re.match(rb"Version \d+\.\d+ JT", head):
         raise refused(path, "JT")
+    if head.startswith((b"PXR-USDC", b"#usda")):
+        return ".usd"
     if head.startswith(b"PK"):
         return _zipped(path, data)
     if b"ISO-10303-21;" in start[:2000]:
@@ -156,7 +162,10 @@ def refused(path: Path, program: str) -> InputError:
 
 
 def _known() -> str:
-    return "STEP, IGES, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA, 3DXML and AutomationML are read"
+    return (
+        "STEP, IGES, glTF, OBJ, STL, PLY, OFF, 3MF, COLLADA, 3DXML, USD, SDF, URDF, MJCF and AutomationML "
+        "are read"
+    )
 
 
 def _compound(path: Path, data: bytes) -> str:
@@ -186,5 +195,5 @@ def _zipped(path: Path, data: bytes) -> str:
     if any(name.endswith(".3dxml") for name in names) or "manifest.xml" in names:
         return ".3dxml"
     if any(name.endswith((".usd", ".usda", ".usdc")) for name in names):
-        raise refused(path, "USD")
+        return ".usd"
     raise InputError.at(path, "", f"is an archive without a CAD file ({', '.join(names[:3])})", _known())

@@ -284,7 +284,11 @@ def _check_figures(reader: Reader, model: Compiled) -> None:
         key = f"joint[{model.names['joint'][i] or i}].axis"
         reader.problem(key, f"is {model.jnt_axis[i].tolist()}", "must be a direction")
     sizes = model.geom_size
-    fit = (sizes == 0) | ((sizes >= SMALLEST) & (sizes <= FARTHEST))
+    import mujoco
+
+    # That of a mesh is its box, which may be flat.
+    flat = (model.geom_type == int(mujoco.mjtGeom.mjGEOM_MESH))[:, None] & (sizes < SMALLEST)
+    fit = (sizes == 0) | ((sizes >= SMALLEST) & (sizes <= FARTHEST)) | flat
     for i in np.flatnonzero(~fit.all(axis=1)).tolist():
         remedy = f"must be from {SMALLEST:g} m to {FARTHEST:g} m"
         reader.problem(f"geom[{model.names['geom'][i] or i}].size", f"is {sizes[i].tolist()}", remedy)

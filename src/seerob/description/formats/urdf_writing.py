@@ -61,6 +61,11 @@ def written(
         plain: Only what URDF itself has: no ``deviation`` on collisions, capsules of three pieces.
     """
     robot = Element("robot", name=description.name)
+    if plain:
+        # MuJoCo else looks for meshes without their folder, and joins links that no joint is between.
+        # Surfaces that are split by colour have no volume, which it refuses: what is only drawn is left out.
+        said = {"strippath": "false", "fusestatic": "false", "discardvisual": "true"}
+        SubElement(SubElement(robot, "mujoco"), "compiler", said)
     meshes = MeshFiles(folder)
     for link in description.links:
         _link(robot, link, meshes, mimics=mimics, plain=plain)

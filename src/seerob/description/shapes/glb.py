@@ -24,7 +24,7 @@ from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.mesh_bodies import tidied
 
-_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 _ROUND = 20
 """Segments of a full circle; a multiple of four."""
@@ -297,7 +297,7 @@ def glb_bytes(meshes: Sequence[Mesh], *, crease: float = CREASE) -> bytes:
                 "material": len(materials),
             }
         )
-        materials.append(_material(mesh.color))
+        materials.append(material_of(mesh.color))
     tree: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "seerob", "extras": {"up": "z", "unit": "m"}},
         "scene": 0,
@@ -305,7 +305,7 @@ def glb_bytes(meshes: Sequence[Mesh], *, crease: float = CREASE) -> bytes:
     }
     if not primitives:
         del tree["scenes"][0]["nodes"]
-        return _container(tree, b"")
+        return container(tree, b"")
     tree |= {
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": primitives}],
@@ -313,10 +313,11 @@ def glb_bytes(meshes: Sequence[Mesh], *, crease: float = CREASE) -> bytes:
         "accessors": accessors,
         "bufferViews": views,
     }
-    return _container(tree, b"".join(chunks))
+    return container(tree, b"".join(chunks))
 
 
-def _material(color: tuple[float, float, float, float]) -> dict[str, object]:
+def material_of(color: tuple[float, float, float, float]) -> dict[str, object]:
+    """A glTF material of a colour."""
     # glTF wants linear light; the colours of meshes, files and screens are sRGB.
     rgba = np.clip(color, 0, 1)
     linear = np.where(rgba <= 0.04045, rgba / 12.92, ((rgba + 0.055) / 1.055) ** 2.4)
@@ -330,7 +331,8 @@ def _material(color: tuple[float, float, float, float]) -> dict[str, object]:
     return material
 
 
-def _container(tree: dict[str, object], binary: bytes) -> bytes:
+def container(tree: dict[str, object], binary: bytes) -> bytes:
+    """A binary glTF file of its JSON and its buffer."""
     if binary:
         tree["buffers"] = [{"byteLength": len(binary)}]
     text = json.dumps(tree, separators=(",", ":"), sort_keys=True).encode()
@@ -357,7 +359,7 @@ def stl_bytes(mesh: Mesh) -> bytes:
 
 def glb_y_up(*meshes: Mesh) -> bytes:
     """Binary glTF as the format has it: metres, y up; one part, split by colour where there are several."""
-    return glb_bytes([mesh.moved(_Y_UP) for mesh in meshes])
+    return glb_bytes([mesh.moved(Y_UP) for mesh in meshes])
 
 
 WRITERS: dict[str, Callable[[Mesh], bytes]] = {".stl": stl_bytes, ".glb": glb_y_up}

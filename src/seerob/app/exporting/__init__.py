@@ -1,0 +1,1 @@
+"""From a workstation to files that other programs read."""

@@ -1,0 +1,34 @@
+"""Meshes of simple shapes of a scene file: none is inside the shape that it stands for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seerob.core.shapes import Mesh
+from seerob.description.shapes.shapes import capsule_mesh, lathe_mesh, sphere_mesh
+
+SIDES = 64
+"""Corners of a cylinder or a cone, outside the circle."""
+_AROUND = 1 / math.cos(math.pi / SIDES)
+_BALL = 1 / math.cos(math.pi / 16)
+"""Of the meshes of balls and capsules, whose flat ends begin a 16th of half a turn from the pole."""
+
+
+def ball(radius: float) -> Mesh:
+    """About the origin; at most 2 % of the radius larger."""
+    return sphere_mesh(np.zeros(3), radius * _BALL)
+
+
+def rounded(start: ArrayLike, end: ArrayLike, radius: float) -> Mesh:
+    """A capsule between two points; at most 2 % of the radius larger."""
+    return capsule_mesh(start, end, radius * _BALL)
+
+
+def cylinder(start: ArrayLike, end: ArrayLike, radius: float, top: float | None = None) -> Mesh:
+    """A cylinder, or a cone with another radius at its end; at most 0.13 % of the radius larger."""
+    length = float(np.linalg.norm(np.subtract(end, start)))
+    profile = [(radius * _AROUND, 0.0), ((radius if top is None else top) * _AROUND, length)]
+    return lathe_mesh(start, end, profile, sides=SIDES)

@@ -13,6 +13,8 @@ from seerob.app.console.progress import announced
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Result, Verdict
 from seerob.outputs.sinks.dossier import Dossier
+from seerob.outputs.words import LANGUAGES, speaking
+from seerob.outputs.words import said as spoken
 from seerob.recording.result_log import ResultLog
 
 VOID = {"meta", "img", "br", "col", "link", "input", "hr", "base"}
@@ -299,3 +301,23 @@ def test_parts_that_inform_show_the_extremum_in_their_own_sense_and_unit(tmp_pat
     page = Page((tmp_path / "report.html").read_text())
     assert re.search(r"largest 434 ?474(\.0+)?(?! ?m)", page.text)
     assert "smallest 0.3" in page.text
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_report_speaks_the_language_that_its_file_asks_for(language, tmp_path):
+    name, *others = made_run.FILES
+    asked = made_run.FILES[name] + f'\n[report]\nlanguage = "{language}"\n'.encode()
+    files = {name: asked, **{other: made_run.FILES[other] for other in others}}
+    with Dossier().open(made_run.scene(), made_run.MESHES, files, tmp_path) as writer:
+        for k in range(120):
+            writer.write(made_run.snapshot(k), made_run.samples(k))
+    written = (tmp_path / "report.html").read_text()
+    text = Page(written).text
+    assert f'<html lang="{language}">' in written
+    with speaking(language):
+        told = [spoken("Verdicts"), spoken("What to do"), spoken("EXCEEDED"), spoken("What was evaluated")]
+    for each in told:
+        assert each in text
+    # Nothing is left to be filled in.
+    assert not re.search(r"\{[a-z]+\}", text)
+    assert ("What to do" in text) == (language == "en")

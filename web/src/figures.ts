@@ -2,6 +2,12 @@
 // and report write with. A value beside its limit keeps its side; where rounding must choose, it chooses
 // against whoever hopes for *within*.
 
+import { angleUnit, lengthUnit, shownIn } from "./units";
+import { said } from "./words";
+
+/** What figures are written in. */
+export { angleUnit, lengthUnit };
+
 const NO_BREAK = "\u00a0";
 
 /** Places after the point per unit: what a twin can be asked for, 0.1 mm for a distance. */
@@ -10,6 +16,9 @@ const DECIMALS: Readonly<Record<string, number>> = {
   "m/s": 3,
   "m/s²": 2,
   "m/rad": 4,
+  mm: 1,
+  "mm/s": 0,
+  "mm/s²": 0,
   rad: 4,
   "rad/s": 3,
   s: 2,
@@ -37,16 +46,19 @@ export interface Pair {
 }
 
 /** A number without a limit, rounded to the nearest; a dash for what is not there. Its unit is not written. */
-export function figure(value: number | null, unit: string): string {
+export function figure(value: number | null, given: string): string {
   if (value === null || Number.isNaN(value)) return "–";
-  return text(value, placesOf(unit, [value]), "nearest");
+  const { unit, scale } = shownIn(given);
+  return text(value * scale, placesOf(unit, [value * scale]), "nearest");
 }
 
 /** A value and its limit, on the same side of each other as the numbers are. */
-export function against(value: number | null, limit: number | null, unit: string, atMost: boolean): Pair {
-  if (value === null || limit === null || !Number.isFinite(value) || !Number.isFinite(limit)) {
-    return { value: figure(value, unit), limit: figure(limit, unit) };
+export function against(inSi: number | null, limitInSi: number | null, given: string, atMost: boolean): Pair {
+  if (inSi === null || limitInSi === null || !Number.isFinite(inSi) || !Number.isFinite(limitInSi)) {
+    return { value: figure(inSi, given), limit: figure(limitInSi, given) };
   }
+  const { unit, scale } = shownIn(given);
+  const [value, limit] = [inSi * scale, limitInSi * scale];
   const [worse, better]: [Rounding, Rounding] = atMost ? ["up", "down"] : ["down", "up"];
   const places = placesOf(unit, [value, limit]);
   for (let more = 0; more < MOST; more += 1) {
@@ -57,7 +69,9 @@ export function against(value: number | null, limit: number | null, unit: string
 }
 
 /** How far a value is inside (rounded down) or beyond (rounded up, with a minus) its limit. */
-export function gap(value: number, limit: number, unit: string, atMost: boolean): string {
+export function gap(inSi: number, limitInSi: number, given: string, atMost: boolean): string {
+  const { unit, scale } = shownIn(given);
+  const [value, limit] = [inSi * scale, limitInSi * scale];
   const left = atMost ? limit - value : value - limit;
   const places = placesOf(unit, [value, limit]);
   if (left >= 0) return text(left, places, "down");
@@ -70,28 +84,34 @@ export function gap(value: number, limit: number, unit: string, atMost: boolean)
 }
 
 /** What is allowed or kept at least: rounded down. */
-export function atLeast(value: number | null, unit: string): string {
+export function atLeast(value: number | null, given: string): string {
   if (value === null || Number.isNaN(value)) return "–";
-  return text(value, placesOf(unit, [value]), "down");
+  const { unit, scale } = shownIn(given);
+  return text(value * scale, placesOf(unit, [value * scale]), "down");
 }
 
 /** Where a value lies, with its unit: rounded outward. */
-export function between([low, high]: readonly [number, number], unit: string): string {
-  const places = placesOf(unit, [low, high]);
-  return `${withUnit(text(low, places, "down"), unit)} and ${withUnit(text(high, places, "up"), unit)}`;
+export function between([low, high]: readonly [number, number], given: string): string {
+  const { unit, scale } = shownIn(given);
+  const places = placesOf(unit, [low * scale, high * scale]);
+  return said("{low} and {high}", {
+    low: withUnit(text(low * scale, places, "down"), given),
+    high: withUnit(text(high * scale, places, "up"), given),
+  });
 }
 
 /** The same number with as many places as its unit has, so that a changing one does not jump. */
 export function steady(shown: string, unit: string): string {
-  const places = DECIMALS[unit];
+  const places = DECIMALS[shownIn(unit).unit];
   if (places === undefined || !/^−?\d/.test(shown)) return shown;
   const [whole, fraction = ""] = shown.split(".");
+  if (places === 0) return shown;
   return `${whole}.${fraction.padEnd(places, "0")}`;
 }
 
 /** A number as text with its unit. */
 export function withUnit(number: string, unit: string): string {
-  return unit === "" || number === "–" ? number : `${number}${NO_BREAK}${unit}`;
+  return unit === "" || number === "–" ? number : `${number}${NO_BREAK}${shownIn(unit).unit}`;
 }
 
 /**

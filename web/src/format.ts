@@ -1,5 +1,7 @@
 // Numbers for people: enough digits to compare with the limit, a true minus, units beside.
 
+import { angleUnit, shownIn } from "./units";
+
 const NO_BREAK = "\u00a0";
 
 /** Decimals that give three significant digits at this magnitude. */
@@ -17,8 +19,9 @@ export function formatNumber(value: number | null, like: number | null = null): 
   return formatFixed(value, decimalsFor(Math.abs(like ?? value)));
 }
 
-export function formatQuantity(value: number | null, unit: string, like: number | null = null): string {
-  const text = formatNumber(value, like);
+export function formatQuantity(value: number | null, given: string, like: number | null = null): string {
+  const { unit, scale } = shownIn(given);
+  const text = formatNumber(value === null ? null : value * scale, like === null ? null : like * scale);
   return value === null || unit === "" ? text : `${text}${NO_BREAK}${unit}`;
 }
 
@@ -34,9 +37,9 @@ export function formatTime(t: number): string {
 
 /** A joint position: angles in degrees, as robots' own panels show them. */
 export function formatJoint(value: number, unit: string): string {
-  return unit === "rad"
+  return unit === "rad" && angleUnit.value !== "rad"
     ? `${formatFixed((value * 180) / Math.PI, 1)}°`
-    : `${formatFixed(value, 4)}${NO_BREAK}${unit}`;
+    : `${formatFixed(value * shownIn(unit).scale, shownIn(unit).unit === "mm" ? 1 : 4)}${NO_BREAK}${shownIn(unit).unit}`;
 }
 
 /** A number with so many decimals and a true minus. */

@@ -2,8 +2,9 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { remembered } from "./remembered";
+import { word } from "./words";
 
-export const THEMES = ["system", "dark", "light"] as const;
+export const THEMES = [word("system"), word("dark"), word("light")] as const;
 
 export const chosenTheme = remembered("seerob.theme", THEMES, "system");
 

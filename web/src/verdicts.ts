@@ -2,6 +2,7 @@
 // and always an icon and a word beside them.
 
 import type { Result, Verdict } from "./wire";
+import { word } from "./words";
 
 /** How a row, a body or the whole is shown. `none` informs; `missing` is a limit that nobody judged. */
 export type State = "exceeded" | "undecided" | "missing" | "close" | "within" | "none";
@@ -10,12 +11,12 @@ export type State = "exceeded" | "undecided" | "missing" | "close" | "within" | 
 export const CLOSE_MARGIN = 0.1;
 
 export const STATE_WORDS: Record<State, string> = {
-  exceeded: "exceeded",
-  undecided: "undecided",
-  missing: "no result",
-  close: "within, close",
-  within: "within",
-  none: "informs",
+  exceeded: word("exceeded"),
+  undecided: word("undecided"),
+  missing: word("no result"),
+  close: word("within, close"),
+  within: word("within"),
+  none: word("informs"),
 };
 
 export const STATE_ICONS: Record<State, string> = {

@@ -248,6 +248,23 @@ test("what others speak of is removed with them, or not at all", async () => {
   assert.equal(saved(), begun);
 });
 
+test("the page speaks the chosen language and writes the chosen units, and remembers both", async () => {
+  await page.getByLabel("Language").selectOption({ label: "Deutsch" });
+  await page.getByRole("tab", { name: "Kriterien" }).click();
+  await page.getByLabel("Längen").selectOption("mm");
+  const row = page.locator('tr[data-criterion="beside the table"]');
+  const millimetres = await row.locator(".value").innerText();
+  assert.match(await row.innerText(), /mm[\s\S]*innerhalb/);
+  await page.reload();
+  await page.getByRole("button", { name: "Prüfen und speichern" }).waitFor();
+  await page.getByRole("tab", { name: "Kriterien" }).click();
+  await page.getByLabel("Längen").selectOption("m");
+  await page.getByLabel("Sprache").selectOption({ label: "English" });
+  const metres = await row.locator(".value").innerText();
+  assert.ok(Math.abs(Number(millimetres) - 1000 * Number(metres)) < 0.11, `${millimetres} mm, ${metres} m`);
+  await page.getByRole("tab", { name: "Edit" }).click();
+});
+
 test("axe finds no fault in the panels, dark and light", async () => {
   await page.evaluate(AXE);
   const found = [];

@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { askPython } from "./python.mjs";
 import { load } from "./source.mjs";
 
-const { against, figure, gap, percent } = await load("figures");
+const { against, angleUnit, figure, gap, lengthUnit, percent, withUnit } = await load("figures");
 
 const UNITS = ["m", "m/s", "J", "kg", "N", "s", "", "°", "N/cm²"];
 
@@ -66,4 +66,16 @@ test("a share never flatters", () => {
     [0.991, 1.0001, 0.29].map((share) => percent(share, "up").replace("\u00a0", "")),
     ["100%", "101%", "29%"],
   );
+});
+
+test("lengths in millimetres and angles in degrees are the same numbers, on the same side of their limits", () => {
+  lengthUnit.value = "mm";
+  angleUnit.value = "°";
+  assert.deepEqual(against(0.50004, 0.5, "m", true), { value: "500.1", limit: "500" });
+  assert.deepEqual(against(0.49996, 0.5, "m", false), { value: "499.9", limit: "500" });
+  assert.equal(withUnit(against(0.25, 0.2, "m/s", true).value, "m/s"), "250\u00a0mm/s");
+  assert.equal(withUnit(against(Math.PI / 2, 2, "rad", true).value, "rad"), "90\u00a0°");
+  assert.equal(against(3, 4, "J", true).value, "3");
+  lengthUnit.value = "m";
+  angleUnit.value = "as given";
 });

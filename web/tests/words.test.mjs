@@ -81,3 +81,13 @@ function contrast(a, b) {
   const [high, low] = [luminance(a), luminance(b)].sort((x, y) => y - x);
   return (high + 0.05) / (low + 0.05);
 }
+
+const { language, said } = await load("words");
+
+test("a text is said in the chosen language, with its values, and in English where nobody translated it", () => {
+  assert.equal(said("at {time}", { time: "1:02" }), "at 1:02");
+  language.value = "de";
+  assert.equal(said("at {time}", { time: "1:02" }), "bei 1:02");
+  assert.equal(said("of no catalogue"), "of no catalogue");
+  language.value = "en";
+});

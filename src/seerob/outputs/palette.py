@@ -7,6 +7,7 @@ variants are for text and lines on white.
 from __future__ import annotations
 
 from seerob.core.snapshot import Verdict
+from seerob.outputs.words import word
 
 Color = tuple[float, float, float]
 
@@ -24,10 +25,10 @@ DARK_HEX = {
 }
 MARK = {Verdict.WITHIN: "✓", Verdict.UNDECIDED: "?", Verdict.EXCEEDED: "✕", None: "–"}
 WORD = {
-    Verdict.WITHIN: "within",
-    Verdict.UNDECIDED: "UNDECIDED",
-    Verdict.EXCEEDED: "EXCEEDED",
-    None: "no limit",
+    Verdict.WITHIN: word("within"),
+    Verdict.UNDECIDED: word("UNDECIDED"),
+    Verdict.EXCEEDED: word("EXCEEDED"),
+    None: word("no limit"),
 }
 
 

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 
 from seerob.core.figures import against, between, figure, margin, with_unit
 from seerob.core.snapshot import Finding, Verdict
+from seerob.outputs.words import said as spoken_as
+from seerob.outputs.words import word
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES, Series, Worst
 
@@ -74,7 +76,7 @@ def extremum(worst: Worst, series: Series) -> str:
     text = reached(worst, series)
     if series.verdict is not None or worst.value is None:
         return text
-    return f"{'largest' if series.at_most else 'smallest'} {text}"
+    return f"{spoken_as('largest') if series.at_most else spoken_as('smallest')} {text}"
 
 
 def bound(worst: Worst, series: Series) -> str:
@@ -111,7 +113,9 @@ def listed(names: Sequence[str]) -> str:
     """``a, b and c``; of very many the first, as the table has all."""
     if len(names) > _LISTED:
         names = [*names[: _LISTED - 1], f"{len(names) - _LISTED + 1} more"]
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+    if len(names) == 1:
+        return names[0]
+    return spoken_as("{first} and {last}", first=", ".join(names[:-1]), last=names[-1])
 
 
 def summary(log: ResultLog) -> list[str]:
@@ -121,31 +125,51 @@ def summary(log: ResultLog) -> list[str]:
     for series in log.values():
         by[series.verdict].append(series.name)
     if not log.ticks:
-        return ["Nothing was evaluated: the run has no tick."]
-    criteria = counted(len(log), "criterion was", "criteria were")
-    said = [f"Over {figure(span, 's')} of motion ({log.ticks} ticks) {criteria} evaluated."]
+        return [spoken_as("Nothing was evaluated: the run has no tick.")]
+    counts = counted(len(log), "criterion was", "criteria were")
+    said = [
+        spoken_as(
+            "Over {span} of motion ({ticks} ticks) {counted} evaluated.",
+            span=figure(span, "s"), ticks=log.ticks, counted=counts, n=len(log),
+        )
+    ]  # fmt: skip
     if names := by[Verdict.EXCEEDED]:
+        counts = counted(len(names), "limit was", "limits were").capitalize()
         said.append(
-            f"{counted(len(names), 'limit was', 'limits were').capitalize()} exceeded: {listed(names)}."
+            spoken_as("{counted} exceeded: {names}.", counted=counts, n=len(names), names=listed(names))
         )
     if names := by[Verdict.UNDECIDED]:
-        said.append(
-            f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least "
-            f"a part of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
+        counts = counted(len(names), "criterion", "criteria").capitalize()
+        text = word(
+            "{counted} could not be decided for at least a part of the run: {names}. Undecided is not a "
+            "pass; what is missing is said below."
         )
+        said.append(spoken_as(text, counted=counts, n=len(names), names=listed(names)))
     partly = [name for name in by[Verdict.WITHIN] if covered(log[name])]
     if n := len(by[Verdict.WITHIN]) - len(partly):
-        said.append(f"{counted(n, 'criterion', 'criteria').capitalize()} stayed within the limit throughout.")
+        counts = counted(n, "criterion", "criteria").capitalize()
+        said.append(spoken_as("{counted} stayed within the limit throughout.", counted=counts, n=n))
     if partly:
-        shares = listed([f"{name} ({percent(log[name].times().decided)} of the run)" for name in partly])
-        said.append(
-            f"{counted(len(partly), 'criterion', 'criteria').capitalize()} stayed within the limit, but not "
-            f"throughout the run: asked and decided in a part of it only, {shares}."
+        shares = listed(
+            [
+                spoken_as("{name} ({share} of the run)", name=name, share=percent(log[name].times().decided))
+                for name in partly
+            ]
         )
+        text = word(
+            "{counted} stayed within the limit, but not throughout the run: asked and decided in a part of "
+            "it only, {shares}."
+        )
+        counts = counted(len(partly), "criterion", "criteria").capitalize()
+        said.append(spoken_as(text, counted=counts, n=len(partly), shares=shares))
     if names := by[None]:
+        counts = counted(len(names), "figure").capitalize()
         said.append(
-            f"{counted(len(names), 'figure').capitalize()} without a limit for information: {listed(names)}."
-        )
+            spoken_as(
+                "{counted} without a limit for information: {names}.",
+                counted=counts, n=len(names), names=listed(names),
+            )
+        )  # fmt: skip
     return said
 
 
@@ -157,39 +181,49 @@ def covered(series: Series) -> str:
     times = series.times()
     if series.verdict is None or times.decided > 1 - 1e-12:
         return ""
-    said = [f"decided {percent(times.decided)} of the run"]
+    said = [spoken_as("decided {share} of the run", share=percent(times.decided))]
     for share, what in (
-        (times.undecided, "undecided in"),
-        (times.open, "not asked in"),
-        (times.muted, "did not apply in"),
-        (times.nothing, "nothing to judge in"),
+        (times.undecided, word("undecided in {share}")),
+        (times.open, word("not asked in {share}")),
+        (times.muted, word("did not apply in {share}")),
+        (times.nothing, word("nothing to judge in {share}")),
     ):
         if share > 1e-12:
-            said.append(f"{what} {percent(share)}")
+            said.append(spoken_as(what, share=percent(share)))
     return ", ".join(said)
 
 
 def about(series: Series) -> list[str]:
     """What the paragraph of one criterion says."""
     if not series.known:
-        return [
+        text = word(
             "This criterion was set up but never gave a result, so nothing can be said. It is not a pass: "
             "find out why it was silent."
-        ]
+        )
+        return [spoken_as(text)]
     worst, shares = series.worst(), series.shares()
     said = []
     if share := shares.get(Verdict.EXCEEDED):
-        beyond = "above" if series.at_most else "below"
-        said.append(
-            f"The value was {beyond} the limit in {percent(share)} of the evaluated ticks, "
-            f"{_stretches(series, Verdict.EXCEEDED)}."
+        text = (
+            word("The value was above the limit in {share} of the evaluated ticks, {stretches}.")
+            if series.at_most
+            else word("The value was below the limit in {share} of the evaluated ticks, {stretches}.")
         )
-        said.append(f"Worst at {worst.t:.2f} s: {reached(worst, series)}{_against(series)}.")
+        said.append(spoken_as(text, share=percent(share), stretches=_stretches(series, Verdict.EXCEEDED)))
+        said.append(
+            spoken_as(
+                "Worst at {t} s: {value}{against}.",
+                t=f"{worst.t:.2f}", value=reached(worst, series), against=_against(series),
+            )
+        )  # fmt: skip
     if share := shares.get(Verdict.UNDECIDED):
         said.append(
-            f"In {percent(share)} of the evaluated ticks nothing can be said, "
-            f"{_stretches(series, Verdict.UNDECIDED)}. {_reasons(series)}"
-        )
+            spoken_as(
+                "In {share} of the evaluated ticks nothing can be said, {stretches}. {reasons}",
+                share=percent(share), stretches=_stretches(series, Verdict.UNDECIDED),
+                reasons=_reasons(series),
+            )
+        )  # fmt: skip
     if series.asked:
         said.append(f"{series.asked[0].upper()}{series.asked[1:]}.")
     if gap := series.gap():
@@ -197,28 +231,42 @@ def about(series: Series) -> list[str]:
     if part := covered(series):
         said.append(f"{part[0].upper()}{part[1:]}.")
     if series.verdict is Verdict.WITHIN:
-        when = "whenever it applied" if part else "throughout"
+        text = (
+            word("Within the limit whenever it applied. Closest to it at {t} s: {value}{against}.")
+            if part
+            else word("Within the limit throughout. Closest to it at {t} s: {value}{against}.")
+        )
         said.append(
-            f"Within the limit {when}. Closest to it at {worst.t:.2f} s: {reached(worst, series)}"
-            f"{_against(series)}."
+            spoken_as(text, t=f"{worst.t:.2f}", value=reached(worst, series), against=_against(series))
         )
     if series.verdict is None:
-        extreme = "Largest" if series.at_most else "Smallest"
-        said.append(f"No limit was given. {extreme} value {reached(worst, series)} at {worst.t:.2f} s.")
+        text = (
+            word("No limit was given. Largest value {value} at {t} s.")
+            if series.at_most
+            else word("No limit was given. Smallest value {value} at {t} s.")
+        )
+        said.append(spoken_as(text, value=reached(worst, series), t=f"{worst.t:.2f}"))
     if worst.interval is not None and worst.value is not None:
         there = between(*worst.interval, series.unit)
-        said.append(f"Given the tolerances of the inputs, the true value there is between {there}.")
+        said.append(
+            spoken_as(
+                "Given the tolerances of the inputs, the true value there is between {limits}.", limits=there
+            )
+        )
     if worst.verdict is not Verdict.UNDECIDED and (worst.reason or worst.part):
         governs = worst.reason or worst.part
         extra = f" ({worst.part})" if worst.part and worst.part not in governs else ""
-        said.append(f"What governs there: {governs}{extra}.")
+        said.append(spoken_as("What governs there: {what}.", what=f"{governs}{extra}"))
     return said
 
 
 def _stretches(series: Series, verdict: Verdict) -> str:
     found = series.intervals(verdict)
     longest = figure(max(b - a for a, b in found), "s")
-    return f"in {counted(len(found), 'stretch', 'stretches')}; the longest lasted {longest}"
+    return spoken_as(
+        "in {counted}; the longest lasted {longest}",
+        counted=counted(len(found), "stretch", "stretches"), n=len(found), longest=longest,
+    )  # fmt: skip
 
 
 def _against(series: Series) -> str:
@@ -226,9 +274,13 @@ def _against(series: Series) -> str:
     if worst.limit is None or worst.value is None:
         return ""
     gap = worst.limit - worst.value if series.at_most else worst.value - worst.limit
-    side = "inside" if gap >= 0 else "beyond"
     size = margin(worst.value, worst.limit, series.unit, at_most=series.at_most)
-    return f", {size} {side} the limit of {bound(worst, series)}"
+    text = (
+        word(", {size} inside the limit of {limit}")
+        if gap >= 0
+        else word(", {size} beyond the limit of {limit}")
+    )
+    return spoken_as(text, size=size, limit=bound(worst, series))
 
 
 def _reasons(series: Series) -> str:
@@ -236,8 +288,11 @@ def _reasons(series: Series) -> str:
     seen: dict[str, list[str]] = {}
     for verdict, reason in zip(series.verdicts.tolist(), series.reasons, strict=False):
         if verdict == CODES[Verdict.UNDECIDED]:
-            seen.setdefault(re.sub(r"\d+(\.\d+)?", "0", reason), []).append(reason or "no reason given")
+            seen.setdefault(re.sub(r"\d+(\.\d+)?", "0", reason), []).append(
+                reason or spoken_as("no reason given")
+            )
     most = sorted(seen.values(), key=len, reverse=True)
     texts = [alike[0] + (" and alike" if len(set(alike)) > 1 else "") for alike in most[:3]]
     more = f"; and {len(most) - 3} more" if len(most) > 3 else ""
-    return ("Reason: " if len(most) == 1 else "Reasons: ") + "; ".join(texts) + more + "."
+    head = spoken_as("Reason") if len(most) == 1 else spoken_as("Reasons")
+    return f"{head}: {'; '.join(texts)}{more}."

@@ -104,6 +104,8 @@ class ReportCover(_Table, frozen=True, kw_only=True):
     """Of the workstation, as its owner counts."""
     logo: str | None = None
     """A PNG or JPEG file of at most 1 MB, beside this one."""
+    language: Literal["en", "de", "fr", "es", "it"] = "en"
+    """Of headings, verdicts and sentences; what criteria and findings say is English in all of them."""
 
 
 class Robot(_Table, frozen=True, kw_only=True):

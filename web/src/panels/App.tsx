@@ -4,6 +4,7 @@ import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
+import { said } from "../words";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
 import { Legend } from "./Legend";
@@ -32,10 +33,10 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
   return (
     <div class="app">
       <TopBar />
-      <aside class="left" aria-label="Scene and properties">
+      <aside class="left" aria-label={said("Scene and properties")}>
         <SceneTree />
         {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls can be reached by keys */}
-        <section class="selection scroll" aria-label="Properties" tabIndex={0}>
+        <section class="selection scroll" aria-label={said("Properties")} tabIndex={0}>
           <Properties />
         </section>
       </aside>
@@ -51,7 +52,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         {!notRun.value && <Plots count={plots} />}
         <div class="time-row">
           {notRun.value ? (
-            <p class="not-run">Nothing is run: this is where everybody begins.</p>
+            <p class="not-run">{said("Nothing is run: this is where everybody begins.")}</p>
           ) : (
             <TransportBar />
           )}

@@ -2,16 +2,17 @@
 
 import { formatNumber } from "../format";
 import type { Basis, Input } from "../wire";
+import { said } from "../words";
 
 export function BasisView({ basis }: { basis: Basis }) {
   return (
     <div class="basis">
-      <h3>Basis</h3>
+      <h3>{said("Basis")}</h3>
       <p class="formula">{basis.formula}</p>
       <p class="cited">{basis.source}</p>
       {basis.inputs.length > 0 && (
         <table class="inputs">
-          <caption>Inputs</caption>
+          <caption>{said("Inputs")}</caption>
           <tbody>
             {basis.inputs.map((input, i) => (
               <InputRow key={i} input={input} />
@@ -21,7 +22,7 @@ export function BasisView({ basis }: { basis: Basis }) {
       )}
       {basis.not_modelled.length > 0 && (
         <>
-          <h3>Not modelled</h3>
+          <h3>{said("Not modelled")}</h3>
           <ul class="not-modelled">
             {basis.not_modelled.map((text) => (
               <li key={text}>{text}</li>

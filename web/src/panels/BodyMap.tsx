@@ -17,6 +17,7 @@ import {
 import { type Spot, spots } from "../body_map/figure";
 import { percent } from "../figures";
 import { frame, scene, stale } from "../page_state";
+import { said } from "../words";
 import { BodyFigure, type DrawnSpot } from "./BodyFigure";
 import { ContactDetails, ContactHead } from "./ContactCard";
 
@@ -49,7 +50,7 @@ export function BodyMap() {
   const possible = run?.criteria.filter((c) => c.kind === "power_and_force").map((c) => c.name) ?? [];
   if (!run || (possible.length === 0 && sources.length === 0)) {
     return (
-      <section class="body-map scroll" aria-label="Body map">
+      <section class="body-map scroll" aria-label={said("Body map")}>
         <p class="empty">
           No criterion of this run judges contacts with the body. Add one of kind <code>power_and_force</code>{" "}
           to the workstation file.
@@ -67,10 +68,10 @@ export function BodyMap() {
   const shown = drawn.find((spot) => spot.key === shownKey);
   const told = shown ? toldOf(shown, all, aspect.value) : governing;
   return (
-    <section class={`body-map scroll ${stale.value ? "stale" : ""}`} aria-label="Body map">
+    <section class={`body-map scroll ${stale.value ? "stale" : ""}`} aria-label={said("Body map")}>
       <div class="panel-tools">
         <fieldset class="choice">
-          <legend class="visually-hidden">Limit</legend>
+          <legend class="visually-hidden">{said("Limit")}</legend>
           {ASPECTS.map(([key, title]) => (
             <button
               key={key}
@@ -86,13 +87,13 @@ export function BodyMap() {
         </fieldset>
         {sources.length > 1 && (
           <select
-            aria-label="Criterion"
+            aria-label={said("Criterion")}
             value={from ?? ""}
             onChange={(event) => {
               only.value = event.currentTarget.value || null;
             }}
           >
-            <option value="">worst of all</option>
+            <option value="">{said("worst of all")}</option>
             {sources.map((name) => (
               <option key={name} value={name}>
                 {name}
@@ -102,7 +103,7 @@ export function BodyMap() {
         )}
       </div>
       <ContactHead spot={shown} told={told} aspect={aspect.value} />
-      <fieldset class="figures" aria-label="Body areas" onKeyDown={(event) => move(event, drawn)}>
+      <fieldset class="figures" aria-label={said("Body areas")} onKeyDown={(event) => move(event, drawn)}>
         {(["front", "back"] as const).map((view) => (
           <BodyFigure
             key={view}
@@ -122,7 +123,7 @@ export function BodyMap() {
           />
         ))}
       </fieldset>
-      <ul class="look-legend" aria-label="Colours: present speed as a share of the permissible one">
+      <ul class="look-legend" aria-label={said("Colours: present speed as a share of the permissible one")}>
         {LEGEND.map((look) => (
           <li key={look}>
             <i class={`swatch look-${look}`} aria-hidden="true" />

@@ -5,6 +5,7 @@ import type { Spot } from "../body_map/figure";
 import { against, atLeast, figure, percent, withUnit } from "../figures";
 import { formatNumber } from "../format";
 import type { Input, Scene } from "../wire";
+import { said } from "../words";
 import { StateBadge } from "./StateBadge";
 
 /** Of constant height, so that the figures stay where they are while one points from area to area. */
@@ -14,7 +15,7 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
     return (
       <div class="contact-head">
         <h2>{spot ? `Area ${spot.area}` : "Whole body"}</h2>
-        <p class="reason">Nothing that moves is within reach.</p>
+        <p class="reason">{said("Nothing that moves is within reach.")}</p>
       </div>
     );
   }
@@ -53,19 +54,19 @@ export function ContactDetails({ run, told }: { run: Scene; told: Told }) {
   return (
     <div class="contact-details">
       <dl>
-        <dt>Speed now</dt>
+        <dt>{said("Speed now")}</dt>
         <dd>{known(row.value, row.unit, figure)}</dd>
-        <dt>Permissible speed</dt>
+        <dt>{said("Permissible speed")}</dt>
         <dd>{row.limit == null ? LOOK_WORDS[lookOf(row, "worst")] : known(row.limit, row.unit, atLeast)}</dd>
         {row.aspects.map((one) => (
           <AspectRow key={one.name} name={one.name} text={one.band || known(one.value, one.unit, atLeast)} />
         ))}
-        <dt>Criterion</dt>
+        <dt>{said("Criterion")}</dt>
         <dd>{criterion}</dd>
       </dl>
       {inputs.length > 0 && (
         <table class="inputs">
-          <caption>Limits, where from and how sure</caption>
+          <caption>{said("Limits, where from and how sure")}</caption>
           <tbody>
             {inputs.map((input) => (
               <LimitRow key={input.name} input={input} group={row.group} />

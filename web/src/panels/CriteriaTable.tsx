@@ -7,8 +7,10 @@ import { formatTime } from "../format";
 import { mutedCriteria, type Row, scene, select, selection, soFar, stale, toggleMuted } from "../page_state";
 import { worstOf } from "../posture/instants";
 import { aim, orderedRows } from "../row_order";
+import { shownIn } from "../units";
 import { margin, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo, Result } from "../wire";
+import { said, word } from "../words";
 import { BasisView } from "./BasisView";
 import { Icon } from "./Icon";
 import { Instants } from "./Instants";
@@ -25,7 +27,7 @@ export function CriteriaTable() {
     select(opening ? { kind: "criterion", name } : null);
   };
   return (
-    <section class="criteria scroll" aria-label="Criteria">
+    <section class="criteria scroll" aria-label={said("Criteria")}>
       <table class={stale.value ? "stale" : ""}>
         <colgroup>
           <col />
@@ -35,7 +37,7 @@ export function CriteriaTable() {
         </colgroup>
         <thead>
           <tr>
-            <th scope="col">Criterion</th>
+            <th scope="col">{said("Criterion")}</th>
             <th scope="col" class="number">
               Value
             </th>
@@ -67,7 +69,7 @@ export function CriteriaTable() {
         </tbody>
       </table>
       {scene.value?.criteria.length === 0 && (
-        <p class="empty">This workstation file has no criteria: nothing is judged.</p>
+        <p class="empty">{said("This workstation file has no criteria: nothing is judged.")}</p>
       )}
     </section>
   );
@@ -80,7 +82,8 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
   const limit = result ? result.limit : info.limit;
   const unit = result?.unit ?? info.unit;
   const figures = against(result?.value ?? null, limit, unit, info.at_most);
-  const reason = result?.reason ?? (state === "missing" ? "nothing was said about it in this snapshot" : "");
+  const reason =
+    result?.reason ?? (state === "missing" ? said("nothing was said about it in this snapshot") : "");
   const shown = stale.value && state !== "missing" ? "off" : state;
   const look = `row-${shown} ${chosen ? "selected" : ""}`;
   return (
@@ -98,14 +101,17 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
           <button
             type="button"
             class={`eye ${muted ? "off" : ""}`}
-            aria-label={`${muted ? "Show" : "Hide"} markers of ${info.name}`}
+            aria-label={said(muted ? word("Show markers of {name}") : word("Hide markers of {name}"), {
+              name: info.name,
+            })}
             onClick={() => toggleMuted(info.name)}
           >
             <Icon name={muted ? "eye-off" : "eye"} />
           </button>
         </th>
         <td class="number">
-          <span class="value">{steady(figures.value, unit)}</span> <span class="unit">{unit}</span>
+          <span class="value">{steady(figures.value, unit)}</span>{" "}
+          <span class="unit">{shownIn(unit).unit}</span>
           {result && <Usage result={result} />}
         </td>
         <td class="number limit">
@@ -113,14 +119,14 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
             "–"
           ) : (
             <>
-              <span class="bound" title={info.at_most ? "at most" : "at least"}>
+              <span class="bound" title={said(info.at_most ? word("at most") : word("at least"))}>
                 {info.at_most ? "≤" : "≥"}
               </span>{" "}
-              {figures.limit} <span class="unit">{unit}</span>
+              {figures.limit} <span class="unit">{shownIn(unit).unit}</span>
             </>
           )}
           {result && limit !== null && (
-            <span class="margin" title="Left to the limit; negative is beyond it">
+            <span class="margin" title={said("Left to the limit; negative is beyond it")}>
               {leftOf(result)}
             </span>
           )}
@@ -128,7 +134,7 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
         <td class="state">
           <StateBadge state={state} />
           {result?.t !== null && result?.t !== undefined && (
-            <span class="instant">at {formatTime(result.t)}</span>
+            <span class="instant">{said("at {time}", { time: formatTime(result.t) })}</span>
           )}
         </td>
       </tr>
@@ -169,7 +175,7 @@ function WorstInstants({ info }: { info: CriterionInfo }) {
   if (instants.length === 0) return null;
   return (
     <div class="instant-row">
-      <span class="unit">Worst instants</span>
+      <span class="unit">{said("Worst instants")}</span>
       <Instants info={info} instants={instants} />
     </div>
   );
@@ -185,17 +191,21 @@ function RunSoFar({ info }: { info: CriterionInfo }) {
   const told = soFar.value?.criteria[info.name];
   if (!told) return null;
   const shares: [number, string][] = [
-    [told.decided, "decided"],
-    [told.undecided, "undecided"],
-    [told.open, "not asked"],
-    [told.muted, "did not apply"],
-    [told.nothing, "nothing to judge"],
+    [told.decided, word("decided")],
+    [told.undecided, word("undecided")],
+    [told.open, word("not asked")],
+    [told.muted, word("did not apply")],
+    [told.nothing, word("nothing to judge")],
   ];
-  const parts = shares.filter(([share]) => share > 0).map(([share, what]) => `${what} ${percent(share)}`);
+  const parts = shares
+    .filter(([share]) => share > 0)
+    .map(([share, what]) => `${said(what)} ${percent(share)}`);
   return (
     <p class="run-so-far">
-      Run{soFar.value?.whole ? "" : " so far"}: {told.verdict ? STATE_WORDS[told.verdict] : "no verdict"};{" "}
-      {parts.join(", ")} of the time{told.reason !== "" && `; ${told.reason}`}
+      {said(soFar.value?.whole ? word("Run") : word("Run so far"))}:{" "}
+      {said(told.verdict ? STATE_WORDS[told.verdict] : word("no verdict"))};{" "}
+      {said("{shares} of the time", { shares: parts.join(", ") })}
+      {told.reason !== "" && `; ${told.reason}`}
     </p>
   );
 }
@@ -206,12 +216,16 @@ function Details({ row }: { row: Row }) {
     <div class="details-body">
       <p class="lead">{info.title}</p>
       {result?.interval && (
-        <p>True value between {between(result.interval, result.unit)}, given the tolerances of the inputs.</p>
+        <p>
+          {said("True value between {limits}, given the tolerances of the inputs.", {
+            limits: between(result.interval, result.unit),
+          })}
+        </p>
       )}
       <RunSoFar info={info} />
       <WorstInstants info={info} />
       {result && result.parts.length > 0 && <Parts parts={result.parts} />}
-      {info.basis ? <BasisView basis={info.basis} /> : <p class="unknown">No basis was stated.</p>}
+      {info.basis ? <BasisView basis={info.basis} /> : <p class="unknown">{said("No basis was stated.")}</p>}
     </div>
   );
 }

@@ -25,21 +25,23 @@ import { moveTo, placing, poseKey, setNumber, tidy } from "../editing/pose";
 import { entrySchema, fetchSchema, kinds, schema } from "../editing/schema";
 import { select } from "../page_state";
 import type { Change } from "../wire";
+import { said, word } from "../words";
+import { Choice } from "./Choice";
 import { MistakeList } from "./MistakeList";
 import { Review } from "./Review";
 import { NameChoices, SchemaForm } from "./SchemaForm";
 
 const GROUPS: readonly [group: string, title: string, one: string][] = [
-  ["robots", "Robots", "robot"],
-  ["parts", "Parts", "part"],
-  ["areas", "Areas", "area"],
-  ["sensors", "Sensors", "sensor"],
-  ["humans", "People", "person"],
-  ["machines", "Machines", "machine"],
-  ["tools", "Tools", "tool"],
-  ["workpieces", "Workpieces", "workpiece"],
-  ["safety", "Safety criteria", "safety criterion"],
-  ["ergonomics", "Ergonomics", "ergonomics rule"],
+  ["robots", word("Robots"), word("robot")],
+  ["parts", word("Parts"), word("part")],
+  ["areas", word("Areas"), word("area")],
+  ["sensors", word("Sensors"), word("sensor")],
+  ["humans", word("People"), word("person")],
+  ["machines", word("Machines"), word("machine")],
+  ["tools", word("Tools"), word("tool")],
+  ["workpieces", word("Workpieces"), word("workpiece")],
+  ["safety", word("Safety criteria"), word("safety criterion")],
+  ["ergonomics", word("Ergonomics"), word("ergonomics rule")],
 ];
 /** How far a copy stands from what it is a copy of [m]. */
 const ASIDE = 0.5;
@@ -49,18 +51,18 @@ export function Editor() {
   const adding = useSignal<string | null>(null);
   const reviewing = useSignal(false);
   const now = draft.value;
-  if (!now) return <p class="empty">The server has not said what the file has.</p>;
+  if (!now) return <p class="empty">{said("The server has not said what the file has.")}</p>;
   const entry = chosenEntry.value;
   const changedLines = now.diff.split("\n").filter((line) => /^[+-](?![+-]{2})/.test(line)).length;
   return (
-    <section class="editor scroll" aria-label="Edit">
+    <section class="editor scroll" aria-label={said("Edit")}>
       <NameChoices />
       <div class="edit-bar">
         <button type="button" disabled={!now.undo} title="Ctrl+Z" onClick={() => void ask("undo")}>
-          Undo
+          {said("Undo")}
         </button>
         <button type="button" disabled={!now.redo} title="Ctrl+Y" onClick={() => void ask("redo")}>
-          Redo
+          {said("Redo")}
         </button>
         <button
           type="button"
@@ -70,47 +72,51 @@ export function Editor() {
             reviewing.value = true;
           }}
         >
-          Review and save{changedLines > 0 && ` (${changedLines})`}
+          {said("Review and save")}
+          {changedLines > 0 && ` (${changedLines})`}
         </button>
         <button
           type="button"
-          title={
+          title={said(
             now.runs
-              ? "End the run: everybody is shown where they begin"
-              : "Run the draft from its beginning; every edit begins it anew, and nothing is recorded"
-          }
+              ? word("End the run: everybody is shown where they begin")
+              : word("Run the draft from its beginning; every edit begins it anew, and nothing is recorded"),
+          )}
           onClick={() => void ask(now.runs ? "stop" : "run")}
         >
-          {now.runs ? "Stop" : "Run"}
+          {said(now.runs ? word("Stop") : word("Run"))}
         </button>
-        <span role="status">{asking.value ? "checking …" : now.diff === "" ? "saved" : "not saved"}</span>
+        <span role="status">
+          {said(asking.value ? word("checking …") : now.diff === "" ? word("saved") : word("not saved"))}
+        </span>
       </div>
       {now.runs && (
         <p class="trial">
-          The draft is run, from its beginning with every edit: time, motions, connections and what criteria
-          counted. Nothing is recorded.
+          {said(
+            "The draft is run, from its beginning with every edit: time, motions, connections and what criteria counted. Nothing is recorded.",
+          )}
         </p>
       )}
       {now.ended !== "" && (
         <p class="trial" role="alert">
-          The run has ended: {now.ended}
+          {said("The run has ended: {why}", { why: now.ended })}
         </p>
       )}
       <div class="edit-bar">
         <select
-          aria-label="What is edited"
+          aria-label={said("What is edited")}
           value={entry ? `${entry.group} ${entry.index}` : ""}
           onChange={(event) => {
             adding.value = null;
             choose(event.currentTarget.value);
           }}
         >
-          <option value="">select something …</option>
+          <option value="">{said("select something …")}</option>
           {GROUPS.map(([group, title]) => {
             const own = entries.value.filter((e) => e.group === group);
             return (
               own.length > 0 && (
-                <optgroup key={group} label={title}>
+                <optgroup key={group} label={said(title)}>
                   {own.map((e) => (
                     <option key={e.index} value={`${group} ${e.index}`}>
                       {e.name}
@@ -122,7 +128,7 @@ export function Editor() {
           })}
         </select>
         <select
-          aria-label="Add"
+          aria-label={said("Add")}
           value=""
           onChange={(event) => {
             adding.value = event.currentTarget.value || null;
@@ -130,10 +136,10 @@ export function Editor() {
             event.currentTarget.value = "";
           }}
         >
-          <option value="">add …</option>
+          <option value="">{said("add …")}</option>
           {GROUPS.map(([group, , one]) => (
             <option key={group} value={group}>
-              {one}
+              {said(one)}
             </option>
           ))}
         </select>
@@ -152,7 +158,7 @@ export function Editor() {
       ) : entry ? (
         <EntryForm key={`${entry.group} ${entry.index}`} entry={entry} />
       ) : (
-        <p class="empty">Select something in the room, the tree or above, or add something.</p>
+        <p class="empty">{said("Select something in the room, the tree or above, or add something.")}</p>
       )}
       <Review
         open={reviewing.value}
@@ -261,10 +267,10 @@ function EntryForm({ entry }: { entry: Entry }) {
       )}
       <div class="edit-bar">
         <button type="button" onClick={() => void copy()}>
-          Copy
+          {said("Copy")}
         </button>
         <button type="button" onClick={() => void change({ kind: "remove", path, value: null })}>
-          Remove
+          {said("Remove")}
         </button>
       </div>
     </div>
@@ -308,43 +314,16 @@ function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
       </div>
       <MistakeList mistakes={mistakesAt([entry.group, entry.index, at])} />
       <div class="edit-bar">
-        <Choice name="Handles" choices={["move", "turn"] as const} chosen={gizmoMode} />
+        <Choice name={said("Handles")} choices={["move", "turn"] as const} chosen={gizmoMode} title={said} />
         <Choice
-          name="Steps"
+          name={said("Steps")}
           choices={STEP_NAMES}
           chosen={steps}
-          title={(one) => (STEPS[one][0] ? `${STEPS[one][0] * 1000} mm, ${STEPS[one][1]}°` : "none")}
+          title={(one) => (STEPS[one][0] ? `${STEPS[one][0] * 1000} mm, ${STEPS[one][1]}°` : said("none"))}
         />
-        <Choice name="Unit" choices={["m", "mm"] as const} chosen={lengthUnit} />
+        <Choice name={said("Unit")} choices={["m", "mm"] as const} chosen={lengthUnit} />
       </div>
     </fieldset>
-  );
-}
-
-interface ChoiceProps<T extends string> {
-  name: string;
-  choices: readonly T[];
-  chosen: { value: T };
-  title?: (one: T) => string;
-}
-
-function Choice<T extends string>({ name, choices, chosen, title = (one) => one }: ChoiceProps<T>) {
-  return (
-    <label>
-      {name}{" "}
-      <select
-        value={chosen.value}
-        onChange={(event) => {
-          chosen.value = choices.find((one) => one === event.currentTarget.value) ?? chosen.value;
-        }}
-      >
-        {choices.map((one) => (
-          <option key={one} value={one}>
-            {title(one)}
-          </option>
-        ))}
-      </select>
-    </label>
   );
 }
 
@@ -429,7 +408,7 @@ function Adding({ group, close }: { group: string; close: () => void }) {
               table.value = { kind: event.currentTarget.value };
             }}
           >
-            <option value="">choose …</option>
+            <option value="">{said("choose …")}</option>
             {choices.map(([kind, about]) => (
               <option key={kind} value={kind} title={about}>
                 {kind}

@@ -6,6 +6,7 @@ import { against, withUnit } from "../figures";
 import { formatTime } from "../format";
 import { isLive, lookingAt, now, scene, traces } from "../page_state";
 import { STATE_ICONS, STATE_WORDS } from "../verdicts";
+import { said } from "../words";
 import { type Instant, worstWith } from "../worst_instant";
 import { useActions } from "./app_context";
 
@@ -60,13 +61,13 @@ export function ElsewhereNote({ other }: { other: Elsewhere }) {
     <button
       type="button"
       class={`pill-elsewhere elsewhere-${verdict}`}
-      title={`${criteria.join(", ")}\nClick: go to the worst instant of ${name}`}
+      title={`${criteria.join(", ")}\n${said("Click: go to the worst instant of {name}", { name })}`}
       // Seconds that count up are not worth being read aloud.
       aria-live="off"
       onClick={visit}
     >
       <span aria-hidden="true">{STATE_ICONS[verdict]} </span>
-      {STATE_WORDS[verdict]} {following ? ago(now.value - latest.end) : "elsewhere"}: {name}
+      {said(STATE_WORDS[verdict])} {following ? ago(now.value - latest.end) : said("elsewhere")}: {name}
       {more}
     </button>
   );

@@ -5,6 +5,7 @@ import { formatNumber } from "../format";
 import { frame, link, scene, select, stale } from "../page_state";
 import { unseen } from "../scene/viewer";
 import type { Finding, SourceLine } from "../wire";
+import { said } from "../words";
 
 const LOOKS: Record<string, { icon: string; word: string; rank: number }> = {
   warning: { icon: "!", word: "warning", rank: 0 },
@@ -26,19 +27,23 @@ export function allFindings(): Finding[] {
 export function Findings() {
   const findings = allFindings();
   return (
-    <section class="findings scroll" aria-label="Findings">
+    <section class="findings scroll" aria-label={said("Findings")}>
       <p class="lead">
         What was noticed, repaired or assumed while the model was built. Each of these bears on the results.
       </p>
-      {findings.length === 0 ? <p class="empty">Nothing was found.</p> : <FindingList findings={findings} />}
+      {findings.length === 0 ? (
+        <p class="empty">{said("Nothing was found.")}</p>
+      ) : (
+        <FindingList findings={findings} />
+      )}
       <Sources />
       {scene.value && (
         <dl class="fingerprint">
-          <dt>Workstation</dt>
+          <dt>{said("Workstation")}</dt>
           <dd title={scene.value.workstation_hash}>{scene.value.workstation_hash.slice(0, 16)}</dd>
           <dt>seerob</dt>
           <dd>{scene.value.version}</dd>
-          <dt>Connection</dt>
+          <dt>{said("Connection")}</dt>
           <dd>{link.value.reason || link.value.state}</dd>
         </dl>
       )}
@@ -51,8 +56,8 @@ export function Sources() {
   const told = Object.entries(frame.value?.sources ?? {});
   if (told.length === 0) return null;
   return (
-    <section class="sources" aria-label="Live sources">
-      <h2>Live sources</h2>
+    <section class="sources" aria-label={said("Live sources")}>
+      <h2>{said("Live sources")}</h2>
       <dl class="fingerprint">
         {told.map(([name, line]) => (
           <Fragment key={name}>

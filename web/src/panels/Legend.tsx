@@ -3,6 +3,7 @@
 import { doubts } from "../doubts";
 import { scene, stale } from "../page_state";
 import { coloring, hasScores, shownScore } from "../posture/coloring";
+import { said } from "../words";
 import { ScaleBar } from "./ScoreColors";
 import { StateBadge } from "./StateBadge";
 
@@ -11,7 +12,7 @@ const SHOWN = ["within", "exceeded", "undecided", "none"] as const;
 export function Legend() {
   if (!scene.value || stale.value) return null;
   return (
-    <section class="legend" aria-label="Colours">
+    <section class="legend" aria-label={said("Colours")}>
       <ul>
         {SHOWN.map((state) => (
           <li key={state}>

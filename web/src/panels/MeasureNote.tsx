@@ -2,6 +2,7 @@
 
 import { faceAngle, measuring } from "../editing/measure";
 import { formatFixed, formatNumber } from "../format";
+import { said } from "../words";
 
 export function MeasureNote() {
   const now = measuring.value;
@@ -19,7 +20,7 @@ export function MeasureNote() {
             {a.name} ↔ {b.name}
           </span>
           {now.refusal !== "" && <span class="unknown">{now.refusal}</span>}
-          {now.refusal === "" && !now.result && <span>measuring …</span>}
+          {now.refusal === "" && !now.result && <span>{said("measuring …")}</span>}
           {value != null && <strong>{distance(value)}</strong>}
           {now.result && value == null && <span class="unknown">{now.result.reason}</span>}
           {angle !== null && <span>faces as drawn at {formatNumber(angle)}°</span>}

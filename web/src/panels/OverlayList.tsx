@@ -3,6 +3,7 @@
 import { kindsOf, SIGNS } from "../markers/signs";
 import { mutedCriteria, rows, stale, toggleMuted } from "../page_state";
 import { showCaptions, showGrid } from "../scene/viewer";
+import { said } from "../words";
 import { StateBadge } from "./StateBadge";
 
 const KEYS = 9;
@@ -26,15 +27,15 @@ export function OverlayList() {
         </label>
       ))}
       <hr />
-      <Choice title="Labels of the worst three" shown={showCaptions} />
-      <Choice title="Floor grid" shown={showGrid} />
+      <Choice title={said("Labels of the worst three")} shown={showCaptions} />
+      <Choice title={said("Floor grid")} shown={showGrid} />
     </div>
   );
 }
 
 function Signs({ markers }: { markers: Parameters<typeof kindsOf>[0] }) {
   const kinds = kindsOf(markers);
-  if (kinds.length === 0) return <span class="unknown">nothing drawn</span>;
+  if (kinds.length === 0) return <span class="unknown">{said("nothing drawn")}</span>;
   return (
     <span class="signs" role="img" aria-label={kinds.map((kind) => SIGNS[kind].word).join(", ")}>
       {kinds.map((kind) => (

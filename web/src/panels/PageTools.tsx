@@ -1,13 +1,25 @@
 // What is of the page itself, not of the run: its look, and its keys.
 
+import { lengthUnit } from "../editing/handles";
 import { chosenTheme, THEMES } from "../theme";
+import { ANGLES, angleUnit } from "../units";
+import { LANGUAGE_NAMES, LANGUAGES, type Language, language, said } from "../words";
+import { Choice } from "./Choice";
 import { keysShown } from "./Keys";
 
 export function PageTools() {
   return (
     <div class="page-tools">
+      <Choice
+        name={said("Language")}
+        choices={LANGUAGES}
+        chosen={language}
+        title={(one: Language) => LANGUAGE_NAMES[one]}
+      />
+      <Choice name={said("Lengths")} choices={["m", "mm"] as const} chosen={lengthUnit} />
+      <Choice name={said("Angles")} choices={ANGLES} chosen={angleUnit} title={said} />
       <select
-        aria-label="Look"
+        aria-label={said("Look")}
         value={chosenTheme.value}
         onChange={(event) => {
           chosenTheme.value = THEMES.find((one) => one === event.currentTarget.value) ?? "system";
@@ -15,18 +27,18 @@ export function PageTools() {
       >
         {THEMES.map((one) => (
           <option key={one} value={one}>
-            {one}
+            {said(one)}
           </option>
         ))}
       </select>
       <button
         type="button"
-        title="What the keys do (?)"
+        title={said("What the keys do (?)")}
         onClick={() => {
           keysShown.value = true;
         }}
       >
-        Keys <kbd>?</kbd>
+        {said("Keys")} <kbd>?</kbd>
       </button>
     </div>
   );

@@ -2,12 +2,13 @@
 
 import { against, withUnit } from "../figures";
 import type { Result } from "../wire";
+import { said } from "../words";
 import { StateBadge } from "./StateBadge";
 
 export function Parts({ parts }: { parts: readonly Result[] }) {
   return (
     <table class="parts">
-      <caption>Parts</caption>
+      <caption>{said("Parts")}</caption>
       <tbody>
         {parts.map((part) => (
           <Part key={part.name} part={part} />

@@ -9,15 +9,16 @@ import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
 import { theme } from "../theme";
+import { said } from "../words";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
 
 export function Plots({ count }: { count: number }) {
   const names = plotted(count);
   return (
-    <section class="plots" aria-label="Plots">
+    <section class="plots" aria-label={said("Plots")}>
       <fieldset class="windows">
-        <legend class="visually-hidden">Time window</legend>
+        <legend class="visually-hidden">{said("Time window")}</legend>
         {WIDTHS.map((title) => (
           <button
             key={title}

@@ -6,6 +6,7 @@ import { chooseScore, shownScore } from "../posture/coloring";
 import { worstScores } from "../posture/instants";
 import { components, scored } from "../posture/scores";
 import type { Result } from "../wire";
+import { said } from "../words";
 import { Instants } from "./Instants";
 import { Parts } from "./Parts";
 import { ColoringChoice, PaletteChoice } from "./ScoreColors";
@@ -18,7 +19,7 @@ export function Posture() {
   const judged = run?.criteria.filter((c) => c.group === "ergonomics") ?? [];
   if (!run || judged.length === 0) {
     return (
-      <section class="posture scroll" aria-label="Posture">
+      <section class="posture scroll" aria-label={said("Posture")}>
         <p class="empty">
           No ergonomics rule in this run. Add one to the workstation file, such as{" "}
           <code>[[ergonomics]] kind = "rula"</code>.
@@ -30,9 +31,9 @@ export function Posture() {
   const withRows = scored(results);
   const result = results.find((r) => r.name === (shownScore.value ?? judged[0]?.name));
   return (
-    <section class={`posture scroll ${stale.value ? "stale" : ""}`} aria-label="Posture">
+    <section class={`posture scroll ${stale.value ? "stale" : ""}`} aria-label={said("Posture")}>
       {withRows.length > 1 && (
-        <div class="choice wide" role="tablist" aria-label="Score">
+        <div class="choice wide" role="tablist" aria-label={said("Score")}>
           {withRows.map(({ name }) => (
             <button
               key={name}
@@ -46,7 +47,11 @@ export function Posture() {
           ))}
         </div>
       )}
-      {result ? <Score result={result} /> : <p class="empty">Nothing was said about the posture yet.</p>}
+      {result ? (
+        <Score result={result} />
+      ) : (
+        <p class="empty">{said("Nothing was said about the posture yet.")}</p>
+      )}
       <div class="colors">
         <ColoringChoice />
         <PaletteChoice />
@@ -87,7 +92,7 @@ function WorstInstants() {
   if (all.length === 0) return null;
   return (
     <div class="worst-instants">
-      <h2>Worst instants</h2>
+      <h2>{said("Worst instants")}</h2>
       {all.map(({ info, instants }) => (
         <div key={info.name} class="instant-row">
           <span class="criterion-name">{info.name}</span>

@@ -4,12 +4,14 @@ import { doubtAmong, doubts } from "../doubts";
 import { formatJoint, formatNumber, formatQuantity } from "../format";
 import { frame, scene, selectedNodes, selection, stale } from "../page_state";
 import type { JointInfo, MechanismInfo, Node, Scene } from "../wire";
+import { said } from "../words";
 import { FindingList } from "./Findings";
 
 export function Properties() {
   const run = scene.value;
   const chosen = selection.value;
-  if (!run || !chosen) return <p class="empty">Select something in the scene, the tree or the table.</p>;
+  if (!run || !chosen)
+    return <p class="empty">{said("Select something in the scene, the tree or the table.")}</p>;
   if (chosen.kind === "criterion") return <CriterionProperties run={run} name={chosen.name} />;
   const nodes = run.nodes.filter((node) => selectedNodes.value.has(node.name));
   const first = nodes[0];
@@ -23,34 +25,34 @@ export function Properties() {
     <div class="properties">
       <h2>{chosen.name}</h2>
       <dl>
-        <dt>Role</dt>
+        <dt>{said("Role")}</dt>
         <dd>{first.role}</dd>
         {doubt !== undefined && (
           <>
-            <dt>May be elsewhere</dt>
+            <dt>{said("May be elsewhere")}</dt>
             <dd class="unknown">{doubt}</dd>
           </>
         )}
         {nodes.every((node) => node.real) && (
           <>
-            <dt>Real</dt>
-            <dd>not drawn over the real cell</dd>
+            <dt>{said("Real")}</dt>
+            <dd>{said("not drawn over the real cell")}</dd>
           </>
         )}
         {chosen.kind === "node" && first.owner !== first.name && (
           <>
-            <dt>Belongs to</dt>
+            <dt>{said("Belongs to")}</dt>
             <dd>{first.owner}</dd>
           </>
         )}
         {chosen.kind === "owner" && (
           <>
-            <dt>Bodies</dt>
+            <dt>{said("Bodies")}</dt>
             <dd>{nodes.length}</dd>
           </>
         )}
         {first.role !== "area" && <Mass nodes={nodes} />}
-        <dt>Mesh</dt>
+        <dt>{said("Mesh")}</dt>
         <dd>{triangles(nodes)}</dd>
         {notes(nodes).map((note) => (
           <NoteRow key={note} note={note} />
@@ -72,7 +74,7 @@ function isAbout(subject: string, node: Node): boolean {
 function NoteRow({ note }: { note: string }) {
   return (
     <>
-      <dt>Geometry</dt>
+      <dt>{said("Geometry")}</dt>
       <dd class="note">{note}</dd>
     </>
   );
@@ -94,7 +96,7 @@ function Mass({ nodes }: { nodes: readonly Node[] }) {
   const sum = known.reduce((total, node) => total + (node.mass ?? 0), 0);
   return (
     <>
-      <dt>Mass</dt>
+      <dt>{said("Mass")}</dt>
       <dd>
         {known.length > 0 && (
           <>
@@ -118,7 +120,9 @@ function Tracking({ mechanism }: { mechanism: MechanismInfo }) {
   const shown = angular ? formatQuantity((error * 180) / Math.PI, "°") : formatNumber(error);
   return (
     <>
-      <dt title="Largest joint error between the twin and what was heard">Tracking error</dt>
+      <dt title={said("Largest joint error between the twin and what was heard")}>
+        {said("Tracking error")}
+      </dt>
       <dd class={stale.value ? "stale" : ""}>{shown}</dd>
     </>
   );
@@ -130,7 +134,9 @@ function Lateness({ mechanism }: { mechanism: MechanismInfo }) {
   const [by, bound] = late;
   return (
     <>
-      <dt title="How much later than the fastest sample the newest one arrived, and how late it may be">
+      <dt
+        title={said("How much later than the fastest sample the newest one arrived, and how late it may be")}
+      >
         Late
       </dt>
       <dd class={stale.value ? "stale" : by > bound ? "unknown" : ""}>
@@ -145,7 +151,7 @@ function Joints({ mechanism }: { mechanism: MechanismInfo }) {
   if (mechanism.joints.length === 0) return null;
   return (
     <table class={`joints ${stale.value ? "stale" : ""}`}>
-      <caption>Joints</caption>
+      <caption>{said("Joints")}</caption>
       <tbody>
         {mechanism.joints.map((joint, i) => (
           <tr key={joint.name}>
@@ -177,7 +183,11 @@ function Masses({ mechanism }: { mechanism: MechanismInfo }) {
           <tr key={row.name} title={[row.note, row.source].filter(Boolean).join("; ")}>
             <th scope="row">{row.name}</th>
             <td>
-              {row.mass === null ? <span class="unknown">unknown</span> : formatQuantity(row.mass, "kg")}
+              {row.mass === null ? (
+                <span class="unknown">{said("unknown")}</span>
+              ) : (
+                formatQuantity(row.mass, "kg")
+              )}
             </td>
             <td>
               <span class="origin">
@@ -194,7 +204,7 @@ function Masses({ mechanism }: { mechanism: MechanismInfo }) {
 }
 
 function JointBar({ joint, q }: { joint: JointInfo; q: number | undefined }) {
-  if (joint.lower === null || joint.upper === null) return <span class="unknown">no limits</span>;
+  if (joint.lower === null || joint.upper === null) return <span class="unknown">{said("no limits")}</span>;
   const share = q === undefined ? null : (q - joint.lower) / (joint.upper - joint.lower);
   const title = `${formatJoint(joint.lower, joint.unit)} to ${formatJoint(joint.upper, joint.unit)}`;
   return (
@@ -212,11 +222,11 @@ function CriterionProperties({ run, name }: { run: Scene; name: string }) {
       <h2>{info.name}</h2>
       <p>{info.title}</p>
       <dl>
-        <dt>Kind</dt>
+        <dt>{said("Kind")}</dt>
         <dd>{info.kind}</dd>
-        <dt>Speaks of</dt>
+        <dt>{said("Speaks of")}</dt>
         <dd>{info.subjects.join(", ") || "the whole workstation"}</dd>
-        <dt>Limit</dt>
+        <dt>{said("Limit")}</dt>
         <dd>
           {info.limit === null
             ? "none in the file"

@@ -2,6 +2,7 @@
 
 import { useEffect, useRef } from "preact/hooks";
 import { ask, draft, refused } from "../editing/draft";
+import { said } from "../words";
 import { MistakeList } from "./MistakeList";
 
 const LOOKS: Record<string, string> = { "+": "added", "-": "removed", "@": "place" };
@@ -19,9 +20,9 @@ export function Review({ open, close }: { open: boolean; close: () => void }) {
   };
   return (
     <dialog ref={dialog} class="review" aria-labelledby="review-title" onClose={close}>
-      <h2 id="review-title">What changes in {now?.file}</h2>
+      <h2 id="review-title">{said("What changes in {file}", { file: now?.file ?? "" })}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls can be reached by keys */}
-      <section class="scroll" tabIndex={0} aria-label="Changes">
+      <section class="scroll" tabIndex={0} aria-label={said("Changes")}>
         <pre>
           {lines.map((line, k) => (
             <span key={k} class={LOOKS[line[0] ?? ""] ?? ""}>
@@ -34,10 +35,10 @@ export function Review({ open, close }: { open: boolean; close: () => void }) {
       {open && <MistakeList mistakes={refused.value?.mistakes ?? []} keys />}
       <div class="edit-bar">
         <button type="button" class="primary" onClick={() => void finish("save")}>
-          Save
+          {said("Save")}
         </button>
         <button type="button" onClick={() => void finish("discard")}>
-          Discard
+          {said("Discard")}
         </button>
         <button type="button" onClick={close}>
           Go on editing

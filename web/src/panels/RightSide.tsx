@@ -2,6 +2,7 @@
 
 import { useSignal } from "@preact/signals";
 import { mayEdit } from "../editing/draft";
+import { said, word } from "../words";
 import { BodyMap } from "./BodyMap";
 import { CriteriaTable } from "./CriteriaTable";
 import { Editor } from "./Editor";
@@ -12,11 +13,11 @@ const TABS = ["edit", "criteria", "body", "posture", "findings"] as const;
 type Tab = (typeof TABS)[number];
 
 const TITLES: Record<Tab, string> = {
-  edit: "Edit",
-  criteria: "Criteria",
-  body: "Body",
-  posture: "Posture",
-  findings: "Findings",
+  edit: word("Edit"),
+  criteria: word("Criteria"),
+  body: word("Body"),
+  posture: word("Posture"),
+  findings: word("Findings"),
 };
 
 export function RightSide() {
@@ -27,11 +28,11 @@ export function RightSide() {
     tab.value = name;
   };
   return (
-    <aside class="right" aria-label="Results">
+    <aside class="right" aria-label={said("Results")}>
       <div
         class="tabs"
         role="tablist"
-        aria-label="Results"
+        aria-label={said("Results")}
         onKeyDown={(event) => turn(event, tabs, shown, open)}
       >
         {tabs.map((name) => (
@@ -45,7 +46,7 @@ export function RightSide() {
             tabIndex={shown === name ? 0 : -1}
             onClick={() => open(name)}
           >
-            {TITLES[name]}
+            {said(TITLES[name])}
             {name === "findings" && <FindingCount />}
           </button>
         ))}
@@ -57,7 +58,7 @@ export function RightSide() {
         {shown === "posture" && <Posture />}
         {shown === "findings" && <Findings />}
       </div>
-      <p class="disclaimer">Evaluation of a model, to be confirmed by measurement.</p>
+      <p class="disclaimer">{said("Evaluation of a model, to be confirmed by measurement.")}</p>
     </aside>
   );
 }
@@ -82,11 +83,14 @@ function turn(event: KeyboardEvent, tabs: readonly Tab[], shown: Tab, open: (nam
 function FindingCount() {
   const findings = allFindings();
   const warnings = findings.filter((finding) => finding.level !== "note").length;
-  const said = `${warnings} warnings and assumptions, ${findings.length - warnings} notes`;
+  const counts = said("{warnings} warnings and assumptions, {notes} notes", {
+    warnings,
+    notes: findings.length - warnings,
+  });
   return (
     <>
       {" "}
-      <span class={warnings > 0 ? "count count-warn" : "count"} title={said}>
+      <span class={warnings > 0 ? "count count-warn" : "count"} title={counts}>
         {warnings > 0 ? `! ${findings.length}` : findings.length}
       </span>
     </>

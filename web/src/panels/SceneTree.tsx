@@ -5,6 +5,7 @@ import { doubtAmong, doubts } from "../doubts";
 import { shortName } from "../format";
 import { hidden, scene, select, selectedNodes, selection, toggleHidden } from "../page_state";
 import type { Node } from "../wire";
+import { said, word } from "../words";
 import { Icon } from "./Icon";
 
 const ROLES: readonly [role: string, title: string][] = [
@@ -33,13 +34,13 @@ export function SceneTree() {
   const known = new Set(ROLES.map(([role]) => role));
   roles.push({ title: "Other", owners: owners.value.filter((o) => !known.has(o.role)) });
   return (
-    <section class="tree" aria-label="Scene">
+    <section class="tree" aria-label={said("Scene")}>
       <label class="search">
         <Icon name="search" />
         <input
           type="search"
-          placeholder="Filter by name"
-          aria-label="Filter the scene by name"
+          placeholder={said("Filter by name")}
+          aria-label={said("Filter the scene by name")}
           value={search.value}
           onInput={(event) => {
             search.value = event.currentTarget.value;
@@ -59,7 +60,7 @@ export function SceneTree() {
               </ul>
             </div>
           ))}
-        {owners.value.length === 0 && <p class="empty">Nothing of that name.</p>}
+        {owners.value.length === 0 && <p class="empty">{said("Nothing of that name.")}</p>}
       </div>
     </section>
   );
@@ -83,7 +84,7 @@ function OwnerItem({ owner, open }: { owner: Owner; open: boolean }) {
             type="button"
             class={`twist ${shown ? "open" : ""}`}
             aria-expanded={shown}
-            aria-label={`${shown ? "Fold" : "Unfold"} ${owner.name}`}
+            aria-label={said(shown ? word("Fold {name}") : word("Unfold {name}"), { name: owner.name })}
             onClick={() => {
               expanded.value = !expanded.value;
             }}
@@ -143,8 +144,8 @@ function DoubtSign({ nodes }: { nodes: readonly Node[] }) {
     <span
       class="doubt"
       role="img"
-      aria-label={`may be elsewhere: ${reason}`}
-      title={`May be elsewhere: ${reason}`}
+      aria-label={said("may be elsewhere: {reason}", { reason })}
+      title={said("may be elsewhere: {reason}", { reason })}
     >
       ?
     </span>
@@ -157,7 +158,7 @@ function EyeButton({ names, label }: { names: string[]; label: string }) {
     <button
       type="button"
       class={`eye ${off ? "off" : ""}`}
-      aria-label={`${off ? "Show" : "Hide"} ${label}`}
+      aria-label={said(off ? word("Show {name}") : word("Hide {name}"), { name: label })}
       onClick={() => toggleHidden(names)}
     >
       <Icon name={off ? "eye-off" : "eye"} />

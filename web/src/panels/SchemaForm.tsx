@@ -4,6 +4,7 @@ import { useSignal } from "@preact/signals";
 import { useId } from "preact/hooks";
 import { mistakesAt, names, type Path, type Table } from "../editing/draft";
 import { type Field, fields, given, type Schema } from "../editing/schema";
+import { said } from "../words";
 import { MistakeList } from "./MistakeList";
 
 /** What nearly everybody gives, where it may be given. */
@@ -33,14 +34,14 @@ export function SchemaForm({ schema, table, path, without = [], onChange }: Form
       ))}
       {rest.length > 0 && (
         <select
-          aria-label="Another option"
+          aria-label={said("Another option")}
           value=""
           onChange={(event) => {
             more.value = new Set([...more.value, event.currentTarget.value]);
             event.currentTarget.value = "";
           }}
         >
-          <option value="">another option …</option>
+          <option value="">{said("another option …")}</option>
           {rest.map((field) => (
             <option key={field.name} value={field.name}>
               {field.name}

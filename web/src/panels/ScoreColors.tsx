@@ -2,6 +2,7 @@
 
 import { coloring, palette } from "../posture/coloring";
 import { COLORINGS, type Coloring, cssColor, PALETTES, type Palette, scaleColor } from "../posture/scores";
+import { said } from "../words";
 
 const TITLES: Record<Coloring, string> = { parts: "Body parts", overall: "Overall", verdict: "Verdicts" };
 const STEPS = [0, 0.25, 0.5, 0.75, 1];
@@ -9,7 +10,7 @@ const STEPS = [0, 0.25, 0.5, 0.75, 1];
 export function ColoringChoice() {
   return (
     <fieldset class="choice">
-      <legend>Colour the manikin by</legend>
+      <legend>{said("Colour the manikin by")}</legend>
       {COLORINGS.map((key) => (
         <button
           key={key}
@@ -40,11 +41,11 @@ export function ScaleBar() {
 export function PaletteChoice() {
   return (
     <label class="scale-choice">
-      <span class="unit">best</span>
+      <span class="unit">{said("best")}</span>
       <ScaleBar />
-      <span class="unit">worst</span>
+      <span class="unit">{said("worst")}</span>
       <select
-        aria-label="Colours from the best to the worst score"
+        aria-label={said("Colours from the best to the worst score")}
         value={palette.value}
         onChange={(event) => {
           palette.value = event.currentTarget.value as Palette;

@@ -5,15 +5,16 @@ import { formatFixed } from "../format";
 import { palette } from "../posture/coloring";
 import { type Component, cssColor, scaleColor, shareOfScale, TOTAL } from "../posture/scores";
 import type { Aspect, Row } from "../wire";
+import { said } from "../words";
 
 export function ScoreTable({ parts }: { parts: readonly Component[] }) {
   return (
     <table class="scores">
       <thead>
         <tr>
-          <th scope="col">Component</th>
-          <th scope="col">Left</th>
-          <th scope="col">Right</th>
+          <th scope="col">{said("Component")}</th>
+          <th scope="col">{said("Left")}</th>
+          <th scope="col">{said("Right")}</th>
         </tr>
       </thead>
       <tbody>

@@ -2,17 +2,18 @@
 
 import { stale } from "../page_state";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
+import { said, word } from "../words";
 
 /** @param brief Whether the word is only for those who hear it. */
 export function StateBadge({ state, brief = false }: { state: State; brief?: boolean }) {
   const old = stale.value;
-  const word = old ? "stale" : STATE_WORDS[state];
+  const verdict = said(old ? word("stale") : STATE_WORDS[state]);
   return (
-    <span class={`badge state-${old ? "off" : state}`} title={brief ? word : undefined}>
+    <span class={`badge state-${old ? "off" : state}`} title={brief ? verdict : undefined}>
       <span class="badge-icon" aria-hidden="true">
         {old ? "–" : STATE_ICONS[state]}
       </span>
-      {brief ? <span class="visually-hidden">{word}</span> : word}
+      {brief ? <span class="visually-hidden">{verdict}</span> : verdict}
     </span>
   );
 }

@@ -9,6 +9,7 @@ import { drawLanes, LANE_PX } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
 import { theme } from "../theme";
+import { said } from "../words";
 import { useActions } from "./app_context";
 
 export function Timeline() {
@@ -71,7 +72,7 @@ export function Timeline() {
           style={{ height: `${Math.max(1, names.length) * LANE_PX}px` }}
           tabIndex={0}
           role="slider"
-          aria-label="Time cursor"
+          aria-label={said("Time cursor")}
           aria-valuemin={start}
           aria-valuemax={end}
           aria-valuenow={Number.isFinite(now.value) ? now.value : start}

@@ -19,6 +19,7 @@ import {
 import { orderedRows } from "../row_order";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
 import type { Result } from "../wire";
+import { said, word } from "../words";
 import { ElsewhereNote } from "./ElsewhereNote";
 import { HeadsetOffer } from "./HeadsetOffer";
 
@@ -32,7 +33,7 @@ export function TopBar() {
       </div>
       <div class="study">
         <h1 title={run?.title}>{run?.title ?? "…"}</h1>
-        {run && <span class="edition">{run.edition || "no edition stated"}</span>}
+        {run && <span class="edition">{run.edition || said("no edition stated")}</span>}
       </div>
       <HeadsetOffer />
       <SourceState />
@@ -45,18 +46,18 @@ function SourceState() {
   const { state, reason } = link.value;
   const lost = state !== "open";
   const words = {
-    connecting: "connecting…",
-    lost: "disconnected – trying again",
-    refused: "refused",
+    connecting: said("connecting…"),
+    lost: said("disconnected – trying again"),
+    refused: said("refused"),
     open: notRun.value
-      ? "editing"
+      ? said("editing")
       : isLive.value
         ? stale.value
-          ? "live – nothing heard"
+          ? said("live – nothing heard")
           : onTrial.value
-            ? "live – a draft, not recorded"
-            : "live"
-        : "replay",
+            ? said("live – a draft, not recorded")
+            : said("live")
+        : said("replay"),
   }[state];
   const look = lost || stale.value ? "off" : isLive.value ? "live" : "replay";
   return (
@@ -69,12 +70,12 @@ function SourceState() {
 }
 
 const HEADLINES: Record<State, string> = {
-  exceeded: "LIMIT EXCEEDED",
-  undecided: "UNDECIDED",
-  missing: "UNDECIDED",
-  close: "WITHIN LIMITS, CLOSE",
-  within: "WITHIN LIMITS",
-  none: "NO LIMITS SET",
+  exceeded: word("LIMIT EXCEEDED"),
+  undecided: word("UNDECIDED"),
+  missing: word("UNDECIDED"),
+  close: word("WITHIN LIMITS, CLOSE"),
+  within: word("WITHIN LIMITS"),
+  none: word("NO LIMITS SET"),
 };
 
 /**
@@ -88,7 +89,7 @@ function StatusPill() {
         <span class="badge-icon" aria-hidden="true">
           –
         </span>
-        <strong>NO CURRENT DATA</strong>
+        <strong>{said("NO CURRENT DATA")}</strong>
       </output>
     );
   }
@@ -98,7 +99,7 @@ function StatusPill() {
         <span class="badge-icon" aria-hidden="true">
           –
         </span>
-        <strong>NOT RUN</strong>
+        <strong>{said("NOT RUN")}</strong>
         <AtInstant />
       </output>
     );
@@ -112,17 +113,21 @@ function StatusPill() {
         {STATE_ICONS[run]}
       </span>
       <strong>
-        {HEADLINES[run]}
-        {told?.whole !== true && " SO FAR"}
-        {onTrial.value && ", DRAFT"}
+        {said(HEADLINES[run])}
+        {told?.whole !== true && ` ${said("SO FAR")}`}
+        {onTrial.value && `, ${said("DRAFT")}`}
       </strong>
-      {run === "within" && <span class="pill-more">all {judgedCount()} with a limit</span>}
+      {run === "within" && (
+        <span class="pill-more">{said("all {n} with a limit", { n: judgedCount() })}</span>
+      )}
       {run === "within" && told?.decided != null && told.decided < 1 && (
-        <span class="pill-more">decided {percent(told.decided)}</span>
+        <span class="pill-more">
+          {said("decided")} {percent(told.decided)}
+        </span>
       )}
       <AtInstant />
       {other && <ElsewhereNote other={other} />}
-      {lookingAt.value !== null && <span class="pill-more">looking back</span>}
+      {lookingAt.value !== null && <span class="pill-more">{said("looking back")}</span>}
     </output>
   );
 }
@@ -133,10 +138,14 @@ function AtInstant() {
   const there = orderedRows.value.filter((row) => row.state === state);
   const worst = there[0];
   const named = worst && state !== "within" && state !== "none";
-  const when = notRun.value ? "at the start" : isLive.value && lookingAt.value === null ? "now" : "here";
+  const when = notRun.value
+    ? said("at the start")
+    : isLive.value && lookingAt.value === null
+      ? said("now")
+      : said("here");
   return (
     <span class={`pill-now now-${state}`}>
-      {when} <span aria-hidden="true">{STATE_ICONS[state]}</span> {STATE_WORDS[state]}
+      {when} <span aria-hidden="true">{STATE_ICONS[state]}</span> {said(STATE_WORDS[state])}
       {named && (
         <span class="pill-detail" title={worst.info.name}>
           {` ${worst.info.name}`}

@@ -5,6 +5,7 @@ import { formatTime } from "../format";
 import { tradeColumns, tradeRows } from "../posture/instants";
 import { STATE_ICONS } from "../verdicts";
 import type { CriterionInfo } from "../wire";
+import { said } from "../words";
 import { type Instant, verdictOf } from "../worst_instant";
 import { useActions } from "./app_context";
 
@@ -15,12 +16,12 @@ export function TradeTable() {
   if (rows.length === 0 || !columns.some((c) => c.group !== "ergonomics")) return null;
   return (
     <div class="trade">
-      <h2>Posture against separation</h2>
+      <h2>{said("Posture against separation")}</h2>
       <div class="trade-scroll">
         <table>
           <thead>
             <tr>
-              <th scope="col">At</th>
+              <th scope="col">{said("At")}</th>
               {columns.map(({ name, unit }) => (
                 <th scope="col" key={name} class="number" title={name}>
                   {name}

@@ -3,6 +3,7 @@
 import { formatTime } from "../format";
 import { isLive, lookingAt, mayControl, now, reach, scene, stale, transport } from "../page_state";
 import { SPEEDS } from "../time_control";
+import { said, word } from "../words";
 import { useActions } from "./app_context";
 import { Icon, type IconName } from "./Icon";
 
@@ -11,17 +12,21 @@ export function TransportBar() {
   const { playing, speed, loop } = transport.value;
   const moving = isLive.value ? lookingAt.value === null : playing;
   return (
-    <div class="transport" role="toolbar" aria-label="Time">
-      <TransportButton icon="previous" title="Previous violation ([)" act={() => time.violation(false)} />
-      <TransportButton icon="back" title="One step back (←)" act={() => time.step(-1)} />
+    <div class="transport" role="toolbar" aria-label={said("Time")}>
+      <TransportButton
+        icon="previous"
+        title={said("Previous violation ([)")}
+        act={() => time.violation(false)}
+      />
+      <TransportButton icon="back" title={said("One step back (←)")} act={() => time.step(-1)} />
       <TransportButton
         icon={moving ? "pause" : "play"}
-        title={`${moving ? "Pause" : "Play"} (space)`}
+        title={said(moving ? word("Pause (space)") : word("Play (space)"))}
         act={() => time.toggle()}
         strong
       />
-      <TransportButton icon="ahead" title="One step ahead (→)" act={() => time.step(1)} />
-      <TransportButton icon="next" title="Next violation (])" act={() => time.violation(true)} />
+      <TransportButton icon="ahead" title={said("One step ahead (→)")} act={() => time.step(1)} />
+      <TransportButton icon="next" title={said("Next violation (])")} act={() => time.violation(true)} />
       <span class="clock">
         <strong>{formatTime(now.value)}</strong>
         {!isLive.value && <span> / {formatTime(reach.value.end)}</span>}
@@ -31,7 +36,7 @@ export function TransportBar() {
           type="button"
           class={`live-button ${lookingAt.value === null && !stale.value ? "on" : ""}`}
           aria-pressed={lookingAt.value === null}
-          title="Follow the newest (L)"
+          title={said("Follow the newest (L)")}
           onClick={() => time.follow()}
         >
           <span class="dot" aria-hidden="true" /> LIVE
@@ -39,7 +44,7 @@ export function TransportBar() {
       ) : (
         <>
           <select
-            aria-label="Speed"
+            aria-label={said("Speed")}
             disabled={!mayControl.value}
             value={String(speed)}
             onChange={(event) => time.speed(Number(event.currentTarget.value))}
@@ -54,20 +59,24 @@ export function TransportBar() {
             type="button"
             class={loop ? "on" : ""}
             aria-pressed={loop}
-            aria-label="Loop"
+            aria-label={said("Loop")}
             disabled={!mayControl.value}
-            title="Start again at the end"
+            title={said("Start again at the end")}
             onClick={() => time.loop(!loop)}
           >
             <Icon name="loop" />
           </button>
         </>
       )}
-      {!mayControl.value && <span class="only-look">looks on: whoever may control it plays</span>}
+      {!mayControl.value && <span class="only-look">{said("looks on: whoever may control it plays")}</span>}
       {lookingAt.value !== null && (
-        <span class="behind">{formatTime(reach.value.end - lookingAt.value)} behind live</span>
+        <span class="behind">
+          {said("{time} behind live", { time: formatTime(reach.value.end - lookingAt.value) })}
+        </span>
       )}
-      {scene.value && <span class="tick">tick {Math.round(scene.value.period * 1e5) / 100} ms</span>}
+      {scene.value && (
+        <span class="tick">{said("tick {ms} ms", { ms: Math.round(scene.value.period * 1e5) / 100 })}</span>
+      )}
     </div>
   );
 }

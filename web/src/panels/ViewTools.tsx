@@ -5,16 +5,17 @@ import { mayEdit } from "../editing/draft";
 import { measuring, toggleMeasure } from "../editing/measure";
 import { scene } from "../page_state";
 import type { Preset } from "../scene/viewpoint";
+import { said, word } from "../words";
 import { useActions } from "./app_context";
 import { Icon } from "./Icon";
 import { OverlayList } from "./OverlayList";
 
 const PRESETS: readonly [Preset, string][] = [
-  ["corner", "3D"],
-  ["front", "Front"],
-  ["side", "Side"],
-  ["top", "Top"],
-  ["operator", "Operator"],
+  ["corner", word("3D")],
+  ["front", word("Front")],
+  ["side", word("Side")],
+  ["top", word("Top")],
+  ["operator", word("Operator")],
 ];
 
 export function ViewTools() {
@@ -24,16 +25,16 @@ export function ViewTools() {
   return (
     <div class="view-tools">
       <fieldset class="tools">
-        <legend class="visually-hidden">Viewpoint</legend>
+        <legend class="visually-hidden">{said("Viewpoint")}</legend>
         {PRESETS.filter(([preset]) => preset !== "operator" || person).map(([preset, title]) => (
           <button key={preset} type="button" onClick={() => actions.look(preset)}>
-            {title}
+            {said(title)}
           </button>
         ))}
         <button
           type="button"
-          title="Frame the selection (F)"
-          aria-label="Frame the selection"
+          title={said("Frame the selection (F)")}
+          aria-label={said("Frame the selection")}
           onClick={() => actions.frameSelection()}
         >
           <Icon name="frame" />
@@ -43,11 +44,11 @@ export function ViewTools() {
         <div class="tools">
           <button
             type="button"
-            title="Distance of two surfaces (D); Escape ends it"
+            title={said("Distance of two surfaces (D); Escape ends it")}
             aria-pressed={measuring.value !== null}
             onClick={toggleMeasure}
           >
-            Measure
+            {said("Measure")}
           </button>
         </div>
       )}
@@ -60,17 +61,17 @@ export function ViewTools() {
           event.stopPropagation();
         }}
       >
-        <legend class="visually-hidden">Overlays</legend>
+        <legend class="visually-hidden">{said("Overlays")}</legend>
         <button
           type="button"
-          title="What is drawn by which criterion (1 to 9)"
+          title={said("What is drawn by which criterion (1 to 9)")}
           aria-expanded={open.value}
           aria-controls="overlays"
           onClick={() => {
             open.value = !open.value;
           }}
         >
-          <Icon name="layers" /> Overlays
+          <Icon name="layers" /> {said("Overlays")}
         </button>
         {open.value && <OverlayList />}
       </fieldset>

@@ -11,16 +11,17 @@ from seerob.description.humans.skeleton import BONES
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.report.report import UNKNOWN, WHO, Report, Setup
 from seerob.outputs.sentences import grouped, number
+from seerob.outputs.words import said
 from seerob.recording.bone_errors import BoneErrors
 
 
 def assumed(report: Report) -> Html:
     """What was found while the model was built."""
     if not report.findings:
-        return tag("p", "Nothing was assumed, repaired or found odd.")
+        return tag("p", said("Nothing was assumed, repaired or found odd."))
     marks = {"note": "note", "assumed": "! assumed", "warning": "! warning"}
     rows = [[f.subject, whole(marks.get(f.level, f.level)), f.text] for f in grouped(report.findings)]
-    return table(["about", "kind", "what was found while the model was built"], rows)
+    return table([said("about"), said("kind"), said("what was found while the model was built")], rows)
 
 
 def not_covered(report: Report) -> Html:
@@ -37,16 +38,23 @@ def not_covered(report: Report) -> Html:
         [
             tag(
                 "p",
-                "A twin shows the motion that it was given. Another program, another person, a failing part "
-                "or a control system that reacts differently are other runs. Stopping times and distances, "
-                "contact forces and pressures, and the response of protective devices are properties of the "
-                "real machine: measure them there.",
+                said(
+                    "A twin shows the motion that it was given. Another program, another person, a failing "
+                    "part or a control system that reacts differently are other runs. Stopping times and "
+                    "distances, contact forces and pressures, and the response of protective devices are "
+                    "properties of the real machine: measure them there."
+                ),
             ),
-            tag("p", f"Still to be decided by other means: {', '.join(silent)}.", class_="doubt")
+            tag(
+                "p",
+                said("Still to be decided by other means: {names}.", names=", ".join(silent)),
+                class_="doubt",
+            )
             if silent
             else None,
             table(
-                ["criterion", "leaves out"], [[names, "; ".join(items)] for names, items in left_out.items()]
+                [said("criterion"), said("leaves out")],
+                [[names, "; ".join(items)] for names, items in left_out.items()],
             )
             if left_out
             else None,
@@ -83,20 +91,21 @@ def evaluated(report: Report) -> Html:
         mass = f" {number(node.mass, 'kg')}" if node.mass is not None else ""
         alike.setdefault((node.role, node.mass_origin, node.note), []).append(f"{node.name}{mass}")
     bodies = [
-        ["; ".join(names), role, WHO[origin], note or "–"] for (role, origin, note), names in alike.items()
+        ["; ".join(names), role, said(WHO[origin]), note or "–"]
+        for (role, origin, note), names in alike.items()
     ]
     heads = ["source", "drives", "from", "what it is", "time-out", "at its end"]
     return joined(
         [
             table(["", ""], facts),
             bone_errors(log.bones),
-            tag("h4", "Sources"),
+            tag("h4", said("Sources")),
             _sources(heads, how),
-            tag("h4", "With what"),
+            tag("h4", said("With what")),
             table(["", ""], written),
-            tag("h4", "Input files") if files else None,
+            tag("h4", said("Input files")) if files else None,
             table(["file", "size", "SHA-256"], files) if files else None,
-            tag("h4", "Bodies of the twin"),
+            tag("h4", said("Bodies of the twin")),
             table(["bodies and masses", "role", "mass is", "geometry"], bodies),
             masses(scene),
         ]
@@ -145,7 +154,7 @@ def bone_errors(people: Mapping[str, BoneErrors]) -> Html | None:
         "How far the twin's bones are from where the devices see them: fit of the person's lengths, "
         "the controllers, and contacts together. Percentiles are good to half a per cent of themselves."
     )
-    return joined([tag("h4", "Tracking of bones"), table(head, rows), tag("p", text, class_="lead")])
+    return joined([tag("h4", said("Tracking of bones")), table(head, rows), tag("p", text, class_="lead")])
 
 
 HEAD = ("link or thing", "mass", "mass is", "moves", "moves as one with", "from, or why")

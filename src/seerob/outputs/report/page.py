@@ -18,6 +18,7 @@ from seerob.outputs.report.posture_safety import posture_safety_section
 from seerob.outputs.report.report import DOUBTFUL, Report, ReportSection, ReportTable, badge, grouped_inputs
 from seerob.outputs.report.time_shares import spread_over_time
 from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
+from seerob.outputs.words import said, speaking, spoken, word
 from seerob.recording.series import Series
 
 STYLE = f"""
@@ -154,19 +155,24 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-ur
 
 
 def page(report: Report) -> str:
-    """The whole document."""
+    """The whole document, in the language that the file asks for."""
+    with speaking(report.setup.cover.language):
+        return _page(report)
+
+
+def _page(report: Report) -> str:
     scene = report.scene
-    title = f"Evaluation of {scene.title}"
+    title = said("Evaluation of {title}", title=scene.title)
     sections = [
-        ("Verdicts", _verdicts(report)),
-        ("Criterion by criterion", _criteria(report)),
-        ("Posture against safety", posture_safety_section(scene, report.log)),
-        ("What happened to workpieces", events_section(report.log)),
+        (word("Verdicts"), _verdicts(report)),
+        (word("Criterion by criterion"), _criteria(report)),
+        (word("Posture against safety"), posture_safety_section(scene, report.log)),
+        (word("What happened to workpieces"), events_section(report.log)),
         *((section.title, _section(section)) for section in report.sections),
-        ("What is not covered and must be measured", not_covered(report)),
-        ("What was assumed, and by whom", assumed(report)),
-        ("Where the figures come from", _origins(report)),
-        ("What was evaluated", evaluated(report)),
+        (word("What is not covered and must be measured"), not_covered(report)),
+        (word("What was assumed, and by whom"), assumed(report)),
+        (word("Where the figures come from"), _origins(report)),
+        (word("What was evaluated"), evaluated(report)),
     ]
     written = [(name, content) for name, content in sections if content]
     body = tag(
@@ -174,7 +180,10 @@ def page(report: Report) -> str:
         _cover(report, title, [name for name, _ in written]),
         [
             tag(
-                "div", tag("h2", name, id=_place(k)), content, class_="appendix" if name in APPENDIX else None
+                "div",
+                tag("h2", said(name), id=_place(k)),
+                content,
+                class_="appendix" if name in APPENDIX else None,
             )
             for k, (name, content) in enumerate(written)
         ],
@@ -193,10 +202,10 @@ def document(title: str, body: Html) -> str:
         tag("title", title),
         tag("style", Html(STYLE)),
     )
-    return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en") + "\n"
+    return "<!DOCTYPE html>\n" + tag("html", head, body, lang=spoken()) + "\n"
 
 
-_SHARES = (
+_SHARES = word(
     "Shares are of the run's time. Decided is what was within or exceeded; what is left of it was undecided, "
     "or a criterion did not apply (muted, nobody near)."
 )
@@ -214,23 +223,23 @@ def _cover(report: Report, title: str, contents: Sequence[str]) -> Html:
     """The first page: what, for whom, by whom, when; the verdict, what to do, and what is where."""
     scene, cover = report.scene, report.setup.cover
     facts = {
-        "customer": cover.customer,
-        "author": cover.author,
-        "revision": cover.revision,
-        "written": f"{report.date}, by seerob {scene.version}",
-        "figures from": scene.edition,
-        "inputs, SHA-256": scene.workstation_hash,
+        word("customer"): cover.customer,
+        word("author"): cover.author,
+        word("revision"): cover.revision,
+        word("written"): said("{date}, by seerob {version}", date=report.date, version=scene.version),
+        word("figures from"): scene.edition,
+        word("inputs, SHA-256"): scene.workstation_hash,
     }
     return tag(
         "div",
         _logo(report),
         tag("h1", title),
-        tag("dl", [[tag("dt", name), tag("dd", text)] for name, text in facts.items() if text]),
+        tag("dl", [[tag("dt", said(name)), tag("dd", text)] for name, text in facts.items() if text]),
         _opening(report),
-        tag("h4", "What to do"),
+        tag("h4", said("What to do")),
         tag("ul", [tag("li", text) for text in to_do(report)]),
-        tag("h4", "Contents"),
-        tag("ol", [tag("li", tag("a", name, href=f"#{_place(k)}")) for k, name in enumerate(contents)]),
+        tag("h4", said("Contents")),
+        tag("ol", [tag("li", tag("a", said(name), href=f"#{_place(k)}")) for k, name in enumerate(contents)]),
         class_="cover",
     )
 
@@ -261,33 +270,46 @@ def to_do(report: Report) -> list[str]:
     for series in report.log.ranked():
         if series.verdict is Verdict.EXCEEDED:
             worst = series.worst()
-            what = f"{reached(worst, series)} at {worst.t:.2f} s, {_limit(series)} is admissible"
-            exceeded.append(f"Change the cell, its motion or its task: {series.name} is {what}.")
+            exceeded.append(
+                said(
+                    "Change the cell, its motion or its task: {name} is {value} at {t} s, {limit} is "
+                    "admissible.",
+                    name=series.name, value=reached(worst, series), t=f"{worst.t:.2f}", limit=_limit(series),
+                )
+            )  # fmt: skip
         elif series.verdict is Verdict.UNDECIDED:
-            reason = (series.worst().reason if series.known else "") or "it was not decided all the time"
-            undecided.append(f"Give what is not known: {series.name}: {reason}.")
+            reason = (series.worst().reason if series.known else "") or said(
+                "it was not decided all the time"
+            )
+            undecided.append(
+                said("Give what is not known: {name}: {reason}.", name=series.name, reason=reason)
+            )
     texts = []
     for each in (exceeded, undecided):
         more = len(each) - _LISTED
-        texts += [*each[:_LISTED], *([f"And {more} more, below."] if more > 0 else [])]
+        texts += [*each[:_LISTED], *([said("And {n} more, below.", n=more)] if more > 0 else [])]
     inputs = (item for basis in report.bases.values() for item in basis.inputs)
     doubtful = {(item.name, item.origin) for item in inputs if item.origin in DOUBTFUL}
     if doubtful:
-        number = "one input" if len(doubtful) == 1 else f"{len(doubtful)} inputs"
-        texts.append(f"Measure or state {number} that nobody did, marked among where the figures come from.")
+        texts.append(
+            said(
+                "Measure or state inputs that nobody did ({n}), marked among where the figures come from.",
+                n=len(doubtful),
+            )
+        )
     return [
         *texts,
-        "Measure at the real workstation what no twin can tell, listed under what is not covered.",
+        said("Measure at the real workstation what no twin can tell, listed under what is not covered."),
     ]
 
 
 def _opening(report: Report) -> Html:
     verdict = report.log.verdict
     head = {
-        Verdict.EXCEEDED: "At least one limit is exceeded.",
-        Verdict.UNDECIDED: "No limit was seen exceeded, but not everything could be decided.",
-        Verdict.WITHIN: "Every limit that was evaluated was kept in this run.",
-        None: "No limit was given, so there is no verdict.",
+        Verdict.EXCEEDED: said("At least one limit is exceeded."),
+        Verdict.UNDECIDED: said("No limit was seen exceeded, but not everything could be decided."),
+        Verdict.WITHIN: said("Every limit that was evaluated was kept in this run."),
+        None: said("No limit was given, so there is no verdict."),
     }[verdict]
     return joined(
         [
@@ -299,9 +321,11 @@ def _opening(report: Report) -> Html:
             ),
             tag(
                 "p",
-                "This is an evaluation in simulation of one run of one described workstation. It supports a "
-                "risk assessment; it neither replaces it nor the measurements at the real workstation. What "
-                "was assumed, and what must be measured, has its own section.",
+                said(
+                    "This is an evaluation in simulation of one run of one described workstation. It "
+                    "supports a risk assessment; it neither replaces it nor the measurements at the real "
+                    "workstation. What was assumed, and what must be measured, has its own section."
+                ),
                 class_="notice",
             ),
         ]
@@ -311,7 +335,11 @@ def _opening(report: Report) -> Html:
 def _unasked(report: Report) -> list[str]:
     """Whom and what no criterion asks about: the verdict does not speak of them."""
     names = [f.subject for f in report.scene.findings if f.text.startswith("not evaluated: ")]
-    return [f"The verdict says nothing of {listed(names)}: no criterion asks about that."] if names else []
+    return (
+        [said("The verdict says nothing of {names}: no criterion asks about that.", names=listed(names))]
+        if names
+        else []
+    )
 
 
 def _verdicts(report: Report) -> Html:
@@ -319,7 +347,7 @@ def _verdicts(report: Report) -> Html:
     for series in report.log.ranked():
         link = tag("a", series.name, href=f"#{_anchor(report, series)}")
         if not series.known:
-            rows.append([link, badge(series.verdict), *["–"] * 6, "never gave a result"])
+            rows.append([link, badge(series.verdict), *["–"] * 6, said("never gave a result")])
             continue
         worst, times = series.worst(), series.times()
         rows.append(
@@ -336,25 +364,25 @@ def _verdicts(report: Report) -> Html:
             ]
         )
     head = [
-        "criterion",
-        "verdict",
-        "worst value",
-        "limit",
-        "at",
-        "decided",
-        "exceeded",
-        "undecided",
-        "what governs, or why",
+        said("criterion"),
+        said("verdict"),
+        said("worst value"),
+        said("limit"),
+        said("at"),
+        said("decided"),
+        said("exceeded"),
+        said("undecided"),
+        said("what governs, or why"),
     ]
     shown = [s for s in report.log.ranked() if s.known]
     return joined(
         [
             table(head, rows, class_="overview"),
-            tag("p", _SHARES, class_="lead"),
+            tag("p", said(_SHARES), class_="lead"),
             tag(
                 "figure",
                 _plots.lanes(shown, salt="lanes"),
-                tag("figcaption", "The verdicts over the run."),
+                tag("figcaption", said("The verdicts over the run.")),
                 class_="lanes",
             )
             if shown
@@ -399,8 +427,10 @@ def _criteria(report: Report) -> Html:
 def _described(info: CriterionInfo | None) -> Html | None:
     if info is None:
         return None
-    about_ = f" Speaks of {', '.join(info.subjects)}." if info.subjects else ""
-    between = f" Between the instants at which it was asked: {info.between or 'bounded'}."
+    about_ = f" {said('Speaks of {names}.', names=', '.join(info.subjects))}" if info.subjects else ""
+    between = " " + said(
+        "Between the instants at which it was asked: {how}.", how=info.between or said("bounded")
+    )
     return tag("p", f"{info.title}{about_}{between}", class_="lead")
 
 
@@ -409,7 +439,7 @@ def _picture(report: Report, series: Series) -> Html | None:
     if png is None:
         return None
     worst = series.worst()
-    what = f"{reached(worst, series)} at {worst.t:.2f} s, its worst instant"
+    what = said("{value} at {t} s, its worst instant", value=reached(worst, series), t=f"{worst.t:.2f}")
     source = f"data:image/png;base64,{b64encode(png).decode()}"
     return tag("figure", tag("img", src=source, alt=f"{series.name}: {what}"), tag("figcaption", f"{what}."))
 
@@ -431,14 +461,18 @@ def _parts(series: Series) -> Html | None:
                 percent(shares.get(Verdict.UNDECIDED, 0.0)),
             ]
         )
-    head = ["part", "verdict", "worst value", "limit", "at", "exceeded", "undecided"]
-    text = "Shares are of the ticks in which the part was spoken of."
-    return joined([tag("h4", "By part"), table(head, rows, class_="parts"), tag("p", text, class_="lead")])
+    head = [
+        said(one) for one in (word("part"), "verdict", "worst value", "limit", "at", "exceeded", "undecided")
+    ]
+    text = said("Shares are of the ticks in which the part was spoken of.")
+    return joined(
+        [tag("h4", said("By part")), table(head, rows, class_="parts"), tag("p", text, class_="lead")]
+    )
 
 
 def _formula(basis: Basis | None) -> Html:
     if basis is None:
-        return tag("p", "The criterion did not say what its figure rests on.", class_="doubt")
+        return tag("p", said("The criterion did not say what its figure rests on."), class_="doubt")
     return joined([tag("p", basis.formula, class_="formula"), tag("p", basis.source, class_="lead")])
 
 
@@ -446,8 +480,8 @@ def _origins(report: Report) -> Html:
     """Every input of every criterion with where it comes from; what nobody measured or stated first."""
     items = [(name, item) for name, basis in report.bases.items() for item in basis.inputs]
     items.sort(key=lambda one: one[1].origin not in DOUBTFUL)
-    text = "What is marked ! nobody measured or stated: it is assumed, estimated or missing."
-    head = ["inputs", "criteria", "origin", "source"]
+    text = said("What is marked ! nobody measured or stated: it is assumed, estimated or missing.")
+    head = [said("inputs"), said("criteria"), said("origin"), said("source")]
     return (
         joined([tag("p", text), table(head, grouped_inputs(items), class_="inputs")]) if items else Html("")
     )

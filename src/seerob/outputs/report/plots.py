@@ -18,6 +18,7 @@ from seerob.core.snapshot import Verdict
 from seerob.core.transforms import Array
 from seerob.outputs.html import Html, tag
 from seerob.outputs.palette import DARK_HEX, HEX, MARK, WORD
+from seerob.outputs.words import said
 from seerob.recording.series import CODES, Series
 
 POINTS = 1500
@@ -92,16 +93,16 @@ def curve(series: Series, *, salt: str) -> Html:
     over.append(_line(x.at(t), y.at(values), _INK))
     if few:
         over += [_dot(a, b, 1.5, _INK) for a, b in _finite(x.at(t), y.at(values))]
-    legend.append(("value", [_stroke("M0,-2.5H16", _INK)]))
+    legend.append((said("value"), [_stroke("M0,-2.5H16", _INK)]))
     if len(known[1]):
         color = DARK_HEX[Verdict.EXCEEDED]
         over.append(_line(x.at(t), y.at(limits), color, dash=_DASH))
-        name = "limit (at most)" if series.at_most else "limit (at least)"
+        name = said("limit (at most)") if series.at_most else said("limit (at least)")
         legend.append((name, [_stroke("M0,-2.5H16", color, dash=_DASH)]))
     if worst.value is not None and shown:
         color = DARK_HEX[worst.verdict]
         over.append(_dot(x.place(worst.t), y.place(worst.value), 2.5, color))
-        legend.append((f"worst, {worst.t:.2f} s", [_dot(8, -2.5, 2.5, color)]))
+        legend.append((said("worst, {t} s", t=f"{worst.t:.2f}"), [_dot(8, -2.5, 2.5, color)]))
     unit = f"[{series.unit}]" if series.unit else ""
     middle = _number((y.begin + y.end) / 2)
     return _svg(

@@ -21,6 +21,7 @@ from seerob.core.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
 from seerob.outputs.html import Html, tag
 from seerob.outputs.palette import MARK, WORD
 from seerob.outputs.sentences import number
+from seerob.outputs.words import said, word
 from seerob.recording.result_log import ResultLog
 from seerob.workstation.source import Source
 from seerob.workstation.workstation import Engine, ReportCover
@@ -50,14 +51,14 @@ class ReportSection:
 
 DOUBTFUL = (Origin.ASSUMED, Origin.MISSING, Origin.ESTIMATED)
 WHO = {
-    Origin.MEASURED: "measured",
-    Origin.STATED: "stated by its source",
-    Origin.GIVEN: "given by the user",
-    Origin.COMPUTED: "computed",
-    Origin.ESTIMATED: "estimated",
-    Origin.CHOICE: "a choice of the method, by seerob",
-    Origin.ASSUMED: "assumed, nobody gave it",
-    Origin.MISSING: "missing",
+    Origin.MEASURED: word("measured"),
+    Origin.STATED: word("stated by its source"),
+    Origin.GIVEN: word("given by the user"),
+    Origin.COMPUTED: word("computed"),
+    Origin.ESTIMATED: word("estimated"),
+    Origin.CHOICE: word("a choice of the method, by seerob"),
+    Origin.ASSUMED: word("assumed, nobody gave it"),
+    Origin.MISSING: word("missing"),
 }
 
 
@@ -88,7 +89,7 @@ class Report:
 def badge(verdict: Verdict | None) -> Html:
     """Mark and word; colour comes third."""
     name = "none" if verdict is None else verdict.value
-    return tag("span", f"{MARK[verdict]} {WORD[verdict]}", class_=f"badge {name}")
+    return tag("span", f"{MARK[verdict]} {said(WORD[verdict])}", class_=f"badge {name}")
 
 
 def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]:
@@ -103,7 +104,8 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
         by: dict[str, list[str]] = {}
         for text, names in texts.items():
             by.setdefault(", ".join(names), []).append(text)
-        who = tag("span", f"! {WHO[origin]}", class_="doubt") if origin in DOUBTFUL else WHO[origin]
+        whose = said(WHO[origin])
+        who = tag("span", f"! {whose}", class_="doubt") if origin in DOUBTFUL else whose
         found += [["; ".join(each), criteria, who, source or "–"] for criteria, each in by.items()]
     return found
 

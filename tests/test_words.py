@@ -1,0 +1,63 @@
+"""Catalogues of page and report: each has every text, no other, with the same values in it."""
+
+import re
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+
+import pytest
+
+from seerob.core.snapshot import Verdict
+from seerob.outputs.palette import WORD
+from seerob.outputs.words import LANGUAGES, catalogue, said, speaking, spoken
+
+ROOT = Path(__file__).parents[1]
+LOADER = SourceFileLoader("missing_words", str(ROOT / "scripts/missing-words"))
+missing = module_from_spec(spec_from_loader("missing_words", LOADER))
+LOADER.exec_module(missing)
+OTHERS = LANGUAGES[1:]
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_a_catalogue_has_every_text_and_no_other(language):
+    assert missing.mistakes(language) == []
+    assert len(missing.needed()) > 300
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_three_verdicts_have_three_words_the_same_in_page_and_report(language):
+    with speaking(language):
+        report = [said(WORD[verdict]).lower() for verdict in Verdict]
+        page = [said(verdict.value) for verdict in Verdict]
+    assert report == page
+    assert len(set(report)) == 3
+    assert not set(report) & {verdict.value for verdict in Verdict}
+
+
+def test_what_is_spoken_ends_with_it_and_what_is_not_known_stays_english():
+    with speaking("de"):
+        assert spoken() == "de"
+        assert said("no such text, {n}", n=3) == "no such text, 3"
+    assert spoken() == "en"
+    assert said("{low} and {high}", low=1, high=2) == "1 and 2"
+
+
+def test_a_text_that_lacks_a_value_is_found(monkeypatch):
+    wrong = {**catalogue("de"), "at {time}": "um"}
+    del wrong["Time"]
+    monkeypatch.setattr(missing, "catalogue", lambda language: {**wrong, "Tmie": "Zeit"})
+    assert missing.mistakes("de") == ["missing: Time", "said nowhere: Tmie", "other values: at {time} → um"]
+
+
+def test_panels_say_nothing_past_the_catalogues():
+    """Text between tags, and titles and labels, of which a catalogue cannot know."""
+    found = []
+    for file in sorted((ROOT / "web/src/panels").glob("*.tsx")):
+        text = file.read_text()
+        for pattern in (
+            r'\s(?:title|aria-label|placeholder)="([^"]*[a-z]{3}[^"]*)"',
+            r">([A-Z][a-z]+[^<>{}=;()\n]*)</",
+        ):
+            found += [f"{file.name}: {each}" for each in re.findall(pattern, text)]
+    # Names of keys, and the panel of headsets.
+    assert [each for each in found if "Ctrl+" not in each and not each.startswith("HeadsetOffer")] == []

@@ -17,6 +17,7 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.safety.velocity import Velocity
 from seerob.recording.series import Series
 from seerob.session.permissible import evaluation
+from seerob.session.permissible.between_samples import motions_of
 from seerob.session.permissible.ceilings import By, Ceiling, Method
 from seerob.session.permissible.evaluation import PermissibleSpeed, Wish, either_permits, given_motion, mapped
 from seerob.session.permissible.joint_limits import JointLimits, joint_limits
@@ -576,6 +577,34 @@ def test_what_a_motion_and_its_path_leave_to_be_desired_is_a_finding(surveyed, p
         "velocities of the given motion are derived from its positions",
         "the given motion begins at 0.0105 rad/s or m/s; the rescaled one begins at rest",
     ]
+    qd[-1] = (0.0, -0.02)
+    assert "the given motion ends at 0.02 rad/s" in told(replace(MOTION, qd=qd), off)[-1][1]
+    for use, undecided, what in ((0.9, 0, None), (1.5, 0, "uses 1.5"), (0.9, 2, "be judged at 2 of 9")):
+        found = list(evaluation._between_stations(Verified(1e-3, 9, use, 0.0, "", undecided, ()), "arm"))
+        assert len(found) == (what is not None)
+        assert all(finding.level == "warning" and what in finding.text for finding in found)
+
+
+def test_motions_between_samples_are_those_of_the_files_or_the_rescaled_one(station, plan):
+    """None where a source gives anything but joint positions, fewer than two, or somebody has two sources."""
+    found = PermissibleSpeed(plan.of, MOTION, None, {}, None, plan, "", None, None, (), None, ())
+    given, anew = motions_of(station.sources), motions_of(station.sources, found)
+    assert {name: motion.t.tolist() for name, motion in given.items()} == {"arm": [0, 1, 2], "other": [0, 1]}
+    assert anew["other"].t.tolist() == [0, 1]
+    assert anew["arm"].t[-1] == plan.duration
+    assert np.diff(anew["arm"].t).max() == pytest.approx(0.008)
+    np.testing.assert_array_equal(anew["arm"].q, plan.at(anew["arm"].t)[0])
+    assert anew["arm"].good.all()
+    refused = replace(found, rescaled=None)
+    assert motions_of(station.sources, refused)["arm"].t.tolist() == [0, 1, 2]
+    arm, other = station.sources
+    assert motions_of([arm, other, other]) is None
+    assert motions_of([arm, (other[0], Opened(samples=[heard("other", 0.0, (0, 0))], duration=0.0))]) is None
+    pose = PoseSample(source="a", seq=0, target="other/tip", t=1.0, position=(2.0, 0, 0), wxyz=(1.0, 0, 0, 0))
+    mixed = [heard("other", 0.0, (0, 0)), heard("other", 0.5, (0, 0)), pose]
+    assert motions_of([arm, (other[0], Opened(samples=mixed, duration=1.0))]) is None
+    nobody = changed(other[0], robot="")
+    assert set(motions_of([arm, (nobody, other[1])])) == {"arm"}
 
 
 # -- where everybody was -------------------------------------------------------------------------

@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.core.errors import Undecided
 from seerob.core.snapshot import Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.contact.clamped_regions import Clamping
-from seerob.criteria.contact.regions import FEET, REGIONS, SENSITIVE, Person
+from seerob.criteria.contact.regions import (
+    ANYWHERE,
+    FEET,
+    REGIONS,
+    SENSITIVE,
+    HeightReach,
+    Person,
+    heights,
+    without_limit,
+)
+from seerob.description.humans import manikin
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import bone_poses, without_side
+from seerob.description.humans.skin import BODY_REGION
 from seerob.session.station import Station, load
+from seerob.twin.spans import Span
+from seerob.twin.state import State
 
 REACH = 2.0
 """Of the arm along x [m]; it is ± 0.05 m thick."""
@@ -116,3 +133,133 @@ def test_who_is_touched_all_the_same_was_not_kept_from_contact(
     pelvis = next(part for part in found.parts if part.name == "Pelvis")
     assert ("touched by arm/l" in pelvis.reason) == touched
     assert pelvis.verdict is (Verdict.UNDECIDED if touched else None)
+
+
+def a_span(station: Station, state: State, robot: float, person: float, noise: float = 0.0) -> Span:
+    """0.1 s in which bodies of the robot and of the person are at most so fast [m/s]."""
+    model = station.model
+    fast = np.zeros(len(model.bodies))
+    fast[list(model.robot("arm").moving)], fast[list(model.human("op").bodies)] = robot, person
+    zeros = np.zeros_like(fast)
+    span = Span(0.0, 0.1, fast, zeros, zeros, np.zeros((4, model.mj.nv)), None, model.mj)
+    span.noise = np.where(fast == person, noise, 0.0)
+    return span
+
+
+def least(holds: Callable[[float], bool]) -> float:
+    """Where something begins to hold, by bisection."""
+    low, high = -4.0, 4.0
+    assert not holds(low)
+    assert holds(high)
+    while high - low > 1e-8:
+        middle = (low + high) / 2
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
+
+
+def test_until_the_next_tick_the_horizon_is_wider_by_both_ways_and_the_person_as_fast_as_they_may_be(
+    tmp_path: Path,
+) -> None:
+    """2 m/s and 0.5 m/s for 0.1 s; more is touched where surfaces come so much nearer or bones are off."""
+    station = cell(tmp_path, -1.0)
+    state = state_at(station, arm=((0.0, 0.0), (0.1, 0.0)))
+    region = "Skull and forehead"
+    column, robot = REGIONS.index(region), station.model.robot("arm")
+    plain, span = horizon_of(station, region), a_span(station, state, 2.0, 0.5, noise=0.03)
+
+    def near(horizon: float) -> tuple[Array, Array]:
+        return Person(station.model, robot, "op", horizon=horizon).near(state, None, span)
+
+    assert least(lambda h: bool(near(max(h, 1e-6))[0][:, column].any())) == pytest.approx(
+        plain - 0.25, abs=1e-6
+    )
+    hit, v = near(plain)
+    assert v[column] == pytest.approx(0.53, abs=1e-12)
+    assert (v[~hit.any(axis=0)] == 0).all()
+    given = Person(station.model, robot, "op", horizon=plain).near(state, 0.9, span)[1]
+    assert (given == 0.9).all()
+
+    def touches(way: float) -> bool:
+        person = Person(station.model, robot, "op", horizon=0.1)
+        return bool(person.touched(state, max(way, 0.0))[:, column].any())
+
+    assert least(touches) == pytest.approx(plain, abs=1e-6)
+    state.hearings["op"].bones = {"head": (0.05, 0.0)}
+    assert least(touches) == pytest.approx(plain - 0.05, abs=1e-6)
+    with pytest.raises(Undecided, match="between two ticks"):
+        near(plain)
+
+
+def test_one_person_is_not_several(tmp_path: Path) -> None:
+    guest = (
+        '[[humans]]\nname = "guest"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [9, 0, 0] }\n'
+    )
+    cell(tmp_path, -1.0)
+    text = tmp_path.joinpath("workstation.toml").read_text() + guest
+    model = made(tmp_path / "two", text, {"arm.urdf": two_r()}).model
+    several = [
+        Person(model, model.robot("arm"), *who, horizon=1.0).several for who in (("op",), ("op", "guest"))
+    ]
+    assert several == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("permitted", "within", "verdict"),
+    [
+        (True, None, "undecided"),
+        (True, "x", "undecided"),
+        (False, None, "undecided"),
+        (False, "x", "exceeded"),
+    ],
+)
+def test_a_region_without_a_limit_is_never_within(permitted: bool, within: str | None, verdict: str) -> None:
+    assert without_limit("Chest", permitted, within, "f")[0] == verdict
+    forbidden = without_limit(SENSITIVE, permitted, within, "f")[0]
+    assert forbidden == ("undecided" if within is None else "exceeded")
+
+
+def test_a_part_reaches_a_region_from_its_skin_to_the_horizon_above_and_below(tmp_path: Path) -> None:
+    """The arm at 0, ± 0.05 m thick; the floor that people stand on is moved."""
+    station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()})
+    state = state_at(station, arm=((0.0, 0.0), (0.1, 0.0)))
+    robot, bands = station.model.robot("arm"), heights(("standing",), (1.6, 1.9))
+    zeros = np.zeros(len(station.model.bodies))
+    fast = zeros + 2.0
+    span = Span(0.0, 0.1, fast, zeros, zeros, np.zeros((4, station.model.mj.nv)), None, station.model.mj)
+    for between, way in ((None, 0.0), (span, 0.2)):
+
+        def reached(floor: float, between: Span | None = between) -> Array:
+            reach = HeightReach(station.model, robot, ("standing",), (1.6, 1.9), horizon=0.3, floor=floor)
+            return reach.at(state, between).all(axis=0)
+
+        for region in ("Face", "Feet", SENSITIVE):
+            low, high = bands[region]
+            for floor, inward in ((-0.35 - way - high, 1e-6), (0.35 + way - low, -1e-6)):
+                found = [reached(floor + step)[REGIONS.index(region)] for step in (inward, -inward)]
+                assert found == [True, False], (region, floor)
+        anywhere = reached(50.0)
+        assert {REGIONS[k] for k in np.flatnonzero(anywhere)} >= ANYWHERE
+        assert not anywhere.all()
+
+
+@pytest.mark.parametrize("stature", [1.4, 1.75, 2.1])
+def test_heights_are_those_of_the_leanest_and_the_heaviest_man_and_woman(stature: float) -> None:
+    """From 15 to 45 kg/m², and 30 to 250 kg; the fourth corner of a flat bone lies across from its first."""
+    skin: dict[str, list[float]] = {}
+    for sex in ("male", "female"):
+        for mass in (max(15 * stature**2, 30.0), min(45 * stature**2, 250.0)):
+            who = manikin.build(name="x", stature=stature, mass=mass, sex=sex)
+            rotations, positions = bone_poses(who, posture(who, "standing"))
+            for k, link in enumerate(who.links[1:]):
+                bone = without_side(link.name)
+                regions = {FEET if region is None else region for region in BODY_REGION[bone]}
+                for solid in link.solids:
+                    p = solid.points
+                    corners = [*p] if len(p) == 2 else [*p, p[1] + p[2] - p[0]]
+                    z = [float((rotations[k] @ corner + positions[k])[2]) for corner in corners]
+                    for region in regions | ({SENSITIVE} if bone in ("head", "neck") else set()):
+                        skin.setdefault(region, []).extend((min(z) - solid.radius, max(z) + solid.radius))
+    found = heights(("standing",), (stature, stature))
+    assert found.keys() == skin.keys()
+    for region, (low, high) in found.items():
+        assert (low, high) == pytest.approx((min(skin[region]), max(skin[region])), abs=1e-12)

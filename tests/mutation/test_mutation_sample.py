@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from mutation.operators import SPOKEN, mutants, mutated
 from mutation.session import PACKAGE, put_in
+from mutation.traces import Traces
 from seerob.core.verdict import Verdict, judge
 from seerob.criteria.stopping import models, terms
 
@@ -133,3 +135,39 @@ def test_a_test_that_fails_in_any_forked_process_kills_nothing(tmp_path):
     assert done.returncode == 2, done.stdout + done.stderr
     assert "::test_it (in a forked process)" in done.stderr
     assert "survived" in done.stdout
+
+
+def test_traces_are_kept_until_a_test_or_what_it_runs_changes(tmp_path):
+    """And a test that fails has none."""
+    text = "LIMIT = 2\n\n\ndef asked(v):\n    if v > LIMIT:\n        return 1\n    return 0\n"
+    place, test, kept = tmp_path / "made.py", tmp_path / "test_made.py", tmp_path / "kept.json"
+    test.write_text("one test")
+    found = {}
+    exec(compile(text, str(place), "exec"), found)
+    runs = []
+
+    def trace(source=text, loops=(), v=1):
+        def run():
+            runs.append(v)
+            return found["asked"](v) < 9
+
+        traces = Traces({"made.py": source, "other.py": text + "#"}, tmp_path, kept, list(loops))
+        result = traces.of("test_made.py::test_it", test, run)
+        traces.write()
+        return result
+
+    first = trace()
+    assert {file: sorted(lines) for file, lines in first.lines.items()} == {"made.py": [5, 7]}
+    assert first.functions == {"made.py": ["asked"]}
+    assert first.names == ["LIMIT"]
+    assert trace() == first
+    assert len(runs) == 1
+    assert sorted(trace(source=text + "#", v=3).lines["made.py"]) == [5, 6]
+    assert trace(loops=["kernels/x.py"]).functions == first.functions
+    test.write_text("another")
+    assert trace() is not None
+    assert len(runs) == 4
+    found["asked"] = lambda v: 9
+    test.write_text("a third")
+    assert trace() is None
+    assert len(json.loads(kept.read_text("utf-8"))) == 1

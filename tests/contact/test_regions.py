@@ -216,6 +216,7 @@ def test_a_region_without_a_limit_is_never_within(permitted: bool, within: str |
     assert without_limit("Chest", permitted, within, "f")[0] == verdict
     forbidden = without_limit(SENSITIVE, permitted, within, "f")[0]
     assert forbidden == ("undecided" if within is None else "exceeded")
+    assert without_limit(FEET, True, None, "f")[1] == "no limit available"
 
 
 def test_a_part_reaches_a_region_from_its_skin_to_the_horizon_above_and_below(tmp_path: Path) -> None:

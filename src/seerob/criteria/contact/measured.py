@@ -55,6 +55,9 @@ COARSE = 2e-3
 (a hand, 0.6 kg and 75 N/mm: π √(m/k)), samples so far apart meet 94 % at least. Own choice (D)."""
 DROPS = 0.3
 """Share of its largest force from which no contact falls to nothing in a sample. Own choice (D)."""
+ENDS = 0.8
+"""Share of its largest force from which no contact ends for good between two samples that are `COARSE` apart:
+of half a sine of 9 ms it is 0.69 at most. Own choice (D)."""
 SLOW = 0.1
 """A force that a drive keeps up is looked at so often at least [s]. Own choice (D)."""
 RISES = 0.02
@@ -207,6 +210,10 @@ def missing(t: Array, force: Array) -> tuple[str, ...]:
     gone = np.flatnonzero((force[:-1] >= DROPS * peak) & ~touches[1:])
     if len(gone) and touches[gone[0] + 1 :].any():
         found.append(f"it drops out at {t[gone[0] + 1]:.4g} s, from {force[gone[0]]:.4g} N, and comes back")
+    elif len(lost := gone[(force[gone] >= ENDS * peak) & (t[gone] < t[first] + TRANSIENT)]):
+        found.append(
+            f"it ends at {t[lost[0] + 1]:.4g} s, from {force[lost[0]]:.4g} N from one sample to the next"
+        )
     top = np.concatenate([[False], force == peak, [False]]).astype(int)
     starts, ends = (np.flatnonzero(np.diff(top) == way) for way in (1, -1))
     if int((ends - starts).max()) >= FLAT:

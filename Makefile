@@ -22,11 +22,11 @@ BROUGHT := src/seerob/kernels/compiled
 KEPT := $(VENV)/.compiled
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock audit clean
+.PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs docs-site lock audit clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo "also: check format unit web-test package bench soak mutate wire web build docs lock audit clean"
+	@echo "also: check format unit web-test package bench soak mutate wire web build docs docs-site lock audit clean"
 
 # -- the two commands ---------------------------------------------------------------------------
 
@@ -152,6 +152,11 @@ audit:
 mutate: $(DEV)
 	$(BIN)/python scripts/mutate
 
+# The documentation site in .site/html, for any web server or to be opened from the disk.
+docs-site: $(DEV)
+	$(BIN)/python scripts/site_pages .site/pages
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
 docs: $(DEV)
 	$(BIN)/python scripts/write-docs
 
@@ -160,4 +165,4 @@ lock: $(DEV)
 	scripts/lock $(BIN)/python
 
 clean:
-	rm -rf $(VENV) web/node_modules dist src/seerob/app/server/page $(BROUGHT) .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) web/node_modules dist .site src/seerob/app/server/page $(BROUGHT) .mypy_cache .ruff_cache .pytest_cache

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "d0c21aaaaffac79a";
+export const SCHEMA = "bc792d068e81ec22";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -454,6 +454,18 @@ export interface MechanismInfo {
   masses: LinkMass[];
 }
 
+/** A point of interest of the cell, and how it is turned. */
+export interface Place {
+  name: string;
+  /** Full name of the node that it goes along with; empty where it stands in the world. */
+  node: string;
+  /** In that node's frame, or in the world [m]. */
+  position: Vec3;
+  wxyz: Vec4;
+  /** How far it may be from there, standard deviation per axis [m]. */
+  accuracy: number;
+}
+
 /** Everything about a run that does not change while it runs; sent once. */
 export interface Scene {
   type: "scene";
@@ -480,6 +492,10 @@ export interface Scene {
    * first; x is ahead there, z up.
    */
   headsets: Record<string, [number, number, number, number, number, number, number]>;
+  /** By which the room of a visitor, or a camera, is placed in the cell. */
+  landmarks: Place[];
+  /** Point of interest of each robot, by its name. */
+  tips: Place[];
 }
 
 /** What happened to a loose workpiece. */
@@ -609,6 +625,68 @@ export interface Tracking {
   poses: Uint8Array;
   /** One byte per name, 1 where the headset itself only estimates the position; empty for nowhere. */
   guessed?: Uint8Array;
+  /**
+   * Which tracking space that is: another one after each recentring and in each session. Where a room lies
+   * in the cell is known of the space in which that was found out.
+   */
+  space?: string;
+}
+
+/** One step of finding out where the room of a page's headset lies in the cell. */
+export interface Register {
+  type: "register";
+  /** The page's own number, by which it knows the answer. */
+  id: number;
+  /** The person that the visitor is; empty for one who looks. */
+  human?: string;
+  /** Which tracking space that is (`Tracking.space`); a step in another one begins anew. */
+  space: string;
+  /**
+   * `sweep` (the controller was turned about its tip), `touch` (the tip is on a landmark), `strapped`
+   * (the controller is fixed to what carries a landmark), `known` (the controller lies in the pose of a
+   * landmark), `check` (as touch, of what is known already), `nudge`, `restore`, `drop` (the last
+   * touch), `forget`.
+   */
+  step: string;
+  /** Of `touch`, `strapped`, `known` and `check`. */
+  landmark?: string;
+  /** Of the controller while it was held: little-endian float32, seven each as in `Tracking.poses`. */
+  poses?: Uint8Array;
+  /**
+   * `nudge`: translation [m] and rotation vector [rad] in the cell's axes. `restore`: what `Registered`
+   * said: its `at`, `about` and `covariance`, 46 numbers.
+   */
+  by?: number[];
+}
+
+/** What a page's `Register` came to, and all that is known of where its room lies. */
+export interface Registered {
+  type: "registered";
+  id: number;
+  accepted: boolean;
+  /** Why the step was refused. */
+  reason: string;
+  /**
+   * Where the floor of the room lies: position [m], quaternion with w first; x is ahead there, z up. Empty
+   * while too little is known.
+   */
+  at: number[];
+  /** Point of the cell that `covariance` is about [m]. */
+  about: number[];
+  /** 36 numbers row by row: translation [m] before rotation [rad], in the cell's axes. */
+  covariance: number[];
+  /** What 95 % of the error at `tool` stay within [m]. */
+  error: number | null;
+  /** The robot whose point of interest is meant: of several the one with the largest error. */
+  tool: string;
+  /** Why nothing rests on where the visitor is all the same; empty when it may. */
+  doubt: string;
+  /** What was touched so far, in order. */
+  landmarks: string[];
+  /** How far each is from where the registration puts it [m]. */
+  residuals: number[];
+  /** What 95 % of the error of the controller's tip stay within [m]; null before it was turned about it. */
+  tip: number | null;
 }
 
 /** What became of a page's `Tracking`; sent at its first, and when that changes. */
@@ -843,6 +921,6 @@ export const FIELDS = {
   highlight: ["type", "body", "verdict"],
 } as const;
 
-export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Draft | Edited | Measured | Visitors | Presences | Refused;
+export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Registered | Draft | Edited | Measured | Visitors | Presences | Refused;
 
-export type PageMessage = Command | Tracking | Edit | Measure | Introduction | Presence | Hold | Grab | Pull;
+export type PageMessage = Command | Tracking | Register | Edit | Measure | Introduction | Presence | Hold | Grab | Pull;

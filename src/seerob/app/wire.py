@@ -34,6 +34,7 @@ FROM_SERVER = (
     snapshot.Transport,
     snapshot.Snapshot,
     snapshot.Tracked,
+    snapshot.Registered,
     snapshot.Draft,
     snapshot.Edited,
     snapshot.Measured,
@@ -45,6 +46,7 @@ FROM_SERVER = (
 FROM_PAGE = (
     snapshot.Command,
     snapshot.Tracking,
+    snapshot.Register,
     snapshot.Edit,
     snapshot.Measure,
     snapshot.Introduction,

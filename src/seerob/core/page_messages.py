@@ -102,6 +102,60 @@ class Tracking(Struct, frozen=True, kw_only=True, tag="tracking"):
     z backward); NaN for what is not tracked."""
     guessed: bytes = b""
     """One byte per name, 1 where the headset itself only estimates the position; empty for nowhere."""
+    space: str = ""
+    """Which tracking space that is: another one after each recentring and in each session. Where a room lies
+    in the cell is known of the space in which that was found out."""
+
+
+class Register(Struct, frozen=True, kw_only=True, tag="register"):
+    """One step of finding out where the room of a page's headset lies in the cell."""
+
+    id: int
+    """The page's own number, by which it knows the answer."""
+    human: str = ""
+    """The person that the visitor is; empty for one who looks."""
+    space: str
+    """Which tracking space that is (`Tracking.space`); a step in another one begins anew."""
+    step: str
+    """``sweep`` (the controller was turned about its tip), ``touch`` (the tip is on a landmark), ``strapped``
+    (the controller is fixed to what carries a landmark), ``known`` (the controller lies in the pose of a
+    landmark), ``check`` (as touch, of what is known already), ``nudge``, ``restore``, ``drop`` (the last
+    touch), ``forget``."""
+    landmark: str = ""
+    """Of ``touch``, ``strapped``, ``known`` and ``check``."""
+    poses: bytes = b""
+    """Of the controller while it was held: little-endian float32, seven each as in `Tracking.poses`."""
+    by: tuple[float, ...] = ()
+    """``nudge``: translation [m] and rotation vector [rad] in the cell's axes. ``restore``: what `Registered`
+    said: its ``at``, ``about`` and ``covariance``, 46 numbers."""
+
+
+class Registered(Struct, frozen=True, kw_only=True, tag="registered"):
+    """What a page's `Register` came to, and all that is known of where its room lies."""
+
+    id: int
+    accepted: bool
+    reason: str = ""
+    """Why the step was refused."""
+    at: tuple[float, ...] = ()
+    """Where the floor of the room lies: position [m], quaternion with w first; x is ahead there, z up. Empty
+    while too little is known."""
+    about: tuple[float, ...] = ()
+    """Point of the cell that ``covariance`` is about [m]."""
+    covariance: tuple[float, ...] = ()
+    """36 numbers row by row: translation [m] before rotation [rad], in the cell's axes."""
+    error: float | None = None
+    """What 95 % of the error at ``tool`` stay within [m]."""
+    tool: str = ""
+    """The robot whose point of interest is meant: of several the one with the largest error."""
+    doubt: str = ""
+    """Why nothing rests on where the visitor is all the same; empty when it may."""
+    landmarks: tuple[str, ...] = ()
+    """What was touched so far, in order."""
+    residuals: tuple[float, ...] = ()
+    """How far each is from where the registration puts it [m]."""
+    tip: float | None = None
+    """What 95 % of the error of the controller's tip stay within [m]; null before it was turned about it."""
 
 
 class Tracked(Struct, frozen=True, kw_only=True, tag="tracked"):

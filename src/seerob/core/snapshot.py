@@ -48,6 +48,8 @@ from seerob.core.page_messages import (
     Presences,
     Pull,
     Refused,
+    Register,
+    Registered,
     SoFar,
     Trace,
     Tracked,
@@ -96,6 +98,7 @@ __all__ = [
     "Mistake",
     "Node",
     "Origin",
+    "Place",
     "Polyline",
     "Presence",
     "Presences",
@@ -103,6 +106,8 @@ __all__ = [
     "Pull",
     "Rays",
     "Refused",
+    "Register",
+    "Registered",
     "Result",
     "Row",
     "RowState",
@@ -483,6 +488,19 @@ class MechanismInfo(Struct, frozen=True, kw_only=True):
     """What each link of a robot or machine and each thing on it weighs."""
 
 
+class Place(Struct, frozen=True, kw_only=True):
+    """A point of interest of the cell, and how it is turned."""
+
+    name: str
+    node: str = ""
+    """Full name of the node that it goes along with; empty where it stands in the world."""
+    position: Vec3
+    """In that node's frame, or in the world [m]."""
+    wxyz: Vec4 = (1.0, 0.0, 0.0, 0.0)
+    accuracy: float = 0.0
+    """How far it may be from there, standard deviation per axis [m]."""
+
+
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     """Everything about a run that does not change while it runs; sent once."""
 
@@ -505,6 +523,10 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     headsets: dict[str, tuple[float, float, float, float, float, float, float]] = {}
     """Person whom a page's headset drives → where the floor of its room lies: position [m], quaternion with w
     first; x is ahead there, z up."""
+    landmarks: tuple[Place, ...] = ()
+    """By which the room of a visitor, or a camera, is placed in the cell."""
+    tips: tuple[Place, ...] = ()
+    """Point of interest of each robot, by its name."""
 
     def __repr__(self) -> str:
         count = f"{len(self.nodes)} bodies, {len(self.criteria)} criteria, {len(self.findings)} findings"

@@ -32,7 +32,7 @@ from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
 from seerob.recording.frames import told_of
 from seerob.recording.result_log import ResultLog
 from seerob.session.opening import coarse, signal_timeouts, untimed
-from seerob.session.scene import Looks, invalid_reasons
+from seerob.session.scene import Looks, invalid_reasons, landmark_of
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
 from seerob.twin.state import State
@@ -63,6 +63,11 @@ def bind(model: Model) -> tuple[Bound, ...]:
             model.select(display.of)
         except SeerobError as error:
             problems.append(Problem(file, f"displays[{i}].of", str(error)))
+    for i, landmark in enumerate(model.workstation.landmarks):
+        try:
+            landmark_of(model, landmark)
+        except SeerobError as error:
+            problems.append(Problem(file, f"landmarks[{i}].on", str(error)))
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:

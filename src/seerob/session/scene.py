@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 
+import numpy as np
+
+from seerob.core.errors import UnknownName
 from seerob.core.plugin import kind_of
-from seerob.core.snapshot import ControlInfo, CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
-from seerob.core.transforms import wxyz_from_rotation
+from seerob.core.snapshot import (
+    ControlInfo,
+    CriterionInfo,
+    Finding,
+    JointInfo,
+    MechanismInfo,
+    Node,
+    Place,
+    Scene,
+)
+from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.criteria.question import Bound
 from seerob.criteria.scoring.phases import entered_for
 from seerob.description.norms.editions import headline
 from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.headset_offers import TakesOffers
-from seerob.model.model import Model
+from seerob.model.model import Frame, Model
 from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
 from seerob.session.opening import coarse
 from seerob.twin.state import State
 from seerob.workstation.variables import Value, WhenStale
-from seerob.workstation.workstation import Pose, Workstation, real_names
+from seerob.workstation.workstation import Landmark, Pose, Workstation, real_names
 
 
 def unmet_phases(model: Model, bound: Sequence[Bound], end: float) -> Iterator[Finding]:
@@ -125,7 +138,58 @@ def scene_of(
             for source in station.sources
             if isinstance(source, TakesOffers) and isinstance(source, CaptureStream)
         },
+        landmarks=tuple(landmark_of(model, landmark) for landmark in station.landmarks),
+        tips=tuple(_tips(model)),
     )
+
+
+def place_of(model: Model, name: str, frame: Frame | None, at: Array, accuracy: float = 0.0) -> Place:
+    """A pose that goes along with a frame of the model, as a page knows it: in one of its nodes.
+
+    Args:
+        model: The compiled workstation.
+        name: Its own.
+        frame: What carries it; the world when None.
+        at: Pose in that frame, shape (4, 4).
+        accuracy: Standard deviation per axis [m].
+
+    Raises:
+        UnknownName: What carries it has no shape, so that no node shows where it is.
+    """
+    node = ""
+    if frame is not None:
+        for body in sorted(model.bodies, key=lambda body: body.mj != frame.mj):
+            node_from_frame = model.between(Frame(body.name, body.mj, np.eye(4)), frame)
+            if node_from_frame is not None and body.holder == "" and (body.carrier or body.mj == frame.mj):
+                node, at = body.name, node_from_frame @ at
+                break
+        else:
+            raise UnknownName("link with a shape", frame.name, [body.name for body in model.bodies])
+    x, y, z = at[:3, 3].tolist()
+    w, i, j, k = wxyz_from_rotation(at[:3, :3])
+    return Place(name=name, node=node, position=(x, y, z), wxyz=(w, i, j, k), accuracy=accuracy)
+
+
+def landmark_of(model: Model, landmark: Landmark) -> Place:
+    """Where a landmark is, in a node of the page.
+
+    Raises:
+        UnknownName: Nothing carries that name, or it has no shape.
+    """
+    frame = None
+    if landmark.on is not None:
+        bodies = {body.name: body for body in model.bodies}
+        body = bodies.get(landmark.on)
+        frame = model.frame(landmark.on) if body is None else Frame(body.name, body.mj, np.eye(4))
+    return place_of(model, landmark.name, frame, placement(landmark.at), landmark.accuracy)
+
+
+def _tips(model: Model) -> Iterator[Place]:
+    for mechanism in model.mechanisms.values():
+        if mechanism.role == "robot":
+            with suppress(UnknownName):  # a robot without a shape is not shown
+                tip = mechanism.tip
+                yield place_of(model, mechanism.name, Frame(tip.name, tip.mj, np.eye(4)), tip.body_from_frame)
 
 
 def _floor(at: Pose) -> tuple[float, float, float, float, float, float, float]:

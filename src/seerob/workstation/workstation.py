@@ -419,6 +419,21 @@ class Human(_Table, frozen=True, kw_only=True):
             raise ValueError(f"{what} is not an adult's: say adult = false of a child or adolescent")
 
 
+class Landmark(_Table, frozen=True, kw_only=True):
+    """A place of the cell that can be touched or seen, by which a visitor's room or a camera is placed."""
+
+    name: Name
+    """What the visitor is asked for, such as ``table_corner``."""
+    on: str | None = None
+    """Full name of the link, tool, part or machine that carries it, such as ``ur10/tool0``: it goes along; in
+    the world when not given."""
+    at: Pose = Pose()
+    """Where it is in that frame; a board lies in its plane z = 0, from this point along x and y."""
+    accuracy: Annotated[float, unit("m", ge=0, le=0.1)]
+    """How far it may be from there, standard deviation per axis [m]: as it was measured, or as the robot that
+    carries it is accurate."""
+
+
 class Contact(_Table, frozen=True, kw_only=True):
     """Two sets that may touch in the physics. Nothing else does."""
 
@@ -465,6 +480,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     sensors: tuple[Sensor, ...] = ()
     humans: tuple[Human, ...] = ()
     phases: tuple[TaskPhase, ...] = ()
+    landmarks: tuple[Landmark, ...] = ()
     displays: tuple[Display, ...] = ()
     triggers: tuple[Trigger, ...] = ()
     targets: tuple[CartesianTarget, ...] = ()
@@ -512,6 +528,7 @@ TABLES: dict[str, type[Struct]] = {
     "sensors": Sensor,
     "humans": Human,
     "phases": TaskPhase,
+    "landmarks": Landmark,
     "displays": Display,
     "triggers": Trigger,
     "targets": CartesianTarget,

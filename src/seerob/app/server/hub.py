@@ -19,6 +19,7 @@ from seerob.app.server.client import Client, Closing
 from seerob.app.server.company import Company
 from seerob.app.server.desk import Desk
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
+from seerob.app.server.registrar import Registrar
 from seerob.app.wire import schema
 from seerob.core.markers import plain
 from seerob.core.snapshot import (
@@ -37,6 +38,8 @@ from seerob.core.snapshot import (
     Presence,
     Pull,
     Refused,
+    Register,
+    Registered,
     Scene,
     Snapshot,
     SoFar,
@@ -52,7 +55,7 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
-Message = Command | Tracking | Edit | Measure | Introduction | Presence | Hold | Grab | Pull
+Message = Command | Tracking | Register | Edit | Measure | Introduction | Presence | Hold | Grab | Pull
 """Of a page."""
 _KINDS: dict[type, str] = {
     Tracking: "tracking",
@@ -130,6 +133,7 @@ class Hub:
         self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
         self._greeted: dict[Client, Hello] = {}
         self._scene = _encode(scene)
+        self._registrar = Registrar(offers, scene)
         self._shared = {kind: Allowance(*rate) for kind, rate in SHARED.items()}
         self._newest: Snapshot | None = None
         self._until = inf
@@ -141,6 +145,7 @@ class Hub:
     def begin(self, scene: Scene) -> None:
         """Send another scene to every page, of which snapshots are from now on."""
         self._scene, self._newest = _encode(scene), None
+        self._registrar.begin(scene)
         turned = self._hello.mode != self._feed.mode
         self._hello = replace(self._hello, mode=self._feed.mode)
         for client in self.clients:
@@ -152,6 +157,7 @@ class Hub:
     def show(self, snapshot: Snapshot, until: float = inf) -> None:
         """Send a snapshot to every page, if it is sent before ``until`` [s], monotonic time."""
         self._newest, self._until = snapshot, until
+        self._registrar.show(snapshot)
         if not self.clients:
             return
         payload = _encode(snapshot)
@@ -219,6 +225,7 @@ class Hub:
             self._greeted.pop(client, None)
             self._offers.gone(client)
             self.company.gone(client)
+            self._registrar.gone(client)
             if self._desk is not None:
                 self._desk.gone(client)
             for task in tasks:
@@ -261,6 +268,8 @@ class Hub:
                     self.company.hold(client, message, may=may)
                 elif isinstance(message, Edit):
                     client.offer("Edited", _encode(await self._edit(client, message, visit, roles)))
+                elif isinstance(message, Register):
+                    client.offer("Registered", _encode(await self._register(client, message, visit, roles)))
                 elif isinstance(message, Measure):
                     client.offer("Measured", _encode(await self._measure(message, visit, roles)))
                 elif kind == "ack":
@@ -312,6 +321,15 @@ class Hub:
         return Measured(
             id=asked.id, refusal="nothing is measured here: seerob edit does, for who may control"
         )
+
+    async def _register(
+        self, client: Client, asked: Register, visit: Visit, roles: frozenset[Role]
+    ) -> Registered:
+        if Role.TRACK in roles:
+            return await asyncio.to_thread(self._registrar.take, client, asked)
+        visit.refuse("register")
+        refusal = "this page may not: open the address for tracking that seerob printed"
+        return Registered(id=asked.id, accepted=False, reason=refusal)
 
     def _offer(
         self, client: Client, tracking: Tracking, last_answer: Tracked | None, visit: Visit, *, may: bool

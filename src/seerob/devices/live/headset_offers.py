@@ -10,10 +10,12 @@ import math
 import time
 from collections.abc import Callable
 from threading import Lock
-from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from msgspec import Meta, Struct
 
+from seerob.core.samples import Placing
 from seerob.core.snapshot import Grab, Pull, Tracking
 from seerob.core.transforms import Array
 from seerob.devices.live.doings import Doings
@@ -27,6 +29,8 @@ SHORTEST = 0.003
 """Offers of a page that follow one another faster are left out [s]; headsets do 60 to 144 Hz."""
 MOST_NAMES = 160
 LONGEST_NAME = 64
+Angle = Annotated[float, Meta(ge=0, le=0.5, extra={"unit": "rad"}, extra_json_schema={"x-unit": "rad"})]
+Metres = Annotated[float, Meta(ge=0, le=0.5, extra={"unit": "m"}, extra_json_schema={"x-unit": "m"})]
 
 
 class Offer(NamedTuple):
@@ -42,6 +46,46 @@ class Offer(NamedTuple):
     wxyz: Array
     """Shape (n, 4)."""
     guessed: tuple[bool, ...]
+    space: str = ""
+    """Which tracking space that is."""
+    cell_from_room: Array | None = None
+    """Where that lies, x ahead and z up in it, shape (4, 4), as was found out; None where the file says."""
+    placing: Placing | None = None
+    """How well that is known; None where what the file says is exact."""
+
+
+class Registering(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the room of a headset is put in the cell; errors are standard deviations per axis."""
+
+    level: Angle | None = None
+    """How far the vertical of the headset may be from that of the cell [rad]; without it the tilt is found
+    from what is touched, which takes more and farther touches."""
+    touch: Metres | None = None
+    """Error of one touch [m]; when not given, how well touches agree tells, and fewer count less."""
+    pose: Metres | None = None
+    """Error of where the device sees its controller [m], for one that lies at a known place."""
+    pose_turn: Angle | None = None
+    """Error of how the device sees it turned [rad]."""
+    at: Metres | None = None
+    """How far the floor of the room may be from the source's ``at`` [m], where that was measured."""
+    at_turn: Angle | None = None
+    """How far it may be turned from there [rad]."""
+    limit: Annotated[float, Meta(gt=0, le=0.5, extra={"unit": "m"}, extra_json_schema={"x-unit": "m"})] = 0.05
+    """Error at the tool, 95 %, beyond which nothing rests on where the person is [m]; a choice."""
+
+
+class Room(NamedTuple):
+    """Where the room of a page's headset lies in the cell."""
+
+    visitor: object
+    space: str
+    cell_from_room: Array
+    placing: Placing
+
+
+NOT_REGISTERED = (
+    "nobody found out where the room of this headset lies in the real cell: register it (docs/xr.md)"
+)
 
 
 class Held(NamedTuple):
@@ -60,7 +104,7 @@ def read(tracking: Tracking, now: float) -> Offer:
     n = len(tracking.names)
     if not 0 < n <= MOST_NAMES or len(set(tracking.names)) < n:
         raise ValueError(f"tracking of {n} names: 1 to {MOST_NAMES} different ones are expected")
-    if max(map(len, (tracking.human, *tracking.names))) > LONGEST_NAME:
+    if max(map(len, (tracking.human, tracking.space, *tracking.names))) > LONGEST_NAME:
         raise ValueError(f"a name of more than {LONGEST_NAME} characters")
     if len(tracking.poses) != 28 * n or len(tracking.guessed) not in (0, n):
         raise ValueError(f"tracking of {n} names with {len(tracking.poses)} bytes of poses")
@@ -69,7 +113,7 @@ def read(tracking: Tracking, now: float) -> Offer:
     with np.errstate(invalid="ignore"):  # a signalling NaN is one more NaN
         rows = np.frombuffer(tracking.poses, "<f4").reshape(n, 7).astype(float)
     guessed = tuple(map(bool, tracking.guessed)) or (False,) * n
-    return Offer(now, tracking.t, tracking.names, rows[:, :3], rows[:, 3:], guessed)
+    return Offer(now, tracking.t, tracking.names, rows[:, :3], rows[:, 3:], guessed, tracking.space)
 
 
 class Offers:
@@ -81,10 +125,21 @@ class Offers:
         self._held: dict[str, Held] = {}
         self.doings = Doings()
         """What visitors do besides."""
+        self._rooms: dict[str, Room] = {}
+        self._registering: dict[str, Registering] = {}
+        self.mixed = False
+        """Whether something of the cell is real: then where a room lies has an error, or is not known."""
 
-    def wait(self, human: str, key: object, take: Callable[[Offer], None]) -> None:
+    def wait(
+        self,
+        human: str,
+        key: object,
+        take: Callable[[Offer], None],
+        registering: Registering = Registering(),  # noqa: B008 (frozen)
+    ) -> None:
         """Have every offer for a person given to ``take``, in the server's thread; it must not block."""
         with self._lock:
+            self._registering[human] = registering
             self._waiting.setdefault(human, {})[key] = take
 
     def leave(self, human: str, key: object) -> None:
@@ -116,6 +171,11 @@ class Offers:
             if held is not None and held.visitor is visitor and offer.arrived - held.last < SHORTEST:
                 return ""
             self._held[human] = Held(visitor, offer.arrived)
+            room = self._rooms.get(human)
+            if room is not None and room.visitor is visitor and room.space == offer.space:
+                offer = offer._replace(cell_from_room=room.cell_from_room, placing=room.placing)
+            elif self.mixed:
+                offer = offer._replace(placing=Placing(reason=NOT_REGISTERED))
         for take in takers:
             take(offer)
         return ""
@@ -137,11 +197,26 @@ class Offers:
                 return f"this page is not the headset of {human!r}, whose hand that is"
         return self.doings.do(visitor, what)
 
+    def registering(self, human: str) -> Registering:
+        """What the file says of how the room of a person's headset is put in the cell."""
+        with self._lock:
+            return self._registering.get(human, Registering())
+
+    def place(self, human: str, room: Room | None, visitor: object) -> None:
+        """Know from now on where a visitor's room lies; None for not any more."""
+        with self._lock:
+            before = self._rooms.get(human)
+            if room is not None:
+                self._rooms[human] = room
+            elif before is not None and before.visitor is visitor:
+                del self._rooms[human]
+
     def gone(self, visitor: object) -> None:
         """A page has left: its places are free."""
         self.doings.gone(visitor)
         with self._lock:
             self._held = {human: held for human, held in self._held.items() if held.visitor is not visitor}
+            self._rooms = {human: room for human, room in self._rooms.items() if room.visitor is not visitor}
 
 
 @runtime_checkable

@@ -13,16 +13,20 @@ import logging
 from collections import deque
 from collections.abc import AsyncGenerator, Iterable
 from contextlib import aclosing
+from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
 
+from seerob.core.samples import Placing
 from seerob.core.snapshot import Finding
+from seerob.core.transforms import apply, inverse, turned
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.description.capture.mapping import conventions, plain
+from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
-from seerob.devices.live.headset_offers import Offer, Offers
+from seerob.devices.live.headset_offers import Offer, Offers, Registering
 from seerob.devices.live.listening import Contact, LiveSource, say_once
 from seerob.protocols.tracking.vive import world_positions, world_turns
 
@@ -45,6 +49,8 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
     """The page's server is of the run's own process."""
     frequency: Annotated[float, Meta(ge=30, le=144, extra={"unit": "Hz"})] = 72.0
     """Pictures per second of the headset [Hz]."""
+    registration: Registering = Registering()
+    """How its room is put in the cell, where something there is real."""
 
     def period(self) -> float:
         """Interval between samples that is expected [s]."""
@@ -92,7 +98,33 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
                 if offer.t <= last:
                     continue
                 last = offer.t
-                yield layout, frame(offer, layout)
+                said = frame(offer, layout)
+                yield (
+                    layout,
+                    replace(said, placing=self._stated())
+                    if said.placing is None
+                    else self._moved(said, offer),
+                )
+
+    def _stated(self) -> Placing | None:
+        """How well the file says that its ``at`` is known; None where it does not."""
+        known = self.registration
+        if known.at is None or known.at_turn is None:
+            return None
+        covariance = np.diag([known.at**2] * 3 + [known.at_turn**2] * 3)
+        return Placing(covariance=tuple(covariance.ravel().tolist()), about=self.at.position)
+
+    def _moved(self, said: CaptureFrame, offer: Offer) -> CaptureFrame:
+        """What was said, so that ``at`` puts it where the room was found to lie."""
+        if offer.cell_from_room is None:
+            stated = self._stated()
+            return said if stated is None else replace(said, placing=stated)
+        T = inverse(placement(self.at)) @ offer.cell_from_room
+        assert said.orientations is not None  # of a headset
+        with np.errstate(all="ignore"):
+            return replace(
+                said, positions=apply(T, said.positions), orientations=turned(T[:3, :3], said.orientations)
+            )
 
     def _tell(self, layout: Layout) -> None:
         if BODY not in layout.names:
@@ -110,7 +142,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
             with contextlib.suppress(RuntimeError):  # the loop ended meanwhile
                 loop.call_soon_threadsafe(arrived.set)
 
-        place.wait(self.human, key, take)
+        place.wait(self.human, key, take, self.registration)
         try:
             while True:
                 try:
@@ -156,5 +188,9 @@ def frame(offer: Offer, layout: Layout) -> CaptureFrame:
             sure[row] = GUESSED if offer.guessed[found] else 1.0
     with np.errstate(all="ignore"):  # what is not finite is left out where it is used
         return CaptureFrame(
-            t=offer.t, positions=world_positions(positions), orientations=world_turns(turns), confidence=sure
+            t=offer.t,
+            positions=world_positions(positions),
+            orientations=world_turns(turns),
+            confidence=sure,
+            placing=offer.placing,
         )

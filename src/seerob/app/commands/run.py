@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
         )
         scene = replace(scene, findings=(*scene.findings, *said))
         tell(scene.findings, verbose=options.verbose)
-        found = _edited(station, options) if options.edit else live(station, scene, options)
+        found = _edited(station, options) if options.edit else live(station, scene, options, running)
         for each in running:
             if each.ended:
                 line("warning", f"{each.key}: the emulator ({each.kind}) ended by itself", "yellow")
@@ -162,7 +162,9 @@ def reach(station: Station) -> None:
         station.reach()
 
 
-def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
+def live(
+    station: Station, scene: Scene, options: argparse.Namespace, emulators: Sequence[Running] = ()
+) -> int:
     """Show, judge and record until Ctrl-C or the time is over."""
     from seerob.app.server.live import LiveView
     from seerob.outputs.sink import RecordsVisitors
@@ -196,6 +198,8 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
                 if isinstance(writer, RecordsVisitors):
                     writer.watch(view.server.visits)
             tell_pages(view.server, "Ctrl-C ends the run")
+            for each in emulators:
+                each.find_page(view.server.port)
             _tell_ends(station)
             writers += _triggers(station, allow=options.allow_writing)
             targets = _targets(station, allow=options.allow_writing)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, runtime_checkable
 
 from msgspec import Meta
 
@@ -61,6 +61,14 @@ class Server(Protocol):
 
     def stop(self) -> None:
         """End it."""
+
+
+@runtime_checkable
+class AsksForPage(Protocol):
+    """A server that comes to the page of a run."""
+
+    def found_page(self, port: int) -> None:
+        """Where the page is."""
 
 
 class Ready(NamedTuple):

@@ -1,8 +1,9 @@
 """The emulators of a workstation, each in a process of its own as long as a run lasts.
 
-Such a process is told on its standard input what to be, says on its standard output that it is, and ends when
-its input is closed: with whoever started it, however that ends. A workstation file may come from anywhere, so
-what it asks for listens on this machine and sends to this machine only.
+Such a process is told on its standard input what to be and, once that is served, at which port the page is.
+It says on its standard output that it is there, and ends when its input is closed: with whoever started it,
+however that ends. A workstation file may come from anywhere, so what it asks for listens on this machine and
+sends to this machine only.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
 
-from seerob.app.emulation.options import HOSTS, EmulatorOptions
+from seerob.app.emulation.options import HOSTS, AsksForPage, EmulatorOptions
 from seerob.app.emulation.serving import served
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.host_name import is_loopback
@@ -50,6 +51,13 @@ class Running(NamedTuple):
     def ended(self) -> bool:
         """Whether it ended by itself."""
         return self.process.poll() is not None
+
+    def find_page(self, port: int) -> None:
+        """Tell it where the page of the run is, if it asks for one."""
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):  # it ended by itself
+            self.process.stdin.write(b"%d\n" % port)
+            self.process.stdin.flush()
 
 
 @contextmanager
@@ -97,7 +105,8 @@ def _process(options: EmulatorOptions, folder: Path) -> Iterator[subprocess.Pope
             process.stdin.flush()
             yield process
         finally:
-            process.stdin.close()
+            with suppress(BrokenPipeError):
+                process.stdin.close()
             try:
                 process.wait(ENDED_WITHIN)
             except subprocess.TimeoutExpired:
@@ -125,9 +134,12 @@ def serve() -> None:
     order = json.loads(sys.stdin.buffer.readline(_LONGEST))
     try:
         kind = load("emulators", order["kind"], EmulatorOptions, allow_plugins=True)
-        with served(order["kind"], msgspec.convert(order["options"], kind, strict=False)) as (what, at, _):
-            print(json.dumps({"what": what, "at": at}), flush=True)  # noqa: T201 - to who started it
-            sys.stdin.buffer.read()
+        with served(order["kind"], msgspec.convert(order["options"], kind, strict=False)) as device:
+            said = {"what": device.what, "at": device.at}
+            print(json.dumps(said), flush=True)  # noqa: T201 - to who started it
+            for line in iter(lambda: sys.stdin.buffer.readline(_LONGEST), b""):
+                if isinstance(device.server, AsksForPage):
+                    device.server.found_page(int(line))
     except (SeerobError, OSError) as error:
         print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201
 

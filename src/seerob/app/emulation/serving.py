@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from msgspec.structs import fields, replace
 
-from seerob.app.emulation.options import COMMAND, EmulatorOptions, Ready
+from seerob.app.emulation.options import COMMAND, EmulatorOptions, Ready, Server
 from seerob.app.emulation.wire import FaultyWire
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_loopback
@@ -15,16 +16,25 @@ from seerob.core.plugin import load
 from seerob.workstation.source import Source
 
 
+class Served(NamedTuple):
+    """A device that serves."""
+
+    server: Server
+    what: str
+    """What it plays."""
+    at: str
+    """``listens at`` or ``sends to`` an address."""
+    commands: tuple[str, ...]
+    """That hear it."""
+
+
 @contextmanager
-def served(kind: str, asked: EmulatorOptions) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+def served(kind: str, asked: EmulatorOptions) -> Iterator[Served]:
     """Be a device meanwhile.
 
     Args:
         kind: What it is.
         asked: Its options.
-
-    Yields:
-        What it plays, ``listens at`` or ``sends to`` an address, and commands that hear it.
 
     Raises:
         InputError: What it shall play is wrong, or it cannot listen there.
@@ -42,7 +52,7 @@ def served(kind: str, asked: EmulatorOptions) -> Iterator[tuple[str, str, tuple[
         to = getattr(server, "to", None)
         host, port = to or (getattr(server, "host", asked.host), getattr(server, "port", 0))
         commands = probes_of(kind, host, port, sends=bool(to), commands=made.commands)
-        yield made.what, f"{'sends to' if to else 'listens at'} {host}:{port}", commands
+        yield Served(server, made.what, f"{'sends to' if to else 'listens at'} {host}:{port}", commands)
     finally:
         server.stop()
 

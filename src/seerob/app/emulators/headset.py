@@ -1,0 +1,196 @@
+"""A visitor without a headset: comes to the page of a run and says what a headset would see."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.mvn_person import Person
+from seerob.app.emulation.options import PersonOptions, Ready, option, port
+from seerob.core.page_messages import Command, Tracking
+from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.protocols.tracking.mvn_pose import SEGMENTS
+from seerob.protocols.tracking.vive import xr_positions, xr_turns
+
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
+PROTOCOL = "seerob.v2.msgpack"
+RETRY = 0.5
+"""Time between two attempts to come in [s]."""
+ACKNOWLEDGED = 4
+"""Every so many snapshots."""
+
+THREE = {
+    "viewer": ("Head", (0.05, 0.0, 0.04)),
+    "left-grip": ("LeftHand", (0.0, 0.05, 0.0)),
+    "right-grip": ("RightHand", (0.0, -0.05, 0.0)),
+}
+"""What every headset sees: segment, and where on it in the T-pose (x forward, y left, z up) [m]."""
+_SIDES = {
+    "shoulder": "Shoulder",
+    "arm-upper": "UpperArm",
+    "arm-lower": "ForeArm",
+    "hand-wrist": "Hand",
+    "upper-leg": "UpperLeg",
+    "lower-leg": "LowerLeg",
+    "foot-ankle": "Foot",
+    "foot-ball": "Toe",
+}
+BODY = {
+    "hips": "Pelvis",
+    "spine-lower": "L5",
+    "spine-upper": "T8",
+    "neck": "Neck",
+    "head": "Head",
+    **{
+        f"{side}-{joint}": f"{side.title()}{name}"
+        for side in ("left", "right")
+        for joint, name in _SIDES.items()
+    },
+}
+"""Joints of WebXR Body Tracking: segment whose origin each is."""
+
+
+def seen(person: Person, *, body: bool) -> Callable[[float], tuple[tuple[str, ...], Array]]:
+    """What a headset sees of the person who wears it.
+
+    Args:
+        person: Who wears it.
+        body: Whether it sees joints of the whole body beside head and hands.
+
+    Returns:
+        Of a time [s]: names, and positions and rotations as `Tracking.poses` has them, shape (n, 7).
+    """
+    joints = {name: (segment, (0.0, 0.0, 0.0)) for name, segment in (BODY if body else {}).items()}
+    every = {**THREE, **joints}
+    rows = [SEGMENTS.index(segment) for segment, _ in every.values()]
+    offsets = np.array([at for _, at in every.values()])
+
+    def at(t: float) -> tuple[tuple[str, ...], Array]:
+        pose = person(t)
+        turns = pose.wxyz[rows]
+        positions = pose.positions[rows] + np.einsum("nij,nj->ni", rotation_from_wxyz(turns), offsets)
+        return tuple(every), np.concatenate([xr_positions(positions), xr_turns(turns)], axis=-1)
+
+    return at
+
+
+class _Received(Struct):
+    """Of what a server says, what is answered."""
+
+    type: str = ""
+    seq: int | None = None
+
+
+class Visitor(LoopEmulator):
+    """The visitor, in a thread of its own; comes again when it was sent away.
+
+    Args:
+        person: Who wears the headset.
+        human: Whom of the workstation that person is.
+        host: Machine that serves the page.
+        port: Its port.
+        rate: Pictures per second [Hz].
+        body: Whether joints of the whole body are seen.
+    """
+
+    def __init__(self, person: Person, *, human: str, host: str, port: int, rate: float, body: bool) -> None:
+        super().__init__()
+        self.human, self.rate, self.to = human, rate, (host, port)
+        self.sent = 0
+        """Messages so far."""
+        self._seen = seen(person, body=body)
+
+    def found_page(self, port: int) -> None:
+        """The page is at another port than was said."""
+        self.to = self.to[0], port
+
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Come in, be seen, and come again, until it is over."""
+        ready()
+        task = asyncio.ensure_future(self._visit())
+        await over.wait()
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    async def _visit(self) -> None:
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import WebSocketException
+
+        begun = time.monotonic()
+        while True:
+            with suppress(OSError, WebSocketException, TimeoutError):
+                url = f"ws://{self.to[0]}:{self.to[1]}/ws"
+                async with connect(
+                    url,
+                    subprotocols=[PROTOCOL],  # type: ignore[list-item]
+                    compression=None,
+                    max_size=None,
+                ) as connection:
+                    answers = asyncio.ensure_future(self._acknowledge(connection))
+                    try:
+                        await self._be_seen(connection, begun)
+                    finally:
+                        answers.cancel()
+                        await asyncio.gather(answers, return_exceptions=True)
+            await asyncio.sleep(RETRY)
+
+    async def _be_seen(self, connection: ClientConnection, begun: float) -> None:
+        while True:
+            k = int((time.monotonic() - begun) * self.rate) + 1
+            await asyncio.sleep(max(0.0, begun + k / self.rate - time.monotonic()))
+            names, poses = self._seen(k / self.rate)
+            told = Tracking(
+                human=self.human, t=k / self.rate, names=names, poses=poses.astype("<f4").tobytes()
+            )
+            await connection.send(msgspec.msgpack.encode(told))
+            self.sent += 1
+
+    async def _acknowledge(self, connection: ClientConnection) -> None:
+        decoder = msgspec.msgpack.Decoder(_Received)
+        unanswered = 0
+        async for message in connection:
+            received = decoder.decode(message)  # type: ignore[arg-type]
+            if received.type == "snapshot" and received.seq is not None:
+                unanswered += 1
+                if unanswered == ACKNOWLEDGED:
+                    unanswered = 0
+                    done = Command(action="ack", value=received.seq)
+                    await connection.send(msgspec.msgpack.encode(done))
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Headset(PersonOptions, frozen=True, kw_only=True):
+    """A headset that shows the page of a run: what it sees of the moving person who wears it."""
+
+    human: Annotated[str, option("whom of the workstation that person is")] = "operator"
+    to: Annotated[str, option("machine that serves the page")] = "127.0.0.1"
+    port: Annotated[int, port("port of the page; `seerob run --emulated` tells its own")] = 8080
+    rate: Annotated[float, option("pictures per second", "Hz", ge=30, le=144)] = 72.0
+    body: Annotated[bool, option("joints of the whole body are seen; else head and hands")] = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.faults().any:
+            raise ValueError(
+                "--drop, --delay, --jitter and --garble are of devices with a network of their own"
+            )
+
+    def ready(self) -> Ready:
+        """The visitor."""
+        visitor = Visitor(
+            self.person(), human=self.human, host=self.to, port=self.port, rate=self.rate, body=self.body
+        )
+        hear = (f"seerob run CELL --port {{port}}     (with a source headset of {self.human})",)
+        return Ready(visitor, f"a headset on {self.human}, {self.file}", f"{self.to}:{self.port}", hear)

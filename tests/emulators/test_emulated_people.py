@@ -8,7 +8,7 @@ from seerob.core.errors import InputError
 KINDS = {
     "natnet": ["--port", "0", "--version", "3.1"],
     "rokoko": ["--port", "1", "--lz4", "--version", "2"],
-    "vive": ["--port", "0", "--websocket", "--all"],
+    "vive": ["--port", "0", "--websocket", "--trackers", "all"],
     "vrpn": ["--port", "0"],
 }
 

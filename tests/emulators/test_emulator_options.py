@@ -42,7 +42,7 @@ def test_words_are_the_values_of_the_fields():
     asked = options_of("natnet", ["--version", "3.1", "--rate", "100.5"])
     assert (asked.version, asked.rate) == ("3.1", 100.5)
     assert options_of("drfl", ["--rate", "250"]).rate == 250
-    assert options_of("vive", ["--all", "--websocket"]).all
+    assert options_of("vive", ["--trackers", "all", "--websocket"]).trackers == "all"
 
 
 @pytest.mark.parametrize(

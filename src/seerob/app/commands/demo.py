@@ -26,6 +26,8 @@ SHIPPED = {
     "ur10_rtde": "live: a UR10, emulated",
     "motor_station": "live: an LBR iiwa and a person with trackers, both emulated",
     "assembly_line": "live: a UR10 and a person whom a depth camera sees, both emulated",
+    "empty_room": "live: a UR5 in an empty room, its line virtual, a tracker on a hand; emulated",
+    "three_robots": "live: two LBR iiwa and a UR10 on a line, a visitor with a headset, who is emulated",
     "plc_cell": "live: a UR10 and a PLC with a belt, a light curtain and a door, both emulated",
 }
 """What each shows; the first is run when none is named."""
@@ -41,7 +43,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     text = "its devices are there: start no emulators, and say where the addresses stand"
     sub.add_argument("--real", action="store_true", help=text)
     live.add_live(sub)
-    sub.set_defaults(allow_plugins=False, allow_outside=False, allow_writing=False, replay=None)
+    sub.set_defaults(allow_plugins=False, allow_outside=False, allow_writing=False, replay=None, edit=False)
 
 
 def run(options: argparse.Namespace) -> int:

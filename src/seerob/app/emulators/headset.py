@@ -85,7 +85,7 @@ def seen(person: Person, *, body: bool) -> Callable[[float], tuple[tuple[str, ..
 
 
 class _Received(Struct):
-    """Of what a server says, what is answered."""
+    """Kind and number of a message of the server: snapshots are acknowledged."""
 
     type: str = ""
     seq: int | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -104,13 +104,23 @@ class Vive(PersonOptions, frozen=True, kw_only=True):
     to: Annotated[str, option("address to send datagrams to")] = "127.0.0.1"
     port: Annotated[int, port("port to send to, or to listen at with --websocket")] = PORT
     websocket: Annotated[bool, option("let listeners connect; else UDP")] = False
-    all: Annotated[bool, option("nine trackers; else the least five")] = False
+    trackers: Annotated[
+        Literal["least", "all", "hand"],
+        option("the least five for a whole body, all nine, or one on the right hand"),
+    ] = "least"
 
     def ready(self) -> Ready:
         """The sender."""
-        trackers = worn(self.person(), tuple(WORN) if self.all else FIVE)
+        trackers = worn(
+            self.person(), {"least": FIVE, "all": tuple(WORN), "hand": ("right_hand",)}[self.trackers]
+        )
         to = None if self.websocket else (self.to, self.port)
         server = ViveSender(trackers, to=to, host=self.host, port=self.port, rate=self.rate)
         where = self.host if self.websocket else self.to
         hear = (CONNECT,) if self.websocket else ()
-        return Ready(server, f"trackers on a person, {self.file}", f"{where}:{self.port}", hear)
+        return Ready(
+            server,
+            f"{len(trackers(0.0).devices)} trackers on a person, {self.file}",
+            f"{where}:{self.port}",
+            hear,
+        )

@@ -1,5 +1,6 @@
 // The page's end of the worker: what it says becomes signals, traces and poses.
 
+import { heardPresences, heardVisitors } from "./company";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
 import { heardMeasured } from "./editing/measure";
 import type { Frame, FromWorker, ToWorker } from "./messages";
@@ -107,6 +108,12 @@ export class Connection {
         return;
       case "tracked":
         tracked.value = message.tracked;
+        return;
+      case "visitors":
+        heardVisitors(message.visitors);
+        return;
+      case "presences":
+        heardPresences(message.presences);
         return;
       case "draft":
         draft.value = message.draft;

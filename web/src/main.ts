@@ -3,6 +3,7 @@
 import "uplot/dist/uPlot.min.css";
 import "./look/index.css";
 import { h, render } from "preact";
+import { connectCompany, others, ownDevice, ownHuman } from "./company";
 import { Connection } from "./connection";
 import { connectDraft } from "./editing/draft";
 import { connectMeasure } from "./editing/measure";
@@ -10,9 +11,10 @@ import { listenToKeys } from "./keyboard";
 import { now, selectedNodes } from "./page_state";
 import { App } from "./panels/App";
 import { type Actions, ActionsContext } from "./panels/app_context";
+import { OwnPresence } from "./scene/own_presence";
 import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
-import type { Tracking } from "./wire";
+import type { Tracking, VisitorInfo } from "./wire";
 import { Visit } from "./xr/visit";
 
 declare global {
@@ -35,6 +37,8 @@ declare global {
       readonly held: boolean;
       /** Where a point of a visitor's room [m] is in three.js's own world, y up; null without a visit. */
       visited(point: [number, number, number]): [number, number, number] | null;
+      /** The other visitors, with head and hands as they are drawn, in the world (z up) [m]. */
+      readonly others: (VisitorInfo & Record<"head" | "left" | "right", number[] | null>)[];
     };
   }
 }
@@ -50,12 +54,18 @@ function begin(element: HTMLElement): void {
   actions.time.connect((message) => connection.send(message));
   connectDraft((edit) => connection.send({ kind: "edit", edit }));
   connectMeasure((measure) => connection.send({ kind: "measure", measure }));
+  connectCompany((said) => connection.send({ kind: "company", said }));
+  const presence = new OwnPresence(viewer.stage, (said) => connection.send({ kind: "company", said }));
   let visit: Visit | null = null;
   actions.enter = async (mode, human) => {
     const offer = (tracking: Tracking) => connection.send({ kind: "tracking", tracking });
     visit = await Visit.begin(viewer, mode, human, offer);
+    ownDevice.value = mode === "immersive-ar" ? "ar" : "vr";
+    ownHuman.value = human ?? "";
     visit.session.addEventListener("end", () => {
       visit = null;
+      ownDevice.value = "desk";
+      ownHuman.value = "";
     });
     return visit.session;
   };
@@ -68,6 +78,7 @@ function begin(element: HTMLElement): void {
     connection.tick(time);
     viewer.tick(time);
     visit?.tick(time, frame);
+    presence.tick(time, visit);
   });
   window.seerob = {
     get t() {
@@ -82,6 +93,13 @@ function begin(element: HTMLElement): void {
       return viewer.gizmo.held;
     },
     visited: (point) => visit?.inWorld(point) ?? null,
+    get others() {
+      return others.value.map((info) => {
+        const limbs = viewer.companions.limbsOf(info.id) ?? [];
+        const seen = limbs.map(({ visible, position }) => (visible ? position.toArray() : null));
+        return { ...info, head: seen[0] ?? null, left: seen[1] ?? null, right: seen[2] ?? null };
+      });
+    },
   };
 }
 

@@ -6,8 +6,12 @@ import type {
   Edited,
   Hello,
   History,
+  Hold,
+  Introduction,
   Measure,
   Measured,
+  Presence,
+  Presences,
   Result,
   Scene,
   Snapshot,
@@ -15,6 +19,7 @@ import type {
   Tracked,
   Tracking,
   Transport,
+  Visitors,
 } from "./wire";
 
 /** What a page asks of the server; `ack` is the worker's own affair. */
@@ -60,6 +65,8 @@ export type FromWorker =
   /** What became of what this page asked of the file. */
   | { kind: "edited"; edited: Edited }
   | { kind: "measured"; measured: Measured }
+  | { kind: "visitors"; visitors: Visitors["visitors"] }
+  | { kind: "presences"; presences: Presences }
   /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
   | { kind: "frame"; frame: Frame; heard: number; silent: boolean }
   /** A live run has said nothing for too long. */
@@ -76,5 +83,7 @@ export type ToWorker =
   | { kind: "tracking"; tracking: Tracking }
   | { kind: "edit"; edit: Edit }
   | { kind: "measure"; measure: Measure }
+  /** What this visitor says of themselves. */
+  | { kind: "company"; said: Introduction | Presence | Hold }
   /** While live: show the kept snapshot of this run time, or follow the newest (null). */
   | { kind: "look"; t: number | null };

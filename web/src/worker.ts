@@ -73,6 +73,12 @@ function received(message: ServerMessage, raw: Uint8Array): void {
     case "tracked":
       post({ kind: "tracked", tracked: message });
       return;
+    case "visitors":
+      post({ kind: "visitors", visitors: message.visitors });
+      return;
+    case "presences":
+      post({ kind: "presences", presences: message });
+      return;
     case "draft":
       post({ kind: "draft", draft: message });
       return;
@@ -195,6 +201,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "tracking":
       socket?.send(message.tracking);
+      return;
+    case "company":
+      socket?.send(message.said);
       return;
     case "measure":
       socket?.send(message.measure);

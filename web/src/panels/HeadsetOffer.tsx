@@ -1,6 +1,7 @@
 // Lets whoever wears a headset into the room: to look, or, in a live run, as a person of the workstation.
 
 import { useEffect, useState } from "preact/hooks";
+import { ownScale, SCALES } from "../company";
 import { isLive, mayTrack, scene, tracked } from "../page_state";
 import { type Mode, sessionModes } from "../xr/visit";
 import { useActions } from "./app_context";
@@ -33,6 +34,21 @@ export function HeadsetOffer() {
   return (
     <div class="headset-offer">
       {inside && <span role="status">headset on</span>}
+      <label class="own-scale">
+        my size
+        <select
+          value={String(ownScale.value)}
+          onChange={(event) => {
+            ownScale.value = Number(event.currentTarget.value);
+          }}
+        >
+          {SCALES.map((scale) => (
+            <option key={scale} value={String(scale)}>
+              ×{scale}
+            </option>
+          ))}
+        </select>
+      </label>
       {!inside &&
         modes.map((mode) => (
           <button key={mode} type="button" title={TITLES[mode]} onClick={() => void begin(mode, null)}>

@@ -20,6 +20,7 @@ import { orderedRows } from "../row_order";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
 import type { Result } from "../wire";
 import { said, word } from "../words";
+import { Company } from "./Company";
 import { ElsewhereNote } from "./ElsewhereNote";
 import { HeadsetOffer } from "./HeadsetOffer";
 
@@ -35,6 +36,7 @@ export function TopBar() {
         <h1 title={run?.title}>{run?.title ?? "…"}</h1>
         {run && <span class="edition">{run.edition || said("no edition stated")}</span>}
       </div>
+      <Company />
       <HeadsetOffer />
       <SourceState />
       <StatusPill />

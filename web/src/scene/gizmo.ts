@@ -3,6 +3,7 @@
 import { effect } from "@preact/signals";
 import { MathUtils, Matrix4, Object3D, Quaternion, Vector3 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
+import { holding } from "../company";
 import { change, chosenEntry, draft, type Entry, mayEdit } from "../editing/draft";
 import { gizmoMode, STEPS, steps } from "../editing/handles";
 import { measuring } from "../editing/measure";
@@ -37,6 +38,7 @@ export class Gizmo {
     this.controls.addEventListener("objectChange", () => this.carry());
     this.controls.addEventListener("dragging-changed", ({ value }) => {
       free(value !== true);
+      holding.value = value === true && this.entry ? [this.entry.name] : [];
       if (value === true) this.take();
       else void this.put();
     });

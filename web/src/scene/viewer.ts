@@ -2,6 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import { Quaternion, type Raycaster, Vector3 } from "three";
+import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
 import { measuring, withFace } from "../editing/measure";
@@ -22,6 +23,7 @@ import {
 import { manikinTints } from "../posture/coloring";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
+import { Companions } from "./companions";
 import { DoubtCaptions } from "./doubt_captions";
 import { Gizmo } from "./gizmo";
 import { Outline } from "./outline";
@@ -42,6 +44,7 @@ export class Viewer {
   readonly stage: Stage;
   readonly bodies = new Bodies();
   readonly markers = new MarkerLayer();
+  readonly companions = new Companions();
   readonly viewpoint: Viewpoint;
   private readonly doubts = new DoubtCaptions(this.bodies);
   private readonly outline = new Outline(this.bodies);
@@ -59,7 +62,7 @@ export class Viewer {
 
   constructor(element: HTMLElement) {
     this.stage = new Stage(element);
-    this.stage.world.add(this.bodies.root, this.markers.root, this.doubts.root);
+    this.stage.world.add(this.bodies.root, this.markers.root, this.doubts.root, this.companions.root);
     this.viewpoint = new Viewpoint(this.stage, this.bodies);
     this.view = { camera: this.stage.camera, pixel: 0, margins: true };
     this.gizmo = new Gizmo(this.stage, this.bodies, (free) => {
@@ -119,7 +122,11 @@ export class Viewer {
       this.framed = true;
       this.viewpoint.go("corner");
     }
-    if (!this.stage.renderer.xr.isPresenting) this.viewpoint.update();
+    if (this.companions.tick(time)) this.stage.invalidate();
+    if (!this.stage.renderer.xr.isPresenting) {
+      this.followVisitor();
+      this.viewpoint.update();
+    }
     const { camera, element } = this.stage;
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
     this.view.margins = !this.stage.renderer.xr.isPresenting;
@@ -194,7 +201,25 @@ export class Viewer {
     this.stage.invalidate();
   }
 
+  /** Look with the eyes of the visitor whom one follows. */
+  private followVisitor(): void {
+    const id = following.peek();
+    const head = id === null ? null : this.companions.limbsOf(id)?.[0];
+    if (head?.visible) this.viewpoint.lookWith(head);
+  }
+
   private follow(): void {
+    showPresences((presences) => {
+      this.companions.take(presences);
+      this.stage.invalidate();
+    });
+    this.viewpoint.controls.addEventListener("start", () => {
+      following.value = null;
+    });
+    effect(() => {
+      this.companions.list(others.value);
+      this.stage.invalidate();
+    });
     effect(() => {
       void [selection.value, selectedNodes.value];
       this.emphasize();

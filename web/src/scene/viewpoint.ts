@@ -1,6 +1,6 @@
 // Where one looks from: orbit by mouse, and the places one goes to with a button.
 
-import { Box3, type Object3D, Vector3 } from "three";
+import { Box3, type Object3D, Quaternion, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Bodies } from "./bodies";
 import type { Stage } from "./stage";
@@ -20,6 +20,7 @@ export class Viewpoint {
   private readonly box = new Box3();
   private readonly center = new Vector3();
   private readonly size = new Vector3();
+  private readonly turn = new Quaternion();
 
   constructor(
     private readonly stage: Stage,
@@ -72,6 +73,17 @@ export class Viewpoint {
     camera.position.copy(this.center).addScaledVector(away, distance);
     this.controls.update();
     this.stage.invalidate();
+  }
+
+  /** Look from where somebody's head is, ahead (its -z); what they see beside themselves is theirs. */
+  lookWith(head: Object3D): void {
+    const { camera } = this.stage;
+    head.updateWorldMatrix(true, false);
+    head.getWorldPosition(camera.position);
+    this.size.set(0, 0, -1).applyQuaternion(head.getWorldQuaternion(this.turn));
+    // From before the head, which would be in the picture.
+    camera.position.addScaledVector(this.size, 0.2 * head.scale.x);
+    this.controls.target.copy(camera.position).addScaledVector(this.size, 1);
   }
 
   private lookFromEyes(): void {

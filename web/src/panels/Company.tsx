@@ -1,0 +1,65 @@
+// Who else looks at this twin: role, scale, what they hold; to follow them, and to ask them to follow.
+
+import { calling, following, holders, others, ownName } from "../company";
+
+export function Company() {
+  const there = others.value;
+  if (there.length === 0) return null;
+  const caller = there.find(({ calls, id }) => calls && id !== following.value);
+  return (
+    <details class="company">
+      <summary aria-label={`${there.length} other visitors`}>
+        <span aria-hidden="true">●</span> {there.length} more here
+        {caller && <span class="company-call"> · {caller.name} asks you to follow</span>}
+      </summary>
+      <div class="company-list" role="group" aria-label="Visitors">
+        <ul>
+          {there.map(({ id, name, color, role, scale, device, human, holds }) => (
+            <li key={id}>
+              <span aria-hidden="true" style={{ color }}>
+                ●
+              </span>
+              <span class="company-name">
+                {name}, {role}
+                {human && ` as ${human}`}
+                {device !== "desk" && ` (${device})`}
+                {scale !== 1 && ` ×${Number(scale.toPrecision(3))}`}
+                {holds.length > 0 && `, holds ${holds.join(", ")}`}
+              </span>
+              <button
+                type="button"
+                aria-pressed={following.value === id}
+                onClick={() => {
+                  following.value = following.value === id ? null : id;
+                }}
+              >
+                {following.value === id ? "stop" : "follow"}
+              </button>
+            </li>
+          ))}
+        </ul>
+        <label>
+          my name
+          <input
+            value={ownName.value}
+            maxLength={40}
+            onChange={(event) => {
+              ownName.value = event.currentTarget.value.trim();
+            }}
+          />
+        </label>
+        <label>
+          <input
+            type="checkbox"
+            checked={calling.value}
+            onChange={(event) => {
+              calling.value = event.currentTarget.checked;
+            }}
+          />
+          ask the others to follow me
+        </label>
+        {holders.value.size > 0 && <p>What somebody holds, nobody else can change.</p>}
+      </div>
+    </details>
+  );
+}

@@ -12,7 +12,7 @@ export function Company() {
         <span aria-hidden="true">●</span> {there.length} more here
         {caller && <span class="company-call"> · {caller.name} asks you to follow</span>}
       </summary>
-      <div class="company-list" role="group" aria-label="Visitors">
+      <fieldset class="company-list" aria-label="Visitors">
         <ul>
           {there.map(({ id, name, color, role, scale, device, human, holds }) => (
             <li key={id}>
@@ -59,7 +59,7 @@ export function Company() {
           ask the others to follow me
         </label>
         {holders.value.size > 0 && <p>What somebody holds, nobody else can change.</p>}
-      </div>
+      </fieldset>
     </details>
   );
 }

@@ -83,7 +83,10 @@ class Companion {
 
   constructor(private info: VisitorInfo) {
     this.skin = new MeshBasicMaterial({ color: info.color });
-    const face = new Mesh(new BoxGeometry(1.2 * HEAD, 0.35 * HEAD, 0.3 * HEAD), new MeshBasicMaterial({ color: 0x10151c }));
+    const face = new Mesh(
+      new BoxGeometry(1.2 * HEAD, 0.35 * HEAD, 0.3 * HEAD),
+      new MeshBasicMaterial({ color: 0x10151c }),
+    );
     face.position.z = -0.95 * HEAD;
     const head = new Mesh((SHAPES[info.shape] ?? SHAPES.ball!)(), this.skin);
     head.add(face);
@@ -118,7 +121,7 @@ class Companion {
   }
 
   take(poses: Float32Array, points: Float32Array, laser: Float32Array): void {
-    this.limbs.forEach((limb, row) => limb.take(poses, row));
+    for (const [row, limb] of this.limbs.entries()) limb.take(poses, row);
     fill(this.beam, laser);
     fill(this.joints, points);
   }

@@ -63,7 +63,10 @@ export class OwnPresence {
     this.pointed = points_at;
     this.said.set(poses);
     for (let i = 0; i < points; i += 1) {
-      this.position.fromArray(this.points, 3 * i).applyMatrix4(this.fromRig).toArray(this.points, 3 * i);
+      this.position
+        .fromArray(this.points, 3 * i)
+        .applyMatrix4(this.fromRig)
+        .toArray(this.points, 3 * i);
     }
     if (points_at) {
       visit!.laser(this.position, this.to);

@@ -31,6 +31,29 @@ function* spaces(frame: BodyFrame, sources: Iterable<XRInputSource>): Generator<
 }
 
 /**
+ * Where joints of body and hands are, three numbers [m] each in `space`; how many were written.
+ *
+ * @param into Takes as many as it has room for.
+ */
+export function bodyJoints(
+  frame: XRFrame,
+  space: XRReferenceSpace,
+  sources: Iterable<XRInputSource>,
+  into: Float32Array,
+): number {
+  let count = 0;
+  for (const [name, each] of spaces(frame, sources)) {
+    if (name.endsWith("-grip") || 3 * (count + 1) > into.length) continue;
+    const pose = frame.getPose(each, space);
+    if (!pose) continue;
+    const { x, y, z } = pose.transform.position;
+    into.set([x, y, z], 3 * count);
+    count += 1;
+  }
+  return count;
+}
+
+/**
  * The message of one picture; null when not even the head is tracked.
  *
  * @param space `local-floor`

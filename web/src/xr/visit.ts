@@ -16,11 +16,13 @@ import {
   SphereGeometry,
   Vector3,
 } from "three";
+import { ownScale } from "../company";
 import { hidden, overReality, rows, scene } from "../page_state";
+import type { Sighted } from "../scene/own_presence";
 import type { Viewer } from "../scene/viewer";
 import type { Tracking } from "../wire";
 import { Board } from "./board";
-import { sight } from "./sight";
+import { bodyJoints, sight } from "./sight";
 
 export type Mode = "immersive-vr" | "immersive-ar";
 
@@ -69,7 +71,7 @@ class Pointer {
   }
 }
 
-export class Visit {
+export class Visit implements Sighted {
   private readonly rig: Group;
   private readonly things = new Group();
   private readonly pointers = { left: new Pointer(), right: new Pointer() };
@@ -83,7 +85,9 @@ export class Visit {
   private readonly forget: () => void;
   private exceeded: ReadonlySet<string> = new Set();
   // Made once: a picture allocates nothing of ours.
-  private readonly head = new Vector3();
+  private readonly eyes = new Vector3();
+  private readonly facing = new Quaternion();
+  private frame: XRFrame | null = null;
   private readonly at = new Vector3();
   private readonly turn = new Quaternion();
   private readonly up = new Vector3(0, 1, 0);
@@ -105,7 +109,10 @@ export class Visit {
     this.rig.add(this.things);
     this.stand();
     session.addEventListener("select", this.select);
-    this.forget = effect(() => this.feel());
+    const forgets = [effect(() => this.feel()), effect(() => this.resize(ownScale.value))];
+    this.forget = () => {
+      for (const forget of forgets) forget();
+    };
   }
 
   /**
@@ -142,15 +149,17 @@ export class Visit {
     }
     const viewer = frame.getViewerPose(space);
     if (viewer) {
-      const { x, y, z } = viewer.transform.position;
-      this.head.set(x, y, z);
+      const { position: p, orientation: q } = viewer.transform;
+      this.eyes.set(p.x, p.y, p.z);
+      this.facing.set(q.x, q.y, q.z, q.w);
     }
+    this.frame = frame;
     this.rig.updateMatrixWorld();
     for (const pointer of Object.values(this.pointers)) pointer.ball.visible = pointer.beam.visible = false;
     this.landing.visible = false;
     for (const source of this.session.inputSources) this.hold(frame, space, source);
     if (!this.pointers.left.ball.visible) this.board.mesh.position.copy(FACING);
-    this.board.mesh.lookAt(this.rig.localToWorld(this.at.copy(this.head)));
+    this.board.mesh.lookAt(this.rig.localToWorld(this.at.copy(this.eyes)));
     this.board.update(time);
     this.viewer.stage.invalidate();
   }
@@ -166,13 +175,60 @@ export class Visit {
       viewer.stage.world.updateMatrix();
       rig.matrix.premultiply(viewer.stage.world.matrix).multiply(AHEAD);
       rig.matrix.decompose(rig.position, rig.quaternion, rig.scale);
+      rig.scale.setScalar(ownScale.peek());
       return;
     }
     const { camera } = viewer.stage;
     camera.getWorldDirection(this.at);
     rig.quaternion.setFromAxisAngle(this.up, Math.atan2(-this.at.x, -this.at.z));
     camera.getWorldPosition(rig.position).setY(0);
-    rig.scale.setScalar(1);
+    rig.scale.setScalar(ownScale.peek());
+  }
+
+  /** Be so large from now on, with the head above the same point of the floor. */
+  private resize(scale: number): void {
+    const { rig } = this;
+    if (rig.scale.x === scale) return;
+    rig.updateMatrixWorld();
+    rig.localToWorld(this.at.copy(this.eyes));
+    const { x, z } = this.at;
+    rig.scale.setScalar(scale);
+    rig.updateMatrixWorld();
+    rig.localToWorld(this.at.copy(this.eyes));
+    // A person of the twin stands where the file says.
+    if (this.human === null)
+      rig.position.set(rig.position.x + x - this.at.x, rig.position.y, rig.position.z + z - this.at.z);
+    rig.updateMatrixWorld();
+  }
+
+  // -- what the others are told, in the space of the rig ------------------------------------------
+
+  head(position: Vector3, turn: Quaternion): boolean {
+    position.copy(this.eyes);
+    turn.copy(this.facing);
+    return this.frame !== null;
+  }
+
+  hand(side: "left" | "right", position: Vector3, turn: Quaternion): boolean {
+    const { ball } = this.pointers[side];
+    position.copy(ball.position);
+    turn.copy(ball.quaternion);
+    return ball.visible;
+  }
+
+  joints(into: Float32Array): number {
+    const space = this.viewer.stage.renderer.xr.getReferenceSpace();
+    return this.frame && space ? bodyJoints(this.frame, space, this.session.inputSources, into) : 0;
+  }
+
+  laser(from: Vector3, to: Vector3): boolean {
+    for (const { beam } of [this.pointers.right, this.pointers.left]) {
+      if (!beam.visible) continue;
+      from.copy(beam.position);
+      to.set(0, 0, -beam.scale.x).applyQuaternion(beam.quaternion).add(beam.position);
+      return true;
+    }
+    return false;
   }
 
   /** Where a point of the visitor's room [m] is in the world (y up). */
@@ -188,7 +244,9 @@ export class Visit {
     const held = wrist && frame.getPose(wrist, space);
     if (held) {
       const { x, y, z } = held.transform.position;
+      const { orientation: q } = held.transform;
       pointer.ball.position.set(x, y, z);
+      pointer.ball.quaternion.set(q.x, q.y, q.z, q.w);
       // A person of the twin has hands there.
       pointer.ball.visible = true;
       if (source.handedness === "left") this.board.mesh.position.set(x, y, z).add(BESIDE_WRIST);
@@ -236,11 +294,11 @@ export class Visit {
 
   private turnBy(angle: number): void {
     const { rig } = this;
-    rig.localToWorld(this.at.copy(this.head));
+    rig.localToWorld(this.at.copy(this.eyes));
     const { x, z } = this.at;
     rig.quaternion.premultiply(this.turn.setFromAxisAngle(this.up, angle));
     rig.updateMatrixWorld();
-    rig.localToWorld(this.at.copy(this.head));
+    rig.localToWorld(this.at.copy(this.eyes));
     rig.position.x += x - this.at.x;
     rig.position.z += z - this.at.z;
     rig.updateMatrixWorld();
@@ -249,7 +307,7 @@ export class Visit {
   /** Stand with the head above a point of the floor. */
   private go(floor: Vector3): void {
     const { rig } = this;
-    rig.localToWorld(this.at.copy(this.head));
+    rig.localToWorld(this.at.copy(this.eyes));
     rig.position.x += floor.x - this.at.x;
     rig.position.z += floor.z - this.at.z;
     rig.position.y = floor.y;

@@ -14,6 +14,7 @@ from seerob.core.snapshot import Verdict
 from seerob.criteria.ergonomics.rula import Rula
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.description.capture.registration import CHI, bound
+from seerob.devices.sources.headset import at_scale
 from seerob.session import run as road
 from seerob.session.run import Judge
 from seerob.session.station import Station
@@ -78,6 +79,17 @@ def test_a_missing_registration_leaves_places_undecided_and_postures_as_they_are
     values = [row.value for row in posture.rows]
     assert values == [row.value for row in known.rows]
     assert sum(value is not None for value in values) > 4
+
+
+@pytest.mark.parametrize("scale", [0.1, 10.0])
+def test_a_person_at_another_scale_is_judged_for_posture_and_refused_against_limits(scale):
+    distance, posture = told(at_scale(scale), criteria=(DISTANCE, POSTURE))
+    assert distance.verdict is Verdict.UNDECIDED
+    assert f"works at scale {scale:g}" in distance.reason
+    same, own = told(at_scale(1.0), criteria=(DISTANCE, POSTURE))
+    assert same.verdict is Verdict.WITHIN
+    assert [row.value for row in posture.rows] == [row.value for row in own.rows]
+    assert sum(row.value is not None for row in posture.rows) > 4
 
 
 def test_it_is_recorded_with_the_sample():

@@ -111,6 +111,20 @@ def test_a_whole_body_fits_into_a_message(server, samples):
     assert {p.bone for p in sample.points} == {"head", "pelvis", "left_foot", "right_foot"}
 
 
+@pytest.mark.parametrize("scale", [10.0, 0.1])
+def test_who_works_at_another_scale_is_told_of_by_posture_alone(server, samples, scale):
+    with Page(server) as page:
+        own = seen(page, samples)
+        assert own.placing is None
+        assert {p.name: p.position for p in seen(page, samples, 2).points}
+        after = len(samples) + 1
+        scaled = seen(page, samples, after, scale=scale)
+    assert f"works at scale {scale:g}" in scaled.placing.reason
+    # In their own metres: who reaches out by 40 cm does so at any size.
+    before, now = ({p.name: p.position for p in sample.points} for sample in (own, scaled))
+    np.testing.assert_allclose(now["left-grip"], before["left-grip"], atol=1e-5)
+
+
 def test_nobody_waits_for_it(server):
     with Page(server) as page:
         page.see(human="berta")
@@ -167,6 +181,9 @@ def test_one_page_per_person_until_it_leaves(server, samples):
         {"t": float("nan")},
         {"t": -1.0},
         {"human": "a" * (LONGEST_NAME + 1)},
+        {"scale": 0.0},
+        {"scale": float("nan")},
+        {"scale": 1e3},
     ],
 )
 def test_an_offer_that_contradicts_itself_is_turned_away(server, wrong):

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "bc792d068e81ec22";
+export const SCHEMA = "044c15dde038a04f";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -630,6 +630,11 @@ export interface Tracking {
    * in the cell is known of the space in which that was found out.
    */
   space?: string;
+  /**
+   * Metres of the world in a metre of theirs, as they see it. Poses are in theirs: whoever works at another
+   * scale than 1 is judged by postures alone.
+   */
+  scale?: number;
 }
 
 /** One step of finding out where the room of a page's headset lies in the cell. */

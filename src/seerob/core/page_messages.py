@@ -105,6 +105,9 @@ class Tracking(Struct, frozen=True, kw_only=True, tag="tracking"):
     space: str = ""
     """Which tracking space that is: another one after each recentring and in each session. Where a room lies
     in the cell is known of the space in which that was found out."""
+    scale: float = 1.0
+    """Metres of the world in a metre of theirs, as they see it. Poses are in theirs: whoever works at another
+    scale than 1 is judged by postures alone."""
 
 
 class Register(Struct, frozen=True, kw_only=True, tag="register"):

@@ -145,7 +145,10 @@ export class Visit implements Sighted {
     if (!frame || !space) return;
     if (this.human !== null) {
       const seen = sight(frame, space, this.session.inputSources, this.human, time);
-      if (seen) this.send(seen);
+      if (seen) {
+        seen.scale = this.rig.scale.x;
+        this.send(seen);
+      }
     }
     const viewer = frame.getViewerPose(space);
     if (viewer) {

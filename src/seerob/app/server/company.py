@@ -31,6 +31,7 @@ from seerob.core.snapshot import (
     VisitorPresence,
     Visitors,
 )
+from seerob.devices.live.headset_offers import SCALES
 
 EVERY = 1 / 30
 """Least time between two messages that say where all are [s]."""
@@ -38,7 +39,6 @@ LEASE = 2.0
 """What a page does not say again is let go after so long [s]."""
 FARTHEST = 1e4
 """From the origin of the world nobody is farther [m]."""
-SCALES = (0.01, 100.0)
 MOST_POINTS = 160
 MOST_HELD = 16
 LONGEST_NAME = 40

@@ -31,6 +31,8 @@ MOST_NAMES = 160
 LONGEST_NAME = 64
 Angle = Annotated[float, Meta(ge=0, le=0.5, extra={"unit": "rad"}, extra_json_schema={"x-unit": "rad"})]
 Metres = Annotated[float, Meta(ge=0, le=0.5, extra={"unit": "m"}, extra_json_schema={"x-unit": "m"})]
+SCALES = (0.01, 100.0)
+"""How large visitors may be: metres of the world in one of theirs."""
 
 
 class Offer(NamedTuple):
@@ -52,6 +54,8 @@ class Offer(NamedTuple):
     """Where that lies, x ahead and z up in it, shape (4, 4), as was found out; None where the file says."""
     placing: Placing | None = None
     """How well that is known; None where what the file says is exact."""
+    scale: float = 1.0
+    """Metres of the world in a metre of the visitor, as they see it."""
 
 
 class Registering(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -110,10 +114,15 @@ def read(tracking: Tracking, now: float) -> Offer:
         raise ValueError(f"tracking of {n} names with {len(tracking.poses)} bytes of poses")
     if not (math.isfinite(tracking.t) and tracking.t >= 0):
         raise ValueError("tracking without a time")
+    if not SCALES[0] <= tracking.scale <= SCALES[1]:
+        raise ValueError(f"a scale is from {SCALES[0]:g} to {SCALES[1]:g}")
     with np.errstate(invalid="ignore"):  # a signalling NaN is one more NaN
         rows = np.frombuffer(tracking.poses, "<f4").reshape(n, 7).astype(float)
     guessed = tuple(map(bool, tracking.guessed)) or (False,) * n
-    return Offer(now, tracking.t, tracking.names, rows[:, :3], rows[:, 3:], guessed, tracking.space)
+    turns = rows[:, 3:]
+    return Offer(
+        now, tracking.t, tracking.names, rows[:, :3], turns, guessed, tracking.space, scale=tracking.scale
+    )
 
 
 class Offers:

@@ -176,6 +176,19 @@ def layout_of(names: Iterable[str]) -> Layout:
     return Layout(seen=seen, names=tuple(useful), convention="webxr")
 
 
+def at_scale(scale: float) -> Placing | None:
+    """What is known of where somebody is who sees the twin at a scale; None of the twin's own, 1.
+
+    Their postures are theirs, in their own metres. Where their hands are in the twin's, how fast and how
+    heavy, is that of nobody whom ISO 13855 or ISO/TS 15066 speaks of.
+    """
+    if scale == 1:
+        return None
+    larger = f"{scale:g} times as large as the twin" if scale > 1 else f"{1 / scale:g} times smaller"
+    what = "limits of the workstation are for people of its own scale"
+    return Placing(reason=f"works at scale {scale:g}, {larger}: {what}")
+
+
 def frame(offer: Offer, layout: Layout) -> CaptureFrame:
     """An offer in the rows of a layout, with z up; NaN for what is not tracked."""
     rows = {name: row for row, name in enumerate(offer.names)}
@@ -192,5 +205,5 @@ def frame(offer: Offer, layout: Layout) -> CaptureFrame:
             positions=world_positions(positions),
             orientations=world_turns(turns),
             confidence=sure,
-            placing=offer.placing,
+            placing=at_scale(offer.scale) or offer.placing,
         )

@@ -1,6 +1,7 @@
 // Who else looks at this twin: role, scale, what they hold; to follow them, and to ask them to follow.
 
 import { calling, following, holders, others, ownName } from "../company";
+import { said } from "../words";
 
 export function Company() {
   const there = others.value;
@@ -8,11 +9,13 @@ export function Company() {
   const caller = there.find(({ calls, id }) => calls && id !== following.value);
   return (
     <details class="company">
-      <summary aria-label={`${there.length} other visitors`}>
-        <span aria-hidden="true">●</span> {there.length} more here
-        {caller && <span class="company-call"> · {caller.name} asks you to follow</span>}
+      <summary aria-label={said("{n} other visitors", { n: there.length })}>
+        <span aria-hidden="true">●</span> {said("{n} more here", { n: there.length })}
+        {caller && (
+          <span class="company-call"> · {said("{name} asks you to follow", { name: caller.name })}</span>
+        )}
       </summary>
-      <fieldset class="company-list" aria-label="Visitors">
+      <fieldset class="company-list" aria-label={said("Visitors")}>
         <ul>
           {there.map(({ id, name, color, role, scale, device, human, holds }) => (
             <li key={id}>
@@ -24,7 +27,7 @@ export function Company() {
                 {human && ` as ${human}`}
                 {device !== "desk" && ` (${device})`}
                 {scale !== 1 && ` ×${Number(scale.toPrecision(3))}`}
-                {holds.length > 0 && `, holds ${holds.join(", ")}`}
+                {holds.length > 0 && `, ${said("holds {things}", { things: holds.join(", ") })}`}
               </span>
               <button
                 type="button"
@@ -33,13 +36,13 @@ export function Company() {
                   following.value = following.value === id ? null : id;
                 }}
               >
-                {following.value === id ? "stop" : "follow"}
+                {following.value === id ? said("stop following") : said("follow")}
               </button>
             </li>
           ))}
         </ul>
         <label>
-          my name
+          {said("my name")}
           <input
             value={ownName.value}
             maxLength={40}
@@ -56,9 +59,9 @@ export function Company() {
               calling.value = event.currentTarget.checked;
             }}
           />
-          ask the others to follow me
+          {said("ask the others to follow me")}
         </label>
-        {holders.value.size > 0 && <p>What somebody holds, nobody else can change.</p>}
+        {holders.value.size > 0 && <p>{said("What somebody holds, nobody else can change.")}</p>}
       </fieldset>
     </details>
   );

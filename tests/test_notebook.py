@@ -6,7 +6,11 @@ from html.parser import HTMLParser
 from importlib import import_module
 from multiprocessing import get_context
 
+import msgspec
+import nbformat
+import numpy as np
 import pytest
+from nbclient import NotebookClient
 
 import seerob as sr
 from seerob.outputs.sink import Closing
@@ -119,3 +123,67 @@ def test_a_file_that_changed_meanwhile_is_refused(tmp_path, station):
     trimesh.creation.box((2, 1, 1)).export(mesh)
     with pytest.raises(sr.InputError, match=r"part\.stl.*changed since"):
         pickle.loads(kept)
+
+
+WALK = """
+title = "A cell that moves"
+[[robots]]
+name = "arm"
+model = "library:ur5e"
+[[sources]]
+kind = "csv"
+robot = "arm"
+file = "motion.csv"
+mapping = { time_unit = "s", joint_unit = "rad" }
+[[safety]]
+kind = "velocity"
+at = "arm"
+limit = 0.5
+"""
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+HEAD = ",".join(["t", *(f"{name}_joint" for name in JOINTS)])
+MOTION = "\n".join([HEAD, *(f"{k / 100},{k / 50},-1,1,0,0,0" for k in range(51)), ""])
+
+
+@pytest.fixture
+def walk(tmp_path):
+    (tmp_path / "workstation.toml").write_text(WALK)
+    (tmp_path / "motion.csv").write_text(MOTION)
+    return tmp_path
+
+
+def test_a_run_is_shown_by_frames_of_the_same_run(walk):
+    run = sr.load(walk).run()
+    view = run.show()
+    frames = [msgspec.msgpack.decode(frame, type=sr.Snapshot) for frame in view.frames]
+    assert [frame.t for frame in frames] == pytest.approx([*np.arange(0, 0.5, 0.04), 0.5])
+    worst = run.results["velocity arm"].worst()
+    assert max(frame.results[0].value for frame in frames) == pytest.approx(worst.value, rel=0.05)
+    assert {node.mesh for node in run.scene.nodes if node.mesh} <= view.meshes.keys()
+    assert view.verdict == "the run: exceeded"
+    with pytest.raises(sr.InputError, match="another process"):
+        pickle.loads(pickle.dumps(run)).show()
+
+
+def test_a_workstation_is_shown_where_everybody_begins(walk):
+    view = sr.load(walk).show(height=300)
+    (frame,) = view.frames
+    assert msgspec.msgpack.decode(frame, type=sr.Snapshot).t == 0
+    assert (view.height, view.verdict) == (300, "at the start, not run")
+
+
+def test_a_notebook_that_is_run_holds_what_it_shows(walk):
+    source = f"import seerob as sr\nrun = sr.load({str(walk)!r}).run()\nrun.show()"
+    cells = [nbformat.v4.new_code_cell(each) for each in (source, "run")]
+    book = nbformat.v4.new_notebook(cells=cells)
+    NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    shown, told = (cell.outputs[-1].data for cell in book.cells)
+    (view,) = (
+        state["state"]
+        for state in book.metadata.widgets["application/vnd.jupyter.widget-state+json"]["state"].values()
+        if "frames" in state["state"]
+    )
+    assert shown["application/vnd.jupyter.widget-view+json"]["model_id"]
+    assert len(view["frames"]) == 14
+    assert view["_esm"].startswith("var ") or "export" in view["_esm"][-200:]
+    assert "the run is EXCEEDED" in told["text/html"]

@@ -20,6 +20,7 @@ EXTRAS = {
     "matplotlib": "data",
     "pandas": "data",
     "pyarrow": "data",
+    "anywidget": "notebook",
     "coacd": "contacts",
     "ompl": "plan",
     "openvr": "vive",

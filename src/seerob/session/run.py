@@ -39,7 +39,10 @@ from seerob.twin.state import State
 from seerob.workstation.source import Opened, Pump, Source
 
 if TYPE_CHECKING:
+    from anywidget import AnyWidget
     from matplotlib.figure import Figure
+
+    from seerob.outputs.film import Film
 
 Feed = Iterator[tuple[Sample, ...]]
 """For each tick, from t = 0 on, the samples that were heard for it; ends when the run does."""
@@ -327,6 +330,12 @@ class Summary:
     they may come [s]."""
     sources: Mapping[str, SourceLine] = field(default_factory=dict)
     """How live sources were heard, and targets sent, by name."""
+    again: Callable[[], Film] | None = field(default=None, compare=False)
+    """Runs the same samples once more, for what `show` shows; None of a run that cannot be had again."""
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the way to run it again, which is of this process."""
+        return {**self.__dict__, "again": None}
 
     @property
     def verdict(self) -> Verdict | None:
@@ -340,6 +349,24 @@ class Summary:
 
     def _repr_html_(self) -> str:
         return results_html(self.results)
+
+    def show(self, *, height: int = 480) -> AnyWidget:
+        """Show the run in a notebook: the page's scene, with a slider, offline.
+
+        The same samples are run once more, and frames of that are kept, 25 a second of a run of two minutes.
+
+        Args:
+            height: Of the scene [px].
+
+        Raises:
+            MissingPackage: anywidget is not installed (extra ``notebook``).
+            InputError: It was a live run, of which its recording is shown, or comes from another process.
+        """
+        if self.again is None:
+            what = "was live, or comes from another process, and cannot be had again"
+            raise InputError.at("run", "show", what, "sr.load_recorded(recording).show() shows a recording")
+        word = "no verdict" if self.verdict is None else self.verdict.value
+        return self.again().widget(height=height, verdict=f"the run: {word}")
 
     def plot(self, *criteria: str) -> Figure:
         """Plot criteria over time: figure, limit, and where it is exceeded, undecided or not asked.

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace as replaced
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -45,6 +46,9 @@ from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import Workstation, file_among
 
 if TYPE_CHECKING:
+    from anywidget import AnyWidget
+
+    from seerob.outputs.film import Film
     from seerob.session.batch import Batch
     from seerob.session.explanation import Explanation
     from seerob.session.permissible import evaluation
@@ -204,8 +208,6 @@ class Station:
         other = object.__new__(Station)
         other._cache = self._cache
         other.workstation = replace(self.workstation, safety=(*self.workstation.safety, *criteria))
-        from dataclasses import replace as replaced
-
         model = replaced(self.model, workstation=other.workstation)
         findings = tuple(dict.fromkeys((*model.findings, *implausible(model))))
         other.model = replaced(model, findings=findings)
@@ -292,6 +294,7 @@ class Station:
         if sinks and folder is None:
             raise InputError.at("run", "folder", "missing", "sinks need a folder to write to")
         heard: tuple[LiveSource, ...] = ()
+        given = feed
         if feed is None and live:
             heard = tuple(s for s in self.workstation.sources if isinstance(s, LiveSource))
             self.reach()
@@ -321,7 +324,7 @@ class Station:
                 feed = hear(feed, listening, clock)
             bound = self.bound  # refused, if so, before anything is open
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
-            return road.run(
+            summary = road.run(
                 self.model,
                 feed,
                 bound=bound,
@@ -334,6 +337,33 @@ class Station:
                 stop=stop,
                 progress=progress,
             )
+        # A run of recorded sources is a function of them: the same samples, the same ticks.
+        recorded = not live and given is None
+        return replaced(summary, again=lambda: self._film(scene, end)) if recorded else summary
+
+    def _film(self, scene: Scene, end: float) -> Film:
+        """Frames of a run of the recorded sources."""
+        from seerob.outputs.film import Film
+
+        film = Film(scene, self.model.meshes)
+        self.run(writers=[film], scene=scene, end=end)
+        return film
+
+    def show(self, *, height: int = 480) -> AnyWidget:
+        """Show in a notebook where everybody begins, judged there: the page's scene, offline.
+
+        Args:
+            height: Of the scene [px].
+
+        Raises:
+            MissingPackage: anywidget is not installed (extra ``notebook``).
+        """
+        from seerob.outputs.film import Film
+
+        scene = self.scene()
+        film = Film(scene, self.model.meshes)
+        film.write(self.first(scene))
+        return film.widget(height=height, verdict="at the start, not run")
 
     def batch(
         self,

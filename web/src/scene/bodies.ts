@@ -276,9 +276,22 @@ export class Bodies {
   }
 }
 
+const given = new Map<string, Uint8Array>();
+
+/** A mesh that is here already, and that nobody is asked for: there is no server in a notebook. */
+export function give(hash: string, glb: Uint8Array): void {
+  given.set(hash, glb);
+}
+
 async function fetchModel(hash: string): Promise<Object3D> {
+  const model = await new GLTFLoader().parseAsync(await meshOf(hash), "");
+  return model.scene;
+}
+
+async function meshOf(hash: string): Promise<ArrayBuffer> {
+  const here = given.get(hash);
+  if (here) return here.slice().buffer;
   const response = await fetch(`/mesh/${encodeURIComponent(hash)}.glb`);
   if (!response.ok) throw new Error(`mesh ${hash}: ${response.status}`);
-  const model = await new GLTFLoader().parseAsync(await response.arrayBuffer(), "");
-  return model.scene;
+  return response.arrayBuffer();
 }

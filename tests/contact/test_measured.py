@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Origin, Result, Verdict
-from seerob.criteria.contact.measured import peaks, read, read_curve
+from seerob.criteria.contact.measured import missing, peaks, read, read_curve, risen
 from seerob.criteria.safety.power_and_force import PowerAndForce
 from seerob.session.station import Station
 
@@ -358,6 +358,91 @@ def test_a_force_that_lasts_is_known_as_far_as_it_was_told(tmp_path: Path, force
     part = chest(station, 0.3)
     assert part.verdict is (Verdict.UNDECIDED if why else Verdict.WITHIN)
     assert why in part.reason
+
+
+def blow(t: np.ndarray, *, begins: float = 0.0) -> np.ndarray:
+    """100 N in 20 ms from 0.1 s on, and a share of it before."""
+    return np.where(t < 0.1, 100 * begins, 100 * np.sin(np.pi * np.clip((t - 0.1) / 0.02, 0, 1)))
+
+
+def lasting(t: np.ndarray, end: float = 1.0) -> np.ndarray:
+    """The same, and 60 N that stay until an instant."""
+    return np.where((t > 0.115) & (t < end), 60.0, blow(t))
+
+
+EVERY = np.arange(0, 1300) / 1000
+
+
+@pytest.mark.parametrize(
+    ("t", "force", "why"),
+    [
+        (EVERY, blow(EVERY), None),
+        (EVERY, lasting(EVERY), None),
+        # A contact begins at a twentieth of its largest force.
+        (EVERY, blow(EVERY, begins=0.048), None),
+        (EVERY, blow(EVERY, begins=0.052), "begins in contact"),
+        # Samples are 2 ms apart at most, while it may be quick.
+        (2.0 * EVERY, blow(2.0 * EVERY), None),
+        (2.1 * EVERY, blow(2.1 * EVERY), "2.1 ms apart"),
+        # It is followed for half a second: from 0.101 s, the first sample that is above 5 N.
+        (EVERY[:601], lasting(EVERY[:601], 9.0), "the record ends in contact, 0.499 s after it began"),
+        (EVERY[:603], lasting(EVERY[:603], 9.0), None),
+        # No contact falls to nothing from 0.3 of its largest force, to come back, or from 0.8 for good.
+        (EVERY, np.where(EVERY == 0.2, 0, np.where(EVERY < 0.199, lasting(EVERY), 29)), None),
+        (EVERY, np.where(EVERY == 0.2, 0, np.where(EVERY < 0.199, lasting(EVERY), 31)), "drops out at 0.2 s"),
+        (EVERY, np.where(EVERY < 0.199, lasting(EVERY), 79.0 * (EVERY < 0.3)), None),
+        (EVERY, np.where(EVERY < 0.199, lasting(EVERY), 81.0 * (EVERY < 0.3)), "it ends at 0.3 s, from 81"),
+        (EVERY, np.where(EVERY < 0.199, lasting(EVERY), 81.0 * (EVERY < 0.62)), None),
+        # Something is told every tenth of a second of a force that lasts.
+        (np.delete(EVERY, slice(701, 800)), lasting(np.delete(EVERY, slice(701, 800))), None),
+        (np.delete(EVERY, slice(701, 805)), lasting(np.delete(EVERY, slice(701, 805))), "told for 0.105 s"),
+        # A force that has settled rises by a fiftieth of itself in that time at most.
+        (EVERY, lasting(EVERY, 9.0) * np.where(EVERY > 1.25, 1.019, 1), None),
+        (EVERY, lasting(EVERY, 9.0) * np.where(EVERY > 1.25, 1.021, 1), "while its force still rises"),
+        # Ten samples at the largest force are the end of a range.
+        (EVERY, np.where((EVERY > 0.1995) & (EVERY < 0.2085), 101.0, lasting(EVERY)), None),
+        (EVERY, np.where((EVERY > 0.1995) & (EVERY < 0.2095), 101.0, lasting(EVERY)), "101 N, stands still"),
+    ],
+)  # fmt: skip
+def test_a_record_shows_its_peak_on_one_side_of_each_figure_and_not_on_the_other(t, force, why) -> None:
+    found = missing(t, force)
+    assert len(found) == (why is not None), found
+    assert why is None or why in found[0]
+
+
+def test_what_lasts_half_a_second_is_transient_and_what_is_then_told_is_not() -> None:
+    """It begins between 0.1 s and 0.101 s, so that both ends of the half second count for both."""
+    for at, transient, static in ((0.599, True, False), (0.6, True, True), (0.601, False, True)):
+        found = peaks(EVERY, np.where(np.abs(EVERY - at) < 1e-6, 500.0, lasting(EVERY) * 10))
+        assert (found[0] == 1000.0, found[1] == 600.0) == (True, True)
+        found = peaks(EVERY, np.where(np.abs(EVERY - at) < 1e-6, 1010.0, lasting(EVERY) * 10))
+        assert (found[0] == 1010.0, found[1] == 1010.0) == (transient, static), at
+    with pytest.raises(ValueError, match="t falls"):
+        peaks(np.array([0.0, 1.0, 0.5]), np.ones(3))
+
+
+def test_a_zero_counts_from_below_and_never_from_above() -> None:
+    force = blow(EVERY)
+    np.testing.assert_allclose(risen(force - 3.0), force, atol=1e-12)
+    np.testing.assert_allclose(risen(force + 3.0), force + 3.0)
+    np.testing.assert_array_equal(risen(force[105:]), force[105:])
+
+
+@pytest.mark.parametrize(
+    ("changed", "verdict"),
+    [
+        ({"spring_N_mm": "22.6"}, Verdict.WITHIN),
+        ({"spring_N_mm": "22.4"}, Verdict.UNDECIDED),
+        ({"spring_N_mm": "27.4", "force_N": "281"}, Verdict.EXCEEDED),
+        ({"spring_N_mm": "27.6", "force_N": "281"}, Verdict.UNDECIDED),
+        ({"calibrated": "2025-02-28"}, Verdict.WITHIN),
+        ({"calibrated": "2025-02-27"}, Verdict.UNDECIDED),
+        ({"calibrated": "2026-03-01"}, Verdict.WITHIN),
+    ],
+)
+def test_springs_and_calibrations_count_on_one_side_of_each_figure(tmp_path, changed, verdict) -> None:
+    """A tenth about 25 N/mm; 366 days."""
+    assert chest(cell(tmp_path, entry(**changed))).verdict is verdict
 
 
 def test_a_curve_outside_the_folder_is_refused(tmp_path: Path) -> None:

@@ -384,6 +384,10 @@ EVERY = np.arange(0, 1300) / 1000
         # Samples are 2 ms apart at most, while it may be quick.
         (2.0 * EVERY, blow(2.0 * EVERY), None),
         (2.1 * EVERY, blow(2.1 * EVERY), "2.1 ms apart"),
+        (np.delete(EVERY, slice(99, 101)), blow(np.delete(EVERY, slice(99, 101))), "3 ms apart"),
+        (np.delete(EVERY, slice(90, 97)), blow(np.delete(EVERY, slice(90, 97))), None),
+        (np.delete(EVERY, slice(97, 100)), blow(np.delete(EVERY, slice(97, 100))), None),
+        (np.delete(EVERY[98:], [1, 2]), blow(np.delete(EVERY[98:], [1, 2])), "3 ms apart"),
         # It is followed for half a second: from 0.101 s, the first sample that is above 5 N.
         (EVERY[:601], lasting(EVERY[:601], 9.0), "the record ends in contact, 0.499 s after it began"),
         (EVERY[:603], lasting(EVERY[:603], 9.0), None),
@@ -417,6 +421,10 @@ def test_what_lasts_half_a_second_is_transient_and_what_is_then_told_is_not() ->
         assert (found[0] == 1000.0, found[1] == 600.0) == (True, True)
         found = peaks(EVERY, np.where(np.abs(EVERY - at) < 1e-6, 1010.0, lasting(EVERY) * 10))
         assert (found[0] == 1010.0, found[1] == 1010.0) == (transient, static), at
+        noisy = np.where(EVERY < 0.1, 3.0, lasting(EVERY) * 10)  # of a device that presses nothing
+        found = peaks(EVERY, np.where(np.abs(EVERY - at) < 1e-6, 1010.0, noisy))
+        assert (found[0] == 1010.0, found[1] == 1010.0) == (transient, static), at
+    assert peaks(np.array([0.0, 0.1, 0.1]), np.array([1.0, 2.0, 3.0])) == (3.0, None)
     with pytest.raises(ValueError, match="t falls"):
         peaks(np.array([0.0, 1.0, 0.5]), np.ones(3))
 

@@ -220,3 +220,6 @@ def test_the_side_of_a_row_is_that_of_all_its_bones(tmp_path: Path) -> None:
     ):
         rows = contacts.rows.of([(chest, row)], judged, lambda _, bones=bones: bones, pressed=pressed)
         assert {found.side for found in rows} == {side}, bones
+        open_ = replace(chest, limit=None)
+        rows = contacts.rows.of([(open_, row)], judged, lambda _, bones=bones: bones, pressed=pressed)
+        assert {found.side for found in rows} == {side}, bones

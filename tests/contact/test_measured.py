@@ -403,9 +403,15 @@ EVERY = np.arange(0, 1300) / 1000
         # A force that has settled rises by a fiftieth of itself in that time at most.
         (EVERY, lasting(EVERY, 9.0) * np.where(EVERY > 1.25, 1.019, 1), None),
         (EVERY, lasting(EVERY, 9.0) * np.where(EVERY > 1.25, 1.021, 1), "while its force still rises"),
+        (EVERY, lasting(EVERY, 9.0) * np.where(EVERY > 1.2985, 1.021, 1), "while its force still rises"),
         # Ten samples at the largest force are the end of a range.
         (EVERY, np.where((EVERY > 0.1995) & (EVERY < 0.2085), 101.0, lasting(EVERY)), None),
         (EVERY, np.where((EVERY > 0.1995) & (EVERY < 0.2095), 101.0, lasting(EVERY)), "101 N, stands still"),
+        (
+            EVERY,
+            np.where(((EVERY > 0.1995) & (EVERY < 0.2095)) | (EVERY == 0.3), 101.0, lasting(EVERY)),
+            "101 N, stands still",
+        ),
     ],
 )  # fmt: skip
 def test_a_record_shows_its_peak_on_one_side_of_each_figure_and_not_on_the_other(t, force, why) -> None:

@@ -1,6 +1,8 @@
 """The page over TLS, as foreign clients see it: Python's ssl, websockets, curl and openssl."""
 
+import argparse
 import contextlib
+import re
 import shutil
 import socket
 import ssl
@@ -10,8 +12,11 @@ from datetime import timedelta
 
 import httpx
 import pytest
+import segno
 from websockets.sync.client import connect
 
+from seerob.app.console.lan import qr_code, reverse_port
+from seerob.app.console.visiting import add_page
 from seerob.app.server import certificates, connection
 from seerob.app.server.access import Tokens
 from seerob.app.server.player import Player
@@ -227,3 +232,83 @@ def test_who_begins_tls_and_does_not_go_on_is_counted_and_cut(tls, monkeypatch):
             with contextlib.suppress(ConnectionError):
                 assert one.recv(1) == b""
         assert time.monotonic() - begun < PATIENCE / 2
+
+
+# -- whom to trust ------------------------------------------------------------------------------
+
+
+def test_a_device_that_knows_nothing_is_told_whom_to_trust_and_of_nothing_else(server, tls, folder, tmp_path):
+    base = f"https://localhost:{server.port}"
+    with httpx.Client(verify=False, timeout=PATIENCE) as stranger:
+        told = stranger.get(f"{base}/trust")
+        assert told.status_code == 200
+        assert tls.fingerprint in told.text
+        assert told.headers["content-security-policy"].startswith("default-src 'none'")
+        pem, der = (stranger.get(f"{base}/trust/authority.{kind}") for kind in ("pem", "cer"))
+        assert pem.content == (folder / "authority.pem").read_bytes()
+        for path in (
+            "/",
+            "/trust/authority.key",
+            "/trust/server.pem",
+            "/trust/..%2fserver.pem",
+            "/mesh/x.glb",
+        ):
+            assert stranger.get(f"{base}{path}").status_code == 401
+    # Whoever trusts that and nothing else is served.
+    trusting = ssl.create_default_context(cadata=der.content)
+    assert [c["subject"] for c in trusting.get_ca_certs()]
+    with connect(
+        f"wss://localhost:{server.port}/ws?token={TOKENS.view}", ssl=trusting, subprotocols=[PROTOCOL]
+    ) as page:
+        assert b"hello" in page.recv()[:20]
+    kept = tmp_path / "kept.pem"
+    kept.write_bytes(pem.content)
+    for program in (
+        ["curl", "-sf", "--cacert", kept, f"{base}/trust"],
+        ["openssl", "x509", "-in", kept, "-noout", "-fingerprint", "-sha256"],
+    ):
+        if shutil.which(program[0]):
+            said = subprocess.run(program, capture_output=True, text=True, check=True).stdout
+            assert tls.fingerprint in said
+
+
+def test_where_no_authority_was_made_nobody_is_told_to_trust_one():
+    feed = Player(Remembered([snapshot(0)]))
+    with Server(scene=scene(), meshes=MESHES, feed=feed, port=0, tokens=TOKENS) as server:
+        assert httpx.get(f"http://localhost:{server.port}/trust").status_code == 404
+        with httpx.Client() as stranger:
+            asked = [stranger.get(f"http://localhost:{server.port}/trust").status_code for _ in range(60)]
+        assert set(asked) <= {404, 429}
+
+
+def test_the_qr_code_on_a_terminal_is_the_address_with_its_token():
+    address = f"https://192.0.2.7:8080/?token={TOKENS.track}"
+    rows = [line for line in qr_code(address).splitlines() if line.strip()]
+    bits = []
+    for line in rows:  # two modules above one another per character
+        text = re.sub(r"\x1b\[[0-9;]*m", "", line)
+        bits.append([char in "█▀" for char in text])
+        bits.append([char in "█▄" for char in text])
+    expected = [
+        list(map(bool, row)) for row in segno.make(address, error="l", micro=False).matrix_iter(border=2)
+    ]
+    n = len(expected)
+    light = [[not b for b in row[:n]] for row in bits[:n]]
+    assert light == expected or [row[:n] for row in bits[:n]] == expected
+    # Another token is another picture.
+    assert qr_code(address) != qr_code(address.replace(TOKENS.track, TOKENS.view))
+
+
+@pytest.mark.parametrize(("lan", "qr"), [("--lan", "track"), ("--lan=view", "view")])
+def test_lan_listens_everywhere_with_tokens_and_tls_and_another_host_is_kept(lan, qr):
+    parser = argparse.ArgumentParser()
+    add_page(parser)
+    assert parser.parse_args([]).host == "127.0.0.1"
+    assert (parser.parse_args([lan]).host, parser.parse_args([lan]).lan) == ("0.0.0.0", qr)
+    assert parser.parse_args(["--host", "192.0.2.7", lan]).host == "192.0.2.7"
+
+
+def test_without_adb_it_is_said_what_to_install():
+    with pytest.raises(InputError, match="there is no program"):
+        reverse_port(8080, adb="no-such-adb")
+    assert reverse_port(8080, adb="false") == "adb ended with 1"

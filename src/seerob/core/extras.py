@@ -26,6 +26,7 @@ EXTRAS = {
     "openvr": "vive",
     "xr": "openxr",
     "cryptography": "tls",
+    "segno": "tls",
     "OCP": "cad",
     "robot_descriptions": "robots",
     "pxr": "usd",

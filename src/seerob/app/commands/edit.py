@@ -81,7 +81,7 @@ def edited(station: Station, options: argparse.Namespace, *, running: bool) -> N
     with server:
         if server.notice:
             line("note", server.notice)
-        tell_pages(server, "Ctrl-C ends")
+        tell_pages(server, "Ctrl-C ends", options)
         end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
 
         def over() -> bool:

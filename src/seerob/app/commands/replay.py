@@ -59,7 +59,7 @@ def show(path: Path, options: argparse.Namespace) -> int:
     with server:
         if server.notice:
             line("note", server.notice)
-        tell_pages(server, "Ctrl-C ends")
+        tell_pages(server, "Ctrl-C ends", options)
         end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
         while not stopped() and (time.monotonic() < end or player.reading):
             time.sleep(0.1)

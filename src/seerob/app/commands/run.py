@@ -197,7 +197,7 @@ def live(
             for writer in opened:
                 if isinstance(writer, RecordsVisitors):
                     writer.watch(view.server.visits)
-            tell_pages(view.server, "Ctrl-C ends the run")
+            tell_pages(view.server, "Ctrl-C ends the run", options)
             for each in emulators:
                 each.find_page(view.server.port)
             _tell_ends(station)

@@ -29,6 +29,13 @@ class Visiting(TypedDict):
 def add_page(sub: argparse.ArgumentParser) -> None:
     """Arguments of commands that serve the page."""
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
+    text = "also serve other devices, encrypted, and show a picture of the address for this role's camera"
+    sub.add_argument(
+        "--lan", action=_Lan, nargs="?", const="track", choices=("view", "track", "control"), help=text
+    )
+    sub.add_argument(
+        "--adb", action="store_true", help="make the port one of a headset on a cable, by adb reverse"
+    )
     sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
     text = "tokens of visitors, by role; made when it does not exist; - asks (default: new ones for each run)"
     sub.add_argument("--token-file", type=Path, metavar="FILE", help=text)
@@ -38,6 +45,21 @@ def add_page(sub: argparse.ArgumentParser) -> None:
     text = "serve other machines unencrypted: whoever is on the way can read and change what they see"
     sub.add_argument("--clear-text", action="store_true", help=text)
     sub.add_argument("--token", type=_refused, help=argparse.SUPPRESS)
+
+
+class _Lan(argparse.Action):
+    """Listens on every address of this machine, unless another was named."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        setattr(namespace, self.dest, values)
+        if is_loopback(namespace.host):
+            namespace.host = "0.0.0.0"  # noqa: S104 - as asked for, with tokens and TLS
 
 
 def _refused(text: str) -> NoReturn:
@@ -86,17 +108,32 @@ def _asked() -> Tokens:
     return Tokens.checked({role: token for role, token in given.items() if token}, "prompt")
 
 
-def tell_pages(server: Server, end: str) -> None:
-    """Say which address to open for what, and what visitors have to trust."""
+def tell_pages(server: Server, end: str, options: argparse.Namespace) -> None:
+    """Say which address to open for what, and what visitors have to trust.
+
+    Raises:
+        InputError: A headset was to be reached by adb, which is not there.
+    """
+    from seerob.app.console import lan
     from seerob.app.server.access import Role
 
-    addresses = server.urls
-    line("page", f"{server.url}  ({end})", "bold")
+    addresses = server.urls_at(lan.address_for_others() if options.lan else "")
+    line("page", f"{addresses[Role.VIEW]}  ({end})", "bold")
     if len(set(addresses.values())) > 1:
         line("  track", f"{addresses[Role.TRACK]}  (and may offer what a headset sees)")
         line("  control", f"{addresses[Role.CONTROL]}  (and may play, pause and seek)")
     tls = server.tls
     if tls is not None and tls.authority is not None:
         line("trust", f"{tls.authority} on each visitor's device; SHA-256 {tls.fingerprint}")
+        where = addresses[Role.VIEW].partition("?")[0]
+        line("  how", f"{where}trust has it, with the steps for each device")
     elif tls is None and server.clear_text:
         line("warning", "unencrypted: whoever is on the way can read and change what visitors see", "yellow")
+    if options.lan:
+        lan.show_qr_code(addresses[Role(options.lan)])
+    if options.adb:
+        failure = lan.reverse_port(server.port)
+        if failure:
+            line("warning", f"adb: {failure}", "yellow")
+        else:
+            line("headset", f"{server.urls_at('localhost')[Role.TRACK]}  (in the headset on the cable)")

@@ -20,6 +20,7 @@ from uvicorn.protocols.utils import ClientDisconnected
 
 from seerob.app.server.access import EVERYTHING, Guesses, Role, Tokens, Visits, matching, neighbourhood
 from seerob.app.server.allowance import Allowances
+from seerob.app.server.trust import PATHS
 from seerob.core.host_name import is_address
 
 HEADERS = {
@@ -98,7 +99,8 @@ class Door:
         known = answer is None or answer.status_code < 400
         if answer is not None and not known:
             self._visits.turn_away(address, bytes(answer.body).decode().strip())
-        asked = [self._visitors if known else self._strangers]
+        known_here = known and "role" in scope.get("state", {})
+        asked = [self._visitors if known_here else self._strangers]
         if known and scope["type"] == "websocket":
             asked.append(self._sockets)
         owed = [allowances.of(neighbourhood(address)) for allowances in asked]
@@ -138,6 +140,8 @@ class Door:
         visitor = HTTPConnection(scope)
         asked = visitor.query_params.get("token")
         cookie = f"seerob-{scope['server'][1]}"
+        if asked is None and scope["type"] == "http" and scope["path"] in PATHS:
+            return None
         if asked is None:
             role = matching(visitor.cookies.get(cookie, ""), self._cookies)
         elif (left := self._guesses.locked(address)) > 0:

@@ -29,6 +29,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
+from seerob.app.server import trust
 from seerob.app.server.access import Role, Tokens, Visits
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
@@ -103,7 +104,13 @@ Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
 
 def build(
-    *, hub: Hub, meshes: Mapping[str, bytes], schema: bytes, folder: Path, lifespan: Lifespan
+    *,
+    hub: Hub,
+    meshes: Mapping[str, bytes],
+    schema: bytes,
+    folder: Path,
+    tls: Tls | None,
+    lifespan: Lifespan,
 ) -> Starlette:
     """The application behind the `Door`.
 
@@ -112,6 +119,7 @@ def build(
         meshes: Binary glTF by hash.
         schema: JSON schema of the workstation file, for forms; empty where nobody edits.
         folder: The built page.
+        tls: Whose authority visitors have to trust.
         lifespan: What runs while the application does.
     """
 
@@ -128,6 +136,9 @@ def build(
             return PlainTextResponse("nobody edits here\n", 404)
         return Response(schema, media_type="application/json", headers={"Cache-Control": "no-store"})
 
+    async def trusted(request: Request) -> Response:
+        return trust.answer(tls, request.url.path)
+
     async def file(request: Request) -> Response:
         return await run_in_threadpool(answer, folder, request.path_params["path"])
 
@@ -135,6 +146,7 @@ def build(
         WebSocketRoute("/ws", hub.attend),
         Route("/mesh/{name}", mesh),
         Route("/schema.json", forms),
+        *(Route(path, trusted) for path in sorted(trust.PATHS)),
         Route("/{path:path}", file),
     ]
     return Starlette(routes=routes, lifespan=lifespan)
@@ -204,7 +216,9 @@ class Server:
         )
         self._meshes = dict(meshes)
         schema = b"" if desk is None else desk.schema
-        app = build(hub=self.hub, meshes=self._meshes, schema=schema, folder=page, lifespan=self._lifespan)
+        app = build(
+            hub=self.hub, meshes=self._meshes, schema=schema, folder=page, tls=tls, lifespan=self._lifespan
+        )
         known = (*hosts, *(() if tls is None else tls.names))
         names = {name.lower() for name in known} | ({host.lower()} if not is_address(host) else set())
         self._app = Door(
@@ -233,9 +247,14 @@ class Server:
     @property
     def urls(self) -> dict[Role, str]:
         """What to open in a browser, by role; one address for all where no token is asked for."""
+        return self.urls_at()
+
+    def urls_at(self, host: str = "") -> dict[Role, str]:
+        """What to open in a browser, by role, at an address of this machine; at its first when empty."""
         # "Every address" is not one that a browser can open; this machine's own is among them.
         everywhere = is_address(self._host) and ip_address(self._host).is_unspecified
-        name = "localhost" if everywhere else f"[{self._host}]" if ":" in self._host else self._host
+        name = host or ("localhost" if everywhere else self._host)
+        name = f"[{name}]" if ":" in name else name
         base = f"{'http' if self.tls is None else 'https'}://{name}:{self.port}/"
         tokens = self._tokens or ("",) * len(Role)
         return {role: base + (token and f"?token={token}") for role, token in zip(Role, tokens, strict=True)}

@@ -1,10 +1,14 @@
 """Every numbered example runs as it stands; what it asserts at its end holds."""
 
+import ast
 import runpy
 import sys
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 
 import pytest
+from nbclient import NotebookClient
 
 FOLDER = Path(__file__).parents[1] / "examples"
 FILES = sorted(FOLDER.glob("[0-9]*.py"))
@@ -30,3 +34,25 @@ def test_an_example_starts_with_what_it_shows(file):
     lines = file.read_text().splitlines()
     assert lines[0].startswith('"""')
     assert any(line.startswith("assert ") for line in lines[-8:])
+
+
+LOADER = SourceFileLoader("notebooks", str(FOLDER.parent / "scripts/notebooks"))
+notebooks = module_from_spec(spec_from_loader("notebooks", LOADER))
+LOADER.exec_module(notebooks)
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_notebook_has_all_of_its_example_in_cells_that_stand_alone(file):
+    _, *cells = notebooks.notebook(file).cells
+    code = [ast.parse(cell.source) for cell in cells]  # each is whole
+    own = ast.parse(file.read_text().replace("__file__", repr(str(file)))).body[1:]
+    together = [node for cell in code for node in cell.body]
+    assert [ast.dump(node) for node in together] == [ast.dump(node) for node in own]
+    assert len(cells) > 1
+
+
+def test_a_notebook_of_an_example_runs(tmp_path):
+    book = notebooks.notebook(FILES[0])
+    resources = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(book, timeout=300, kernel_name="python3", resources=resources).execute()
+    assert any(output.get("name") == "stdout" for cell in book.cells[1:] for output in cell.outputs)

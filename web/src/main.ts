@@ -14,6 +14,8 @@ import { type Actions, ActionsContext } from "./panels/app_context";
 import { OwnPresence } from "./scene/own_presence";
 import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
+import { film } from "./view/handed_out";
+import { saveView } from "./view/kept";
 import type { Tracking, VisitorInfo } from "./wire";
 import { Visit } from "./xr/visit";
 
@@ -74,6 +76,10 @@ function begin(element: HTMLElement): void {
     const names = selectedNodes.value;
     viewer.viewpoint.frame(names.size > 0 ? names : null);
   };
+  actions.keepView = () => saveView(viewer.viewpoint.where());
+  actions.goTo = (view) => viewer.viewpoint.stand(view);
+  actions.picture = () => viewer.stage.picture();
+  actions.film = () => film(viewer.stage.renderer.domElement);
   viewer.stage.run((time, frame) => {
     connection.tick(time);
     viewer.tick(time);
@@ -107,6 +113,10 @@ const actions: Actions = {
   time: new TimeControl(),
   look: () => {},
   enter: () => Promise.reject(new Error("there is no room yet")),
+  keepView: () => {},
+  goTo: () => {},
+  picture: () => Promise.reject(new Error("there is no room yet")),
+  film: () => null,
   frameSelection: () => {},
 };
 listenToKeys(actions);

@@ -248,6 +248,75 @@ test("what others speak of is removed with them, or not at all", async () => {
   assert.equal(saved(), begun);
 });
 
+test("a section takes away what lies beyond it, also for clicks; panels fold and views are kept", async () => {
+  await page.keyboard.press("Escape");
+  await page.getByRole("button", { name: "View", exact: true }).click();
+  const panel = page.locator(".view-panel");
+  const at = await page.evaluate(() => window.seerob.project([0.8, 0, 0.74]));
+  const clicked = async () => {
+    await page.mouse.click(...at);
+    return page.evaluate(() => document.querySelector(".entry h2")?.textContent ?? null);
+  };
+  assert.equal(await clicked(), "table");
+  await page.keyboard.press("Escape");
+  await panel.getByLabel("Section").selectOption("z");
+  await panel.getByRole("slider").fill("0.3");
+  assert.equal(await clicked(), null);
+  await panel.getByLabel("Section").selectOption("no section");
+  // Of a body that stands still, a speed is never told from one instant.
+  await panel.getByLabel("Speed of a point").check();
+  await page.mouse.click(...at);
+  await page.locator(".measure-note", { hasText: "table (" }).waitFor();
+  assert.match(await page.locator(".measure-note").innerText(), /two instants/);
+  await panel.getByLabel("Speed of a point").uncheck();
+  await panel.getByRole("button", { name: "Save view" }).click();
+  const pixel = () => page.evaluate(() => window.seerob.project([0.8, 0, 0.74]).map(Math.round));
+  await panel.getByLabel("Results").uncheck();
+  await page.locator(".right").waitFor({ state: "hidden" });
+  await page.reload();
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t));
+  await page.locator(".right").waitFor({ state: "hidden" });
+  await page.getByRole("button", { name: "View", exact: true }).click();
+  await panel.getByLabel("Results").check();
+  await page.getByRole("button", { name: "Top", exact: true }).click();
+  const fromAbove = await pixel();
+  await panel.getByLabel("Saved views").selectOption({ label: "view 1" });
+  await page.waitForFunction(
+    (there) => String(window.seerob.project([0.8, 0, 0.74]).map(Math.round)) !== there,
+    String(fromAbove),
+  );
+  assert.ok(Math.hypot(...(await pixel()).map((x, k) => x - at[k])) < 3, `${await pixel()}, was ${at}`);
+  await panel.getByRole("button", { name: "Forget" }).click();
+  await page.keyboard.press("Escape");
+});
+
+test("a picture, and the figures of the instant, are what is shown", async () => {
+  await page.getByRole("button", { name: "View", exact: true }).click();
+  const taken = async (name) => {
+    const [download] = await Promise.all([
+      page.waitForEvent("download"),
+      page.getByRole("button", { name, exact: true }).click(),
+    ]);
+    return fs.readFileSync(await download.path());
+  };
+  const picture = await taken("Picture");
+  assert.equal(picture.subarray(1, 4).toString(), "PNG");
+  const size = await page.evaluate(
+    () => [...document.querySelectorAll(".room canvas")].map((c) => [c.width, c.height])[0],
+  );
+  assert.deepEqual([picture.readUInt32BE(16), picture.readUInt32BE(20)], size);
+  const told = JSON.parse(await taken("Figures (JSON)"));
+  const table = (await taken("Figures (CSV)")).toString().trim().split("\r\n");
+  assert.equal(table.length, told.results.length + 1);
+  const near = told.results.find(({ name }) => name === "beside the table");
+  assert.deepEqual([near.unit, near.limit, near.verdict], ["m", 0.5, "within"]);
+  assert.ok(
+    table.some((row) => row.startsWith(`0,beside the table,${near.value},m,0.5,false,within,`)),
+    table.join("\n"),
+  );
+  await page.getByRole("button", { name: "View", exact: true }).click();
+});
+
 test("the page speaks the chosen language and writes the chosen units, and remembers both", async () => {
   await page.getByLabel("Language").selectOption({ label: "Deutsch" });
   await page.getByRole("tab", { name: "Kriterien" }).click();
@@ -278,6 +347,11 @@ test("axe finds no fault in the panels, dark and light", async () => {
       found.push(...violations.map(({ id, nodes }) => `${state}, ${colorScheme}: ${id} ${nodes[0].target}`));
     }
   };
+  await page.getByRole("button", { name: "View", exact: true }).click();
+  await page.locator(".view-panel").getByLabel("Section").selectOption("x");
+  await look("the view's panel");
+  await page.locator(".view-panel").getByLabel("Section").selectOption("no section");
+  await page.getByRole("button", { name: "View", exact: true }).click();
   await pick("table");
   await look("a part");
   await fill(page.locator('[data-field="name"] input'), "no name");

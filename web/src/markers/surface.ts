@@ -32,6 +32,7 @@ export class Surface {
   reshape(fill: BufferGeometry, lines: BufferGeometry, smooth = false): void {
     this.free();
     this.smooth = smooth;
+    this.fill.userData.volume = !smooth;
     turnOutward(fill);
     this.fill.geometry = fill;
     this.lines.geometry = lines;

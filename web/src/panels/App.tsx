@@ -4,6 +4,7 @@ import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
+import { folded } from "../view/kept";
 import { said } from "../words";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
@@ -11,6 +12,7 @@ import { Legend } from "./Legend";
 import { MeasureNote } from "./MeasureNote";
 import { PageTools } from "./PageTools";
 import { Plots } from "./Plots";
+import { ProbeNote } from "./ProbeNote";
 import { Properties } from "./Properties";
 import { RightSide } from "./RightSide";
 import { SceneTree } from "./SceneTree";
@@ -31,7 +33,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
     [],
   );
   return (
-    <div class="app">
+    <div class={["app", ...folded.value.map((panel) => `without-${panel}`)].join(" ")}>
       <TopBar />
       <aside class="left" aria-label={said("Scene and properties")}>
         <SceneTree />
@@ -44,6 +46,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <div class="room" ref={place} />
         <ViewTools />
         <MeasureNote />
+        <ProbeNote />
         <Legend />
         <VisitedInstant />
       </main>

@@ -9,6 +9,7 @@ import { said, word } from "../words";
 import { useActions } from "./app_context";
 import { Icon } from "./Icon";
 import { OverlayList } from "./OverlayList";
+import { ViewPanel } from "./ViewPanel";
 
 const PRESETS: readonly [Preset, string][] = [
   ["corner", word("3D")],
@@ -21,6 +22,7 @@ const PRESETS: readonly [Preset, string][] = [
 export function ViewTools() {
   const actions = useActions();
   const open = useSignal(false);
+  const viewing = useSignal(false);
   const person = scene.value?.nodes.some((node) => node.role === "human" && /(^|[/_])head$/i.test(node.name));
   return (
     <div class="view-tools">
@@ -55,8 +57,9 @@ export function ViewTools() {
       <fieldset
         class="tools overlays"
         onKeyDown={(event) => {
-          if (event.key !== "Escape" || !open.value) return;
+          if (event.key !== "Escape" || !(open.value || viewing.value)) return;
           open.value = false;
+          viewing.value = false;
           event.currentTarget.querySelector("button")?.focus();
           event.stopPropagation();
         }}
@@ -69,11 +72,25 @@ export function ViewTools() {
           aria-controls="overlays"
           onClick={() => {
             open.value = !open.value;
+            viewing.value = false;
           }}
         >
           <Icon name="layers" /> {said("Overlays")}
         </button>
         {open.value && <OverlayList />}
+        <button
+          type="button"
+          title={said("How the room is looked at, and what is taken along")}
+          aria-expanded={viewing.value}
+          aria-controls="view-panel"
+          onClick={() => {
+            viewing.value = !viewing.value;
+            open.value = false;
+          }}
+        >
+          {said("View")}
+        </button>
+        {viewing.value && <ViewPanel />}
       </fieldset>
     </div>
   );

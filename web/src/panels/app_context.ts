@@ -4,6 +4,7 @@ import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Preset } from "../scene/viewpoint";
 import type { TimeControl } from "../time_control";
+import type { SavedView } from "../view/kept";
 import type { Mode } from "../xr/visit";
 
 export interface Actions {
@@ -12,6 +13,12 @@ export interface Actions {
   look(preset: Preset): void;
   /** Enter the room with a headset: as a person of the twin, or to look (null). */
   enter(mode: Mode, human: string | null): Promise<XRSession>;
+  /** Save where one looks from. */
+  keepView(): void;
+  goTo(view: SavedView): void;
+  picture(): Promise<Blob>;
+  /** Film the room until the answer is called; null where this browser cannot. */
+  film(): (() => Promise<Blob>) | null;
   /** Fill the view with the selection, or with everything. */
   frameSelection(): void;
 }

@@ -93,6 +93,8 @@ export class Body {
     if (smooth && !part.geometry.hasAttribute("normal")) part.geometry.computeVertexNormals();
     for (const shape of [part, edges]) shape.raycast = () => {};
     part.renderOrder = 2;
+    // A smooth one has no edges to be shown by; its veil covers nothing.
+    part.userData.volume = !smooth;
     part.add(edges);
     this.enclosed.push({ fill: part, edges, smooth });
   }

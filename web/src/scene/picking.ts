@@ -1,6 +1,6 @@
 // A click (not a drag) on a body selects it.
 
-import { type Intersection, type Object3D, Raycaster, Vector2 } from "three";
+import { type Intersection, type Object3D, type Plane, Raycaster, Vector2, type Vector3 } from "three";
 import type { Bodies } from "./bodies";
 import type { Stage } from "./stage";
 
@@ -11,7 +11,7 @@ const STILL_PX = 4;
 export function pickOnClick(
   stage: Stage,
   bodies: Bodies,
-  picked: (name: string | null, normal: [number, number, number] | null) => void,
+  picked: (name: string | null, normal: [number, number, number] | null, point: Vector3 | null) => void,
   taken: () => boolean,
 ): void {
   const canvas = stage.renderer.domElement;
@@ -28,9 +28,14 @@ export function pickOnClick(
       1 - ((event.clientY - box.top) / box.height) * 2,
     );
     ray.setFromCamera(at, stage.camera);
-    const hit = hitAlong(ray, bodies);
+    const planes = stage.renderer.clippingPlanes;
+    const hit = hitAlong(ray, bodies, planes);
     const normal = hit?.face?.normal.clone().transformDirection(hit.object.matrixWorld);
-    picked(hit ? nodeOf(hit.object) : null, normal ? [normal.x, normal.y, normal.z] : null);
+    picked(
+      hit ? nodeOf(hit.object) : null,
+      normal ? [normal.x, normal.y, normal.z] : null,
+      hit?.point ?? null,
+    );
   });
 }
 
@@ -39,8 +44,14 @@ export function nodeAlong(ray: Raycaster, bodies: Bodies): string | null {
   return nodeOf(hitAlong(ray, bodies)?.object ?? null);
 }
 
-function hitAlong(ray: Raycaster, bodies: Bodies): Intersection | undefined {
-  return ray.intersectObject(bodies.root, true).find(({ object }) => nodeOf(object) !== null);
+// What a section takes away is not clicked.
+function hitAlong(ray: Raycaster, bodies: Bodies, planes: readonly Plane[] = []): Intersection | undefined {
+  return ray
+    .intersectObject(bodies.root, true)
+    .find(
+      ({ object, point }) =>
+        nodeOf(object) !== null && planes.every((plane) => plane.distanceToPoint(point) >= 0),
+    );
 }
 
 // Hidden bodies are hit by rays all the same.

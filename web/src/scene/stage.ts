@@ -102,6 +102,15 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
   }
 
+  /** What is drawn now, as a PNG file. */
+  picture(): Promise<Blob> {
+    // Drawn at once: what was drawn before is not kept.
+    this.renderer.render(this.scene, this.camera);
+    return new Promise((resolve, reject) => {
+      this.renderer.domElement.toBlob((png) => (png ? resolve(png) : reject(new Error("no picture"))));
+    });
+  }
+
   /** Fit the element; what is seen in a headset has a size of its own. */
   resize(): void {
     const { clientWidth: width, clientHeight: height } = this.element;

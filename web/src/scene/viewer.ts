@@ -21,6 +21,8 @@ import {
   stale,
 } from "../page_state";
 import { manikinTints } from "../posture/coloring";
+import { followProbe, probeAt, probing } from "../view/probe";
+import { sectionPlanes } from "../view/section";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
 import { Companions } from "./companions";
@@ -33,10 +35,13 @@ import { Viewpoint } from "./viewpoint";
 
 /** Criteria that are labelled in the room, and a room that has space for one. */
 const LABELLED = 3;
+const UNSEEN_LAYER = 31;
 const NARROW_PX = 520;
 
 export const showCaptions = signal(true);
 export const showGrid = signal(true);
+/** Whether volumes with edges are drawn by those alone, so that they hide nothing of what is inside. */
+export const outlinesOnly = signal(false);
 /** Nodes whose mesh could not be fetched: they are there, but not to be seen. */
 export const unseen = signal<readonly string[]>([]);
 
@@ -71,7 +76,12 @@ export class Viewer {
     pickOnClick(
       this.stage,
       this.bodies,
-      (name, normal) => {
+      (name, normal, point) => {
+        const body = name === null ? undefined : this.bodies.byName.get(name);
+        if (probing.peek() && body && point) {
+          probeAt(body.node.name, point, body.group);
+          this.probe();
+        }
         if (name !== null) withFace(normal, () => select({ kind: "node", name }));
         else if (!measuring.peek()) select(null);
       },
@@ -112,6 +122,7 @@ export class Viewer {
       const shown = this.glide.at(time);
       if (shown) {
         this.bodies.pose(shown);
+        if (!this.glide.moving) this.probe();
         this.gizmo.place();
         this.posed = true;
         this.stage.moved();
@@ -158,6 +169,19 @@ export class Viewer {
     return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
   }
 
+  // Where bodies are between two instants is drawn, not known.
+  private probe(): void {
+    if (this.feed) followProbe(this.feed.t, (name) => this.bodies.byName.get(name)?.group);
+  }
+
+  /** Show filled volumes, or their edges alone: a layer that no camera sees. */
+  private outlines(): void {
+    const layer = outlinesOnly.peek() ? UNSEEN_LAYER : 0;
+    this.stage.world.traverse((part) => {
+      if (part.userData.volume === true) part.layers.set(layer);
+    });
+  }
+
   private arrive(): void {
     this.frame = this.coming;
     this.coming = null;
@@ -180,6 +204,7 @@ export class Viewer {
       showCaptions.peek() ? this.labelled() : 0,
     );
     this.paint();
+    this.outlines();
     this.bodies.wear(this.frame?.looks ?? {});
     const doubts = doubtsIn(this.frame);
     this.bodies.doubt(doubts);
@@ -231,6 +256,15 @@ export class Viewer {
     effect(() => {
       this.bodies.overReality(overReality.value);
       this.stage.moved();
+    });
+    effect(() => {
+      void outlinesOnly.value;
+      this.outlines();
+      this.stage.invalidate();
+    });
+    effect(() => {
+      this.stage.renderer.clippingPlanes = sectionPlanes();
+      this.stage.invalidate();
     });
     effect(() => {
       this.stage.grid.visible = showGrid.value && !overReality.value;

@@ -2,6 +2,7 @@
 
 import { Box3, type Object3D, Quaternion, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { SavedView } from "../view/kept";
 import type { Bodies } from "./bodies";
 import type { Stage } from "./stage";
 
@@ -46,6 +47,18 @@ export class Viewpoint {
       if (node.role === "human" && /(^|[/_])head$/i.test(node.name)) return node.name;
     }
     return null;
+  }
+
+  /** Where one looks from and at, to `stand` there again. */
+  where(): Omit<SavedView, "name"> {
+    return { position: this.stage.camera.position.toArray(), target: this.controls.target.toArray() };
+  }
+
+  stand({ position, target }: Omit<SavedView, "name">): void {
+    this.stage.camera.position.fromArray(position);
+    this.controls.target.fromArray(target);
+    this.controls.update();
+    this.stage.invalidate();
   }
 
   go(preset: Preset): void {

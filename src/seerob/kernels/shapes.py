@@ -58,6 +58,7 @@ class Shapes:
         """
         _check(bodies)
         made: list[_Made] = []
+        known: dict[int, _Made] = {}  # instances share a mesh, which lives as long as their solids
         owned: list[tuple[int, ...]] = []
         which: list[list[int]] = []
         ends = np.zeros(3, int)
@@ -65,7 +66,9 @@ class Shapes:
         for body, (_, solids) in enumerate(bodies):
             owned.append(tuple(range(len(made), len(made) + len(solids))))
             for solid in solids:
-                core = _make(solid, cache)
+                core = known.get(id(solid.mesh)) or _make(solid, cache)
+                if solid.mesh is not None:
+                    known[id(solid.mesh)] = core
                 tree = core.tree
                 size = np.array([0, 0, len(core.probes)])
                 if tree is not None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seerob.app.console.terminal import Exit, line, tell
-from seerob.core.errors import InputError
+from seerob.core.errors import InputError, suggestion
 from seerob.core.files.whole_file import whole_file, whole_folder
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 HELP = "make a workstation folder from CAD: parts with names, places, colours and meshes"
 EXAMPLE = "seerob import line.step my_line"
 
-_KEPT = ("density", "tolerance", "units", "up")
+_KEPT = ("density", "tolerance", "units", "up", "accept", "ground")
 """Options that a new revision takes over where they are not given again."""
 _TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 _SHOWN = 20
@@ -38,6 +38,12 @@ def add(sub: argparse.ArgumentParser) -> None:
     text = "density of every part [kg/m³], or of one material as S235JR=7850; may be given several times"
     sub.add_argument("--density", action="append", default=[], metavar="[NAME=]DENSITY", help=text)
     sub.add_argument("--units", help="unit of lengths of a file that does not say it: mm, m, inch")
+    text = "propose axes that parts can move about or along, from shapes of a STEP or IGES file that fit"
+    sub.add_argument("--axes", action="store_true", help=text)
+    text = "make a mechanism of proposed axes, by their numbers: 1,3; implies --axes"
+    sub.add_argument("--accept", metavar="NUMBERS", help=text)
+    text = "part that stands, by its full name (default: of the lowest ones the largest)"
+    sub.add_argument("--ground", metavar="NAME", help=text)
     sub.add_argument(
         "--up", choices=("x", "y", "z"), help="axis that points up in a file that does not say it"
     )
@@ -97,7 +103,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
             setattr(options, key, former.get(key) or getattr(options, key))
     kept = {key: getattr(options, key) for key in _KEPT}
     given = densities(options.density)
-    assembly = baked(_read(options, ending))
+    assembly = _moving(options, baked(_read(options, ending)))
     if before is None:
         made = files(assembly, options.file, given, options=kept)
         _write(folder, made.texts, made.meshes)
@@ -110,6 +116,46 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
     _revise(folder, before, made)
     _say(options.file, assembly, made)
     return Exit.WITHIN
+
+
+def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:
+    """The assembly with axes that the user accepts as a mechanism; tells what is proposed."""
+    if not (options.axes or options.accept):
+        if options.ground:
+            raise InputError.at(
+                "--ground", "", "is of --accept", "say which axes are accepted, or leave it out"
+            )
+        return assembly
+    from seerob.description.cad.axes import accepted, proposals
+    from seerob.description.cad.names import plain_name
+
+    if not any(shape.surfaces for shape in assembly.shapes):
+        raise InputError.at("--axes", "", "only STEP and IGES files say which faces are round", "export STEP")
+    found, names = proposals(assembly), assembly.names()
+    for number, p in enumerate(found[:_SHOWN], 1):
+        line("axis", f"{number}: {p.kind.value}, {names[p.b]} on {names[p.a]}: {p.reason}")
+    if not found:
+        line("axis", "no shapes fit into each other")
+    if not options.accept:
+        return assembly
+    words = options.accept.replace(",", " ").split()
+    numbers = [int(word) for word in words if word.isdecimal() and 1 <= int(word) <= len(found)]
+    if not words or len(numbers) != len(words):
+        what = f"{options.accept!r} are no numbers of proposals"
+        raise InputError.at("--accept", "", what, f"from 1 to {len(found)}, as --axes lists them")
+    if options.ground is not None and options.ground not in names:
+        raise InputError.at(
+            "--ground", "", f"there is no part {options.ground!r}", suggestion(options.ground, names)
+        )
+    ground = None if options.ground is None else names.index(options.ground)
+    try:
+        chosen = [found[number - 1] for number in dict.fromkeys(numbers)]
+        made, told = accepted(assembly, chosen, plain_name(options.file.stem), ground)
+    except ValueError as error:
+        raise InputError.at("--accept", "", str(error), "accept other axes, or say --ground") from None
+    for text in told:
+        line("accepted", text)
+    return made
 
 
 def _revise(folder: Path, before: dict[str, Any], made: Files) -> None:

@@ -142,7 +142,10 @@ def files(
 
 
 def _robot_names(assembly: Assembly) -> list[str]:
-    return told_apart(plain_name(moving.description.name) for moving in assembly.mechanisms)
+    """Names of mechanisms, under which no part lies: links have full names, too."""
+    tops = {name.partition("/")[0] for name in assembly.names()}
+    wanted = (plain_name(moving.description.name) for moving in assembly.mechanisms)
+    return told_apart(f"{name}_moving" if name in tops else name for name in wanted)
 
 
 def _robot(moving: Moving, name: str, files: dict[str, bytes]) -> dict[str, Any]:

@@ -20,6 +20,23 @@ SINGLE = 6e-8
 
 
 @dataclass(frozen=True, eq=False)
+class Surface:
+    """A plane, cylinder or cone that a boundary representation has for a face, in its shape's frame [m]."""
+
+    kind: str
+    """``plane`` or ``round``."""
+    point: Array
+    """Of the plane, or of the axis, shape (3,)."""
+    axis: Array
+    """Normal of a plane away from matter, or axis, unit, shape (3,)."""
+    round: tuple[float, ...] = ()
+    """Radius at the point, slope of the radius, 1 for a shaft and 0 for a hole, both ends along the axis from
+    the point, angle covered [m, rad]."""
+    corners: Array = field(default_factory=lambda: np.empty((0, 3)))
+    """Of a plane face, shape (n, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
 class Shape:
     """The surface of one product, which may be there several times."""
 
@@ -33,6 +50,8 @@ class Shape:
     """Closed bodies that the file says it has; 0 when it says nothing of that."""
     material: str = ""
     """Name of its material, as the file has it."""
+    surfaces: tuple[Surface, ...] = ()
+    """Plane and round faces, where the file is a boundary representation."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,8 @@ COLOR = (0.7, 0.72, 0.75, 1.0)
 """Shown of a face without a colour: red, green, blue, alpha in 0…1."""
 MAX_INSTANCES = 200_000
 MAX_DEPTH = 100
+MAX_CORNERS = 64
+"""Corners of a plane face that are told."""
 MAX_SAMPLES = 40_000
 """Points of a shape's curved surfaces at which its triangles are compared with it."""
 _REFERENCES = re.compile(
@@ -266,6 +268,7 @@ class _Document:
             "area": float(area.Mass()) * 1e-6,
             "volume": float(volume.Mass()) * 1e-9 if solids else 0.0,
             "material": _material(label),
+            "surfaces": [found for face in faces if (found := _analytic(face)) is not None],
         }
 
 
@@ -442,6 +445,48 @@ def _is_flat(faces: list[Any]) -> bool:
         for face in faces
         for edge in _explored(face, TopAbs_ShapeEnum.TopAbs_EDGE)
     )
+
+
+def _analytic(face: Any) -> tuple[Any, ...] | None:
+    """A cylinder, a cone or a plane of a face in metres: kind, point, axis, figures, corners.
+
+    Of a cylinder or cone: a point of its axis, the axis, radius at the point, slope of the radius along the
+    axis, whether matter is inside (a shaft), the ends along the axis from the point, and the angle that it
+    covers. Of a plane: a point, its normal away from matter, and corners of its triangles.
+    """
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_SurfaceType
+    from OCP.TopAbs import TopAbs_Orientation
+
+    surface = BRepAdaptor_Surface(face, True)
+    kind = surface.GetType()
+    forward = face.Orientation() != TopAbs_Orientation.TopAbs_REVERSED
+    if kind == GeomAbs_SurfaceType.GeomAbs_Plane:
+        plane = surface.Plane()
+        normal = np.array(plane.Axis().Direction().Coord())
+        if forward != plane.Position().Direct():
+            normal = -normal
+        corners = _triangles(face)[0] * 1e-3
+        step = max(1, len(corners) // MAX_CORNERS)
+        at = np.array(plane.Location().Coord()) * 1e-3
+        return "plane", at.tolist(), normal.tolist(), (), corners[::step].tolist()
+    if kind == GeomAbs_SurfaceType.GeomAbs_Cylinder:
+        shape, slope, along = surface.Cylinder(), 0.0, 1.0
+        radius = shape.Radius() * 1e-3
+    elif kind == GeomAbs_SurfaceType.GeomAbs_Cone:
+        shape = surface.Cone()
+        slope, along = float(np.tan(shape.SemiAngle())), float(np.cos(shape.SemiAngle()))
+        radius = shape.RefRadius() * 1e-3
+    else:
+        return None
+    ends = sorted((surface.FirstVParameter() * along * 1e-3, surface.LastVParameter() * along * 1e-3))
+    covered = abs(surface.LastUParameter() - surface.FirstUParameter())
+    at = np.array(shape.Axis().Location().Coord()) * 1e-3
+    axis = np.array(shape.Axis().Direction().Coord())
+    inside = forward == shape.Position().Direct()
+    if not np.isfinite([radius, slope, *ends, covered]).all():
+        return None
+    return "round", at.tolist(), axis.tolist(), (radius, slope, inside, *ends, covered), []
 
 
 def _merged(parts: list[tuple[Array, NDArray[np.int32]]]) -> tuple[bytes, bytes]:

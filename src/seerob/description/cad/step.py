@@ -15,7 +15,7 @@ from seerob.core.files.parser_process import parsed
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape
+from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape, Surface
 from seerob.description.cad.opencascade import plain
 from seerob.description.mesh_files import MeshSource
 from seerob.description.shapes.mesh_bodies import is_closed, joined
@@ -92,7 +92,11 @@ def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Sh
             note("warning", f"its triangles enclose {100 * share:+.1f} % of the solid's volume")
     elif not row["solids"] and is_closed(whole):
         note("note", "is made of surfaces, not of a solid; they close")
-    return Shape(name, pieces, deviation, row["solids"], row["material"])
+    surfaces = tuple(
+        Surface(kind, np.array(at), np.array(axis), tuple(figures), np.array(corners, float).reshape(-1, 3))
+        for kind, at, axis, figures, corners in row["surfaces"]
+    )
+    return Shape(name, pieces, deviation, row["solids"], row["material"], surfaces)
 
 
 def _farthest(whole: Mesh, points: Array) -> float:

@@ -64,8 +64,15 @@ from seerob.workstation.workstation import (
 def listed(mounting: Mounting) -> tuple[Body, ...]:
     """The bodies, with `mujoco` indices still to come: contacts are added by name first."""
     bodies = []
+    known: dict[tuple[tuple[int, float], ...], tuple[Array, float]] = {}  # instances share their meshes
     for index, entry in enumerate(mounting.entries):
-        corners, radius = extreme_points(entry.solids)
+        if all(solid.mesh is not None for solid in entry.solids):
+            key = tuple((id(solid.mesh), solid.radius) for solid in entry.solids)
+            if key not in known:
+                known[key] = extreme_points(entry.solids)
+            corners, radius = known[key]
+        else:
+            corners, radius = extreme_points(entry.solids)
         notes = list(dict.fromkeys(solid.note for solid in entry.solids if solid.note))
         bodies.append(
             Body(
@@ -420,7 +427,7 @@ class _Compiler:
     ) -> None:
         self.progress(f"reading {thing.name}")
         moves = role in ("tool", "workpiece")
-        loaded = load_thing(thing, self.folder, color, needs_mass=moves, file=self.file)
+        loaded = load_thing(thing, self.folder, color, needs_mass=moves, file=self.file, cache=self.cache)
         self.mounting.findings += loaded.findings
         self.mounting.files |= filed(thing.name, loaded.files, folder=self.folder, references=(thing.mesh,))
         carrier = "" if parent is None else self.carriers[parent]

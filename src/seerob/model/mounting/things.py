@@ -15,7 +15,7 @@ from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
 from seerob.description.description import Inertial, Link
-from seerob.description.mesh import load_meshes
+from seerob.description.prepared import PreparedMesh, prepared
 from seerob.description.shapes import detail, mass_properties, shapes
 from seerob.description.shapes.detail import display_mesh
 from seerob.description.shapes.hull import hull_volume
@@ -68,7 +68,13 @@ class MadeArea:
 
 
 def load_thing(
-    thing: Thing, folder: Path, color: Color, *, needs_mass: bool, file: str = "workstation"
+    thing: Thing,
+    folder: Path,
+    color: Color,
+    *,
+    needs_mass: bool,
+    file: str = "workstation",
+    cache: Path | None = None,
 ) -> LoadedThing:
     """Read a tool, a workpiece or a part.
 
@@ -78,6 +84,7 @@ def load_thing(
         color: For what has no colour of its own.
         needs_mass: Whether it moves, so that a mass from the shape is worth computing.
         file: The workstation file, for messages.
+        cache: Folder that keeps meshes that were made ready.
 
     Raises:
         InputError: The mesh cannot be read, a mass was asked for that the shape cannot give, or no body
@@ -89,23 +96,18 @@ def load_thing(
     files: dict[str, bytes] = {}
     if thing.mesh is not None:
         path = folder / thing.mesh
-        loaded = load_meshes(path, units=thing.units, up=thing.up)
+        loaded = prepared(path, units=thing.units, up=thing.up, cache=cache)
         findings = tuple(replace_subject(f, thing.name) for f in loaded.findings)
         files = loaded.files
         single = len(loaded.meshes) == 1
         own_color = thing.color is not None
         pieces = tuple(
-            _piece(
-                "" if single else m.name,
-                m.mesh,
-                (Mesh(m.mesh.vertices, m.mesh.faces, color),) if own_color else m.drawn,
-                thing.deviation,
-            )
+            _piece("" if single else m.name, m, thing.deviation, color if own_color else None)
             for m in loaded.meshes
         )
         source = f"shape of {thing.mesh}"
         whole = [m.mesh for m in loaded.meshes]
-        if not all(map(is_closed, whole)):
+        if not all(m.closed for m in loaded.meshes):
             around = enclosing(whole)
             if around is None:
                 findings += (_hole(thing, path),)
@@ -141,9 +143,12 @@ def replace_subject(finding: Finding, subject: str) -> Finding:
     return structs.replace(finding, subject=subject)
 
 
-def _piece(name: str, mesh: Mesh, drawn: Sequence[Mesh], deviation: float) -> Piece:
-    solid = Solid(mesh=detail.physics_mesh(mesh), name=name, deviation=deviation)
-    return Piece(name, tuple(map(detail.display_mesh, drawn)), (solid,))
+def _piece(name: str, made: PreparedMesh, deviation: float, color: Color | None) -> Piece:
+    solid = Solid(mesh=made.exact, name=name, deviation=deviation)
+    if color is None:
+        return Piece(name, made.shown, (solid,))
+    one = made.shown[0] if len(made.shown) == 1 else detail.display_mesh(made.mesh)
+    return Piece(name, (replace(one, color=color),), (solid,))
 
 
 def _round(shape: Shape | None) -> tuple[float, float] | None:

@@ -1,6 +1,7 @@
 // The page's end of the worker: what it says becomes signals, traces and poses.
 
 import { heardPresences, heardVisitors } from "./company";
+import { refused } from "./doing";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
 import { heardMeasured } from "./editing/measure";
 import type { Frame, FromWorker, ToWorker } from "./messages";
@@ -114,6 +115,9 @@ export class Connection {
         return;
       case "presences":
         heardPresences(message.presences);
+        return;
+      case "refused":
+        refused.value = message.refused;
         return;
       case "draft":
         draft.value = message.draft;

@@ -5,6 +5,7 @@ import "./look/index.css";
 import { h, render } from "preact";
 import { connectCompany, others, ownDevice, ownHuman } from "./company";
 import { Connection } from "./connection";
+import { connectDoing } from "./doing";
 import { connectDraft } from "./editing/draft";
 import { connectMeasure } from "./editing/measure";
 import { listenToKeys } from "./keyboard";
@@ -41,6 +42,10 @@ declare global {
       visited(point: [number, number, number]): [number, number, number] | null;
       /** The other visitors, with head and hands as they are drawn, in the world (z up) [m]. */
       readonly others: (VisitorInfo & Record<"head" | "left" | "right", number[] | null>)[];
+      /** Where a button of the menu at a visitor's wrist is in that world [m]; null without one. */
+      button(label: string): [number, number, number] | null;
+      /** Where a point of that world is in the visitor's room [m]; null without a visit. */
+      inRoom(point: [number, number, number]): [number, number, number] | null;
     };
   }
 }
@@ -55,13 +60,14 @@ function begin(element: HTMLElement): void {
   });
   actions.time.connect((message) => connection.send(message));
   connectDraft((edit) => connection.send({ kind: "edit", edit }));
+  connectDoing((doing) => connection.send({ kind: "doing", doing }));
   connectMeasure((measure) => connection.send({ kind: "measure", measure }));
   connectCompany((said) => connection.send({ kind: "company", said }));
   const presence = new OwnPresence(viewer.stage, (said) => connection.send({ kind: "company", said }));
   let visit: Visit | null = null;
   actions.enter = async (mode, human) => {
     const offer = (tracking: Tracking) => connection.send({ kind: "tracking", tracking });
-    visit = await Visit.begin(viewer, mode, human, offer);
+    visit = await Visit.begin(viewer, mode, human, offer, actions.time);
     ownDevice.value = mode === "immersive-ar" ? "ar" : "vr";
     ownHuman.value = human ?? "";
     visit.session.addEventListener("end", () => {
@@ -106,6 +112,8 @@ function begin(element: HTMLElement): void {
         return { ...info, head: seen[0] ?? null, left: seen[1] ?? null, right: seen[2] ?? null };
       });
     },
+    button: (label) => visit?.button(label) ?? null,
+    inRoom: (point) => visit?.inRoom(point) ?? null,
   };
 }
 

@@ -4,6 +4,7 @@ import type {
   Draft,
   Edit,
   Edited,
+  Grab,
   Hello,
   History,
   Hold,
@@ -12,6 +13,8 @@ import type {
   Measured,
   Presence,
   Presences,
+  Pull,
+  Refused,
   Result,
   Scene,
   Snapshot,
@@ -61,6 +64,8 @@ export type FromWorker =
   | { kind: "so_far"; soFar: SoFar }
   /** What became of what this page's headset sees. */
   | { kind: "tracked"; tracked: Tracked }
+  /** Why what this page did in the room was not taken. */
+  | { kind: "refused"; refused: Refused }
   | { kind: "draft"; draft: Draft }
   /** What became of what this page asked of the file. */
   | { kind: "edited"; edited: Edited }
@@ -81,6 +86,7 @@ export type ToWorker =
   | { kind: "recycle"; buffer: ArrayBuffer }
   | { kind: "command"; action: Action; value: number | null }
   | { kind: "tracking"; tracking: Tracking }
+  | { kind: "doing"; doing: Grab | Pull }
   | { kind: "edit"; edit: Edit }
   | { kind: "measure"; measure: Measure }
   /** What this visitor says of themselves. */

@@ -79,6 +79,9 @@ function received(message: ServerMessage, raw: Uint8Array): void {
     case "presences":
       post({ kind: "presences", presences: message });
       return;
+    case "refused":
+      post({ kind: "refused", refused: message });
+      return;
     case "draft":
       post({ kind: "draft", draft: message });
       return;
@@ -198,6 +201,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "command":
       socket?.send({ type: "command", action: message.action, value: message.value });
+      return;
+    case "doing":
+      socket?.send(message.doing);
       return;
     case "tracking":
       socket?.send(message.tracking);

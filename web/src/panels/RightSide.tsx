@@ -1,15 +1,18 @@
 // What is said: verdicts, contacts on the body, posture, and what to know of the model.
 
-import { useSignal } from "@preact/signals";
+import { computed, useSignal } from "@preact/signals";
+import { controls, isLoose } from "../doing";
 import { mayEdit } from "../editing/draft";
+import { scene } from "../page_state";
 import { said, word } from "../words";
 import { BodyMap } from "./BodyMap";
 import { CriteriaTable } from "./CriteriaTable";
 import { Editor } from "./Editor";
 import { allFindings, Findings } from "./Findings";
 import { Posture } from "./Posture";
+import { Room } from "./Room";
 
-const TABS = ["edit", "criteria", "body", "posture", "findings"] as const;
+const TABS = ["edit", "criteria", "body", "posture", "room", "findings"] as const;
 type Tab = (typeof TABS)[number];
 
 const TITLES: Record<Tab, string> = {
@@ -17,12 +20,17 @@ const TITLES: Record<Tab, string> = {
   criteria: word("Criteria"),
   body: word("Body"),
   posture: word("Posture"),
+  room: word("Room"),
   findings: word("Findings"),
 };
 
+const hasRoom = computed(() => controls.value.length > 0 || (scene.value?.nodes.some(isLoose) ?? false));
+
 export function RightSide() {
   const tab = useSignal<Tab | null>(null);
-  const tabs = TABS.filter((name) => name !== "edit" || mayEdit.value);
+  const tabs = TABS.filter(
+    (name) => (name !== "edit" || mayEdit.value) && (name !== "room" || hasRoom.value),
+  );
   const shown = tab.value ?? tabs[0]!;
   const open = (name: Tab): void => {
     tab.value = name;
@@ -56,6 +64,7 @@ export function RightSide() {
         {shown === "criteria" && <CriteriaTable />}
         {shown === "body" && <BodyMap />}
         {shown === "posture" && <Posture />}
+        {shown === "room" && <Room />}
         {shown === "findings" && <Findings />}
       </div>
       <p class="disclaimer">{said("Evaluation of a model, to be confirmed by measurement.")}</p>

@@ -17,11 +17,17 @@ import {
   Vector3,
 } from "three";
 import { ownScale } from "../company";
-import { hidden, overReality, rows, scene } from "../page_state";
+import { hidden, isLive, lookingAt, overReality, rows, scene, transport } from "../page_state";
 import type { Sighted } from "../scene/own_presence";
 import type { Viewer } from "../scene/viewer";
+import type { TimeControl } from "../time_control";
 import type { Tracking } from "../wire";
 import { Board } from "./board";
+import { isOn, leftHanded, seated, smooth, sound, tone, turnOver, vignette } from "./comfort";
+import { Hands } from "./hands";
+import { Ghost, Ruler, Section, Vignette } from "./instruments";
+import { type Item, Menu } from "./menu";
+import { PlotPanel } from "./plot_panel";
 import { bodyJoints, sight } from "./sight";
 
 export type Mode = "immersive-vr" | "immersive-ar";
@@ -40,7 +46,13 @@ const RELEASED = 0.3;
 /** A beam is no longer [m]. */
 const FARTHEST = 12;
 const PULSE = { strength: 0.7, ms: 150 };
-const BESIDE_WRIST = new Vector3(0, 0.16, -0.05);
+const TAKEN = { strength: 0.3, ms: 40 };
+const OVER_WRIST = new Vector3(0, 0.14, -0.05);
+const OVER_MENU = new Vector3(0, 0.44, -0.07);
+const PLOT_ABOVE = 0.36;
+/** Turning while the stick is pushed [rad/s], and eyes of one who stands [m]. */
+const TURNING = Math.PI / 2;
+const STANDING = 1.6;
 const FACING = new Vector3(0, 1.3, -1.1);
 
 /** The kinds of session that this browser can begin. */
@@ -80,6 +92,19 @@ export class Visit implements Sighted {
     new MeshBasicMaterial({ color: 0x7ee7f1 }),
   );
   private readonly board = new Board();
+  private readonly hands: Hands;
+  private readonly menu: Menu;
+  private readonly plot = new PlotPanel();
+  private readonly ruler = new Ruler();
+  private readonly section: Section;
+  private readonly ghost: Ghost;
+  private readonly vignette = new Vignette();
+  private measures = false;
+  private shines = false;
+  private moved = false;
+  private raised = 0;
+  private tickedAt = 0;
+  private elapsed = 0;
   private readonly ray = new Raycaster();
   private readonly before: () => void;
   private readonly forget: () => void;
@@ -99,20 +124,30 @@ export class Visit implements Sighted {
     readonly human: string | null,
     private readonly viewer: Viewer,
     private readonly send: (tracking: Tracking) => void,
+    private readonly time: TimeControl,
   ) {
     const { stage } = viewer;
     this.rig = stage.rig;
     this.before = this.remember();
-    this.things.add(this.board.mesh, this.landing);
+    this.section = new Section(stage);
+    this.ghost = new Ghost(stage, viewer.bodies);
+    this.menu = new Menu(this.items());
+    this.plot.mesh.visible = false;
+    this.things.add(this.board.mesh, this.landing, this.menu.mesh, this.plot.mesh, this.vignette.mesh);
+    stage.scene.add(this.ruler.root);
     for (const { ball, beam } of Object.values(this.pointers)) this.things.add(ball, beam);
     this.landing.visible = false;
     this.rig.add(this.things);
     this.stand();
-    session.addEventListener("select", this.select);
     const forgets = [effect(() => this.feel()), effect(() => this.resize(ownScale.value))];
     this.forget = () => {
       for (const forget of forgets) forget();
     };
+    this.hands = new Hands(viewer, human);
+    for (const kind of ["select", "squeeze"] as const) {
+      session.addEventListener(`${kind}start`, this.close);
+      session.addEventListener(`${kind}end`, this.open);
+    }
   }
 
   /**
@@ -126,11 +161,12 @@ export class Visit implements Sighted {
     mode: Mode,
     human: string | null,
     send: (tracking: Tracking) => void,
+    time: TimeControl,
   ): Promise<Visit> {
     if (!navigator.xr) throw new Error("this browser has no headset");
     const session = await navigator.xr.requestSession(mode, WANTED);
     const { xr } = viewer.stage.renderer;
-    const visit = new Visit(session, mode, human, viewer, send);
+    const visit = new Visit(session, mode, human, viewer, send, time);
     xr.enabled = true;
     xr.setReferenceSpaceType("local-floor");
     await xr.setSession(session);
@@ -155,15 +191,34 @@ export class Visit implements Sighted {
       const { position: p, orientation: q } = viewer.transform;
       this.eyes.set(p.x, p.y, p.z);
       this.facing.set(q.x, q.y, q.z, q.w);
+      const veil = this.vignette.mesh;
+      veil.quaternion.copy(this.facing);
+      veil.position.set(0, 0, -0.2).applyQuaternion(this.facing).add(this.eyes);
     }
     this.frame = frame;
+    this.elapsed = Math.min(Math.max((time - this.tickedAt) / 1000, 0), 0.1);
+    this.tickedAt = time;
+    this.moved = false;
     this.rig.updateMatrixWorld();
     for (const pointer of Object.values(this.pointers)) pointer.ball.visible = pointer.beam.visible = false;
     this.landing.visible = false;
+    this.sit();
     for (const source of this.session.inputSources) this.hold(frame, space, source);
-    if (!this.pointers.left.ball.visible) this.board.mesh.position.copy(FACING);
-    this.board.mesh.lookAt(this.rig.localToWorld(this.at.copy(this.eyes)));
-    this.board.update(time);
+    const { menu, board, plot } = this;
+    const wrist = this.pointers[leftHanded.value === "on" ? "right" : "left"].ball;
+    menu.mesh.visible = wrist.visible;
+    if (wrist.visible) {
+      menu.mesh.position.copy(wrist.position).add(OVER_WRIST);
+      board.mesh.position.copy(wrist.position).add(OVER_MENU);
+    } else board.mesh.position.copy(FACING);
+    plot.mesh.position.copy(board.mesh.position);
+    plot.mesh.position.y += PLOT_ABOVE;
+    this.rig.localToWorld(this.at.copy(this.eyes));
+    for (const mesh of [menu.mesh, board.mesh, plot.mesh]) mesh.lookAt(this.at);
+    this.vignette.update(this.moved && vignette.value === "on", this.elapsed);
+    menu.update();
+    board.update(time);
+    plot.update(time);
     this.viewer.stage.invalidate();
   }
 
@@ -240,6 +295,12 @@ export class Visit implements Sighted {
     return this.rig.localToWorld(new Vector3(...point)).toArray();
   }
 
+  /** Where a point of the world (y up) is in the visitor's room [m]. */
+  inRoom(point: [number, number, number]): [number, number, number] {
+    this.rig.updateMatrixWorld();
+    return this.rig.worldToLocal(new Vector3(...point)).toArray();
+  }
+
   private hold(frame: XRFrame, space: XRReferenceSpace, source: XRInputSource): void {
     if (source.handedness !== "left" && source.handedness !== "right") return;
     const pointer = this.pointers[source.handedness];
@@ -252,7 +313,7 @@ export class Visit implements Sighted {
       pointer.ball.quaternion.set(q.x, q.y, q.z, q.w);
       // A person of the twin has hands there.
       pointer.ball.visible = true;
-      if (source.handedness === "left") this.board.mesh.position.set(x, y, z).add(BESIDE_WRIST);
+      this.hands.move(source.handedness, pointer.ball.getWorldPosition(this.at));
     }
     const aimed = frame.getPose(source.targetRaySpace, space);
     if (!aimed) return;
@@ -264,15 +325,115 @@ export class Visit implements Sighted {
       .set(0, 0, -1)
       .applyQuaternion(pointer.beam.quaternion)
       .transformDirection(this.rig.matrixWorld);
+    this.ray.set(pointer.from, pointer.along);
+    const onMenu = this.menu.mesh.visible && this.wrist !== source.handedness && this.menu.point(this.ray);
+    if (onMenu || this.shines) {
+      pointer.beam.visible = true;
+      pointer.beam.scale.setScalar(this.shines && !onMenu ? this.meets(pointer) : 0.6);
+    }
     // Who is a person of the twin goes on their own feet.
     if (this.human === null) this.steer(pointer, source.gamepad);
+  }
+
+  /** The hand at whose wrist the menu is. */
+  private get wrist(): "left" | "right" {
+    return leftHanded.peek() === "on" ? "right" : "left";
+  }
+
+  /** Put a seated visitor who looks as high as one who stands; a person of the twin sits where they sit. */
+  private sit(): void {
+    const wanted = this.human === null && seated.value === "on" && this.eyes.y > 0;
+    const raise = wanted ? this.raised || Math.max(0, STANDING - this.eyes.y) : 0;
+    if (raise === this.raised) return;
+    this.rig.position.y += (raise - this.raised) * this.rig.scale.y;
+    this.raised = raise;
+    this.rig.updateMatrixWorld();
+  }
+
+  /** How far a beam goes until it meets something [m] of the visitor's room. */
+  private meets({ from, along }: Pointer): number {
+    this.ray.set(from, along);
+    const [hit] = this.ray.intersectObject(this.viewer.bodies.root, true);
+    return Math.min(hit?.distance ?? FARTHEST, FARTHEST) / this.rig.scale.x;
+  }
+
+  private items(): Item[] {
+    const { time, ruler, ghost, section } = this;
+    const choice = (words: string, of: typeof smooth): Item => ({
+      label: () => words,
+      on: () => isOn(of),
+      press: () => turnOver(of),
+    });
+    return [
+      { label: () => "− 1 s", press: () => time.seekBy(-1) },
+      { label: () => (isPlaying() ? "hold" : "play"), press: () => time.toggle() },
+      { label: () => "+ 1 s", press: () => time.seekBy(1) },
+      {
+        label: () => (isLive.peek() ? "now" : "begin"),
+        press: () => (isLive.peek() ? time.follow() : time.begin()),
+      },
+      { label: () => "last limit", press: () => time.violation(false) },
+      { label: () => "next limit", press: () => time.violation(true) },
+      { label: () => "ghost", on: () => ghost.on, press: () => ghost.turnOver() },
+      {
+        label: () => "plot",
+        on: () => this.plot.mesh.visible,
+        press: () => {
+          this.plot.mesh.visible = !this.plot.mesh.visible;
+        },
+      },
+      {
+        label: () => "ruler",
+        on: () => this.measures,
+        press: () => {
+          this.measures = !this.measures;
+          if (!this.measures) ruler.clear();
+        },
+      },
+      {
+        label: () => "section",
+        on: () => section.on,
+        press: () => {
+          // Across the way one looks, half a metre ahead.
+          const ahead = this.vignette.mesh.getWorldDirection(new Vector3()).negate();
+          const at = this.rig.localToWorld(this.eyes.clone()).addScaledVector(ahead, 0.5);
+          section.turnOver(at, ahead);
+        },
+      },
+      {
+        label: () => "laser",
+        on: () => this.shines,
+        press: () => {
+          this.shines = !this.shines;
+        },
+      },
+      choice("sound", sound),
+      choice("smooth", smooth),
+      choice("vignette", vignette),
+      choice("seated", seated),
+      choice("left hand", leftHanded),
+      { label: () => "leave", press: () => void this.session.end() },
+    ];
+  }
+
+  /** Where the middle of a button of the menu is in the world; null where there is none. */
+  button(label: string): [number, number, number] | null {
+    const middle = this.menu.middle(label);
+    this.menu.mesh.updateWorldMatrix(true, false);
+    return middle && this.menu.mesh.localToWorld(new Vector3(...middle)).toArray();
   }
 
   /** Turn at a push to the side, go where one points at a push ahead that is let go. */
   private steer(pointer: Pointer, gamepad: Gamepad | undefined): void {
     const x = gamepad?.axes[2] ?? 0;
     const y = gamepad?.axes[3] ?? 0;
-    if (Math.abs(x) > PUSHED && !pointer.turned) this.turnBy(-Math.sign(x) * SNAP);
+    if (smooth.value === "on" && Math.abs(x) > RELEASED) {
+      this.turnBy(-x * TURNING * this.elapsed);
+      this.moved = true;
+    } else if (Math.abs(x) > PUSHED && !pointer.turned) {
+      this.turnBy(-Math.sign(x) * SNAP);
+      this.moved = true;
+    }
     pointer.turned = Math.abs(x) > (pointer.turned ? RELEASED : PUSHED);
     const floor = this.floor(pointer);
     const pushed = y < -(pointer.walking ? RELEASED : PUSHED);
@@ -282,7 +443,10 @@ export class Visit implements Sighted {
       this.landing.visible = true;
       this.landing.position.copy(this.rig.worldToLocal(this.at.copy(floor))).y += 0.005;
     }
-    if (pointer.walking && !pushed && floor) this.go(floor);
+    if (pointer.walking && !pushed && floor) {
+      this.go(floor);
+      this.moved = true;
+    }
     pointer.walking = pushed;
   }
 
@@ -317,12 +481,28 @@ export class Visit implements Sighted {
     rig.updateMatrixWorld();
   }
 
-  private readonly select = (event: XRInputSourceEvent): void => {
-    const side = event.inputSource.handedness;
+  private readonly close = ({ inputSource, type }: XRInputSourceEvent): void => {
+    const side = inputSource.handedness;
     if (side !== "left" && side !== "right") return;
-    const { from, along } = this.pointers[side];
+    const { ball, from, along } = this.pointers[side];
+    this.ray.set(from, along);
+    if (type === "selectstart" && side !== this.wrist && this.menu.press(this.ray)) {
+      pulse(inputSource, TAKEN);
+      return;
+    }
+    if (type === "selectstart" && this.measures) {
+      if (this.ruler.take(this.ray, this.viewer.bodies)) pulse(inputSource, TAKEN);
+      return;
+    }
+    const taken = this.hands.close(side, ball.getWorldPosition(this.at), from, along);
+    if (taken) pulse(inputSource, TAKEN);
+    if (taken || type !== "selectstart") return;
     this.ray.set(from, along);
     this.viewer.pick(this.ray);
+  };
+
+  private readonly open = ({ inputSource }: XRInputSourceEvent): void => {
+    this.hands.open(inputSource.handedness);
   };
 
   /** A pulse in both hands as soon as a limit is exceeded. */
@@ -331,10 +511,8 @@ export class Visit implements Sighted {
     const more = [...now].some((name) => !this.exceeded.has(name));
     this.exceeded = now;
     if (!more) return;
-    for (const { gamepad } of this.session.inputSources) {
-      const [actuator] = (gamepad?.hapticActuators ?? []) as unknown as { pulse?: Pulse }[];
-      void actuator?.pulse?.(PULSE.strength, PULSE.ms);
-    }
+    if (sound.peek() === "on") tone();
+    for (const source of this.session.inputSources) pulse(source, PULSE);
   }
 
   /** What the room changes outside, and how to put it back. */
@@ -369,6 +547,10 @@ export class Visit implements Sighted {
   private end(): void {
     const { rig, things, viewer } = this;
     this.forget();
+    this.hands.end();
+    viewer.stage.scene.remove(this.ruler.root);
+    this.section.clear();
+    for (const each of [this.menu, this.plot, this.ruler, this.ghost, this.vignette]) each.dispose();
     rig.remove(things);
     rig.position.set(0, 0, 0);
     rig.quaternion.identity();
@@ -380,6 +562,15 @@ export class Visit implements Sighted {
     viewer.stage.renderer.xr.enabled = false;
     viewer.stage.resize();
   }
+}
+
+function isPlaying(): boolean {
+  return isLive.peek() ? lookingAt.peek() === null : transport.peek().playing;
+}
+
+function pulse({ gamepad }: XRInputSource, { strength, ms }: typeof PULSE): void {
+  const [actuator] = (gamepad?.hapticActuators ?? []) as unknown as { pulse?: Pulse }[];
+  void actuator?.pulse?.(strength, ms);
 }
 
 type Pulse = (strength: number, ms: number) => Promise<boolean>;

@@ -1,0 +1,95 @@
+// A menu beside the wrist: large buttons that the other hand's beam presses, for time and for comfort.
+
+import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, type Raycaster, SRGBColorSpace } from "three";
+
+/** Size of a button in the room [m]: no smaller than a finger hits. */
+const BUTTON = { width: 0.066, height: 0.046 };
+const COLUMNS = 4;
+/** Pixels per metre: letters are 9 mm high, to be read at arm's length. */
+const SHARP = 2600;
+
+export interface Item {
+  /** What stands on it now. */
+  label(): string;
+  /** Whether it is on. */
+  on?(): boolean;
+  press(): void;
+}
+
+export class Menu {
+  readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  private readonly brush: CanvasRenderingContext2D;
+  private readonly texture: CanvasTexture;
+  private readonly rowCount: number;
+  private drawn = "";
+  private pointed = -1;
+
+  constructor(readonly items: readonly Item[]) {
+    this.rowCount = Math.ceil(items.length / COLUMNS);
+    const [width, height] = [BUTTON.width * COLUMNS, BUTTON.height * this.rowCount];
+    const canvas = document.createElement("canvas");
+    Object.assign(canvas, { width: width * SHARP, height: height * SHARP });
+    this.brush = canvas.getContext("2d")!;
+    this.texture = new CanvasTexture(canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
+    this.mesh = new Mesh(new PlaneGeometry(width, height), material);
+  }
+
+  /** Whether a ray of the world meets it; notes which button. */
+  point(ray: Raycaster): boolean {
+    const [hit] = ray.intersectObject(this.mesh);
+    this.pointed = hit?.uv ? this.at(hit.uv.x, hit.uv.y) : -1;
+    return this.pointed >= 0;
+  }
+
+  /** Press the button that a ray of the world meets; whether there is one. */
+  press(ray: Raycaster): boolean {
+    if (!this.mesh.visible || !this.point(ray)) return false;
+    this.items[this.pointed]?.press();
+    return true;
+  }
+
+  /** Where the middle of a button is in the mesh's own frame [m]. */
+  middle(label: string): [number, number, number] | null {
+    const k = this.items.findIndex((item) => item.label() === label);
+    if (k < 0) return null;
+    const x = ((k % COLUMNS) + 0.5 - COLUMNS / 2) * BUTTON.width;
+    return [x, (this.rowCount / 2 - Math.floor(k / COLUMNS) - 0.5) * BUTTON.height, 0];
+  }
+
+  /** Draw what has changed. */
+  update(): void {
+    const state = this.items.map((item, k) => `${item.label()}${item.on?.() ? 1 : 0}${k === this.pointed}`);
+    if (state.join() === this.drawn) return;
+    this.drawn = state.join();
+    const { brush } = this;
+    const [w, h] = [BUTTON.width * SHARP, BUTTON.height * SHARP];
+    brush.clearRect(0, 0, brush.canvas.width, brush.canvas.height);
+    brush.textAlign = "center";
+    brush.textBaseline = "middle";
+    brush.font = `${0.0105 * SHARP}px sans-serif`;
+    this.items.forEach((item, k) => {
+      const [x, y] = [(k % COLUMNS) * w, Math.floor(k / COLUMNS) * h];
+      brush.fillStyle = item.on?.() ? "#14656e" : "rgba(13, 19, 28, 0.94)";
+      brush.fillRect(x + 3, y + 3, w - 6, h - 6);
+      brush.strokeStyle = k === this.pointed ? "#7ee7f1" : "#46566b";
+      brush.lineWidth = k === this.pointed ? 6 : 2;
+      brush.strokeRect(x + 4, y + 4, w - 8, h - 8);
+      brush.fillStyle = "#eef3fa";
+      brush.fillText(item.label(), x + w / 2, y + h / 2, w - 12);
+    });
+    this.texture.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.texture.dispose();
+    this.mesh.material.dispose();
+    this.mesh.geometry.dispose();
+  }
+
+  private at(u: number, v: number): number {
+    const k = Math.floor((1 - v) * this.rowCount) * COLUMNS + Math.floor(u * COLUMNS);
+    return k < this.items.length ? k : -1;
+  }
+}

@@ -1,4 +1,5 @@
 # make demo   set everything up and run the UR10 assembly workstation live
+# make demo-xr   a cell to walk into with an emulated headset, in a desktop browser
 # make demo-plc   a cell with a robot controller and a PLC, both emulated; the PLC dies and comes back
 # make test   set everything up and run every check
 #
@@ -22,7 +23,7 @@ BROUGHT := src/seerob/kernels/compiled
 KEPT := $(VENV)/.compiled
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs docs-site lock audit clean
+.PHONY: help demo demo-plc demo-xr test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs docs-site lock audit clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -34,6 +35,9 @@ help:
 demo: $(RUN)
 	$(MAKE) --no-print-directory -j2 $(KEPT) $(PAGE)
 	$(BIN)/seerob run workstations/ur10_assembly || [ $$? -le 2 ]  # 1 and 2 are verdicts, not failures
+
+demo-xr: $(DEV) $(PAGE)
+	scripts/demo-xr $(BIN) || [ $$? -le 2 ]
 
 demo-plc: $(DEV) $(PAGE)
 	scripts/demo-plc $(BIN) || [ $$? -le 2 ]

@@ -4,12 +4,13 @@ import { metaQuest3, XRDevice } from "iwer";
 
 const device = new XRDevice(metaQuest3);
 device.installRuntime({ forceInstall: true });
-const { left, right } = device.controllers as Required<typeof device.controllers>;
+const left = device.controllers.left!;
+const right = device.controllers.right!;
 
 const WALK = 1.2;
 const REACH = { least: 0.15, most: 0.8 };
 const keys = new Set<string>();
-const head = { x: 0, y: 1.65, z: 0, turn: 0, nod: -0.35 };
+const head = { x: 0, y: 1.62, z: 0, turn: 0, nod: -0.35 };
 const hand = { far: 0.45, turn: 0, nod: -0.25 };
 let before = performance.now();
 

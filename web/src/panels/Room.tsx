@@ -3,6 +3,7 @@
 import { controls, mayPull, press, pull, refused, release, standsAt } from "../doing";
 import { soFar } from "../page_state";
 import type { ControlInfo } from "../wire";
+import { said } from "../words";
 import { eventLine } from "./event_line";
 
 export function Room() {
@@ -10,18 +11,18 @@ export function Room() {
   return (
     <div class="room-tab">
       {controls.value.length > 0 && (
-        <section aria-label="Controls">
-          <h2>Controls</h2>
+        <section aria-label={said("Controls")}>
+          <h2>{said("Controls")}</h2>
           {controls.value.map((control) => (
             <ControlRow key={control.name} control={control} />
           ))}
-          {!mayPull.value && <p>Only a page of a live run that may track or control pulls them.</p>}
+          {!mayPull.value && <p>{said("Only a page of a live run that may track or control pulls them.")}</p>}
         </section>
       )}
       {refused.value && <p role="alert">{refused.value.reason}</p>}
-      <section aria-label="Events">
-        <h2>Events</h2>
-        {events.length === 0 && <p>Nothing has happened yet.</p>}
+      <section aria-label={said("Events")}>
+        <h2>{said("Events")}</h2>
+        {events.length === 0 && <p>{said("Nothing has happened yet.")}</p>}
         <ol class="events">
           {events.map((event, k) => (
             <li key={k}>{eventLine(event)}</li>

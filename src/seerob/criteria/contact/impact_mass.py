@@ -2,6 +2,7 @@ r"""Mass that a person hit by a moving part of a robot would feel: by the norm, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -30,8 +31,8 @@ def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
     Where `Mechanism.unknown_masses` names any, of the known masses alone.
     """
     masses = {int(i): float(model.mj.body_mass[i]) for i in robot.mj_bodies if i not in robot.unweighed}
-    load = sum(mass for i, mass in masses.items() if i in robot.load)
-    return sum(masses.values()) - load, load
+    load = math.fsum(mass for i, mass in masses.items() if i in robot.load)
+    return math.fsum(masses.values()) - load, load
 
 
 def masses_along_motion(
@@ -123,4 +124,4 @@ def _total(model: Model, mechanisms: Iterable[Mechanism]) -> float:
     every = tuple(mechanisms)
     unweighed = {i for m in every for i in m.unweighed}
     bodies = {int(i) for m in every for i in m.mj_bodies} - unweighed
-    return sum(float(model.mj.body_mass[i]) for i in sorted(bodies))
+    return math.fsum(float(model.mj.body_mass[i]) for i in sorted(bodies))

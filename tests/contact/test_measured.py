@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Origin, Result, Verdict
-from seerob.criteria.contact.measured import missing, peaks, read, read_curve, risen
-from seerob.criteria.safety.power_and_force import PowerAndForce
+from seerob.criteria.contact.measured import Measurements, missing, peaks, read, read_curve, risen
+from seerob.criteria.safety.power_and_force import Contacts, PowerAndForce
 from seerob.session.station import Station
 
 CHEST = "Chest"
@@ -119,6 +119,7 @@ def test_what_was_measured_on_its_limit_is_not_within(tmp_path, figure, limit, c
     ("changed", "reason"),
     [
         ({"speed": "0.4"}, "measured at 0.4 m/s, and it moves at 0.45 m/s here"),
+        ({"part": '"arm"', "speed": "0.4"}, "measured at 0.4 m/s, and it moves at 0.45 m/s here"),
         ({"spring_N_mm": None}, "the spring constant of the device is not told"),
         ({"spring_N_mm": "20"}, "is softer than 25 N/mm"),
         ({"pad": None}, "the pad of the device is not told"),
@@ -184,6 +185,8 @@ def test_a_clamped_body_part_asks_for_a_clamped_measurement(tmp_path: Path) -> N
     free = chest(cell(tmp_path / "a", entry(), tool=wall), 0.3)
     assert "it is clamped here" in free.reason
     assert free.verdict is Verdict.UNDECIDED
+    whole = chest(cell(tmp_path / "w", entry(part='"arm"'), tool=wall), 0.3)
+    assert "it is clamped here" in whole.reason
     cases = (
         ({}, Verdict.WITHIN),
         ({"static_force_N": "141"}, Verdict.EXCEEDED),
@@ -193,6 +196,51 @@ def test_a_clamped_body_part_asks_for_a_clamped_measurement(tmp_path: Path) -> N
     for n, (more, verdict) in enumerate(cases):
         found = chest(cell(tmp_path / str(n), entry(**{**clamped, "speed": "0.3", **more}), tool=wall), 0.3)
         assert found.verdict is verdict, more
+
+
+def bound(folder: Path, *entries: str) -> tuple[Measurements, int]:
+    station = cell(folder, *entries)
+    (criterion,) = station.workstation.safety
+    contacts = Contacts(criterion, station.model)
+    return contacts.measured, contacts.columns[CHEST]
+
+
+def test_of_the_bodies_of_a_part_the_fastest_counts_and_whichever_clamps(tmp_path: Path) -> None:
+    measured, column = bound(tmp_path, entry(part='"arm"', speed="0.4"))
+    yes, no = np.array([True, True]), np.array([False, False])
+
+    def said(v: list[float], near: np.ndarray, clamped: np.ndarray, at: int = column) -> list[str]:
+        return [part.reason for part in measured.results(at, np.array(v), near, clamped)]
+
+    assert said([0.1, 0.4], yes, no) == ["", ""]
+    assert said([0.4 * (1 + 1e-10), 0.4], yes, no) == ["", ""]
+    for v in ([0.1, 0.5], [0.5, 0.1]):
+        assert all("it moves at 0.5 m/s" in reason for reason in said(v, yes, no))
+    for clamped in ([True, False], [False, True]):
+        assert all("it is clamped here" in reason for reason in said([0.4, 0.4], yes, np.array(clamped)))
+    # Who cannot be hit is not asked, nor is another region.
+    assert said([0.5, 0.4], np.array([False, True]), np.array([True, False])) == ["", ""]
+    assert said([0.5, 0.5], no, no) == said([0.5, 0.5], yes, no, column + 1) == []
+
+
+def test_a_measurement_bears_out_its_own_speed_and_no_more(tmp_path: Path) -> None:
+    """Of the part that was measured, where it says that all of it is within."""
+    no, nan, inf = np.array([False, False]), np.nan, np.inf
+    for k, (entries, expected) in enumerate(
+        (
+            ([entry(speed="0.4")], [inf, 0.4]),
+            ([entry(part='"arm"', speed="0.4"), entry(speed="0.3")], [0.4, 0.3]),
+            ([entry(part='"arm"', speed="0.3"), entry(speed="0.4")], [0.3, 0.3]),
+            ([entry(force_N="281")], [inf, nan]),
+            ([entry(pressure_N_cm2="241")], [inf, nan]),
+            ([entry(pad=None)], [inf, nan]),
+            ([entry(region='"Pelvis"')], [inf, inf]),
+        )
+    ):
+        measured, column = bound(tmp_path / str(k), *entries)
+        np.testing.assert_array_equal(measured.permits(column, no), expected)
+    measured, column = bound(tmp_path / "clamped", entry(part='"arm"', speed="0.4"))
+    np.testing.assert_array_equal(measured.permits(column, np.array([True, False])), [nan, 0.4])
 
 
 # -- records ------------------------------------------------------------------------------------

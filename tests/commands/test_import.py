@@ -284,3 +284,26 @@ def test_formats_are_known_by_content(content, ending):
 def test_what_nobody_knows_is_said_to_be_so(content):
     with pytest.raises(InputError):
         recognised(Path("a.bin"), content)
+
+
+def test_a_picture_shows_what_became_parts_in_their_colours(tmp_path):
+    from PIL import Image
+
+    scene = trimesh.Scene()
+    for name, color, x in (("red", (255, 0, 0, 255), 0.0), ("blue", (0, 0, 255, 255), 3.0)):
+        box = trimesh.creation.box((1, 1, 1))
+        box.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(baseColorFactor=color)
+        )
+        scene.add_geometry(
+            box, node_name=name, transform=trimesh.transformations.translation_matrix((x, 0, 0))
+        )
+    scene.export(tmp_path / "a.glb")
+    imported(tmp_path / "a.glb", tmp_path / "cell")
+    pixels = np.asarray(Image.open(tmp_path / "cell/import.png").convert("RGB")).astype(int)
+    red = (pixels[..., 0] > 2 * pixels[..., 2] + 20) & (pixels[..., 0] > 80)
+    blue = (pixels[..., 2] > 2 * pixels[..., 0] + 20) & (pixels[..., 2] > 80)
+    assert red.sum() > 5000
+    assert blue.sum() > 5000
+    # Red is to the left of blue, seen from the front.
+    assert np.flatnonzero(red.any(axis=0)).max() < np.flatnonzero(blue.any(axis=0)).min()

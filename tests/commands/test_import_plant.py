@@ -264,3 +264,42 @@ def test_names_of_others_are_texts_and_a_decimal_comma_is_said(tmp_path, box):
     assert table["title"] == file.name
     variables = tomllib.loads((tmp_path / "cell" / "variables.toml").read_text(encoding="utf-8"))["variables"]
     assert variables[0]["address"] == 'DB1"\x7f.Speed'
+
+
+def test_what_only_a_class_has_is_taken_from_it_and_mirrors_are_there_once(tmp_path, capsys, box):
+    geometry = (
+        f'<ExternalInterface Name="Geometry" RefBaseClassPath="{INTERFACE}/COLLADAInterface">'
+        '<Attribute Name="refURI"><Value>geometry/box.dae</Value></Attribute></ExternalInterface>'
+    )
+    library = (
+        '<SystemUnitClassLib Name="Lib"><SystemUnitClass Name="Base">'
+        f"{geometry}</SystemUnitClass>"
+        '<SystemUnitClass Name="Clamp" RefBaseClassPath="Lib/Base">'
+        f'<SupportedRoleClass RefRoleClassPath="{ROLE}/Fixture"/></SystemUnitClass>'
+        '<SystemUnitClass Name="Loop" RefBaseClassPath="Lib/Loop"/></SystemUnitClassLib>'
+    )
+    own = geometry.replace("Geometry", "Mine")
+    elements = (
+        '<InternalElement Name="One" ID="{1}" RefBaseSystemUnitPath="Lib/Clamp">'
+        f"{frame(x=1)}</InternalElement>"
+        f'<InternalElement Name="Two" ID="{{2}}" RefBaseSystemUnitPath="Lib/Clamp">{own}</InternalElement>'
+        '<InternalElement Name="Again" ID="{3}" RefBaseSystemUnitPath="{1}"/>'
+        '<InternalElement Name="Lost" ID="{4}" RefBaseSystemUnitPath="{9}"/>'
+        '<InternalElement Name="Round" ID="{5}" RefBaseSystemUnitPath="Lib/Loop"/>'
+        '<InternalElement Name="Far" ID="{6}" RefBaseSystemUnitPath="Other@Lib/Thing"/>'
+    )
+    text = OLD.format(f'<InstanceHierarchy Name="a">{elements}</InstanceHierarchy>{library}')
+    file = written(tmp_path / "in", text, box)
+    assert cli.main(["import", str(file), str(tmp_path / "cell")]) == Exit.WITHIN
+    made = (tmp_path / "cell/workstation.toml").read_text()
+    parts = tomllib.loads(made)["parts"]
+    assert [part["name"] for part in parts] == ["One", "Two"]
+    assert parts[0]["at"]["position"] == [1, 0, 0]
+    (top,) = read(file).roots
+    assert [element.has_role("Fixture") for element in top.children] == [True, True] + 4 * [False]
+    said = " ".join(finding.text for finding in read(file).findings)
+    assert "2 elements have from their classes what they do not state: One, Two" in said
+    assert "1 elements mirror others, which are there once: Again (One)" in said
+    assert "Lost mirrors an element that is not in the file" in said
+    assert "Lib/Loop is derived from itself" in said
+    assert "Other@Lib/Thing of 1 element is not in the file" in said

@@ -240,3 +240,37 @@ def test_places_that_are_rigid_but_for_the_digits_of_the_file_stay_instances():
     rotation = made.world_from_shape[:3, :3]
     assert rotation.T @ rotation == pytest.approx(np.eye(3), abs=1e-12)
     assert rotation == pytest.approx(turned[:3, :3], abs=2e-6)
+
+
+def test_what_the_file_states_of_volume_area_and_centroid_is_compared(tmp_path):
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.gp import gp_Pnt
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
+
+    for name, volume, area, center, told in (
+        ("right", 6000.0, 2200.0, (5, 10, 15), 0),
+        ("wrong", 6600.0, 2000.0, (5, 10, 18), 3),
+    ):
+        document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
+        label = XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).AddShape(
+            BRepPrimAPI_MakeBox(10, 20, 30).Shape()
+        )
+        TDataStd_Name.Set_s(label, TCollection_ExtendedString("block"))
+        XCAFDoc_Volume.Set_s(label, volume)
+        XCAFDoc_Area.Set_s(label, area)
+        XCAFDoc_Centroid.Set_s(label, gp_Pnt(*map(float, center)))
+        writer = STEPCAFControl_Writer()
+        writer.SetPropsMode(True)
+        writer.Transfer(document)
+        writer.Write(str(tmp_path / f"{name}.step"))
+        found = read(tmp_path / f"{name}.step")
+        said = [f.text for f in found.findings if "the file states" in f.text]
+        assert len(said) == told, said
+        if told:
+            assert "-9.1 %" in said[0]
+            assert "+10 %" in said[1]
+            assert "3 mm" in said[2]

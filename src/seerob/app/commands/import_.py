@@ -95,6 +95,7 @@ def _before(folder: Path) -> dict[str, Any] | None:
 
 def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: dict[str, Any] | None) -> Exit:
     from seerob.app.importing.folder import densities, files
+    from seerob.app.importing.picture import FILE, picture
     from seerob.description.cad.assembly import baked
 
     former = {} if before is None else before["options"]
@@ -106,14 +107,14 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
     assembly = _moving(options, baked(_read(options, ending)))
     if before is None:
         made = files(assembly, options.file, given, options=kept)
-        _write(folder, made.texts, made.meshes)
+        _write(folder, made.texts, {**made.meshes, FILE: picture(assembly)})
         _say(options.file, assembly, made)
         return Exit.WITHIN
     own = {f"cad/{file.name}" for file in (folder / "cad").glob("*")} - {
         row["mesh"] for row in before["parts"]
     }
     made = files(assembly, options.file, given, options=kept, taken=own)
-    _revise(folder, before, made)
+    _revise(folder, before, made, picture(assembly))
     _say(options.file, assembly, made)
     return Exit.WITHIN
 
@@ -158,15 +159,21 @@ def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:
     return made
 
 
-def _revise(folder: Path, before: dict[str, Any], made: Files) -> None:
-    """Write a new revision into a folder."""
+def _revise(folder: Path, before: dict[str, Any], made: Files, shown: bytes) -> None:
+    """Write a new revision, and its picture, into a folder."""
     from seerob.app.importing.folder import TABLE
+    from seerob.app.importing.picture import FILE
     from seerob.app.importing.revision import revised
 
     file = folder / "workstation.toml"
     try:
         revision = revised(file.read_bytes(), before, made.rows(), str(file))
-        contents = {file.name: revision.text, **made.meshes, TABLE: made.texts[TABLE].encode()}
+        contents = {
+            file.name: revision.text,
+            **made.meshes,
+            FILE: shown,
+            TABLE: made.texts[TABLE].encode(),
+        }
         for name, content in contents.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             with whole_file(folder / name) as hidden:
@@ -261,6 +268,7 @@ def _plant(file: Path, folder: Path) -> Exit:
 def _write(folder: Path, texts: Mapping[str, str], meshes: Mapping[str, bytes]) -> None:
     try:
         with whole_folder(folder) as working:
+            (working / "cad").mkdir()
             for name, data in meshes.items():
                 (working / name).parent.mkdir(parents=True, exist_ok=True)
                 (working / name).write_bytes(data)

@@ -97,7 +97,13 @@ class _Document:
         file = folder / "assembly.step"
         file.write_bytes(self._local(self.source.data, folder, 0))
         reader = STEPCAFControl_Reader()
-        for mode in (reader.SetNameMode, reader.SetColorMode, reader.SetMatMode, reader.SetLayerMode):
+        for mode in (
+            reader.SetNameMode,
+            reader.SetColorMode,
+            reader.SetMatMode,
+            reader.SetLayerMode,
+            reader.SetPropsMode,
+        ):
             mode(True)
         if reader.ReadFile(str(file)) != IFSelect_ReturnStatus.IFSelect_RetDone:
             self.source.fail("is not a readable STEP file", "export it again")
@@ -268,6 +274,8 @@ class _Document:
             "area": float(area.Mass()) * 1e-6,
             "volume": float(volume.Mass()) * 1e-9 if solids else 0.0,
             "material": _material(label),
+            "stated": _validation(label),
+            "center": (np.array(volume.CentreOfMass().Coord()) * 1e-3).tolist() if solids else None,
             "surfaces": [found for face in faces if (found := _analytic(face)) is not None],
         }
 
@@ -445,6 +453,21 @@ def _is_flat(faces: list[Any]) -> bool:
         for face in faces
         for edge in _explored(face, TopAbs_ShapeEnum.TopAbs_EDGE)
     )
+
+
+def _validation(label: Any) -> dict[str, Any]:
+    """Area, volume and centroid that the file states of a shape [m, m², m³], where it does (AP242, AP214)."""
+    from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_Volume
+
+    found: dict[str, Any] = {}
+    for attribute in _attributes(label):
+        if isinstance(attribute, XCAFDoc_Volume):
+            found["volume"] = float(attribute.Get()) * 1e-9
+        elif isinstance(attribute, XCAFDoc_Area):
+            found["area"] = float(attribute.Get()) * 1e-6
+        elif isinstance(attribute, XCAFDoc_Centroid):
+            found["center"] = (np.array(attribute.Get().Coord()) * 1e-3).tolist()
+    return found
 
 
 def _analytic(face: Any) -> tuple[Any, ...] | None:

@@ -6,6 +6,7 @@ comes back is compared here with what it said of areas, volumes and points of th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ TOLERANCE = 1e-4
 """How far triangles may be from the surface unless the caller says otherwise [m]."""
 SECONDS, MEMORY = 900.0, 4 << 30
 """Computing time [s] and memory [byte] that reading may take."""
+VALIDATION = 1e-3
+"""Share by which area, volume and centroid may differ from what the file states without a warning."""
 AREA, VOLUME = 0.02, 0.02
 """Shares of area and volume by which triangles may be off without a warning."""
 
@@ -92,11 +95,27 @@ def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Sh
             note("warning", f"its triangles enclose {100 * share:+.1f} % of the solid's volume")
     elif not row["solids"] and is_closed(whole):
         note("note", "is made of surfaces, not of a solid; they close")
+    for text in _contradicted(row):
+        note("warning", text)
     surfaces = tuple(
         Surface(kind, np.array(at), np.array(axis), tuple(figures), np.array(corners, float).reshape(-1, 3))
         for kind, at, axis, figures, corners in row["surfaces"]
     )
     return Shape(name, pieces, deviation, row["solids"], row["material"], surfaces)
+
+
+def _contradicted(row: dict[str, Any]) -> Iterator[str]:
+    """What the file states of a shape and its surface does not have: something was lost, or never there."""
+    stated = row["stated"]
+    for key, what, unit in (("volume", "volume", "m³"), ("area", "area", "m²")):
+        has = row[key]
+        if stated.get(key, 0.0) > 0 and has > 0 and abs(has / stated[key] - 1) > VALIDATION:
+            share = 100 * (has / stated[key] - 1)
+            yield f"the file states a {what} of {stated[key]:.6g} {unit}; its surface has {share:+.2g} %"
+    if "center" in stated and row["center"] is not None and row["volume"] > 0:
+        off = float(np.linalg.norm(np.subtract(stated["center"], row["center"])))
+        if off > VALIDATION * row["volume"] ** (1 / 3):
+            yield f"the file states a centroid that is {off * 1e3:.3g} mm from that of its surface"
 
 
 def _farthest(whole: Mesh, points: Array) -> float:

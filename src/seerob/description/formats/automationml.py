@@ -165,11 +165,13 @@ def read(path: Path) -> Plant:
     root = parse_xml(data, str(path))
     if _local(root.tag) != "CAEXFile":
         raise InputError.at(path, _local(root.tag), "is no CAEXFile", "give an AutomationML file")
+    reader.know(root)
     roots = tuple(
         reader.element(node, MAX_DEPTH, group=True)
         for node in root
         if _local(node.tag) == "InstanceHierarchy"
     )
+    reader.tell()
     if not roots:
         reader.note("warning", "has no instance hierarchy: it describes classes, not a plant")
     version = str(root.get("SchemaVersion", "unknown"))
@@ -261,6 +263,57 @@ class _Reader:
         self.findings: list[Finding] = []
         self._count = 0
         self._turned = self._comma = False
+        self._classes: dict[str, Node] = {}
+        self._masters: dict[str, str] = {}
+        self._inherited: list[str] = []
+        self._mirrors: list[str] = []
+        self._unknown: dict[str, int] = {}
+
+    def know(self, root: Node) -> None:
+        """Remember classes by their path, and elements by their identifier."""
+        waiting = [(lib, str(lib.get("Name", ""))) for lib in root if _local(lib.tag) == "SystemUnitClassLib"]
+        while waiting:
+            node, path = waiting.pop()
+            if _local(node.tag) == "SystemUnitClass":
+                self._classes.setdefault(path, node)
+            inner = (child for child in node if _local(child.tag) == "SystemUnitClass")
+            waiting += [(child, f"{path}/{child.get('Name', '')}") for child in inner]
+            if len(self._classes) > MAX_ELEMENTS:
+                what = f"more than {MAX_ELEMENTS} classes"
+                raise InputError.at(self.file, "", what, "export the cell alone")
+        for node in root.iter():
+            if _local(node.tag) == "InternalElement" and node.get("ID"):
+                self._masters[_plain(str(node.get("ID")))] = str(node.get("Name", ""))
+
+    def tell(self) -> None:
+        """Say how many elements have something from their class, and which are others once more."""
+        if self._inherited:
+            names = ", ".join(self._inherited[:5])
+            text = f"{len(self._inherited)} elements have from their classes what they do not state: {names}"
+            self.note("note", text)
+        if self._mirrors:
+            names = ", ".join(self._mirrors[:5])
+            text = f"{len(self._mirrors)} elements mirror others, which are there once: {names}"
+            self.note("note", text)
+        for path, count in sorted(self._unknown.items())[:20]:
+            many = f"{count} element{'' if count == 1 else 's'}"
+            self.note("note", f"the class {path} of {many} is not in the file: nothing is taken from it")
+
+    def _class_nodes(self, node: Node) -> list[Node]:
+        """Classes of an element, its own first, then what that one is derived from."""
+        found: list[Node] = []
+        path = str(node.get("RefBaseSystemUnitPath", "")).replace("[", "").replace("]", "")
+        while path and len(found) < MAX_DEPTH:
+            known = self._classes.get(path)
+            if known is None:
+                self._unknown[path[:120]] = self._unknown.get(path[:120], 0) + 1
+                break
+            if any(known is other for other in found):
+                self.note("warning", f"the class {path[:120]} is derived from itself")
+                break
+            found.append(known)
+            path = str(known.get("RefBaseClassPath", "")).replace("[", "").replace("]", "")
+        return found
 
     def note(self, level: str, text: str) -> None:
         """Add a finding."""
@@ -288,15 +341,57 @@ class _Reader:
             elif tag == "InternalLink":
                 a, b = child.get("RefPartnerSideA", ""), child.get("RefPartnerSideB", "")
                 self.links.append((_plain(a), _plain(b)))
-        if "/" not in (master := str(node.get("RefBaseSystemUnitPath", ""))) and master:
-            what = f"{node.get('Name', '')} mirrors another element; what it has from there is left out"
-            self.note("warning", what)
+        base = str(node.get("RefBaseSystemUnitPath", ""))
+        master = _plain(base).partition(":")[0]
+        if base and (master in self._masters or "/" not in base):
+            # The same thing in another tree: where it is and what it looks like is said at the master.
+            if master in self._masters:
+                self._mirrors.append(f"{node.get('Name', '')} ({self._masters[master]})")
+            else:
+                what = f"{node.get('Name', '')} mirrors an element that is not in the file"
+                self.note("warning", what)
+        else:
+            self._inherit(node, depth, attributes, roles, interfaces, children)
         name = str(node.get("Name", "")).strip() or ("plant" if group else "unnamed")
         frame = self._frame(attributes.get("Frame"), name)
         where = str(node.get("ID", ""))
         return Element(
             name, _plain(where), tuple(roles), attributes, tuple(interfaces), tuple(children), frame
         )
+
+    def _inherit(
+        self,
+        node: Node,
+        depth: int,
+        attributes: dict[str, Attribute],
+        roles: list[str],
+        interfaces: list[Interface],
+        children: list[Element],
+    ) -> None:
+        """Add what only the classes of an element have.
+
+        An instance is a copy of its class, of which tools may have taken something out: so interfaces and
+        inner elements are taken from the class only where the instance has none at all.
+        """
+        bare = not interfaces, not children
+        before = len(attributes), len(interfaces), len(children)
+        for known in self._class_nodes(node):
+            for key, attribute in self._attributes(known, depth).items():
+                attributes.setdefault(key, attribute)
+            for child in known:
+                tag = _local(child.tag)
+                if tag == "ExternalInterface" and bare[0]:
+                    names = {interface.name for interface in interfaces}
+                    interfaces += [i for i in self._interfaces(child, depth) if i.name not in names]
+                elif tag == "InternalElement" and bare[1]:
+                    if child.get("Name") not in {element.name for element in children}:
+                        children.append(self.element(child, depth - 1))
+                elif tag == "SupportedRoleClass":
+                    role = child.get("RefRoleClassPath") or ""
+                    if role not in roles:
+                        roles.append(role)
+        if (len(attributes), len(interfaces), len(children)) != before:
+            self._inherited.append(str(node.get("Name", "")))
 
     def _interfaces(self, node: Node, depth: int) -> Iterator[Interface]:
         """The interface and, in CAEX 3.0, those nested in it."""

@@ -374,7 +374,7 @@ class _Reader:
         inner elements are taken from the class only where the instance has none at all.
         """
         bare = not interfaces, not children
-        before = len(attributes), len(interfaces), len(children)
+        before = len(attributes), len(roles), len(interfaces), len(children)
         for known in self._class_nodes(node):
             for key, attribute in self._attributes(known, depth).items():
                 attributes.setdefault(key, attribute)
@@ -390,7 +390,7 @@ class _Reader:
                     role = child.get("RefRoleClassPath") or ""
                     if role not in roles:
                         roles.append(role)
-        if (len(attributes), len(interfaces), len(children)) != before:
+        if (len(attributes), len(roles), len(interfaces), len(children)) != before:
             self._inherited.append(str(node.get("Name", "")))
 
     def _interfaces(self, node: Node, depth: int) -> Iterator[Interface]:

@@ -14,6 +14,7 @@ import {
   lookingAt,
   now,
   reach,
+  registered,
   soFar,
   stale,
   traces,
@@ -121,6 +122,9 @@ export class Connection {
         return;
       case "draft":
         draft.value = message.draft;
+        return;
+      case "registered":
+        registered.value = message.registered;
         return;
       case "measured":
         heardMeasured(message.measured);

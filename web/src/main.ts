@@ -17,7 +17,7 @@ import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
 import { film } from "./view/handed_out";
 import { saveView } from "./view/kept";
-import type { Tracking, VisitorInfo } from "./wire";
+import type { Register, Tracking, VisitorInfo } from "./wire";
 import { Visit } from "./xr/visit";
 
 declare global {
@@ -46,6 +46,8 @@ declare global {
       button(label: string): [number, number, number] | null;
       /** Where a point of that world is in the visitor's room [m]; null without a visit. */
       inRoom(point: [number, number, number]): [number, number, number] | null;
+      /** What the visitor is asked to do so that it is known where the room lies; empty where nothing is asked. */
+      readonly asked: string[];
     };
   }
 }
@@ -66,7 +68,12 @@ function begin(element: HTMLElement): void {
   const presence = new OwnPresence(viewer.stage, (said) => connection.send({ kind: "company", said }));
   let visit: Visit | null = null;
   actions.enter = async (mode, human) => {
-    const offer = (tracking: Tracking) => connection.send({ kind: "tracking", tracking });
+    const offer = (message: Tracking | Register) =>
+      connection.send(
+        message.type === "tracking"
+          ? { kind: "tracking", tracking: message }
+          : { kind: "register", asked: message },
+      );
     visit = await Visit.begin(viewer, mode, human, offer, actions.time);
     ownDevice.value = mode === "immersive-ar" ? "ar" : "vr";
     ownHuman.value = human ?? "";
@@ -114,6 +121,9 @@ function begin(element: HTMLElement): void {
     },
     button: (label) => visit?.button(label) ?? null,
     inRoom: (point) => visit?.inRoom(point) ?? null,
+    get asked() {
+      return visit?.registering?.active ? visit.registering.lines : [];
+    },
   };
 }
 

@@ -15,6 +15,8 @@ import type {
   Presences,
   Pull,
   Refused,
+  Register,
+  Registered,
   Result,
   Scene,
   Snapshot,
@@ -72,6 +74,8 @@ export type FromWorker =
   | { kind: "measured"; measured: Measured }
   | { kind: "visitors"; visitors: Visitors["visitors"] }
   | { kind: "presences"; presences: Presences }
+  /** Where the room of this page's headset lies, as far as is known. */
+  | { kind: "registered"; registered: Registered }
   /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
   | { kind: "frame"; frame: Frame; heard: number; silent: boolean }
   /** A live run has said nothing for too long. */
@@ -87,6 +91,7 @@ export type ToWorker =
   | { kind: "command"; action: Action; value: number | null }
   | { kind: "tracking"; tracking: Tracking }
   | { kind: "doing"; doing: Grab | Pull }
+  | { kind: "register"; asked: Register }
   | { kind: "edit"; edit: Edit }
   | { kind: "measure"; measure: Measure }
   /** What this visitor says of themselves. */

@@ -5,7 +5,17 @@ import { type Elsewhere, worseElsewhere } from "./elsewhere";
 import type { Frame, LinkState } from "./messages";
 import { Trace } from "./traces";
 import { type State, stateOf, worstState } from "./verdicts";
-import type { CriterionInfo, Hello, Node, Result, Scene, SoFar, Tracked, Transport } from "./wire";
+import type {
+  CriterionInfo,
+  Hello,
+  Node,
+  Registered,
+  Result,
+  Scene,
+  SoFar,
+  Tracked,
+  Transport,
+} from "./wire";
 
 export interface Selection {
   /** `node` and `criterion` name one thing; `owner` a whole robot, human, tool or part. */
@@ -39,6 +49,9 @@ export const transport = signal<Transport>({
 
 /** What became of what this page's headset sees; null before it offered anything. */
 export const tracked = signal<Tracked | null>(null);
+
+/** What the server said last of where the room of this page's headset lies; null before it said anything. */
+export const registered = signal<Registered | null>(null);
 
 /** What the run came to by now, or as far as the recording was read; null where nobody says. */
 export const soFar = signal<SoFar | null>(null);

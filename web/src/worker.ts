@@ -85,6 +85,9 @@ function received(message: ServerMessage, raw: Uint8Array): void {
     case "draft":
       post({ kind: "draft", draft: message });
       return;
+    case "registered":
+      post({ kind: "registered", registered: message });
+      return;
     case "measured":
       post({ kind: "measured", measured: completedMeasure(message) });
       return;
@@ -204,6 +207,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "doing":
       socket?.send(message.doing);
+      return;
+    case "register":
+      socket?.send(message.asked);
       return;
     case "tracking":
       socket?.send(message.tracking);

@@ -44,6 +44,7 @@ COMMANDS = (
     "explain",
     "measure",
     "capture",
+    "calibrate",
     "import_",
     "export",
 )

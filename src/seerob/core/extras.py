@@ -30,6 +30,7 @@ EXTRAS = {
     "OCP": "cad",
     "robot_descriptions": "robots",
     "pxr": "usd",
+    "cv2": "camera",
 }
 """Package as it is imported → the extra that brings it."""
 

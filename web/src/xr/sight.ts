@@ -1,5 +1,6 @@
 // What a headset sees of the person who wears it, at one of its pictures: head, hands, body joints.
 
+import { Matrix4, Quaternion, Vector3 } from "three";
 import type { Tracking } from "../wire";
 
 /** Floats per name: x, y, z [m], w, x, y, z. */
@@ -30,6 +31,17 @@ function* spaces(frame: BodyFrame, sources: Iterable<XRInputSource>): Generator<
         yield [handName(source.handedness, joint), space];
 }
 
+const MOVED = new Matrix4();
+const PLACE = new Vector3();
+const TURN = new Quaternion();
+const SCALE = new Vector3();
+
+function within({ transform }: XRPose, roomFromFloor: Matrix4 | null) {
+  if (!roomFromFloor) return { p: transform.position, q: transform.orientation };
+  MOVED.fromArray(transform.matrix).premultiply(roomFromFloor).decompose(PLACE, TURN, SCALE);
+  return { p: PLACE, q: TURN };
+}
+
 /**
  * Where joints of body and hands are, three numbers [m] each in `space`; how many were written.
  *
@@ -58,6 +70,8 @@ export function bodyJoints(
  *
  * @param space `local-floor`
  * @param t of the picture [ms]
+ * @param name Which tracking space it is (`Tracking.space`).
+ * @param roomFromFloor The space that poses are told in, from ``space``.
  */
 export function sight(
   frame: XRFrame,
@@ -65,6 +79,8 @@ export function sight(
   sources: Iterable<XRInputSource>,
   human: string,
   t: number,
+  name = "",
+  roomFromFloor: Matrix4 | null = null,
 ): Tracking | null {
   const viewer = frame.getViewerPose(space);
   if (!viewer) return null;
@@ -78,12 +94,13 @@ export function sight(
   let row = 0;
   for (const pose of found.values()) {
     if (pose) {
-      const { position: p, orientation: q } = pose.transform;
+      const { p, q } = within(pose, roomFromFloor);
       poses.set([p.x, p.y, p.z, q.w, q.x, q.y, q.z], row * FLOATS);
       guessed[row] = pose.emulatedPosition ? 1 : 0;
     }
     row += 1;
   }
   const names = [...found.keys()];
-  return { type: "tracking", human, t: t / 1000, names, poses: new Uint8Array(poses.buffer), guessed };
+  const bytes = new Uint8Array(poses.buffer);
+  return { type: "tracking", human, t: t / 1000, names, poses: bytes, guessed, space: name };
 }

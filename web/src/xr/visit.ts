@@ -17,17 +17,18 @@ import {
   Vector3,
 } from "three";
 import { ownScale } from "../company";
-import { hidden, isLive, lookingAt, overReality, rows, scene, transport } from "../page_state";
+import { hidden, isLive, lookingAt, overReality, registered, rows, scene, transport } from "../page_state";
 import type { Sighted } from "../scene/own_presence";
 import type { Viewer } from "../scene/viewer";
 import type { TimeControl } from "../time_control";
-import type { Tracking } from "../wire";
+import type { Register, Tracking } from "../wire";
 import { Board } from "./board";
 import { isOn, leftHanded, seated, smooth, sound, tone, turnOver, vignette } from "./comfort";
 import { Hands } from "./hands";
 import { Ghost, Ruler, Section, Vignette } from "./instruments";
 import { type Item, Menu } from "./menu";
 import { PlotPanel } from "./plot_panel";
+import { placeOfRoom, Registering } from "./registering";
 import { bodyJoints, sight } from "./sight";
 
 export type Mode = "immersive-vr" | "immersive-ar";
@@ -35,7 +36,7 @@ export type Mode = "immersive-vr" | "immersive-ar";
 const MODES: readonly Mode[] = ["immersive-vr", "immersive-ar"];
 const WANTED: XRSessionInit = {
   requiredFeatures: ["local-floor"],
-  optionalFeatures: ["hand-tracking", "body-tracking"],
+  optionalFeatures: ["hand-tracking", "body-tracking", "anchors"],
 };
 /** The device's world as sources have it (x ahead, y to the left, z up) from that of WebXR (y up, -z ahead). */
 const AHEAD = new Matrix4().set(0, 0, -1, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1);
@@ -106,6 +107,8 @@ export class Visit implements Sighted {
   private tickedAt = 0;
   private elapsed = 0;
   private readonly ray = new Raycaster();
+  /** Finds out where the room lies; null where nothing has to be found. */
+  readonly registering: Registering | null = null;
   private readonly before: () => void;
   private readonly forget: () => void;
   private exceeded: ReadonlySet<string> = new Set();
@@ -123,7 +126,7 @@ export class Visit implements Sighted {
     /** The person that the visitor is; null for one who looks. */
     readonly human: string | null,
     private readonly viewer: Viewer,
-    private readonly send: (tracking: Tracking) => void,
+    private readonly send: (message: Tracking | Register) => void,
     private readonly time: TimeControl,
   ) {
     const { stage } = viewer;
@@ -138,6 +141,13 @@ export class Visit implements Sighted {
     for (const { ball, beam } of Object.values(this.pointers)) this.things.add(ball, beam);
     this.landing.visible = false;
     this.rig.add(this.things);
+    // Over the real cell the twin has to lie where that is.
+    if (mode === "immersive-ar" && scene.peek()?.landmarks.length)
+      this.registering = new Registering(session, viewer, human, send);
+    if (this.registering) {
+      this.things.add(this.registering.panel);
+      viewer.stage.world.add(this.registering.mark);
+    }
     this.stand();
     const forgets = [effect(() => this.feel()), effect(() => this.resize(ownScale.value))];
     this.forget = () => {
@@ -160,7 +170,7 @@ export class Visit implements Sighted {
     viewer: Viewer,
     mode: Mode,
     human: string | null,
-    send: (tracking: Tracking) => void,
+    send: (message: Tracking | Register) => void,
     time: TimeControl,
   ): Promise<Visit> {
     if (!navigator.xr) throw new Error("this browser has no headset");
@@ -172,6 +182,7 @@ export class Visit implements Sighted {
     await xr.setSession(session);
     // After three.js has heard it: until then the camera is the headset's.
     session.addEventListener("end", () => visit.end());
+    xr.getReferenceSpace()?.addEventListener("reset", () => visit.registering?.recentred());
     return visit;
   }
 
@@ -179,8 +190,13 @@ export class Visit implements Sighted {
   tick(time: number, frame: XRFrame | undefined): void {
     const space = this.viewer.stage.renderer.xr.getReferenceSpace();
     if (!frame || !space) return;
+    const { registering } = this;
+    registering?.tick(time, frame, space);
+    if (registering && registered.peek()?.at.length) this.stand();
     if (this.human !== null) {
-      const seen = sight(frame, space, this.session.inputSources, this.human, time);
+      const { space: name = "", roomFromFloor = null } = registering ?? {};
+      const sources = this.session.inputSources;
+      const seen = sight(frame, space, sources, this.human, time, name, roomFromFloor);
       if (seen) {
         seen.scale = this.rig.scale.x;
         this.send(seen);
@@ -214,6 +230,7 @@ export class Visit implements Sighted {
     plot.mesh.position.copy(board.mesh.position);
     plot.mesh.position.y += PLOT_ABOVE;
     this.rig.localToWorld(this.at.copy(this.eyes));
+    registering?.panel.lookAt(this.at);
     for (const mesh of [menu.mesh, board.mesh, plot.mesh]) mesh.lookAt(this.at);
     this.vignette.update(this.moved && vignette.value === "on", this.elapsed);
     menu.update();
@@ -225,6 +242,13 @@ export class Visit implements Sighted {
   /** Where the floor of the visitor's room lies in the world (y up), and how large the visitor is. */
   stand(): void {
     const { rig, viewer, human } = this;
+    const found = this.registering && registered.peek();
+    if (found?.at.length) {
+      viewer.stage.world.updateMatrix();
+      placeOfRoom(found.at, rig.matrix).premultiply(viewer.stage.world.matrix).multiply(AHEAD);
+      rig.matrix.multiply(this.registering!.roomFromFloor).decompose(rig.position, rig.quaternion, rig.scale);
+      return;
+    }
     const placed = human === null ? null : scene.peek()?.headsets[human];
     if (placed) {
       const [x, y, z, qw, qx, qy, qz] = placed;
@@ -331,8 +355,8 @@ export class Visit implements Sighted {
       pointer.beam.visible = true;
       pointer.beam.scale.setScalar(this.shines && !onMenu ? this.meets(pointer) : 0.6);
     }
-    // Who is a person of the twin goes on their own feet.
-    if (this.human === null) this.steer(pointer, source.gamepad);
+    // Who is a person of the twin, or in the real cell, goes on their own feet.
+    if (this.human === null && !this.registering) this.steer(pointer, source.gamepad);
   }
 
   /** The hand at whose wrist the menu is. */
@@ -482,6 +506,7 @@ export class Visit implements Sighted {
   }
 
   private readonly close = ({ inputSource, type }: XRInputSourceEvent): void => {
+    if (this.registering?.active) return;
     const side = inputSource.handedness;
     if (side !== "left" && side !== "right") return;
     const { ball, from, along } = this.pointers[side];
@@ -556,6 +581,7 @@ export class Visit implements Sighted {
     rig.quaternion.identity();
     rig.scale.setScalar(1);
     this.board.dispose();
+    this.registering?.dispose();
     for (const { ball, beam } of Object.values(this.pointers))
       for (const each of [ball, beam]) each.geometry.dispose();
     this.before();

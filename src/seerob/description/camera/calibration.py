@@ -183,10 +183,10 @@ def placed(
             worst, where = error, name
     world_from_camera = cell_from_board @ inverse(camera_from_board)
     x, y, z = world_from_camera[:3, 3].tolist()
-    w, i, j, l = wxyz_from_rotation(world_from_camera[:3, :3])  # noqa: E741
+    w, i, j, k_ = wxyz_from_rotation(world_from_camera[:3, :3]).tolist()
     camera = Camera(
         width=found.size[0], height=found.size[1], fx=fx, fy=fy, cx=cx, cy=cy,
-        distortion=(k[0], k[1], k[2], k[3], k[4]), position=(x, y, z), wxyz=(w, i, j, l),
+        distortion=(k[0], k[1], k[2], k[3], k[4]), position=(x, y, z), wxyz=(w, i, j, k_),
         error_px=max(px, found.error_px), error=worst, tool=where, board=str(board),
     )  # fmt: skip
     eye = np.concatenate([np.eye(3), -_skew(-camera_from_board[:3, 3])], -1)

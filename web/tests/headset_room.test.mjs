@@ -93,7 +93,7 @@ def said(snapshots):
 one, two = said(recording.snapshots()), said(again.snapshots)
 grabs = [s.piece for tick in recording.ticks() for s in tick.samples if type(s).__name__ == "GrabSample"]
 head = [node.name for node in recording.scene.nodes].index("operator/head")
-places = {s.seq: np.frombuffer(s.poses, "<f4").reshape(-1, 7)[head, :3] for s in again.snapshots if not s.doubts}
+places = {s.seq: np.frombuffer(s.poses, "<f4").reshape(-1, 7)[head, :3] for s in again.snapshots if s.results[0].verdict in ("within", "exceeded")}
 steps = [float(np.linalg.norm(places[k + 1] - places[k])) for k in places if k + 1 in places]
 print(json.dumps({"fastest": max(steps) / recording.scene.period, "ticks": len(one), "same": all(two.get(k) == v for k, v in one.items()), "grabs": grabs,
     "events": [e.what for s in again.snapshots for e in s.events]}))

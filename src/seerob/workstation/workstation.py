@@ -125,6 +125,9 @@ class Robot(_Table, frozen=True, kw_only=True):
     visuals: Literal["read", "ignore"] = "read"
     """``ignore``: what a description shows besides its collision shapes is not read, and distances take it
     that nothing stands out of those; where a link has no other shape, it is read all the same."""
+    scale: Annotated[float, Meta(ge=0.01, le=100)] = 1.0
+    """How many times as large it is as the one that exists; masses, speeds and torques follow by similarity,
+    and a finding says that there is no such robot."""
     calibration: str | None = None
     """File with the kinematics of this very robot, as ``seerob probe`` writes it."""
     packages: dict[str, str] = {}
@@ -170,6 +173,8 @@ class Robot(_Table, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if (self.published_mass is None) != (self.published_mass_source is None):
             raise ValueError("published_mass and published_mass_source belong together: give both or none")
+        if self.scale != 1 and (self.calibration is not None or self.real):
+            raise ValueError("a robot with a scale does not exist: leave out calibration and real")
 
 
 class Body(_Table, frozen=True, kw_only=True):

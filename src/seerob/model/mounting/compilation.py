@@ -22,6 +22,7 @@ from seerob.description.description import Inertial, Link, Quantity
 from seerob.description.humans import posture
 from seerob.description.loader import load_robot
 from seerob.description.robots.calibration import calibrated_by
+from seerob.description.robots.scaled import scaled
 from seerob.distance.least import Shapes
 from seerob.model.model import Body, Frame, Mechanism, Model
 from seerob.model.mounting import loose as loose_mounting
@@ -231,6 +232,8 @@ class _Compiler:
             outside=self.station.outside,
             visuals=robot.visuals == "read",
         )
+        if robot.scale != 1:
+            description = scaled(description, robot.scale, name=robot.name)
         description = overridden(description, robot, self.file)
         if robot.calibration is not None:
             description = calibrated_by(description, robot.calibration, self.folder)

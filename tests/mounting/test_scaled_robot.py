@@ -1,0 +1,56 @@
+"""A robot of another size moves like the one that exists, only slower: MuJoCo's dynamics are the judge."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import seerob as sr
+from seerob.core.errors import InputError
+
+ROBOT = 'title = "one robot"\n[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+
+
+def station(folder, text=""):
+    folder.mkdir()
+    (folder / "workstation.toml").write_text(ROBOT + text)
+    return sr.load(folder)
+
+
+@pytest.mark.parametrize("scale", [10.0, 0.3])
+def test_the_same_motion_in_the_time_of_froude_takes_the_torques_of_froude(tmp_path, scale):
+    real = station(tmp_path / "real").model
+    large = station(tmp_path / "large", f"scale = {scale}\n").model
+    rng = np.random.default_rng(5)
+    n = real.mj.nv
+    for _ in range(5):
+        q, qd, qdd = rng.uniform(-1, 1, (3, n))
+        found = []
+        for model, time in ((real, 1.0), (large, scale**0.5)):
+            data = mujoco.MjData(model.mj)
+            data.qpos, data.qvel, data.qacc = q, qd / time, qdd / time**2
+            mujoco.mj_inverse(model.mj, data)
+            tip = model.mechanisms["arm"].tip
+            found.append((data.qfrc_inverse.copy(), data.xpos[tip.mj].copy(), data.xmat[tip.mj].copy()))
+        (torque, place, turn), (torque_large, place_large, turn_large) = found
+        np.testing.assert_allclose(torque_large, scale**4 * torque, rtol=1e-9, atol=1e-9 * scale**4)
+        np.testing.assert_allclose(place_large, scale * place, atol=1e-12 * scale)
+        np.testing.assert_allclose(turn_large, turn, atol=1e-12)
+
+
+def test_shapes_and_limits_follow_and_the_findings_say_that_there_is_no_such_robot(tmp_path):
+    real, large = station(tmp_path / "real"), station(tmp_path / "large", "scale = 10\n")
+    for small, big in zip(real.model.bodies, large.model.bodies, strict=True):
+        np.testing.assert_allclose(big.corners, 10 * small.corners, rtol=1e-12)
+        assert big.radius == pytest.approx(10 * small.radius)
+    (small,), (big,) = real.workstation.robots, large.workstation.robots
+    assert (small.scale, big.scale) == (1, 10)
+    assert [f for f in large.scene().findings if "does not exist" in f.text and f.level == "warning"]
+    assert not [f for f in real.scene().findings if "does not exist" in f.text]
+
+
+@pytest.mark.parametrize("text", ["scale = 10\nreal = true\n", "scale = 0\n", "scale = 1e9\n"])
+def test_what_contradicts_itself_is_refused(tmp_path, text):
+    with pytest.raises(InputError, match="scale"):
+        station(tmp_path / "cell", text)

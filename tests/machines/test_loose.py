@@ -142,6 +142,16 @@ def test_a_table_in_the_way_tears_it_out_of_the_hand(tmp_path):
     assert cell.at(RIGHT)[2] < 0.5
 
 
+def test_a_hand_that_jumps_throws_nothing_away(tmp_path):
+    cell = Cell(tmp_path, PERSON + TABLE + BLANK).grab(RIGHT, "blank").go(50)
+    fastest, before = 0.0, cell.at()
+    for way in (*[0.0] * 5, 4.0, *[0.0] * 40, -4.0, *[0.0] * 40):
+        cell.go(1, way)
+        fastest, before = max(fastest, float(np.linalg.norm(cell.at() - before)) / TICK), cell.at()
+    assert "torn" in [event.what for event in cell.events]
+    assert fastest < 6.0, "what falls from the table is as fast"
+
+
 def test_hands_hand_it_over_and_farther_away_it_is_refused(tmp_path):
     cell = Cell(tmp_path, PERSON + TABLE + BLANK).grab(RIGHT, "blank").go(50)
     cell.grab(LEFT, "blank").go(30).grab(RIGHT).go(30)

@@ -171,7 +171,7 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
   await reach([x, y + 0.12, z]);
   await until("blank/body", (p) => p[1] > begin[1] + 0.05);
   // The world of three.js has z of the cell as y, and y of the cell as -z.
-  for (let k = 1; k <= 4; k += 1) await reach([x, y + 0.12, z - 0.1 * k]);
+  for (let k = 1; k <= 8; k += 1) await reach([x, y + 0.12, z - 0.05 * k]);
   await until("blank/body", (p) => p[2] < begin[2] - 0.3);
   await trigger(0);
   await page.locator(".events li", { hasText: "round ended" }).waitFor({ timeout: 60_000 });

@@ -5,11 +5,12 @@ A workpiece that a hand holds hangs on it by a spring: on its centre of mass and
 .. math:: F = \min(m, 1\,\mathrm{kg}) (\omega^2 \Delta x + 2 \omega \Delta v) - m g,\quad
           \tau = I (\omega^2 \Delta\varphi + 2 \omega \Delta w)
 
-toward where it would be if it were fixed to the hand as it was when it was taken. The opposite force acts on
-the hand's joint, so that arm and trunk carry its weight; the moment about the wrist is left out, since what
-pulls a twin's wrist is set for a hand without a load. It is never put anywhere: a table that is in the way
-stops it, and farther than ``torn`` from where it should be it is torn out. One that was taken from afar comes
-to the hand with `REEL`. In a place with ``snap`` the same spring pulls it into the place's pose.
+toward where it would be if it were fixed to the hand as it was when it was taken, no faster than `FASTEST`.
+The opposite force acts on the hand's joint, so that arm and trunk carry its weight; the moment about the wrist
+is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put anywhere: a
+table that is in the way stops it, and farther than ``torn`` from where it should be it is torn out. One that
+was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring pulls it into the
+place's pose.
 
 Its joints are three ways and three turns. The frame they are counted from is put anew between two ticks
 before the second turn comes near a right angle, where the others would be one.
@@ -45,6 +46,9 @@ STIFFNESS = 8.0
 """Natural frequency of the spring [Hz]: as stiff as arms that hold something; our choice."""
 HEAVY = 1.0
 """What weighs more is pulled no harder [kg], beside its weight: the spring stays stable on a light hand."""
+FASTEST, QUICKEST = 4.0, 20.0
+"""No spring makes a workpiece go faster [m/s], nor turn faster [rad/s]: a hand that jumps from picture to
+picture throws nothing away; our choice, beyond what hands at work do."""
 NEAR = 0.25
 """A hand whose wrist is no farther from a workpiece's surface takes it where it is [m]: a hand's length and
 what a ball about the workpiece has too much; our choice."""
@@ -200,11 +204,13 @@ class Loose:
         speed = of_carrier[3:] + np.cross(spin, to - carrier[:3, 3])
         gap = to - com
         pulled = min(piece.mass, HEAVY)
-        force = pulled * (omega**2 * gap + 2 * omega * (speed - velocity[3:])) - piece.mass * mj.opt.gravity
+        wanted_speed = _at_most(speed + 0.5 * omega * gap, FASTEST)
+        force = 2 * omega * pulled * (wanted_speed - velocity[3:]) - piece.mass * mj.opt.gravity
         turn = wanted[:3, :3] @ here[:3, :3].T
         axes = data.ximat[piece.body].reshape(3, 3)
         inertia = axes @ np.diag(mj.body_inertia[piece.body]) @ axes.T
-        torque = inertia @ (omega**2 * _rotation_vector(turn) + 2 * omega * (spin - velocity[:3]))
+        wanted_spin = _at_most(spin + 0.5 * omega * _rotation_vector(turn), QUICKEST)
+        torque = 2 * omega * inertia @ (wanted_spin - velocity[:3])
         data.xfrc_applied[piece.body] += np.concatenate([force, torque])
         if spring.carrier:
             lever = carrier[:3, 3] - data.xipos[spring.carrier]
@@ -392,6 +398,12 @@ def _fixed(model: Model, place: Place) -> tuple[int, Array, float]:
 def _pose(data: mujoco.MjData, body: int) -> Array:
     """World from body, shape (4, 4)."""
     return transform(data.xmat[body].reshape(3, 3), data.xpos[body])
+
+
+def _at_most(vector: Array, most: float) -> Array:
+    """A vector, no longer than that."""
+    length = float(np.linalg.norm(vector))
+    return vector if length <= most else vector * (most / length)
 
 
 def _about(axis: int, angle: float) -> Array:

@@ -6,8 +6,8 @@ A workpiece that a hand holds hangs on it by a spring: on its centre of mass and
           \tau = I (\omega^2 \Delta\varphi + 2 \omega \Delta w)
 
 toward where it would be if it were fixed to the hand as it was when it was taken, no faster than `FASTEST`.
-The opposite force acts on the hand's joint, so that arm and trunk carry its weight; the moment about the wrist
-is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put anywhere: a
+The opposite force acts on the hand's joint, so that arm and trunk carry its weight; the moment about the
+wrist is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put anywhere: a
 table that is in the way stops it, and farther than ``torn`` from where it should be it is torn out. One that
 was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring pulls it into the
 place's pose.

@@ -7,6 +7,8 @@ import { heardMeasured } from "./editing/measure";
 import type { Frame, FromWorker, ToWorker } from "./messages";
 import {
   beginScene,
+  besideTitle,
+  besideTraces,
   frame,
   hello,
   isLive,
@@ -169,6 +171,9 @@ export class Connection {
       traces.set(wire.name, trace);
       if (trace.length > 0) start = Math.min(start, trace.t[0]!);
     }
+    for (const wire of history.beside ?? [])
+      besideTraces.set(wire.name, traceFromWire(wire, Number.POSITIVE_INFINITY));
+    besideTitle.value = history.beside_title ?? "";
     if (!isLive.value && Number.isFinite(start))
       reach.value = { start: Math.min(start, reach.value.end), end: reach.value.end };
     tracesRevision.value += 1;

@@ -78,6 +78,9 @@ export const mutedCriteria = signal<ReadonlySet<string>>(new Set());
 /** Traces are changed in place; the revision says so. */
 export const traces = new Map<string, Trace>();
 export const tracesRevision = signal(0);
+/** Traces of another run, on the same axis, and what it is called; empty without one. */
+export const besideTraces = new Map<string, Trace>();
+export const besideTitle = signal("");
 
 /** Whether this page may play, pause and seek; a live run can be held back in any page. */
 export const mayControl = computed(() => isLive.value || (hello.value?.may.includes("control") ?? false));
@@ -175,6 +178,8 @@ export function beginScene(next: Scene): void {
     now.value = Number.NaN;
     lookingAt.value = null;
     traces.clear();
+    besideTraces.clear();
+    besideTitle.value = "";
     for (const { name } of next.criteria) traces.set(name, new Trace(name));
     tracesRevision.value += 1;
   });

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "044c15dde038a04f";
+export const SCHEMA = "f9710133bbb911ff";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -564,6 +564,10 @@ export interface Trace {
 export interface History {
   type: "history";
   traces: Trace[];
+  /** Of another run, on the same axis: to look at, and of no verdict here. */
+  beside: Trace[];
+  /** What that run is called. */
+  beside_title: string;
 }
 
 /** What one criterion came to. */

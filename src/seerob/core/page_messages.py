@@ -44,6 +44,10 @@ class History(Struct, frozen=True, kw_only=True, tag="history"):
     """What happened so far (live) or all of it (replay), thinned without losing an extremum."""
 
     traces: tuple[Trace, ...]
+    beside: tuple[Trace, ...] = ()
+    """Of another run, on the same axis: to look at, and of no verdict here."""
+    beside_title: str = ""
+    """What that run is called."""
 
 
 class CriterionSoFar(Struct, frozen=True, kw_only=True):

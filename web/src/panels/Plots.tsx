@@ -3,7 +3,19 @@
 import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { against, steady, withUnit } from "../figures";
-import { now, type Row, rows, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
+import {
+  besideTitle,
+  besideTraces,
+  now,
+  type Row,
+  rows,
+  scene,
+  select,
+  selection,
+  stale,
+  traces,
+  tracesRevision,
+} from "../page_state";
 import { setWidth, shownRange, WIDTHS, width } from "../plots/axis";
 import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
@@ -31,6 +43,9 @@ export function Plots({ count }: { count: number }) {
           </button>
         ))}
       </fieldset>
+      {besideTitle.value !== "" && (
+        <p class="beside">{said("dashed: {title}, as it was recorded", { title: besideTitle.value })}</p>
+      )}
       <div class="charts">
         {names.map((name) => (
           <Plot key={name} name={name} />
@@ -59,7 +74,8 @@ function Plot({ name }: { name: string }) {
     const draw = (): void => {
       timer = null;
       const trace = traces.get(name);
-      if (trace) chart.show(trace, { ...untracked(shownRange), now: now.peek() });
+      if (trace)
+        chart.show(trace, { ...untracked(shownRange), now: now.peek() }, besideTraces.get(name) ?? null);
     };
     const stop = effect(() => {
       void [tracesRevision.value, now.value, shownRange(), theme.value];

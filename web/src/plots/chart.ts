@@ -19,6 +19,7 @@ export class Chart {
   private readonly plot: uPlot;
   private view: ChartView = { start: 0, end: 1, now: Number.NaN };
   private trace: Trace | null = null;
+  private beside: [t: readonly number[], values: (number | null)[]] | null = null;
   private readonly resized: ResizeObserver;
 
   /** @param seek Called with the run time that was clicked [s]. */
@@ -35,14 +36,17 @@ export class Chart {
     this.resized.observe(element);
   }
 
-  show(trace: Trace, view: ChartView): void {
+  /** @param beside Of another run, drawn behind, dashed; its limits are not. */
+  show(trace: Trace, view: ChartView, beside: Trace | null = null): void {
     this.view = view;
     this.trace = trace;
+    const other = beside && windowOf(beside, view.start, view.end, Math.max(100, this.element.clientWidth));
+    this.beside = other ? [other[0], other[1]] : null;
     const data = windowOf(trace, view.start, view.end, Math.max(100, this.element.clientWidth));
     this.plot.setData(data, false);
     this.plot.batch(() => {
       this.plot.setScale("x", { min: view.start, max: view.end });
-      this.plot.setScale("y", valueRange(data[1], data[2]));
+      this.plot.setScale("y", valueRange(data[1], data[2], this.beside?.[1] ?? []));
     });
   }
 
@@ -85,7 +89,10 @@ export class Chart {
         { stroke: () => colorOf("--curve"), width: 1.5, points: { show: false } },
         { stroke: () => colorOf("--exceeded-text"), width: 1.5, dash: [6, 4], points: { show: false } },
       ],
-      hooks: { drawClear: [(plot) => this.shade(plot)], draw: [(plot) => this.cursor(plot)] },
+      hooks: {
+        drawClear: [(plot) => this.shade(plot)],
+        draw: [(plot) => this.other(plot), (plot) => this.cursor(plot)],
+      },
     };
   }
 
@@ -103,6 +110,33 @@ export class Chart {
       ctx.fillStyle = span.verdict === "exceeded" ? "#c11540" : hatchPattern(ctx);
       ctx.fillRect(left, bbox.top, Math.max(right - left, 1), bbox.height);
     }
+    ctx.restore();
+  }
+
+  private other(plot: uPlot): void {
+    if (!this.beside) return;
+    const [times, values] = this.beside;
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.beginPath();
+    let drawn = false;
+    values.forEach((value, i) => {
+      if (value === null) {
+        drawn = false;
+        return;
+      }
+      const at: [number, number] = [plot.valToPos(times[i]!, "x", true), plot.valToPos(value, "y", true)];
+      if (drawn) ctx.lineTo(...at);
+      else ctx.moveTo(...at);
+      drawn = true;
+    });
+    ctx.setLineDash([3, 3]);
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.strokeStyle = colorOf("--accent");
+    ctx.stroke();
     ctx.restore();
   }
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import WORDS, Exit, exit_code, line, seconds
 from seerob.app.console.visiting import add_page, tell_pages, visiting
-from seerob.core.snapshot import Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import History, Verdict
 
 if TYPE_CHECKING:
     from seerob.app.server.player import Player
@@ -25,6 +26,10 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
     add_page(sub)
+    text = (
+        "plot another recording's figures on the same axis, by names of criteria; run time 0 is that of each"
+    )
+    sub.add_argument("--beside", type=Path, metavar="RECORDING", help=text)
     sub.add_argument("--seconds", type=seconds, help="end after this time, once all was read")
 
 
@@ -46,7 +51,7 @@ def show(path: Path, options: argparse.Namespace) -> int:
     line("recording", f"{recording.scene.title}: {recording.duration:.1f} s", "bold")
     for finding in recording.findings:
         line(finding.level, finding.text, "yellow")
-    player = Player(recording)
+    player = Player(recording, beside=_beside(getattr(options, "beside", None), recording))
     server = Server(
         scene=recording.scene,
         meshes=recording.meshes,
@@ -64,6 +69,32 @@ def show(path: Path, options: argparse.Namespace) -> int:
         while not stopped() and (time.monotonic() < end or player.reading):
             time.sleep(0.1)
     return _verdict(recording, player)
+
+
+def _beside(path: Path | None, recording: Recording) -> History:
+    """What another recording holds of criteria of the same name and unit, as it was recorded.
+
+    Raises:
+        InputError: It is no recording, or has no such criterion.
+    """
+    if path is None:
+        return History(traces=())
+    from seerob.app.server.player import POINTS
+    from seerob.recording.recording import Recording
+    from seerob.recording.result_log import ResultLog
+
+    other = Recording.open(path)
+    units = {info.name: info.unit for info in recording.scene.criteria}
+    same = {info.name for info in other.scene.criteria if units.get(info.name) == info.unit}
+    if not same:
+        what = "has no criterion with a name and unit of the one that is shown"
+        raise InputError.at(path, "criteria", what, "name a recording of the same criteria")
+    log = ResultLog(other.scene.criteria)
+    for snapshot in other.snapshots():
+        log.add(snapshot)
+    line("beside", f"{other.scene.title}: {other.duration:.1f} s, {len(same)} of {len(units)} criteria")
+    traces = tuple(trace for trace in log.history(POINTS).traces if trace.name in same)
+    return History(traces=(), beside=traces, beside_title=f"{path.parent.name}/{path.name}")
 
 
 def _verdict(recording: Recording, player: Player) -> Exit:

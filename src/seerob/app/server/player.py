@@ -10,6 +10,8 @@ from math import inf, nextafter
 from time import monotonic
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from seerob.app.server.feed import Audience
 from seerob.core.printable import printable_record
 from seerob.core.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
@@ -51,12 +53,19 @@ class Player:
         playing: Whether it starts by itself.
         loop: Whether it starts again at the end; otherwise it pauses there.
         rate: Frames sent per second at most [1/s].
+        beside: What of another run is plotted on the same axis (`History.beside`).
     """
 
     mode = "replay"
 
     def __init__(
-        self, recording: Recorded, *, playing: bool = False, loop: bool = False, rate: float = 60.0
+        self,
+        recording: Recorded,
+        *,
+        playing: bool = False,
+        loop: bool = False,
+        rate: float = 60.0,
+        beside: History | None = None,
     ) -> None:
         self._recording = recording
         self._playing, self._loop, self._speed = playing, loop, 1.0
@@ -67,7 +76,8 @@ class Player:
         self._shown: float | None = None
         self._wake = asyncio.Event()
         self._log = ResultLog(recording.scene.criteria)
-        self._history = printable_record(self._log.history(POINTS))
+        self._beside = beside or History(traces=())
+        self._history = self._so_far_history()
         self._so_far = printable_record(self._log.so_far(whole=False))
         self.reading = True
         """Whether the recording is still read through; then `so_far` is ``whole``, or reading failed."""
@@ -76,6 +86,9 @@ class Player:
     def duration(self) -> float:
         """Length of the recording [s]."""
         return self._recording.end - self._recording.start
+
+    def _so_far_history(self) -> History:
+        return printable_record(replace(self._beside, traces=self._log.history(POINTS).traces))
 
     def history(self) -> History:
         """The whole recording, or as much of it as was read by now."""
@@ -195,6 +208,6 @@ class Player:
             if monotonic() > until:
                 more = True
                 break
-        self._history = printable_record(self._log.history(POINTS))
+        self._history = self._so_far_history()
         self._so_far = printable_record(self._log.so_far(whole=not more))
         return more

@@ -1,0 +1,66 @@
+"""Another recording on the axis of one that is replayed: what of it is plotted, and what is refused."""
+
+import numpy as np
+import pytest
+
+import seerob as sr
+from seerob.app.commands.replay import _beside
+from seerob.app.server.player import Player
+from seerob.app.server.serving import Server
+from seerob.core.errors import InputError
+from seerob.core.snapshot import History
+from seerob.outputs.sinks.recorder import Recorder
+from server.frames import Visitor
+
+CELL = """
+title = "Cell"
+[[parts]]
+name = "table"
+shape = {{ box = [1, 1, 1] }}
+[[humans]]
+name = "person"
+stature = 1.75
+mass = 70
+sex = "female"
+at = {{ position = [{x}, 0, 0] }}
+[[safety]]
+kind = "minimum_distance"
+name = "{name}"
+between = ["table", "person"]
+limit = 0.5
+"""
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    def record(folder, **values):
+        cell = tmp_path / folder
+        cell.mkdir()
+        (cell / "workstation.toml").write_text(CELL.format(**values))
+        sr.load(cell).run(folder=cell, sinks=[Recorder()])
+        return cell / "run.mcap"
+
+    return record
+
+
+def test_a_page_is_told_of_the_same_criteria_of_another_run(recorded):
+    ours, other = recorded("near", x=2, name="gap"), recorded("far", x=4, name="gap")
+    recording = sr.Recording.open(ours)
+    player = Player(recording, beside=_beside(other, recording))
+    with (
+        Server(scene=recording.scene, meshes=recording.meshes, feed=player, port=0) as server,
+        Visitor(server) as page,
+    ):
+        told = page.until(lambda m: isinstance(m, History) and m.traces and len(m.traces[0].values))
+    (mine,), (theirs,) = told.traces, told.beside
+    assert mine.name == theirs.name == "gap"
+    # The nearest place of a person is a little aside of the axis on which they stand.
+    assert np.frombuffer(theirs.values)[0] - np.frombuffer(mine.values)[0] == pytest.approx(2, abs=1e-3)
+    assert told.beside_title == "far/run.mcap"
+
+
+def test_without_one_nothing_is_beside_and_another_criterion_is_refused(recorded):
+    recording = sr.Recording.open(recorded("near", x=2, name="gap"))
+    assert _beside(None, recording) == History(traces=())
+    with pytest.raises(InputError, match="no criterion with a name and unit"):
+        _beside(recorded("far", x=4, name="other"), recording)

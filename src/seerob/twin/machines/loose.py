@@ -7,10 +7,10 @@ A workpiece that a hand holds hangs on it by a spring: on its centre of mass and
 
 toward where it would be if it were fixed to the hand as it was when it was taken, no faster than `FASTEST`.
 The opposite force acts on the hand's joint, so that arm and trunk carry its weight; the moment about the
-wrist is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put anywhere: a
-table that is in the way stops it, and farther than ``torn`` from where it should be it is torn out. One that
-was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring pulls it into the
-place's pose.
+wrist is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put
+anywhere: a table that is in the way stops it, and farther than ``torn`` from where it should be it is torn
+out. One that was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring
+pulls it into the place's pose.
 
 Its joints are three ways and three turns. The frame they are counted from is put anew between two ticks
 before the second turn comes near a right angle, where the others would be one.

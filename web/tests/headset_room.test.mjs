@@ -34,6 +34,7 @@ name = "blank"
 shape = { box = [0.08, 0.06, 0.05] }
 mass = 0.8
 at = { position = [0.3, -0.2, 0.826] }
+torn = 0.6
 [[places]]
 name = "box"
 at = { position = [0.3, 0.2, 0.9] }

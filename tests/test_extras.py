@@ -28,7 +28,12 @@ from seerob.protocols.ros.ros_messages import Edition, store
 from seerob.workstation.source import Target
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-DISTRIBUTION = {"xr": "pyopenxr", "OCP": "cadquery-ocp-novtk", "pxr": "usd-core", "cv2": "opencv-python-headless"}
+DISTRIBUTION = {
+    "xr": "pyopenxr",
+    "OCP": "cadquery-ocp-novtk",
+    "pxr": "usd-core",
+    "cv2": "opencv-python-headless",
+}
 ARM = Target(name="arm", joints=("a",))
 BLOCKED = """
 import sys

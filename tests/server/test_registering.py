@@ -7,9 +7,12 @@ from msgspec.structs import replace
 
 from seerob.app.server.live import Live
 from seerob.app.server.serving import Server
-from seerob.core.snapshot import Node, Place, Register, Registered, Snapshot
+from seerob.core.samples import Placing
+from seerob.core.snapshot import Node, Place, Register, Registered, Snapshot, Tracking
 from seerob.core.transforms import inverse, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.description.capture.registration import turn
+from seerob.devices.live.headset_offers import Registering, read
+from seerob.devices.sources.headset import Headset, frame, layout_of
 from seerob.protocols.tracking.vive import WORLD_FROM_XR
 from server.frames import MESHES, PATIENCE, scene
 from server.test_headset import PLACES, Page, heard, seen
@@ -35,7 +38,7 @@ def shown(seq, *, moved=0.0, doubts=None):
     return Snapshot(seq=seq, t=0.01 * seq, poses=poses.tobytes(), doubts=doubts or {})
 
 
-class Registering(Page):
+class Toucher(Page):
     """A page whose visitor touches what there is."""
 
     rng = np.random.default_rng(0)
@@ -88,7 +91,7 @@ def a_server(live):
 
 @pytest.fixture(name="page")
 def a_page(server):
-    with Registering(server) as page:
+    with Toucher(server) as page:
         yield page
 
 
@@ -111,9 +114,27 @@ def test_touches_put_the_person_in_the_cell_with_a_covariance_and_before_that_no
         head = next(p.position for p in after.points if p.name == "viewer")
         expected = transform(rotation_from_wxyz(last.at[3:]), last.at[:3]) @ [*(WORLD_FROM_XR @ PLACES[0]), 1]
         np.testing.assert_allclose(head, expected[:3], atol=1e-5)
+        # Whoever works at another scale is nowhere in the cell, however well the room is known.
+        samples.clear()
+        giant = seen(page, samples, space="first", scale=10.0)
+        assert "works at scale 10" in giant.placing.reason
         # After a recentring the room lies elsewhere, and nobody knows where.
         samples.clear()
         assert "register it" in seen(page, samples, space="second").placing.reason
+
+
+def test_a_place_that_was_measured_counts_with_its_error():
+    known = Registering(at=0.01, at_turn=0.02)
+    source = Headset(human="anna", name="headset", registration=known)
+    offer = read(
+        Tracking(human="anna", t=1.0, names=("viewer",), poses=np.eye(1, 7, 3, dtype="<f4").tobytes()), 0.0
+    )
+    mixed = offer._replace(placing=Placing(reason="nobody knows"))
+    placed = source._placed(frame(mixed, layout_of(offer.names)), mixed).placing
+    np.testing.assert_allclose(np.diag(np.reshape(placed.covariance, (6, 6))), [1e-4] * 3 + [4e-4] * 3)
+    assert placed.reason == ""
+    guessed = Headset(human="anna", name="headset")._placed(frame(mixed, layout_of(offer.names)), mixed)
+    assert guessed.placing.reason == "nobody knows"
 
 
 def test_more_touches_state_less_and_the_mechanism_forgets_with_the_page(server, page):

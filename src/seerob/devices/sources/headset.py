@@ -98,13 +98,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
                 if offer.t <= last:
                     continue
                 last = offer.t
-                said = frame(offer, layout)
-                yield (
-                    layout,
-                    replace(said, placing=self._stated())
-                    if said.placing is None
-                    else self._moved(said, offer),
-                )
+                yield layout, self._placed(frame(offer, layout), offer)
 
     def _stated(self) -> Placing | None:
         """How well the file says that its ``at`` is known; None where it does not."""
@@ -114,17 +108,19 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
         covariance = np.diag([known.at**2] * 3 + [known.at_turn**2] * 3)
         return Placing(covariance=tuple(covariance.ravel().tolist()), about=self.at.position)
 
-    def _moved(self, said: CaptureFrame, offer: Offer) -> CaptureFrame:
-        """What was said, so that ``at`` puts it where the room was found to lie."""
-        if offer.cell_from_room is None:
-            stated = self._stated()
-            return said if stated is None else replace(said, placing=stated)
-        T = inverse(placement(self.at)) @ offer.cell_from_room
-        assert said.orientations is not None  # of a headset
-        with np.errstate(all="ignore"):
-            return replace(
-                said, positions=apply(T, said.positions), orientations=turned(T[:3, :3], said.orientations)
-            )
+    def _placed(self, said: CaptureFrame, offer: Offer) -> CaptureFrame:
+        """What was said, so that ``at`` puts it where the room lies, and how well that is known."""
+        if offer.cell_from_room is not None:
+            T = inverse(placement(self.at)) @ offer.cell_from_room
+            assert said.orientations is not None  # of a headset
+            with np.errstate(all="ignore"):
+                turns = turned(T[:3, :3], said.orientations)
+                said = replace(said, positions=apply(T, said.positions), orientations=turns)
+            known = offer.placing
+        else:
+            known = self._stated() or offer.placing
+        # Whoever works at another scale is nowhere in the cell, however well the room is known to lie.
+        return replace(said, placing=at_scale(offer.scale) or known)
 
     def _tell(self, layout: Layout) -> None:
         if BODY not in layout.names:
@@ -205,5 +201,4 @@ def frame(offer: Offer, layout: Layout) -> CaptureFrame:
             positions=world_positions(positions),
             orientations=world_turns(turns),
             confidence=sure,
-            placing=at_scale(offer.scale) or offer.placing,
         )

@@ -387,7 +387,7 @@ def explain(model: Model, name: str, said: ControllerLog) -> Explanation:
     assert said.tau is not None
     qd = said.qd if said.qd is not None else slopes(said.t, said.q, HALF_WINDOW)
     qdd = slopes(said.t, qd, HALF_WINDOW)
-    rows = _spread(len(said.t), MOST)
+    rows = spread(len(said.t), MOST)
     t, tau, delay = np.asarray(said.t[rows], float), np.asarray(said.tau[rows]), 0.0
     dynamics, n = Dynamics(model, robot), len(robot.joints)
     slow = np.array([SLOW[unit] for unit in robot.units])
@@ -477,7 +477,7 @@ def _then(t: Array, values: Array, at: Array) -> Array:
     return np.stack([np.interp(at, t, column) for column in np.asarray(values).T], axis=1)
 
 
-def _spread(n: int, most: int) -> NDArray[np.int64]:
+def spread(n: int, most: int) -> NDArray[np.int64]:
     """At most so many rows, evenly, and in stretches so that neighbours stay neighbours."""
     if n <= most:
         return np.arange(n, dtype=np.int64)

@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
@@ -39,7 +40,7 @@ from seerob.session.opening import open_sources, reached, source_target
 from seerob.session.reading import read
 from seerob.session.run import Bound, Feed, Summary
 from seerob.session.scene import scene_of, unmet_phases
-from seerob.twin.controller_check import controller_log
+from seerob.twin.controller_check import ControllerLog, controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.allowed import Allowed
 from seerob.workstation.source import Opened, Source
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from seerob.outputs.film import Film
     from seerob.session.batch import Batch
     from seerob.session.explanation import Explanation
+    from seerob.session.identification import Identified
     from seerob.session.permissible import evaluation
     from seerob.session.permissible.evaluation import PermissibleSpeed, Say, Wish
     from seerob.session.permissible.joint_limits import Given
@@ -409,6 +411,40 @@ class Station:
         threads = threads or os.cpu_count() or 1
         return batch.judged(self.model, self.bound, motion, threads=threads, findings=findings)
 
+    def identify(self, robot: str, carrying: Station | None = None) -> Identified:
+        """Base inertial parameters and friction of a robot by the torques that a recorded source measured.
+
+        Args:
+            robot: Its name; it carries nothing in this workstation, whatever the log was taken with.
+            carrying: A workstation with the same robot, whose log was taken with a payload on it.
+
+        Raises:
+            InputError: No recorded source of it measures torques, it carries something, or is carried.
+            UnknownName: There is no such robot.
+        """
+        from seerob.model.mounting.specification import pose_matrix
+        from seerob.session.identification import identify
+
+        found = self.model.robot(robot)
+        if not found.alone or found.carried:
+            what = "carries something here, or is carried"
+            raise InputError.at("identify", found.name, what, "name a cell of the bare arm")
+        (entry,) = (each for each in self.workstation.robots if each.name == found.name)
+        gravity = pose_matrix(entry.base)[:3, :3].T @ np.array(self.model.mj.opt.gravity)
+        more = None if carrying is None else carrying._torque_log(robot)
+        return identify(found.description, gravity, self._torque_log(found.name), more)
+
+    def _torque_log(self, name: str) -> ControllerLog:
+        for source, opened in self.sources:
+            if source.target() == name and not isinstance(source, LiveSource):
+                said = controller_log(opened.samples, getattr(source, "file", source.name))
+                if said is not None and said.tau is not None:
+                    return said
+        remedy = (
+            "log them: actual_current_as_torque of RTDE, measured torques of FRI, torque columns of a table"
+        )
+        raise InputError.at("torques", name, "no recorded source of it measures torques", remedy)
+
     def explain(self, robot: str) -> Explanation:
         """Whether the model explains the torques that a recorded source measured, and what would.
 
@@ -419,16 +455,7 @@ class Station:
         from seerob.session.explanation import explain as explained
 
         name = self.model.robot(robot).name
-        for source, opened in self.sources:
-            if source.target() == name and not isinstance(source, LiveSource):
-                file = getattr(source, "file", source.name)
-                said = controller_log(opened.samples, file)
-                if said is not None and said.tau is not None:
-                    return explained(self.model, name, said)
-        remedy = (
-            "log them: actual_current_as_torque of RTDE, measured torques of FRI, torque columns of a table"
-        )
-        raise InputError.at("explain", name, "no recorded source of it measures torques", remedy)
+        return explained(self.model, name, self._torque_log(name))
 
     def permissible_speed(
         self,

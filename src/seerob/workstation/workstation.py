@@ -159,6 +159,8 @@ class Robot(_Table, frozen=True, kw_only=True):
     for no two arms of a type are alike. Beyond it, what rests on the robot is undecided."""
     mass_tolerance: Tolerance | None = None
     """How far the masses of its links may be off, all alike, as a share: 0.05 for ± 5 %."""
+    rotor_tolerance: Tolerance | None = None
+    """How far ``rotor_inertia`` may be off, all alike, as a share."""
     com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
     """How far the centre of mass of every link may be from where it is said to be, in any direction [m]."""
     published_mass: Mass | None = None
@@ -175,6 +177,8 @@ class Robot(_Table, frozen=True, kw_only=True):
             raise ValueError("published_mass and published_mass_source belong together: give both or none")
         if self.scale != 1 and (self.calibration is not None or self.real):
             raise ValueError("a robot with a scale does not exist: leave out calibration and real")
+        if self.rotor_tolerance is not None and self.rotor_inertia is None:
+            raise ValueError("rotor_tolerance is one of rotor_inertia: give that too")
 
 
 class Body(_Table, frozen=True, kw_only=True):

@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from importlib import metadata
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seerob.app.console.terminal import OUT, Exit, line
+from seerob.app.console.loading import compiled
+from seerob.app.console.terminal import OUT, Exit, add_workstation, allowed, line
+from seerob.core.errors import InputError
 
 if TYPE_CHECKING:
     from seerob.description.description import Description
@@ -37,11 +40,25 @@ def add(sub: argparse.ArgumentParser) -> None:
     fetch = actions.add_parser("fetch", help=text, description=text)
     fetch.add_argument("name", help="description as the package has it: ur5e_description")
 
+    text = "base inertial parameters, rotors and friction of an arm from the torques of a log"
+    identify = actions.add_parser("identify", help=text, description=text)
+    add_workstation(identify)
+    identify.add_argument("--robot", help="whose log; the only robot when not given")
+    text = "workstation of the same arm, with a log that was taken with a payload on its flange"
+    identify.add_argument("--carrying", type=Path, metavar="WORKSTATION", help=text)
+    text = "what the maker says that the whole arm weighs [kg]: needed for -o"
+    identify.add_argument("--mass", type=float, metavar="KG", help=text)
+    identify.add_argument("--mass-source", metavar="TEXT", help="where the maker says so: data sheet, page")
+    text = "write masses, rotors and tolerances for the table of the robot to a new file"
+    identify.add_argument("-o", "--output", type=Path, metavar="FILE", help=text)
+
 
 def run(options: argparse.Namespace) -> int:
-    """List, or fetch."""
+    """List, fetch or identify."""
     if options.action == "fetch":
         return _fetch(options.name)
+    if options.action == "identify":
+        return _identify(options)
     _library()
     _descriptions(options.all)
     _packages()
@@ -147,4 +164,49 @@ def _fetch(name: str) -> int:
     line("fetched", f"{found.address} at {found.commit[:12]}, in {found.repository}", "bold")
     line("licence", found.licence or "the package knows none: read the repository")
     line("next", f'model = "description:{found.name}"')
+    return Exit.WITHIN
+
+
+def _identify(options: argparse.Namespace) -> int:
+    from seerob.session.identification import robot_table, weighed
+
+    if options.output is not None:
+        if options.mass is None or not options.mass_source or not 0.1 <= options.mass <= 10_000:
+            what = "masses for a file need the mass of the whole arm, from 0.1 kg, and where it is stated"
+            raise InputError.at("seerob robots identify", "--mass", what, "give --mass and --mass-source")
+        if options.output.exists():
+            raise InputError.at(options.output, "", "exists already", "give another name with -o")
+    station = compiled(options.workstation, allowed(options))
+    names = [robot.name for robot in station.workstation.robots]
+    if options.robot is None and len(names) != 1:
+        raise InputError.at("seerob robots identify", "--robot", "is not given", f"one of {', '.join(names)}")
+    name = options.robot or names[0]
+    carrying = None if options.carrying is None else compiled(options.carrying, allowed(options))
+    found = station.identify(name, carrying)
+    line("log", f"{name}: {found.source}, {found.samples} samples; condition {found.condition:.3g}")
+    for parameter, unit, value in zip(found.names, found.units, found.values, strict=True):
+        line(
+            "base", f"{parameter}, with what is regrouped into it: {value} {unit if value.determined else ''}"
+        )
+    for j, joint in enumerate(found.regressor.names):
+        unit = "N·m" if found.regressor.revolute[j] else "N"
+        said = f"Coulomb {found.coulomb[j]}, viscous {found.viscous[j]}, offset {found.offset[j]}"
+        line("friction", f"{joint}: {said} [{unit}]; {found.left[j]:.3g} {unit} are left")
+    if found.payload:
+        line(
+            "payload",
+            f"mass {found.payload[0]} kg, first moments {', '.join(map(str, found.payload[1:4]))} kg·m",
+        )
+    if found.hidden:
+        line("not told", f"by this motion: {', '.join(found.hidden)}", "yellow")
+    line("never told", f"by any motion alone: {', '.join(found.never)}")
+    if options.output is None:
+        return Exit.UNDECIDED if found.hidden else Exit.WITHIN
+    made = weighed(found, options.mass)
+    text = robot_table(found, made, mass=options.mass, source=options.mass_source)
+    with options.output.open("x", encoding="utf-8") as opened:
+        opened.write(text)
+    far = f"masses that bodies can have are {made.distance:.2g} standard deviations from the fit"
+    line("wrote", f"{options.output}: mass matrix within ± {100 * made.error:.2g} % (95 %); {far}", "bold")
+    line("next", "put these keys into the table of the robot in the workstation file")
     return Exit.WITHIN

@@ -58,6 +58,9 @@ class MassTolerances:
             if table.name == robot.name:
                 links = [i for i, name in names.items() if name in robot.links]
                 found += _offs(table.name, links, mass=table.mass_tolerance, com=table.com_tolerance)
+                if share := table.rotor_tolerance:
+                    tolerance = Tolerance(f"rotor_tolerance of {table.name}", 100 * share, "%")
+                    found.append(_Off(tolerance, (), share=share, rotors=True))
         for thing in (*station.tools, *station.workpieces):
             bodies = [i for i, name in names.items() if name == thing.name]
             found += _offs(
@@ -116,6 +119,8 @@ class MassTolerances:
         found, factors = mj.__copy__(), np.ones(mj.nbody)
         for off, shift in zip(self._offs, shifts, strict=True):
             factors[list(off.bodies)] += shift * off.share
+            if off.rotors:
+                found.dof_armature[self.robot.v_address] *= 1 + shift * off.share
         found.body_mass *= factors
         found.body_inertia *= factors[:, None]
         mujoco.mj_setConst(found, mujoco.MjData(found))
@@ -162,6 +167,8 @@ class _Off:
     """Least factor on the masses whose centres may be off."""
     heavier: float = 1.0
     """Largest one."""
+    rotors: bool = False
+    """Whether it is the share of the rotors' inertias."""
 
     def parts(self, state: State, robot: Mechanism, qd: Array) -> _Bounds:
         """What it makes of the mass matrix at its ends."""
@@ -171,6 +178,10 @@ class _Off:
             part = _Part.of(state, robot, body)
             each = part.shifted(self, qd) if self.way else (self.share * part.matrix,) * 3
             found = [a + b for a, b in zip(found, each, strict=True)]
+        if self.rotors:
+            spun = state.model.mj.dof_armature[robot.v_address]
+            matrix = self.share * robot.coupling.T @ (spun[:, None] * robot.coupling)
+            found = [a + matrix for a in found]
         return _Bounds(*found)
 
 

@@ -307,3 +307,28 @@ def test_a_picture_shows_what_became_parts_in_their_colours(tmp_path):
     assert blue.sum() > 5000
     # Red is to the left of blue, seen from the front.
     assert np.flatnonzero(red.any(axis=0)).max() < np.flatnonzero(blue.any(axis=0)).min()
+
+
+def test_what_is_left_out_on_request_is_listed_and_stays_out(tmp_path, capsys):
+    file = tmp_path / "line.step"
+    file.write_text(MADE["line"]().text())
+    cell = tmp_path / "cell"
+    code, table = imported(file, cell, "--without", "*/clamp_*", "--smaller", "50")
+    assert code == Exit.WITHIN
+    names = {part["name"] for part in table["parts"]}
+    assert names == {"line/table", "line/post", "line/fixture_1/base", "line/fixture_2/base"}
+    rows = {row["name"]: row["why"] for row in json.loads((cell / "import.json").read_text())["left_out"]}
+    assert len(rows) == 6
+    assert rows["line/fixture_1/clamp_1"] == "as asked: --without */clamp_*"
+    # A pin of 12 mm by 45 mm.
+    assert rows["line/fixture_1/pin"] == "as asked: 45 mm, smaller than 50 mm"
+    assert not (cell / "cad/clamp.glb").exists()
+    assert imported(file, cell)[1] == table
+    capsys.readouterr()
+    for options, says in (
+        (("--without", "*/bolt*"), "no part is called"),
+        (("--without", "*"), "no part would be left"),
+        (("--smaller", "0"), "more than 0"),
+    ):
+        assert cli.main(["import", str(file), str(tmp_path / "new"), *options]) == Exit.ERROR
+        assert says in capsys.readouterr().err

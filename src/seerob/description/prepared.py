@@ -27,7 +27,7 @@ from seerob.description.shapes import detail
 from seerob.description.shapes.mesh_bodies import is_closed
 
 EDITION = 1
-"""Of what is kept; counted up where the same content would become something else."""
+"""Counts up where the same content would become something else, so that nothing old is taken."""
 MOST_BYTES = 1 << 30
 """Memory that what is kept in the process may take [byte]; beyond it, all is forgotten."""
 
@@ -38,7 +38,7 @@ class PreparedMesh:
 
     name: str
     mesh: Mesh
-    """As the file has it."""
+    """The mesh that the file has, in metres."""
     exact: detail.DerivedMesh
     """For distances."""
     drawn: tuple[Mesh, ...]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 HELP = "make a workstation folder from CAD: parts with names, places, colours and meshes"
 EXAMPLE = "seerob import line.step my_line"
 
-_KEPT = ("density", "tolerance", "units", "up", "accept", "ground")
+_KEPT = ("density", "tolerance", "units", "up", "accept", "ground", "without", "smaller")
 """Options that a new revision takes over where they are not given again."""
 _TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 _SHOWN = 20
@@ -38,6 +38,10 @@ def add(sub: argparse.ArgumentParser) -> None:
     text = "density of every part [kg/m³], or of one material as S235JR=7850; may be given several times"
     sub.add_argument("--density", action="append", default=[], metavar="[NAME=]DENSITY", help=text)
     sub.add_argument("--units", help="unit of lengths of a file that does not say it: mm, m, inch")
+    text = "leave out parts by full name, with wildcards, as '*/screw*'; may be given several times"
+    sub.add_argument("--without", action="append", default=[], metavar="PATTERN", help=text)
+    text = "leave out parts that are smaller than this in every direction [mm]"
+    sub.add_argument("--smaller", type=float, metavar="MM", help=text)
     text = "propose axes that parts can move about or along, from shapes of a STEP or IGES file that fit"
     sub.add_argument("--axes", action="store_true", help=text)
     text = "make a mechanism of proposed axes, by their numbers: 1,3; implies --axes"
@@ -104,7 +108,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
             setattr(options, key, former.get(key) or getattr(options, key))
     kept = {key: getattr(options, key) for key in _KEPT}
     given = densities(options.density)
-    assembly = _moving(options, baked(_read(options, ending)))
+    assembly = _moving(options, _wanted(options, baked(_read(options, ending))))
     if before is None:
         made = files(assembly, options.file, given, options=kept)
         _write(folder, made.texts, {**made.meshes, FILE: picture(assembly)})
@@ -117,6 +121,21 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
     _revise(folder, before, made, picture(assembly))
     _say(options.file, assembly, made)
     return Exit.WITHIN
+
+
+def _wanted(options: argparse.Namespace, assembly: Assembly) -> Assembly:
+    """The assembly without what the user leaves out."""
+    from seerob.description.cad.assembly import without
+
+    if options.smaller is not None and not 0 < options.smaller <= 1e4:
+        what = f"{options.smaller:g} mm"
+        raise InputError.at("--smaller", "", what, "more than 0 and at most 10000 mm")
+    try:
+        smaller = None if options.smaller is None else options.smaller * 1e-3
+        return without(assembly, options.without, smaller)
+    except ValueError as error:
+        names = ", ".join(assembly.names()[:5])
+        raise InputError.at("--without", "", str(error), f"full names, as {names}") from None
 
 
 def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -125,6 +127,11 @@ def baked(assembly: Assembly) -> Assembly:
         moved = np.eye(4)
         moved[:3, 3] = instance.world_from_shape[:3, 3]
         instances.append(replace(instance, shape=made[key], world_from_shape=moved))
+    return _pruned(assembly, shapes, instances)
+
+
+def _pruned(assembly: Assembly, shapes: Sequence[Shape], instances: Sequence[Instance]) -> Assembly:
+    """The assembly with these instances, and the shapes that they have."""
     used = sorted({instance.shape for instance in instances})
     number = {shape: k for k, shape in enumerate(used)}
     return replace(
@@ -132,6 +139,37 @@ def baked(assembly: Assembly) -> Assembly:
         shapes=tuple(shapes[shape] for shape in used),
         instances=tuple(replace(instance, shape=number[instance.shape]) for instance in instances),
     )
+
+
+def without(assembly: Assembly, patterns: Sequence[str], smaller: float | None) -> Assembly:
+    """The assembly without parts that the user does not want; each is listed as left out.
+
+    Args:
+        assembly: With rigid places.
+        patterns: Full names, with wildcards.
+        smaller: Parts that are smaller than this in every direction go, too [m].
+
+    Raises:
+        ValueError: A pattern that is nobody's name, or nothing is left.
+    """
+    kept, left_out = [], list(assembly.left_out)
+    used: set[str] = set()
+    for name, instance in zip(assembly.names(), assembly.instances, strict=True):
+        found = [pattern for pattern in patterns if fnmatchcase(name, pattern)]
+        used.update(found)
+        vertices = np.vstack([mesh.vertices for mesh in assembly.shapes[instance.shape].pieces])
+        extent = float(np.ptp(vertices, axis=0).max())
+        if found:
+            left_out.append((name, f"as asked: --without {found[0]}"))
+        elif smaller is not None and extent < smaller:
+            left_out.append((name, f"as asked: {extent * 1e3:.4g} mm, smaller than {smaller * 1e3:g} mm"))
+        else:
+            kept.append(instance)
+    if unused := [pattern for pattern in patterns if pattern not in used]:
+        raise ValueError(f"no part is called {unused[0]!r}")
+    if not kept and not assembly.mechanisms:
+        raise ValueError("no part would be left")
+    return replace(_pruned(assembly, assembly.shapes, kept), left_out=tuple(left_out))
 
 
 def nearest_rotation(linear: Array) -> Array:

@@ -112,6 +112,7 @@ def test_what_was_measured_on_its_limit_is_not_within(tmp_path, figure, limit, c
     name = names.get(figure, "pressure")
     part = told[f"measured {name}"]
     assert part.limit == limit * (1e4 if name == "pressure" else 1)
+    assert part.unit == ("Pa" if name == "pressure" else "N")
     assert (part.verdict is Verdict.WITHIN) is (below > 1e-9)
 
 
@@ -328,6 +329,8 @@ def test_records_are_read_with_their_units(tmp_path: Path, text: str) -> None:
     ("text", "what"),
     [
         ("Time;Force\n0;1\n1;2\n", "no columns of time and force with units"),
+        ("Time [s];Weg [mm]\n0;1\n1;2\n", "no columns of time and force with units"),
+        ("Weg [mm];Force [N]\n0;1\n1;2\n", "no columns of time and force with units"),
         ("Time [s];Force [N]\n1;1\n0;2\n", "do not rise"),
         ("Time [s];Force [N]\n0;0\n1;0\n", "no force above 0"),
         ("Time [s];Force [N]\n0;2\n0,01;-900\n0,02;1\n", "pressing is positive: turn the sign"),
@@ -375,6 +378,9 @@ def test_a_record_that_may_miss_its_peak_is_never_within(tmp_path: Path, force, 
     part = chest(station)
     assert part.verdict is (Verdict.UNDECIDED if why else Verdict.WITHIN)
     assert why in part.reason
+    told = {p.name.partition(":")[0]: p.verdict for p in part.parts if "measured" in p.name}
+    assert told["measured force, first half second"] is part.verdict
+    assert told["measured pressure"] is Verdict.WITHIN
 
 
 @pytest.mark.parametrize(

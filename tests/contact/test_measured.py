@@ -332,6 +332,8 @@ def test_records_are_read_with_their_units(tmp_path: Path, text: str) -> None:
         ("Time [s];Weg [mm]\n0;1\n1;2\n", "no columns of time and force with units"),
         ("Weg [mm];Force [N]\n0;1\n1;2\n", "no columns of time and force with units"),
         ("Time [s];Force [N]\n1;1\n0;2\n", "do not rise"),
+        ("Time [s];Force [N]\n0;1\n1;2\n0,5;3\n", "do not rise"),
+        ("Time [s];Force [N]\n0;1\n0;2\n1;3\n", "do not rise"),
         ("Time [s];Force [N]\n0;0\n1;0\n", "no force above 0"),
         ("Time [s];Force [N]\n0;2\n0,01;-900\n0,02;1\n", "pressing is positive: turn the sign"),
         ("Time [s];Force [N]\n0;x\n1;0\n", "'x'"),
@@ -346,6 +348,12 @@ def test_what_is_no_record_says_so(tmp_path: Path, text: str, what: str) -> None
     path.write_text(text)
     with pytest.raises(InputError, match=what):
         read_curve(path, "a.csv")
+
+
+def test_a_force_below_a_newton_is_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("Time [s];Force [N]\n0;0\n1;0,5\n")
+    assert read_curve(path, "a.csv")[1].tolist() == [0.0, 0.5]
 
 
 INSTANTS = np.arange(0, 0.7, 1e-3)

@@ -22,7 +22,15 @@ from seerob.workstation.workstation import (
     locate,
 )
 
-LIVE = {"ur10_rtde", "plc_cell", "motor_station", "assembly_line", "empty_room", "three_robots"}
+LIVE = {
+    "ur10_rtde",
+    "plc_cell",
+    "motor_station",
+    "assembly_line",
+    "empty_room",
+    "three_robots",
+    "giant_niryo",
+}
 """Run in real time only; see test_live_workstation.py and test_plc_cell.py."""
 EVERY = sorted(
     path.parent for path in (Path(__file__).parents[1] / "workstations").glob("*/workstation.toml")

@@ -131,6 +131,7 @@ def test_a_run_says_so_when_there_is_none(tmp_path, capsys):
         ("assembly_line", {"ur10", "operator"}, 2),
         ("empty_room", {"ur5", "visitor"}, 2),
         ("three_robots", {"iiwa_left", "ur10", "iiwa_right", "visitor"}, 1),
+        ("giant_niryo", {"niryo", "operator"}, 2),
     ],
 )
 def test_cells_of_the_paper_run_without_their_devices(tmp_path, capsys, cell, sources, emulators):

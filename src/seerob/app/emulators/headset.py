@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,8 +15,9 @@ from msgspec import Struct
 
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.mvn_person import Person
-from seerob.app.emulation.options import PersonOptions, Ready, option, port
-from seerob.core.page_messages import Command, Tracking
+from seerob.app.emulation.options import COMMAND, PersonOptions, Ready, option, port
+from seerob.core.errors import InputError
+from seerob.core.page_messages import Command, Grab, Tracking
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.protocols.tracking.mvn_pose import SEGMENTS
 from seerob.protocols.tracking.vive import xr_positions, xr_turns
@@ -101,14 +103,26 @@ class Visitor(LoopEmulator):
         port: Its port.
         rate: Pictures per second [Hz].
         body: Whether joints of the whole body are seen.
+        grabs: What hands hold from when on [s]; time begins with the first picture of the run.
     """
 
-    def __init__(self, person: Person, *, human: str, host: str, port: int, rate: float, body: bool) -> None:
+    def __init__(
+        self,
+        person: Person,
+        *,
+        human: str,
+        host: str,
+        port: int,
+        rate: float,
+        body: bool,
+        grabs: Sequence[tuple[float, Grab]] = (),
+    ) -> None:
         super().__init__()
         self.human, self.rate, self.to = human, rate, (host, port)
         self.sent = 0
         """Messages so far."""
         self._seen = seen(person, body=body)
+        self._grabs = sorted(grabs, key=lambda grab: grab[0])
 
     def found_page(self, port: int) -> None:
         """The page is at another port than was said."""
@@ -126,7 +140,6 @@ class Visitor(LoopEmulator):
         from websockets.asyncio.client import connect
         from websockets.exceptions import WebSocketException
 
-        begun = time.monotonic()
         while True:
             with suppress(OSError, WebSocketException, TimeoutError):
                 url = f"ws://{self.to[0]}:{self.to[1]}/ws"
@@ -136,18 +149,23 @@ class Visitor(LoopEmulator):
                     compression=None,
                     max_size=None,
                 ) as connection:
-                    answers = asyncio.ensure_future(self._acknowledge(connection))
+                    runs = asyncio.Event()
+                    answers = asyncio.ensure_future(self._acknowledge(connection, runs))
                     try:
-                        await self._be_seen(connection, begun)
+                        await runs.wait()
+                        await self._be_seen(connection, time.monotonic())
                     finally:
                         answers.cancel()
                         await asyncio.gather(answers, return_exceptions=True)
             await asyncio.sleep(RETRY)
 
     async def _be_seen(self, connection: ClientConnection, begun: float) -> None:
+        grabs = deque(self._grabs)
         while True:
             k = int((time.monotonic() - begun) * self.rate) + 1
             await asyncio.sleep(max(0.0, begun + k / self.rate - time.monotonic()))
+            while grabs and grabs[0][0] <= k / self.rate:
+                await connection.send(msgspec.msgpack.encode(grabs.popleft()[1]))
             names, poses = self._seen(k / self.rate)
             told = Tracking(
                 human=self.human, t=k / self.rate, names=names, poses=poses.astype("<f4").tobytes()
@@ -155,12 +173,13 @@ class Visitor(LoopEmulator):
             await connection.send(msgspec.msgpack.encode(told))
             self.sent += 1
 
-    async def _acknowledge(self, connection: ClientConnection) -> None:
+    async def _acknowledge(self, connection: ClientConnection, runs: asyncio.Event) -> None:
         decoder = msgspec.msgpack.Decoder(_Received)
         unanswered = 0
         async for message in connection:
             received = decoder.decode(message)  # type: ignore[arg-type]
             if received.type == "snapshot" and received.seq is not None:
+                runs.set()
                 unanswered += 1
                 if unanswered == ACKNOWLEDGED:
                     unanswered = 0
@@ -179,6 +198,10 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
     port: Annotated[int, port("port of the page; `seerob run --emulated` tells its own")] = 8080
     rate: Annotated[float, option("pictures per second", "Hz", ge=30, le=144)] = 72.0
     body: Annotated[bool, option("joints of the whole body are seen; else head and hands")] = False
+    grabs: Annotated[
+        str,
+        option("what hands take and let go: '4.5 right_hand blank_1, 8 right_hand', at seconds of the run"),
+    ] = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -190,7 +213,32 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
     def ready(self) -> Ready:
         """The visitor."""
         visitor = Visitor(
-            self.person(), human=self.human, host=self.to, port=self.port, rate=self.rate, body=self.body
+            self.person(),
+            human=self.human,
+            host=self.to,
+            port=self.port,
+            rate=self.rate,
+            body=self.body,
+            grabs=tuple(self._grabs()),
         )
         hear = (f"seerob run CELL --port {{port}}     (with a source headset of {self.human})",)
         return Ready(visitor, f"a headset on {self.human}, {self.file}", f"{self.to}:{self.port}", hear)
+
+    def _grabs(self) -> Iterator[tuple[float, Grab]]:
+        for text in filter(None, map(str.strip, self.grabs.split(","))):
+            match text.split():
+                case [t, hand, *piece] if len(piece) < 2 and _number(t) is not None:
+                    yield float(t), Grab(hand=f"{self.human}/{hand}", piece="".join(piece))
+                case _:
+                    what, remedy = (
+                        f"{text!r} is no grab",
+                        "write SECONDS HAND PIECE, or SECONDS HAND to let go",
+                    )
+                    raise InputError.at(COMMAND, "--grabs", what, remedy)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

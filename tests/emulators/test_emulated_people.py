@@ -6,6 +6,7 @@ from seerob.app.commands.emulate import options_of
 from seerob.core.errors import InputError
 
 KINDS = {
+    "headset": ["--port", "1"],
     "natnet": ["--port", "0", "--version", "3.1"],
     "rokoko": ["--port", "1", "--lz4", "--version", "2"],
     "vive": ["--port", "0", "--websocket", "--trackers", "all"],
@@ -40,3 +41,12 @@ def test_a_rate_that_the_device_does_not_have_is_refused(kind, rate):
 def test_a_motion_that_is_not_there_is_named(kind):
     with pytest.raises(InputError, match=r"nothing_there\.toml"):
         emulated(kind, "--file", "nothing_there.toml")
+
+
+def test_what_hands_take_is_read_in_words_and_mistakes_are_named():
+    emulated("headset", "--grabs", "4.5 right_hand blank_1, 8 right_hand")
+    for wrong in ("right_hand blank", "soon right_hand blank", "1 right_hand a b"):
+        with pytest.raises(InputError, match="--grabs: .* SECONDS HAND PIECE"):
+            emulated("headset", "--grabs", wrong)
+    with pytest.raises(InputError, match="network of their own"):
+        emulated("headset", "--drop", "0.1")

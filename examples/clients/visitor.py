@@ -13,7 +13,7 @@ import ssl
 import time
 from typing import Any
 
-import msgpack
+import msgpack  # type: ignore[import-untyped]
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
@@ -71,7 +71,7 @@ if __name__ == "__main__":
     parser.add_argument("--authority", help="certificate of the server's authority, from its /trust")
     parser.add_argument("--name", default="python")
     parser.add_argument("--seconds", type=float, default=10.0)
-    seen = asyncio.run(visit(**vars(parser.parse_args())))
+    seen: tuple[dict[Any, Any], ...] = asyncio.run(visit(**vars(parser.parse_args())))
     for what, values in zip(("body", "result", "visitor"), seen, strict=True):
         for key, value in values.items():
             print(what, key, value)

@@ -5,6 +5,7 @@ import logging
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from datetime import datetime
 
 import httpx
@@ -18,6 +19,7 @@ from seerob.core.snapshot import Hello, Snapshot, Transport
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 from server.frames import MESHES, PATIENCE, Visitor, scene, snapshot
+from server.test_company import Guest, presence
 from soak.cut_short import workstation
 
 CLI = [sys.executable, "-m", "seerob.app.cli"]
@@ -159,3 +161,37 @@ def test_what_would_not_protect_is_refused_before_anything_is_served(
     assert code == 3
     assert said in err
     assert "page" not in out
+
+
+@pytest.mark.parametrize("names", [False, True])
+def test_everybody_is_recorded_with_their_places_and_names_only_when_asked(tmp_path, names):
+    with ExitStack() as stack:
+        view = stack.enter_context(LiveView(scene=scene(), meshes=MESHES, port=0))
+        view.server.visits.names = names
+        a = stack.enter_context(Guest(view.server, name="Anna", scale=10.0))
+        writer = Recorder().open(scene(), MESHES, {}, tmp_path)
+        writer.watch(view.server.visits)
+        b = stack.enter_context(Guest(view.server, name="Berta", device="vr"))
+        b.say(presence(3.0, hands=False, points=bytes(24)))
+        a.sees(lambda every: b.hello.visitor in every)
+        writer.write(snapshot(0), ())
+        a.say(presence(4.0))
+        b.sees(lambda every: a.hello.visitor in every)
+        writer.write(snapshot(1), ())
+        writer.close()
+    with (tmp_path / "run.mcap").open("rb") as file:
+        everything = b"".join(m.data for *_, m in make_reader(file).iter_messages())
+    assert (b"Anna" in everything, b"Berta" in everything) == (names, names)
+    told = [v for v in visitors(tmp_path / "run.mcap") if v["event"] == "introduced"]
+    assert [(v["id"], v["name"], v["scale"]) for v in told] == [
+        (a.hello.visitor, "Anna" * names, 10.0),
+        (b.hello.visitor, "Berta" * names, 1.0),
+    ]
+    with (tmp_path / "run.mcap").open("rb") as file:
+        found = [json.loads(m.data) for *_, m in make_reader(file).iter_messages(topics=["/presences"])]
+    assert [[one["id"] for one in told["visitors"]] for told in found] == [[2], [1, 2]]
+    (one,) = found[0]["visitors"]
+    assert (one["head"][0], one["left"], len(one["points"])) == (3.0, None, 2)
+    assert found[1]["visitors"][0]["left"][:3] == pytest.approx([4.0, 0.3, 1.0])
+    recording = Recording.open(tmp_path / "run.mcap")
+    assert (recording.complete, recording.findings) == (True, ())

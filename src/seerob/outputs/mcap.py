@@ -57,6 +57,7 @@ from seerob.core.snapshot import (
     Label,
     Marker,
     Polyline,
+    Presences,
     Prism,
     Rays,
     Scene,
@@ -77,6 +78,7 @@ from seerob.recording.format import (
     FILE_PREFIX,
     MESH_PREFIX,
     METADATA,
+    PRESENCES,
     SAMPLES,
     SCENE,
     SNAPSHOT,
@@ -376,6 +378,31 @@ _RESULTS_SCHEMA = {
     },
 }
 _NUMBERS = {"type": "object", "additionalProperties": {"type": ["number", "null"]}}
+_LIMB, _POINT = struct.Struct("<7f"), struct.Struct("<3f")
+
+
+def _limb(pose: tuple[float, ...]) -> tuple[float, ...] | None:
+    return None if math.isnan(pose[0]) else pose
+
+
+_NUMBERS = {"type": "array", "items": {"type": "number"}}
+_PRESENCES_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "t": {"type": "number"},
+        "visitors": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "properties": {
+                    "id": {"type": "integer"},
+                    **{key: {**_NUMBERS, "type": ["array", "null"]} for key in ("head", "left", "right")},
+                    **{key: {"type": "array", "items": _NUMBERS} for key in ("points", "laser")},
+                },
+            },
+        },
+    },
+}
 _PEOPLE_SCHEMA = {
     "type": "object",
     "properties": {
@@ -403,6 +430,10 @@ _VISITOR_SCHEMA = {
         "since": {"type": "string"},
         "until": {"type": ["string", "null"]},
         "refused": {"type": "object", "additionalProperties": {"type": "integer"}},
+        "id": {"type": "integer"},
+        **{key: {"type": "string"} for key in ("name", "device", "human")},
+        "scale": {"type": "number"},
+        **dict.fromkeys(("position", "turn"), _NUMBERS),
     },
 }
 
@@ -530,6 +561,24 @@ class McapTape:
             self._channels[VISITORS] = self._mcap.register_channel(VISITORS, "json", schema)
         for visitor in visitors:
             self._put(VISITORS, 0, t, msgspec.json.encode({"t": t, **msgspec.to_builtins(visitor)}))
+
+    def presences(self, t: float, told: Presences) -> None:
+        """Append where visitors were."""
+        if PRESENCES not in self._channels:
+            schema = self._mcap.register_schema(
+                "seerob.Presences", "jsonschema", json.dumps(_PRESENCES_SCHEMA).encode()
+            )
+            self._channels[PRESENCES] = self._mcap.register_channel(PRESENCES, "json", schema)
+        visitors = [
+            {
+                "id": one.id,
+                **dict(zip(("head", "left", "right"), map(_limb, _LIMB.iter_unpack(one.poses)), strict=True)),
+                "points": list(_POINT.iter_unpack(one.points)),
+                "laser": list(_POINT.iter_unpack(one.laser)),
+            }
+            for one in told.visitors
+        ]
+        self._put(PRESENCES, 0, t, msgspec.json.encode({"t": t, "visitors": visitors}))
 
     def flush(self) -> None:
         """End the chunk and hand it to the disk: what was written so far survives the process."""

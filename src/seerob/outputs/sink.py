@@ -11,7 +11,7 @@ from typing import Protocol, Self, runtime_checkable
 from msgspec import Struct
 
 from seerob.core.samples import Sample
-from seerob.core.snapshot import CriterionInfo, Scene, Snapshot, SourceLine
+from seerob.core.snapshot import CriterionInfo, Presences, Scene, Snapshot, SourceLine
 from seerob.recording.format import Visitor
 from seerob.recording.result_log import ResultLog
 
@@ -76,6 +76,9 @@ class Visited(Protocol):
 
     def take(self, *, end: bool = False) -> tuple[Visitor, ...]:
         """What happened since the last call; at the ``end`` also who is there still."""
+
+    def seen(self) -> Presences | None:
+        """Where visitors are, if anybody has moved since the last call."""
 
 
 @runtime_checkable

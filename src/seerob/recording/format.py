@@ -24,7 +24,7 @@ from pathlib import Path, PurePosixPath
 from msgspec import Struct
 
 from seerob.core.files.bounded import leads_outside
-from seerob.core.samples import Sample
+from seerob.core.samples import Sample, Vec3, Vec4
 
 OUTSIDE = "outside"
 
@@ -183,6 +183,7 @@ VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf
 VIEW_PEOPLE = "/people"
 """For foreign viewers; `VIEW_SCENE` is sent once, the others from time to time."""
 VISITORS = "/visitors"
+PRESENCES = "/presences"
 """Who looked on; only where somebody did."""
 
 MESH_PREFIX = "mesh/"
@@ -204,7 +205,8 @@ class Visitor(Struct, frozen=True, kw_only=True):
     """A page that was connected to the run, or an address that was not let in."""
 
     event: str
-    """``came``, ``left``, ``there`` (at the end of the recording) or ``refused``."""
+    """``came``, ``introduced`` (who they are, or where they stand, is another), ``left``, ``there`` (at the
+    end of the recording) or ``refused``."""
     role: str
     """``view``, ``track``, ``control``; ``any`` where no token is asked for, ``none`` of strangers."""
     address: str
@@ -213,6 +215,19 @@ class Visitor(Struct, frozen=True, kw_only=True):
     until: str | None = None
     refused: dict[str, int] = {}
     """What was asked for in vain, and how often by now."""
+    id: int = 0
+    """Number of the visitor, by which `/presences` names them; 0 of who was not let in."""
+    name: str = ""
+    """What they call themselves, where the run was told to record it; empty otherwise."""
+    device: str = ""
+    human: str = ""
+    """Person of the workstation file whom they are."""
+    scale: float = 1.0
+    """Metres of the world in a metre of theirs."""
+    position: Vec3 = (0.0, 0.0, 0.0)
+    """Where the floor of their room lies in the world [m]."""
+    turn: Vec4 = (1.0, 0.0, 0.0, 0.0)
+    """How the axes of their room (x right, y up, z backward) are turned in the world, w first."""
 
 
 def nanoseconds(t: float) -> int:

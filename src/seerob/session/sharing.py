@@ -251,7 +251,7 @@ def _written(
             dropped.append(f"the file {name}: what was asked of it is in the samples")
         else:
             kept[name] = _cleaned(name, content, words)
-    dropped.append("who looked on (/visitors), where anybody did")
+    dropped.append("who looked on (/visitors, /presences), where anybody did")
     new = {key: value for key, value in table.items() if key not in _DROPPED_TABLES}
     gone = [key for key in _DROPPED_TABLES if key in table]
     dropped += [f"{', '.join(gone)} of the workstation file"] if gone else []

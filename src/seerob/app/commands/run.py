@@ -70,6 +70,8 @@ def add_live(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
     )
+    text = "also record what visitors call themselves; without it they are numbers"
+    sub.add_argument("--record-names", action="store_true", help=text)
     sub.add_argument("--no-record", action="store_true", help="no recording and no report")
     sub.add_argument("--seconds", type=seconds, help="end the run after this time")
 
@@ -197,6 +199,7 @@ def live(
             for writer in opened:
                 if isinstance(writer, RecordsVisitors):
                     writer.watch(view.server.visits)
+                    view.server.visits.names = options.record_names
             tell_pages(view.server, "Ctrl-C ends the run", options)
             for each in emulators:
                 each.find_page(view.server.port)

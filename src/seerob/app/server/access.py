@@ -29,6 +29,7 @@ from time import monotonic
 from typing import NamedTuple, Self
 
 from seerob.core.errors import InputError
+from seerob.core.snapshot import Introduction, Presences
 from seerob.recording.format import Visitor
 
 
@@ -239,6 +240,9 @@ class Visit:
         self.role, self.address = role, address
         self.since = _now()
         self.refused: dict[str, int] = {}
+        self.id = 0
+        """Number by which other visitors know it."""
+        self.said = Introduction()
 
     def refuse(self, what: str) -> None:
         """Note that something was asked for and not done; told when it is the first of its kind."""
@@ -248,6 +252,11 @@ class Visit:
             self.refused[what] = 1
             _log.warning("page of %s (%s): refused: %s", self.address, self.role, what)
             self._visits.add(self.event("refused"))
+
+    def introduce(self, said: Introduction) -> None:
+        """Note who the visitor is, and where their room stands."""
+        self.said = said
+        self._visits.add(self.event("introduced"))
 
     def leave(self) -> None:
         """The page is gone."""
@@ -262,6 +271,13 @@ class Visit:
             since=self.since,
             until=_now() if what == "left" else None,
             refused=dict(self.refused),
+            id=self.id,
+            name=self.said.name if self._visits.names else "",
+            device=self.said.device if self.id else "",
+            human=self.said.human,
+            scale=self.said.scale,
+            position=self.said.position,
+            turn=self.said.turn,
         )
 
 
@@ -273,10 +289,14 @@ class Visits:
         self._events: deque[Visitor] = deque(maxlen=WAITING)
         self._present: set[Visit] = set()
         self._strangers: OrderedDict[str, Visit] = OrderedDict()
+        self.names = False
+        """Whether whoever records is told what visitors call themselves."""
+        self._seen: Presences | None = None
 
-    def come(self, role: str, address: str) -> Visit:
-        """Somebody is connected."""
+    def come(self, role: str, address: str, number: int = 0) -> Visit:
+        """Somebody is connected, with a number that no other visitor has."""
         visit = Visit(self, role, address)
+        visit.id = number
         with self._lock:
             self._present.add(visit)
             self._events.append(visit.event("came"))
@@ -299,6 +319,15 @@ class Visits:
                 if len(self._strangers) > MOST_STRANGERS:
                     self._strangers.popitem(last=False)
         visit.refuse(why)
+
+    def see(self, presences: Presences) -> None:
+        """Somebody has moved: where all are."""
+        self._seen = presences
+
+    def seen(self) -> Presences | None:
+        """Where all are, if anybody has moved since the last call."""
+        found, self._seen = self._seen, None
+        return found
 
     def add(self, event: Visitor) -> None:
         """Keep an event for whoever records."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from itertools import count
 from math import hypot, inf, isnan
@@ -146,9 +146,14 @@ class Companion:
 
 
 class Company:
-    """All visitors of a server; everything here runs in the server's loop."""
+    """All visitors of a server; everything here runs in the server's loop.
 
-    def __init__(self) -> None:
+    Args:
+        see: Is told where all are, whenever the others are.
+    """
+
+    def __init__(self, see: Callable[[Presences], None] = lambda _: None) -> None:
+        self._see = see
         self._of: dict[Client, Companion] = {}
         self._numbers = count(1)
         self._told = -inf
@@ -182,9 +187,10 @@ class Company:
             one.visit.refuse("to be a person")
             said = msgspec.structs.replace(said, human="")
         first, one.said = one.said is None, said
+        one.visit.introduce(said)
         self._tell()
         if first:
-            client.offer(PRESENCES, self._presences())
+            client.offer(PRESENCES, _encode(self._presences()))
 
     def move(self, client: Client, said: Presence) -> None:
         """Somebody says where they are.
@@ -254,9 +260,10 @@ class Company:
             for client in listeners:
                 client.offer("Visitors", payload)
 
-    def _presences(self) -> bytes:
-        every = tuple(one.presence for one in self._of.values() if one.presence is not None)
-        return _encode(Presences(visitors=every))
+    def _presences(self) -> Presences:
+        return Presences(
+            visitors=tuple(one.presence for one in self._of.values() if one.presence is not None)
+        )
 
     def _soon(self) -> None:
         """Say where all are with the next frame, or as soon as it may be said again."""
@@ -270,7 +277,9 @@ class Company:
             return
         self._due.cancel()
         self._due, self._told = None, monotonic()
-        payload = self._presences()
+        presences = self._presences()
+        self._see(presences)
+        payload = _encode(presences)
         for one in self._of.values():
             if one.said is not None:
                 one.client.offer(PRESENCES, payload)

@@ -139,7 +139,7 @@ class Hub:
         self._until = inf
         self._ended: Closing | None = None
         self.clients: set[Client] = set()
-        self.company = Company()
+        self.company = Company(self._visits.see)
         """Visitors as they see each other."""
 
     def begin(self, scene: Scene) -> None:
@@ -214,7 +214,7 @@ class Hub:
         self.clients.add(client)
         if self._desk is not None and edits:
             self._desk.come(client)
-        visit = self._visits.come(state["role"], address)
+        visit = self._visits.come(state["role"], address, number)
         self.company.come(client, visit, state["roles"], number)
         listening = self._listen(client, socket, visit, state["roles"])
         tasks = [asyncio.create_task(client.send()), asyncio.create_task(listening)]

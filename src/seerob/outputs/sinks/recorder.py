@@ -15,7 +15,7 @@ from msgspec import Meta
 from seerob.core.errors import InputError, SeerobError, ended_by
 from seerob.core.printable import printable
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Finding, Scene, Snapshot
+from seerob.core.snapshot import Finding, Presences, Scene, Snapshot
 from seerob.outputs.sink import Closing, Sink, Visited
 from seerob.recording.format import Visitor
 
@@ -77,6 +77,7 @@ class _Waiting(NamedTuple):
     samples: tuple[Sample, ...]
     snapshot: Snapshot | None
     visitors: tuple[Visitor, ...] = ()
+    presences: Presences | None = None
 
 
 class RecorderWriter(Closing):
@@ -142,8 +143,11 @@ class RecorderWriter(Closing):
             kept = snapshot if backlog < self._queue else None
             if kept is None:
                 self.dropped += 1
-            visitors = () if self._visited is None else self._visited.take()
-            self._waiting.append(_Waiting(seq, t, samples, kept, visitors))
+            visitors: tuple[Visitor, ...] = ()
+            presences = None
+            if self._visited is not None:
+                visitors, presences = self._visited.take(), self._visited.seen()
+            self._waiting.append(_Waiting(seq, t, samples, kept, visitors, presences))
             self._condition.notify_all()
 
     def __exit__(
@@ -220,6 +224,8 @@ class RecorderWriter(Closing):
             for tick in taken:
                 self._tape.tick(tick.seq, tick.t, tick.samples, tick.snapshot)
                 self._tape.visitors(tick.t, tick.visitors)
+                if tick.presences is not None:
+                    self._tape.presences(tick.t, tick.presences)
             if oldest is not None and time.monotonic() - oldest >= FLUSH_PERIOD:
                 self._tape.flush()
                 oldest = None

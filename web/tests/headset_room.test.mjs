@@ -37,8 +37,8 @@ at = { position = [0.3, -0.2, 0.826] }
 torn = 0.6
 [[places]]
 name = "box"
-at = { position = [0.3, 0.2, 0.9] }
-size = [0.6, 0.3, 0.3]
+at = { position = [0.3, 0.3, 0.9] }
+size = [0.9, 0.7, 0.4]
 ends_round = true
 [[humans]]
 name = "operator"
@@ -147,7 +147,7 @@ const inRoom = (point) => page.evaluate((p) => window.seerob.inRoom(p), point);
 async function reach(point, short = 0.1) {
   const [x, y, z] = await inRoom(point);
   await put(page, [0, 1.64, 0], [x, y + 0.02, z + short], [0, -0.1, -1]);
-  await pictures(page, 3);
+  await pictures(page, 5);
 }
 
 async function until(name, holds) {
@@ -174,6 +174,9 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
   // The world of three.js has z of the cell as y, and y of the cell as -z.
   for (let k = 1; k <= 8; k += 1) await reach([x, y + 0.12, z - 0.05 * k]);
   await until("blank/body", (p) => p[2] < begin[2] - 0.3);
+  // Down to the table, and still.
+  await reach([x, y + 0.04, z - 0.4]);
+  await pictures(page, 12);
   await trigger(0);
   await page.locator(".events li", { hasText: "round ended" }).waitFor({ timeout: 60_000 });
   const lines = await events();

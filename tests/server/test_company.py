@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from contextlib import ExitStack
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -299,3 +300,10 @@ def test_entries_that_differ_are_found_by_name():
     assert changed_entries(before, after) == {"a", "c"}
     assert changed_entries(before, before | {"robots": [{"name": "a", "x": 2}, {"name": "b"}]}) == {"a"}
     assert changed_entries(before, before) == set()
+
+
+def test_the_benchmark_of_visitors_runs():
+    file = Path(__file__).parents[2] / "benchmarks" / "visitors.py"
+    done = subprocess.run([sys.executable, file, "--smoke"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "poses heard late" in done.stdout

@@ -1,5 +1,5 @@
-// A visitor who works in a real run: takes a workpiece, puts it into a box, pulls a lever; then the run again.
-
+// By hand (node --test tests/headset_room.soak.mjs), on a machine that keeps real time: a visitor who works in a real run:
+// takes a workpiece, puts it into a box, pulls a lever; then the run again. Beside other work hands swing, and it fails.
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import os from "node:os";

@@ -1,11 +1,13 @@
 """Loose workpieces: hands take, carry, hand over and put them down, and nothing but forces moves them."""
 
+import msgspec
 import numpy as np
 import pytest
 
 from seerob import load
 from seerob.core.errors import InputError
 from seerob.core.samples import GrabSample, JointSample
+from seerob.recording.format import Tick
 from seerob.twin.engine import Engine
 
 PERSON = """
@@ -231,3 +233,12 @@ def test_what_cannot_be_is_said_with_its_place(tmp_path, text, said):
     (tmp_path / "workstation.toml").write_text(text)
     with pytest.raises(InputError, match=said):
         _ = load(tmp_path).model
+
+
+def test_the_same_grabs_move_everything_the_same_bit_for_bit(tmp_path):
+    grab = GrabSample(source="room", seq=0, t=0.5, target=RIGHT, piece="blank")
+    tick = Tick(seq=1, t=0.5, samples=(grab,))
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(tick), type=Tick) == tick
+    one, other = (carried(tmp_path) for _ in range(2))
+    assert one.state.poses() == other.state.poses()
+    assert one.events == other.events

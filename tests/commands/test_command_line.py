@@ -498,7 +498,8 @@ def test_other_machines_are_served_encrypted_with_tokens_that_seerob_makes(
     code, out, _ = seerob(capsys, *asked)
     assert code in (0, 2)
     pages = [line.split("https://localhost:")[1] for line in out.splitlines() if "https://localhost:" in line]
-    tokens = [page.split("?token=")[1].split()[0] for page in pages]
+    tokens = [page.split("?token=")[1].split()[0] for page in pages if "?token=" in page]
+    assert pages[-1].split()[0].endswith("/trust")
     assert len(set(tokens)) == 3
     assert {len(token) for token in tokens} == {32}
     assert str(tmp_path / "seerob" / "tls" / "authority.pem") in out

@@ -46,7 +46,7 @@ def test_a_motion_that_is_not_there_is_named(kind):
 def test_what_hands_take_is_read_in_words_and_mistakes_are_named():
     emulated("headset", "--grabs", "4.5 right_hand blank_1, 8 right_hand")
     for wrong in ("right_hand blank", "soon right_hand blank", "1 right_hand a b"):
-        with pytest.raises(InputError, match="--grabs: .* SECONDS HAND PIECE"):
+        with pytest.raises(InputError, match=r"--grabs: .* SECONDS HAND PIECE"):
             emulated("headset", "--grabs", wrong)
     with pytest.raises(InputError, match="network of their own"):
         emulated("headset", "--drop", "0.1")

@@ -124,6 +124,7 @@ def test_a_run_says_so_when_there_is_none(tmp_path, capsys):
     assert "emulators: none is named" in capsys.readouterr().err
 
 
+@pytest.mark.xdist_group("cells")  # their devices have their usual ports
 @pytest.mark.parametrize(
     ("cell", "sources", "emulators"),
     [

@@ -72,7 +72,7 @@ def test_what_waits_to_be_sent_when_it_gets_too_old_is_not_sent():
 
         class Socket:
             async def send(self, message):
-                sent.append(message["bytes"])
+                sent.extend(message.get("every") or [message["bytes"]])
 
         client = Client(Socket(), patience=10.0)
         client.offer_frame(1, b"old", monotonic() - 0.01)

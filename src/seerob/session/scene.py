@@ -166,7 +166,7 @@ def place_of(model: Model, name: str, frame: Frame | None, at: Array, accuracy: 
         else:
             raise UnknownName("link with a shape", frame.name, [body.name for body in model.bodies])
     x, y, z = at[:3, 3].tolist()
-    w, i, j, k = wxyz_from_rotation(at[:3, :3])
+    w, i, j, k = map(float, wxyz_from_rotation(at[:3, :3]))
     return Place(name=name, node=node, position=(x, y, z), wxyz=(w, i, j, k), accuracy=accuracy)
 
 

@@ -74,6 +74,7 @@ for (const [name, go] of Object.entries(STATES)) {
 
 test("dark or light is the system's choice until one is made here, which is kept", async () => {
   await page.keyboard.press("Escape");
+  await page.setViewportSize({ width: SIZES.desk[0], height: SIZES.desk[1] });
   await page.emulateMedia({ colorScheme: "dark" });
   await page.waitForFunction(() => document.documentElement.dataset.theme === "dark");
   const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);

@@ -299,12 +299,14 @@ test("a picture, and the figures of the instant, are what is shown", async () =>
     ]);
     return fs.readFileSync(await download.path());
   };
+  const size = () =>
+    page.evaluate(() => [...document.querySelectorAll(".room canvas")].map((c) => [c.width, c.height])[0]);
+  // Pixels get larger or smaller meanwhile where pictures come slowly.
+  const before = await size();
   const picture = await taken("Picture");
   assert.equal(picture.subarray(1, 4).toString(), "PNG");
-  const size = await page.evaluate(
-    () => [...document.querySelectorAll(".room canvas")].map((c) => [c.width, c.height])[0],
-  );
-  assert.deepEqual([picture.readUInt32BE(16), picture.readUInt32BE(20)], size);
+  const sizes = [before, await size()].map(String);
+  assert.ok(sizes.includes(String([picture.readUInt32BE(16), picture.readUInt32BE(20)])));
   const told = JSON.parse(await taken("Figures (JSON)"));
   const table = (await taken("Figures (CSV)")).toString().trim().split("\r\n");
   assert.equal(table.length, told.results.length + 1);

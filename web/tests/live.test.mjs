@@ -85,9 +85,16 @@ test("rows stay where they are below a pointer that moves, and are in order agai
       return rows.map((row) => [row.dataset.criterion, row.querySelector(".badge").textContent]);
     });
   const names = (rows) => rows.map(([name]) => name);
-  const { x, y, height } = await page.locator('tr[data-criterion="separation"]').boundingBox();
+  const { x, y, height } = await page.locator("tr[data-criterion]").first().boundingBox();
   await page.mouse.move(x + 20, y + height / 2);
-  const before = await order();
+  // What was to change places before the pointer came has done so.
+  let before = await order();
+  for (let after = null; String(after) !== String(before); ) {
+    before = after ?? before;
+    await page.mouse.move(x + 20 + Math.random(), y + height / 2);
+    await page.waitForTimeout(300);
+    after = await order();
+  }
   // Until a verdict has changed, and for longer than rows may stay out of order.
   let changed = null;
   for (let step = 0; changed === null || Date.now() < changed + 1_500; step += 1) {

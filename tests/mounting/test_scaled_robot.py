@@ -8,6 +8,9 @@ import pytest
 
 import seerob as sr
 from seerob.core.errors import InputError
+from seerob.core.snapshot import Origin
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
+from seerob.description.robots.scaled import scaled
 
 ROBOT = 'title = "one robot"\n[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
 
@@ -48,6 +51,17 @@ def test_shapes_and_limits_follow_and_the_findings_say_that_there_is_no_such_rob
     assert (small.scale, big.scale) == (1, 10)
     assert [f for f in large.scene().findings if "does not exist" in f.text and f.level == "warning"]
     assert not [f for f in real.scene().findings if "does not exist" in f.text]
+
+
+@pytest.mark.parametrize("origin", Origin)
+def test_what_nobody_knows_of_the_real_one_is_known_no_better(origin):
+    inertial = Inertial(1.0, np.zeros(3), np.eye(3), origin, "somebody")
+    joint = Joint("j", JointKind.REVOLUTE, np.array([0, 0, 1.0]), effort=Quantity(5.0, origin, "somebody"))
+    link = Link("l", None, np.eye(4), joints=(joint,), inertial=inertial)
+    (large,) = scaled(Description("r", (link,), "l", "a file"), 2.0, name="r").links
+    unknown = origin in (Origin.ASSUMED, Origin.MISSING, Origin.ESTIMATED, Origin.CHOICE)
+    expected = origin if unknown else Origin.COMPUTED
+    assert large.inertial.origin == large.joints[0].effort.origin == expected
 
 
 @pytest.mark.parametrize("text", ["scale = 10\nreal = true\n", "scale = 0\n", "scale = 1e9\n"])

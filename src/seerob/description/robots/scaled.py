@@ -77,7 +77,13 @@ def _quantity(given: Quantity | None, factor: float, s: float) -> Quantity | Non
     if given is None:
         return None
     source = f"{given.source}, × {factor:.4g} for a robot {s:g} times as large"
-    return Quantity(given.value * factor, Origin.COMPUTED, source, given.error)
+    return Quantity(given.value * factor, _origin(given.origin), source, given.error)
+
+
+def _origin(given: Origin) -> Origin:
+    """What was measured or stated is computed from that; what nobody knows is known no better."""
+    known = (Origin.MEASURED, Origin.STATED, Origin.GIVEN)
+    return Origin.COMPUTED if given in known else given
 
 
 def _inertial(given: Inertial, s: float) -> Inertial:
@@ -87,7 +93,7 @@ def _inertial(given: Inertial, s: float) -> Inertial:
         mass=given.mass * s**3,
         com=given.com * s,
         inertia=given.inertia * s**5,
-        origin=Origin.COMPUTED,
+        origin=_origin(given.origin),
         source=source,
     )
 

@@ -101,15 +101,22 @@ def test_what_cannot_or_must_not_be_is_refused_with_its_key(tmp_path, table, sai
         pass
 
 
-def test_a_port_that_is_taken_is_named_and_nothing_is_left_behind(tmp_path):
-    free = free_port(socket.SOCK_STREAM)
+def test_two_at_one_port_are_refused(tmp_path):
+    file = station(tmp_path, rtde(1234) + rtde(1234))
+    said = r"emulators\[1\].port: emulators\[0\] listens at 127.0.0.1:1234, too"
+    with pytest.raises(InputError, match=said), emulated(read(file).emulators, file):
+        pass
+
+
+def test_where_its_port_is_taken_it_says_which_it_has_instead(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        file = station(tmp_path, rtde(free) + rtde(port))
-        said = rf"emulators\[1\]: rtde: .*127.0.0.1:{port}"
-        with pytest.raises(InputError, match=said), emulated(read(file).emulators, file):
-            pass
-    assert not listens(free)
+        file = station(tmp_path, rtde(port))
+        with emulated(read(file).emulators, file) as (running,):
+            (move,) = running.moves
+            assert move.taken == port
+            assert running.at == f"listens at 127.0.0.1:{move.port}"
+            assert listens(move.port)
 
 
 def test_options_of_a_kind_are_checked_as_the_file_is_read(tmp_path):
@@ -124,27 +131,41 @@ def test_a_run_says_so_when_there_is_none(tmp_path, capsys):
     assert "emulators: none is named" in capsys.readouterr().err
 
 
-@pytest.mark.xdist_group("cells")  # their devices have their usual ports
 @pytest.mark.parametrize(
     ("cell", "sources", "emulators"),
     [
-        ("motor_station", {"iiwa", "operator"}, 2),
         ("assembly_line", {"ur10", "operator"}, 2),
         ("empty_room", {"ur5", "visitor"}, 2),
         ("three_robots", {"iiwa_left", "ur10", "iiwa_right", "visitor"}, 1),
         ("giant_niryo", {"niryo", "operator"}, 2),
     ],
 )
-def test_cells_of_the_paper_run_without_their_devices(tmp_path, capsys, cell, sources, emulators):
+def test_cells_of_the_paper_run_without_their_devices(tmp_path, cell, sources, emulators):
     folder = tmp_path / "run"
-    ended = cli.main(
-        ["run", str(CELLS / cell), "--emulated", "--port", "0", "--seconds", "2", "-o", str(folder)]
-    )
-    assert ended != Exit.ERROR
+    assert cli.main(emulated_run(cell, folder)) != Exit.ERROR
     recording = Recording.open(folder / "run.mcap")
-    samples = [sample for tick in recording.ticks() for sample in tick.samples]
-    heard = {sample.target for sample in samples if isinstance(sample, JointSample | BodySample)}
-    assert heard == sources
+    assert heard(recording) == sources
     said = [f for f in recording.scene.findings if f.subject.startswith("emulators[")]
     assert len(said) == emulators
     assert all("no device, an emulator" in finding.text for finding in said)
+
+
+def emulated_run(cell: str, folder: Path) -> list[str]:
+    return ["run", str(CELLS / cell), "--emulated", "--port", "0", "--seconds", "2", "-o", str(folder)]
+
+
+def heard(recording: Recording) -> set[str]:
+    samples = [sample for tick in recording.ticks() for sample in tick.samples]
+    return {sample.target for sample in samples if isinstance(sample, JointSample | BodySample)}
+
+
+def test_another_cell_of_the_paper_runs_twice_at_once(tmp_path, capfd):
+    """Neither hears the other's devices: of two who send to one port both would be told."""
+    command = [sys.executable, "-m", "seerob", *emulated_run("motor_station", tmp_path / "one")]
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL) as other:
+        ended = cli.main(emulated_run("motor_station", tmp_path / "two"))
+        assert Exit.ERROR not in (ended, other.wait(300))
+    said = "".join(capfd.readouterr())
+    for name in ("one", "two"):
+        assert heard(Recording.open(tmp_path / name / "run.mcap")) == {"iiwa", "operator"}
+    assert "sends to port" not in said

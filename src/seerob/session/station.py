@@ -215,6 +215,17 @@ class Station:
         other.model = replaced(model, findings=findings)
         return other
 
+    def with_addresses(self, workstation: Workstation) -> Station:
+        """Return the compiled workstation with sources and targets elsewhere; nothing is compiled again.
+
+        Args:
+            workstation: The same but for their addresses.
+        """
+        other = object.__new__(Station)
+        other._cache, other.workstation = self._cache, workstation
+        other.model = replaced(self.model, workstation=workstation)
+        return other
+
     def open_sinks(self, sinks: Sequence[Sink], folder: Path, scene: Scene) -> list[Writer]:
         """Open sinks for one run, all or none.
 

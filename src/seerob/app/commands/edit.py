@@ -25,9 +25,10 @@ from seerob.app.console.visiting import Visiting, add_page, tell_pages, visiting
 from seerob.core.errors import SeerobError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from seerob.app.emulation.ports import Move
     from seerob.app.server.desk import Desk
     from seerob.app.server.live import Shown
     from seerob.app.server.serving import Server
@@ -64,7 +65,9 @@ def run(options: argparse.Namespace) -> int:
     return Exit.WITHIN
 
 
-def edited(station: Station, options: argparse.Namespace, *, running: bool) -> None:
+def edited(
+    station: Station, options: argparse.Namespace, *, running: bool, moves: Sequence[Move] = ()
+) -> None:
     """Let pages edit the file, and run the draft while they want that; ends as `run` does.
 
     Args:
@@ -72,10 +75,11 @@ def edited(station: Station, options: argparse.Namespace, *, running: bool) -> N
         options: Of the command.
         running: Whether the draft is tried from the start, and may connect to the live sources that the file
             has now; otherwise one that connects to nothing is tried when a page asks.
+        moves: Of what emulates its devices, to other ports than the file says.
     """
     server, desk, trial = serving(
         station, options.workstation, allowed(options), options.host, options.port, visiting(options),
-        running=running,
+        running=running, moves=moves,
     )  # fmt: skip
     stopped = Stopped()
     with server:
@@ -125,6 +129,7 @@ def serving(
     visits: Visiting,
     *,
     running: bool = False,
+    moves: Sequence[Move] = (),
 ) -> tuple[Server, Desk, Trial]:
     """A server whose pages edit a workstation, the draft that they edit, and the trial of it.
 
@@ -136,8 +141,10 @@ def serving(
         port: Port, 0 for any.
         visits: Who may visit.
         running: See `edited`.
+        moves: See `edited`.
     """
     from seerob.app.commands.schema import schema
+    from seerob.app.emulation.ports import at_ports
     from seerob.app.server.desk import Checked, Desk
     from seerob.app.server.serving import Server
     from seerob.app.server.trial import Begun, Trial
@@ -159,7 +166,7 @@ def serving(
     trial = Trial(Begun(station, scene, station.first(scene)), running=running, refusal=refusal)
 
     def check(raw: bytes) -> Checked:
-        edited = compiled(path, allow, quiet=True, raw=raw)
+        edited = at_ports(compiled(path, allow, quiet=True, raw=raw), moves)
         scene = edited.scene()
         begun = Begun(edited, scene, edited.first(scene))
         return Checked(lambda: trial.put(begun), partial(_distance, edited, scene))

@@ -127,7 +127,7 @@ def run(options: argparse.Namespace) -> int:
     """
     asked = options_of(options.kind, options.options)
     stopped = Stopped()
-    with served(options.kind, asked) as (_, what, at, commands):
+    with served(options.kind, asked) as (_, what, at, commands, _):
         line("emulates", what, "bold")
         way, address = at.split(" ", 1)
         line(way, f"{options.kind} {address}  (Ctrl-C ends)")

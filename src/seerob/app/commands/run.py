@@ -33,6 +33,7 @@ from seerob.core.snapshot import Finding
 from seerob.workstation.workstation import locate
 
 if TYPE_CHECKING:
+    from seerob.app.emulation.ports import Move
     from seerob.app.emulation.processes import Running
     from seerob.core.snapshot import Scene
     from seerob.outputs.sink import Writer
@@ -91,6 +92,10 @@ def run(options: argparse.Namespace) -> int:
     station = compiled(options.workstation, allowed(options))
     describe(station)
     with _emulated(station, locate(options.workstation), wanted=options.emulated) as running:
+        if moves := tuple(move for each in running for move in each.moves):
+            from seerob.app.emulation.ports import at_ports
+
+            station = at_ports(station, moves)
         reach(station)
         scene = station.scene()
         said = tuple(
@@ -99,14 +104,14 @@ def run(options: argparse.Namespace) -> int:
         )
         scene = replace(scene, findings=(*scene.findings, *said))
         tell(scene.findings, verbose=options.verbose)
-        found = _edited(station, options) if options.edit else live(station, scene, options, running)
+        found = _edited(station, options, moves) if options.edit else live(station, scene, options, running)
         for each in running:
             if each.ended:
                 line("warning", f"{each.key}: the emulator ({each.kind}) ended by itself", "yellow")
     return found
 
 
-def _edited(station: Station, options: argparse.Namespace) -> int:
+def _edited(station: Station, options: argparse.Namespace, moves: Sequence[Move]) -> int:
     """Run the draft that pages edit; what it came to is of no file and no verdict.
 
     Raises:
@@ -119,7 +124,7 @@ def _edited(station: Station, options: argparse.Namespace) -> int:
             option = f"--{name.replace('_', '-')}"
             raise InputError.at("seerob run", option, "not with --edit", "leave one of them out")
     line("note", "a trial: nothing is recorded, reported or written to machines; edits begin it anew")
-    edited(station, options, running=True)
+    edited(station, options, running=True, moves=moves)
     return Exit.WITHIN
 
 
@@ -145,9 +150,11 @@ def _emulated(station: Station, file: Path, *, wanted: bool) -> Iterator[tuple[R
     with ExitStack() as stack:
         with spinner() as say:
             say("starting emulators")
-            running = stack.enter_context(emulated(emulators, file))
+            running = stack.enter_context(emulated(emulators, file, station.workstation.sources))
         for each in running:
             line("emulates", f"{each.kind} {each.at}: {each.what.split(';')[0]}", "bold")
+            for move in each.moves:
+                line("note", f"{each.kind}: {move}", "yellow")
         yield running
 
 

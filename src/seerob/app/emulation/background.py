@@ -15,6 +15,20 @@ from typing import Any, Self
 from seerob.protocols.links.tcp_server import stop_accepting
 
 
+class CannotListen(OSError):
+    """One of several ports of an emulator cannot be listened on.
+
+    Args:
+        error: Why.
+        option: Of the port: ``primary_port``.
+        where: Address and port.
+    """
+
+    def __init__(self, error: OSError, option: str, where: str) -> None:
+        super().__init__(error.errno, error.strerror)
+        self.option, self.where = option, where
+
+
 class Emulator:
     """Works in a thread of its own; derive, and say in `begin` what it does there."""
 

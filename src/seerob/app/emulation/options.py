@@ -95,6 +95,16 @@ class EmulatorOptions(Emulator, frozen=True, kw_only=True):
     garble: Annotated[float, option("share of its packets in which a bit is flipped", ge=0, le=1)] = 0.0
     seed: Annotated[int, option("of which packets these are", ge=0)] = 1
 
+    @property
+    def sends(self) -> bool:
+        """Whether it sends to somebody by itself, instead of listening."""
+        return hasattr(self, "to") and not getattr(self, "websocket", False)
+
+    @property
+    def listens(self) -> tuple[str, ...]:
+        """Options of the ports that it listens on."""
+        return () if self.sends or not hasattr(self, "port") else ("port",)
+
     def faults(self) -> Faults:
         """What happens on the way to whoever hears it."""
         return Faults(self.drop, self.delay, self.jitter, self.garble, self.seed)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from msgspec.structs import fields, replace
 
+from seerob.app.emulation.background import CannotListen
 from seerob.app.emulation.options import COMMAND, EmulatorOptions, Ready, Server
 from seerob.app.emulation.wire import FaultyWire
 from seerob.core.errors import InputError
@@ -26,6 +27,8 @@ class Served(NamedTuple):
     """``listens at`` or ``sends to`` an address."""
     commands: tuple[str, ...]
     """That hear it."""
+    ports: dict[str, int]
+    """Where it listens, by option."""
 
 
 @contextmanager
@@ -46,13 +49,18 @@ def served(kind: str, asked: EmulatorOptions) -> Iterator[Served]:
     try:
         server.start()
     except OSError as error:
-        found = f"cannot listen on {where}: {because(error)}"
-        raise InputError.at(COMMAND, "--port", found, "choose another, or 0 for any free one") from error
+        option = "port"
+        if isinstance(error, CannotListen):
+            option, where = error.option, error.where
+        found, key = f"cannot listen on {where}: {because(error)}", f"--{option.replace('_', '-')}"
+        raise InputError.at(COMMAND, key, found, "choose another, or 0 for any free one") from error
     try:
         to = getattr(server, "to", None)
         host, port = to or (getattr(server, "host", asked.host), getattr(server, "port", 0))
         commands = probes_of(kind, host, port, sends=bool(to), commands=made.commands)
-        yield Served(server, made.what, f"{'sends to' if to else 'listens at'} {host}:{port}", commands)
+        at = f"{'sends to' if to else 'listens at'} {host}:{port}"
+        ports = {option: getattr(server, option, 0) for option in asked.listens}
+        yield Served(server, made.what, at, commands, ports)
     finally:
         server.stop()
 
@@ -61,7 +69,7 @@ class _Behind:
     """An emulator and the bad network before it."""
 
     def __init__(self, asked: EmulatorOptions) -> None:
-        self._asked, self._sends = asked, sends(asked)
+        self._asked, self._sends = asked, asked.sends
         self.to: tuple[str, int] | None = None
         if self._sends:
             self.to = asked.to, asked.port  # type: ignore[attr-defined]
@@ -72,6 +80,8 @@ class _Behind:
         else:
             self.made = replace(asked, host="127.0.0.1", port=0).ready()
         self.host, self.port = asked.host, getattr(asked, "port", 0)
+        self.primary_port = 0
+        """Of a controller's kinematics, which no network spoils."""
 
     def start(self) -> None:
         """Begin both.
@@ -80,6 +90,7 @@ class _Behind:
             OSError: The address cannot be listened on.
         """
         self.made.server.start()
+        self.primary_port = getattr(self.made.server, "primary_port", 0)
         if not self._sends:
             inner = "127.0.0.1", getattr(self.made.server, "port", 0)
             at = self.host, self.port
@@ -94,11 +105,6 @@ class _Behind:
         """End both."""
         self._wire.stop()
         self.made.server.stop()
-
-
-def sends(asked: EmulatorOptions) -> bool:
-    """Whether it sends to somebody by itself, instead of listening."""
-    return hasattr(asked, "to") and not getattr(asked, "websocket", False)
 
 
 def with_faults(asked: EmulatorOptions) -> Ready:

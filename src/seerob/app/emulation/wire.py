@@ -19,6 +19,8 @@ from seerob.protocols.links.tcp_server import tcp_server
 
 AGAIN = 0.2
 """After which what a stream lost is sent again [s]: as Linux does at the earliest."""
+ATTEMPTS = 20
+"""Of a number that is free by TCP: by UDP somebody may have it."""
 LARGEST = 1 << 16
 """Most that is passed on at once [byte]."""
 
@@ -63,16 +65,34 @@ class FaultyWire(LoopEmulator):
 
     async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
         """Pass on until it is over."""
-        loop = asyncio.get_running_loop()
         async with AsyncExitStack() as both:
-            server = await both.enter_async_context(tcp_server(self._join, self.host, self.port))
-            self.port = server.sockets[0].getsockname()[1]
-            near = await loop.create_datagram_endpoint(
-                lambda: _Ends(self), local_addr=(self.host, self.port), family=socket.AF_UNSPEC
-            )
-            both.callback(near[0].close)
+            self.port = await self._listen(both)
             ready()
             await over.wait()
+
+    async def _listen(self, both: AsyncExitStack) -> int:
+        """By TCP and by UDP, at one number.
+
+        Raises:
+            OSError: One of them is taken.
+        """
+        loop = asyncio.get_running_loop()
+        for left in reversed(range(1 if self.port else ATTEMPTS)):
+            async with AsyncExitStack() as own:
+                server = await own.enter_async_context(tcp_server(self._join, self.host, self.port))
+                port: int = server.sockets[0].getsockname()[1]
+                try:
+                    near = await loop.create_datagram_endpoint(
+                        lambda: _Ends(self), local_addr=(self.host, port), family=socket.AF_UNSPEC
+                    )
+                except OSError:
+                    if left:
+                        continue
+                    raise
+                own.callback(near[0].close)
+                both.push_async_exit(own.pop_all())
+                return port
+        raise AssertionError
 
     def late(self) -> tuple[bool, float]:
         """Whether the next packet is lost, and how late it is [s]."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import math
+import socket
 import struct
 import time
 from collections.abc import Callable, Mapping
@@ -164,7 +166,8 @@ class ModbusServer(LoopEmulator):
 
         server = Server(device, address=(self.host, self.port))
         if not await server.listen() or server.transport is None:
-            raise OSError(f"cannot listen on {self.host}:{self.port}")
+            socket.create_server((self.host, self.port)).close()  # says why
+            raise OSError(errno.EADDRINUSE, "it was taken just now")
         self.port = server.transport.sockets[0].getsockname()[1]  # type: ignore[attr-defined]
         ready()
         try:

@@ -94,9 +94,12 @@ class OpcuaServer(LoopEmulator):
         return f"opc.tcp://{self.host}:{self.port}"
 
     def begin(self) -> Callable[[], object]:
-        """The loop, at a port that is free."""
-        if self.port == 0:
-            self.port = _free(self.host)
+        """The loop, at a port that is free: to build what it shows for one that is not takes long.
+
+        Raises:
+            OSError: It is taken.
+        """
+        self.port = _free(self.host, self.port)
         return super().begin()
 
     def now(self) -> float:
@@ -311,11 +314,10 @@ class _Cell:
         await self._server.write_attribute_value(node.nodeid, stamped)
 
 
-def _free(host: str) -> int:
+def _free(host: str, port: int) -> int:
     import socket
 
-    with socket.socket() as probe:
-        probe.bind((host, 0))
+    with socket.create_server((host, port)) as probe:
         return int(probe.getsockname()[1])
 
 

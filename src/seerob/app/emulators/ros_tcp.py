@@ -159,6 +159,11 @@ class RosTcp(RosOptions, frozen=True, kw_only=True):
         if self.unity and not self.port:
             raise ValueError("--port is 0 with --unity: name the endpoint's port")
 
+    @property
+    def listens(self) -> tuple[str, ...]:
+        """The endpoint's port; a Unity project connects."""
+        return () if self.unity else ("port",)
+
     def ready(self) -> Ready:
         """The endpoint, or the project."""
         if not self.unity:

@@ -17,7 +17,7 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Annotated
 
-from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.background import CannotListen, LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
 from seerob.app.emulation.ur_fields import INPUTS, MADE_UP, OUTPUTS, ControllerState, defaults
@@ -235,7 +235,12 @@ class RtdeServer(LoopEmulator):
             self._begun = time.monotonic()
             if self.kinematics is not None:
                 primary = tcp_server(self._say_kinematics, self.host, self.primary_port)
-                self.primary_port = (await both.enter_async_context(primary)).sockets[0].getsockname()[1]
+                try:
+                    said = await both.enter_async_context(primary)
+                except OSError as error:
+                    where = f"{self.host}:{self.primary_port}"
+                    raise CannotListen(error, "primary_port", where) from error
+                self.primary_port = said.sockets[0].getsockname()[1]
             ready()
             loop = asyncio.get_running_loop()
             for t, why in self._holds:
@@ -388,6 +393,11 @@ class Rtde(RobotOptions, frozen=True, kw_only=True):
     protective_stop_at: Annotated[float, option("it stops protectively then", "s", ge=0)] | None = None
     calibration: Annotated[str, option("kinematics it says it has: a file of seerob probe")] | None = None
     primary_port: Annotated[int, port("port where it says them; 0 is any free one")] = 30011
+
+    @property
+    def listens(self) -> tuple[str, ...]:
+        """Its port, and that where it says its kinematics."""
+        return ("port",) if self.calibration is None else ("port", "primary_port")
 
     def ready(self) -> Ready:
         """The controller."""

@@ -145,6 +145,8 @@ class Contact(NamedTuple):
     secret: str = ""
     """Name of the secret that is sent; empty for none."""
     encrypted: bool = False
+    listens: bool = False
+    """Whether it waits for the other end, on its own port."""
 
     def __str__(self) -> str:
         """One line."""
@@ -175,6 +177,7 @@ def contact_of(source: Any, *, listens: bool) -> Contact:
         getattr(source, "user", None) or "",
         next(filter(None, secrets), ""),
         getattr(source, "tls", False) or security != "none" or urlsplit(url).scheme in ENCRYPTED,
+        listens and not url,
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 import seerob as sr
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin
-from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
 from seerob.description.robots.scaled import scaled
 
 ROBOT = 'title = "one robot"\n[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
@@ -68,3 +68,34 @@ def test_what_nobody_knows_of_the_real_one_is_known_no_better(origin):
 def test_what_contradicts_itself_is_refused(tmp_path, text):
     with pytest.raises(InputError, match="scale"):
         station(tmp_path / "cell", text)
+
+
+@pytest.mark.parametrize(("scale", "told"), [(1.0, False), (0.5, True), (2.0, False)])
+def test_what_it_is_rated_for_follows_too(tmp_path, scale, told):
+    """6 kg are fewer than the 10 kg of a UR10, and more than the 1.25 kg of half of one."""
+    load = '[[tools]]\nname = "load"\non = "arm/tool0"\nshape = { box = [0.1, 0.1, 0.1] }\nmass = 6\n'
+    findings = station(tmp_path / "cell", f"scale = {scale}\n{load}").model.findings
+    assert bool([f for f in findings if "6 kg of 1.25 kg" in f.text and f.holds]) == told
+
+
+@pytest.mark.parametrize(
+    ("leads", "follows", "per"),
+    [
+        ("PRISMATIC",) * 2 + (1,),
+        ("REVOLUTE",) * 2 + (1,),
+        ("REVOLUTE", "PRISMATIC", 3),
+        ("PRISMATIC", "REVOLUTE", 1 / 3),
+    ],
+)
+def test_what_follows_another_joint_goes_as_far_for_its_size(leads, follows, per):
+    """A finger that slides by 0.1 m per radian slides by 0.3 m of one that is three times as large."""
+    axis = np.array([0, 0, 1.0])
+    led = Joint("b", JointKind[follows], axis, mimic=Mimic("a", 0.1, 0.02))
+    links = (
+        Link("base", None, np.eye(4)),
+        Link("l", "base", np.eye(4), joints=(Joint("a", JointKind[leads], axis),)),
+        Link("m", "l", np.eye(4), joints=(led,)),
+    )
+    mimic = scaled(Description("r", links, "m", "somebody"), 3.0, name="r").links[2].joints[0].mimic
+    offset = 0.06 if follows == "PRISMATIC" else 0.02
+    assert (mimic.multiplier, mimic.offset) == (pytest.approx(0.1 * per), pytest.approx(offset))

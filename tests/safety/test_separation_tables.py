@@ -96,6 +96,15 @@ def test_table_of_the_librarys_robot_is_known_to_be_its_own(tmp_path):
         assert results_at(cell, arm=q)["S"].verdict == verdict
 
 
+@pytest.mark.parametrize("scale", [1.01, 0.5])
+def test_table_of_the_librarys_robot_is_none_of_one_of_another_size(tmp_path, scale):
+    q = ([0.0, -1.2, 1.4, -1.5, -1.5, 0.0], [0.05, 0, 0, 0, 0, 0])
+    text = UR10.replace('"library:ur10"', f'"library:ur10"\nscale = {scale}') + PERSON.format(x=11.0)
+    text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\n{KNOWN}'
+    found = results_at(made(tmp_path, text + f"stop = {{ {UR10_TABLE} }}\n"), arm=q)["S"]
+    assert (found.verdict, f"library:ur10, × {scale:g}" in found.reason) == ("undecided", True)
+
+
 def test_table_without_a_payload_gives_its_printed_figures_once_the_file_says_which(tmp_path):
     """First axis of the shipped KUKA table: 30.47° in 0.38 s at full speed, here that of the UR10's base."""
     full = np.radians(120)

@@ -39,7 +39,7 @@ from seerob.twin.spans import (
     Span,
     Speeding,
 )
-from seerob.twin.state import State
+from seerob.twin.state import VARIABLE, State
 
 MOST = 32
 """Instants that are looked at between two ticks, of one criterion: spans of 10 ms are halved to less than
@@ -267,8 +267,9 @@ class BetweenTicks:
             self._same = self._ids == ids.tobytes()
             self._remember(path)
         back = None
-        if path is not None and path.gaps:
-            back = self._back(path.gaps, ids.tobytes(), speeds, state)
+        gaps = () if path is None else path.gaps or ()
+        if moved := tuple(gap for gap in gaps if not gap.name.startswith(VARIABLE)):
+            back = self._back(moved, ids.tobytes(), speeds, state)
         # Whoever looks back, or failed, is looked at one by one.
         alone = back is not None or self._failed
         for i in range(len(found)) if alone else (*self._others, *self._unclear(found, state, speeds)):

@@ -17,6 +17,7 @@ from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.verdict import ROUNDING, admitted, keeps
 from seerob.criteria.between_ticks import Asking, BetweenTicks
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
+from seerob.criteria.in_hand import InHand
 from seerob.criteria.noisy_speeds import shaken
 from seerob.criteria.plausible_places import PlausiblePlaces
 from seerob.criteria.question import Bound, Kept, Question, held_names, question_of, worded
@@ -191,6 +192,8 @@ class Judge:
         self._claims: list[Claim] = []
         """That nothing has contradicted yet."""
         self._between = BetweenTicks([one.watch for one in bound])
+        self._passed: list[bool] = []
+        """Whether each did not apply at the last tick."""
         self._warned: set[str] = set()
 
     def __call__(self, state: State) -> tuple[Result, ...]:
@@ -201,6 +204,7 @@ class Judge:
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
             self._hold(model, findings)
             self._plausible_places = PlausiblePlaces(model)
+            self._in_hand = InHand(model, self._bound)
             known = {finding.holds for finding in findings}
             claims = (claim for one in self._bound for claim in one.criterion.claims(model))
             self._claims = [claim for claim in claims if claim.holds not in known]
@@ -227,12 +231,36 @@ class Judge:
 
         # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
         found = self._between(state, results, Asking(ask, look, undecided))
+        found, self._passed = self._untold(found, state), [result.muted for result in found]
+        if not self._in_hand.never:
+            for i, why in self._in_hand.reasons(state, found).items():
+                if not found[i].muted:
+                    found = (*found[:i], undecided(found[i], why), *found[i + 1 :])
         if not self._holds:
             return found
         return tuple(
             undecided(result, question.why) if question.why and not result.muted else result
             for result, question in zip(found, self._questions, strict=True)
         )
+
+    def _untold(self, results: tuple[Result, ...], state: State) -> tuple[Result, ...]:
+        """Results without what rests on a variable of which samples turn out to be missing."""
+        gaps = () if state.path is None else state.path.gaps or ()
+        lost = {gap.name: gap for gap in gaps if gap.name.startswith(VARIABLE)}
+        if not lost:
+            return results
+        found, muted = list(results), self._passed or [False] * len(results)
+        for i, question in enumerate(self._questions):
+            applied = not (results[i].muted or muted[i])
+            names = question.declared & lost.keys() - ({question.muted_by} if applied else set())
+            if names:
+                gap = lost[min(names)]
+                text = (
+                    f"samples of {gap.name} are missing from {gap.begin:.4g} s to {gap.end:.4g} s: nobody "
+                    "knows what it was meanwhile"
+                )
+                found[i] = replace(undecided(results[i], text), muted=False)
+        return tuple(found)
 
     @property
     def looks(self) -> int:

@@ -27,6 +27,7 @@ from seerob.files.waypoints.arm import Arm
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.in_place import implausible_motion
+from seerob.model.variables import uses
 from seerob.twin.controller_check import compared, controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.plausibility.ranges import Quantity
@@ -362,6 +363,13 @@ def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:
     }
     followed = {m.name: m.motion.variables() for m in model.workstation.machines}
     return timeouts, {name: min(timeouts[v] for v in by) for name, by in followed.items() if by}
+
+
+def gappy(model: Model) -> frozenset[str]:
+    """Variables that something depends on and that are heard live, unless their source tells each change."""
+    told = {s.name for s in model.workstation.sources if isinstance(s, LiveSource) and not s.tells_changes}
+    used = {name for _, name, _ in uses(model.workstation)}
+    return frozenset(name for name in used if model.dictionary[name].source in told)
 
 
 def untimed(model: Model) -> dict[str, str]:

@@ -31,7 +31,7 @@ from seerob.outputs.over_time import plotted
 from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
 from seerob.recording.frames import told_of
 from seerob.recording.result_log import ResultLog
-from seerob.session.opening import coarse, signal_timeouts, untimed
+from seerob.session.opening import coarse, gappy, signal_timeouts, untimed
 from seerob.session.scene import Looks, invalid_reasons, landmark_of
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
@@ -222,6 +222,7 @@ def engine_of(model: Model, state: type[State] = State) -> Engine:
         complete={s.target() for s in listened if s.tells_changes},
         signals=signals,
         untimed=untimed(model),
+        gappy=gappy(model),
         coarse=coarse(model),
         state=state,
     )

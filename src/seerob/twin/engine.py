@@ -24,7 +24,15 @@ import mujoco
 import numpy as np
 
 from seerob.core.errors import InputError, SimulationDiverged
-from seerob.core.samples import BodySample, GrabSample, JointSample, PoseSample, Sample, SignalSample
+from seerob.core.samples import (
+    BodySample,
+    GrabSample,
+    JointSample,
+    PoseSample,
+    Quality,
+    Sample,
+    SignalSample,
+)
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.description.capture.following import Following
 from seerob.devices.live.differentiation import PositionNoise
@@ -38,7 +46,7 @@ from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
 from seerob.twin.control.reference import Reference
 from seerob.twin.control.sample_values import beyond_limits, is_possible, largest_speed, torques_of
-from seerob.twin.control.unheard import QUICKEST, Unheard
+from seerob.twin.control.unheard import BEATS, QUICKEST, Unheard
 from seerob.twin.machines.following import HOLD, Machines, Moved
 from seerob.twin.machines.gripping import Grips, own_masses
 from seerob.twin.machines.loose import Loose
@@ -48,6 +56,7 @@ from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
 from seerob.twin.validity.hearing import EVERYWHERE, NOWHERE, BonesHeard, Heard
+from seerob.workstation.variables import VARIABLE
 
 DEFAULT_TIMEOUT = 0.2
 """Time-out [s] of what is heard without a source that states one."""
@@ -60,9 +69,6 @@ heard for 30 ms. Ordinary jitter stays below."""
 LAGS = 0.2
 """Share of the tracking limit by which the twin of a person whom things may touch is off where one did: what
 touched it between two ticks is not told. Own choice."""
-BEATS = 0.05
-"""Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
-nobody says that it stopped."""
 FAULTS = (mujoco.FatalError, mujoco.UnexpectedError)
 """How MuJoCo gives up."""
 POSE_TOLERANCE = 1e-4
@@ -110,6 +116,7 @@ class Engine:
         complete: Collection[str] = (),
         signals: dict[str, float] | None = None,
         untimed: dict[str, str] | None = None,
+        gappy: Collection[str] = (),
         coarse: Mapping[str, str] = MappingProxyType({}),
         controllers: bool = True,
         contacts: bool = True,
@@ -125,6 +132,7 @@ class Engine:
             complete: Those of them of whom each change is heard: no sample is missing between two.
             signals: Time-out [s] of each variable, or source of variables.
             untimed: Why nobody knows how late a variable is heard, by name.
+            gappy: Variables that are heard live, of which samples may be missing.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
                 samples put it, and nothing that is heard later is compared with it.
             coarse: Why what is heard is too coarse for energies and forces, by name.
@@ -210,16 +218,21 @@ class Engine:
         """Who was put elsewhere during a tick."""
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
+        quickest = {robot.name: robot.acceleration_limits or QUICKEST for robot in model.workstation.robots}
+        quickest |= {machine.name: math.inf for machine in model.workstation.machines}
+        silent = {m.name for m in model.workstation.machines if set(gappy) & set(m.motion.variables())}
+        silent |= set(live) - following - set(complete)
         self._unheard = {
-            robot.name: Unheard(
-                robot.name,
-                np.full(len(model.mechanisms[robot.name].home), robot.acceleration_limits or QUICKEST),
-                self._hearings[robot.name].timeout,
-            )
-            for robot in model.workstation.robots
-            if robot.name in coasting and robot.name not in complete and controllers
+            name: Unheard(name, np.full(len(model.mechanisms[name].home), most), self._hearings[name].timeout)
+            for name, most in quickest.items()
+            if name in silent and controllers
         }
-        """By robot that is heard live."""
+        """By robot and machine that is heard live."""
+        self._untold = {
+            name: Unheard(VARIABLE + name, np.full(1, math.inf), (signals or {}).get(name, DEFAULT_TIMEOUT))
+            for name in gappy
+        }
+        """By variable that is heard live."""
         self._said: dict[str, controller_check.ControllerCheck] = {}
         self._carried = {name: controller_check.carried(model, name) for name in model.mechanisms}
         """By robot, what its live source says of itself."""
@@ -283,6 +296,9 @@ class Engine:
         for sample in samples:
             if isinstance(sample, SignalSample):
                 self.signals.take(sample)
+                for name, untold in self._untold.items() if sample.quality is Quality.GOOD else ():
+                    if name in sample.values and name not in sample.doubts:
+                        untold.hear(sample.t - sample.ages.get(name, 0.0), 0, speeds=False)
                 for moved in self._machines.hear(sample):
                     self._move(moved)
                 continue
@@ -373,6 +389,8 @@ class Engine:
     def _move(self, moved: Moved) -> None:
         """A machine follows what its variables say."""
         taken = self._take_one(moved.machine, moved.t, moved.q, moved.qd, anew=self._tick > 0 and moved.anew)
+        if taken and moved.machine in self._unheard and not moved.invalid_reason:
+            self._unheard[moved.machine].hear(moved.t - moved.age, 0, speeds=False)
         self._hearings[moved.machine].older = moved.age
         self._note(moved.machine, moved.t, moved.invalid_reason, None, taken=taken)
 
@@ -526,12 +544,13 @@ class Engine:
         self._now = t
         self._show(t)
         self._loose.end(t)
-        self.state.events = self._loose.said()
+        self.state.events, self.state.held = self._loose.said(), self._loose.held()
         strayed = self._strayed
         self._note_errors()
         self.state.path = self._path(start, t, captured=strayed or self._strayed)
-        if self._unheard:
-            gaps = tuple(gap for each in self._unheard.values() for gap in each.ended(t + kernel.SLACK))
+        if self._unheard or self._untold:
+            every = (*self._unheard.values(), *self._untold.values())
+            gaps = tuple(gap for each in every for gap in each.ended(t + kernel.SLACK))
             self.state.path = replace(self.state.path, gaps=gaps)
         self.state.heard()
         return self.state

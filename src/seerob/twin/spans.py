@@ -62,7 +62,7 @@ def coupling_of(model: Model, mechanism: Mechanism) -> Coupling:
 
 
 class Gap(NamedTuple):
-    """A time in which samples of a robot are missing that is heard live (`seerob.twin.control.unheard`)."""
+    """A time in which samples are missing of who is heard live (`seerob.twin.control.unheard`)."""
 
     name: str
     begin: float
@@ -70,9 +70,14 @@ class Gap(NamedTuple):
     end: float
     """When its first one after was [s]."""
     acceleration: Array
-    """Largest of its joints meanwhile [rad/s² or m/s²], shape (n,)."""
+    """Largest of its joints meanwhile [rad/s² or m/s²], shape (n,); infinite where nobody knows it."""
     speeds: bool
     """Whether both samples say speeds."""
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether nothing bounds where it was meanwhile."""
+        return not np.isfinite(self.acceleration).all()
 
 
 ROUNDING = 1e-9
@@ -96,7 +101,8 @@ class Path:
     of them elsewhere at either end (`State.stray`), or touches one (`Hearing.held`)."""
 
     gaps: tuple[Gap, ...] | None = None
-    """What is missing of robots that are heard live until its end; None where none is heard live."""
+    """What is missing until its end of robots, machines and variables that are heard live; None where none is
+    heard live."""
     loose: tuple[Gap, ...] = ()
     """What is missing on the way: robots may have gone another one."""
 
@@ -152,8 +158,11 @@ class Path:
             np.concatenate([part[k:] for part, k in zip(every, ends, strict=True)])
             for every in ([p.t for p in paths], [p.q for p in paths], [p.v for p in paths])
         )
-        broken = tuple(sorted({name for path in paths for name in path.broken}))
-        return Path(t, q, v, broken, captured, loose=loose)
+        broken = {name for path in paths for name in path.broken} | {
+            gap.name for gap in loose if gap.anywhere
+        }
+        bounded = tuple(gap for gap in loose if not gap.anywhere)
+        return Path(t, q, v, tuple(sorted(broken)), captured, loose=bounded)
 
     def middle(self, begin: float, end: float) -> float:
         """Where a span is best cut [s]: at the knot that is nearest to its middle, else there."""

@@ -51,10 +51,11 @@ Bound = tuple[Braking, Callable[[Onset], Course] | None, tuple[Input, ...], InSp
 def other_robot_reason(table: StoppingTable, model: Model, robot: Mechanism) -> str:
     """Why it is not known that a table is of a robot; empty when it is."""
     entry = next(r for r in model.workstation.robots if r.name == robot.name)
-    if table.robot == robot.name or entry.model in table.models:
+    if table.robot == robot.name or (entry.model in table.models and entry.scale == 1):
         return ""
+    which = entry.model if entry.scale == 1 else f"{entry.model}, × {entry.scale:g}"
     return (
-        f"the stopping table is that of {table.robot}, and whether {robot.name} ({entry.model}) is one is "
+        f"the stopping table is that of {table.robot}, and whether {robot.name} ({which}) is one is "
         "not known: say so with stop.table_for"
     )
 

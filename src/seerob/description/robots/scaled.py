@@ -8,6 +8,7 @@ angular speeds go with :math:`s^{-1/2}`, speeds with :math:`s^{1/2}`, forces wit
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
@@ -31,34 +32,36 @@ def scaled(description: Description, scale: float, *, name: str) -> Description:
         "same density; masses, inertia, speeds and torques follow from the similarity law of Froude, and "
         "nobody has measured any of them"
     )
+    slides = {j.name for link in description.links for j in link.joints if j.kind is JointKind.PRISMATIC}
     return replace(
         description,
-        links=tuple(_link(link, scale) for link in description.links),
+        links=tuple(_link(link, scale, slides) for link in description.links),
         source=f"{description.source}, × {scale:g}",
         findings=(*description.findings, Finding(level="warning", subject=name, text=text)),
     )
 
 
-def _link(link: Link, s: float) -> Link:
+def _link(link: Link, s: float, slides: Set[str]) -> Link:
     placed = link.parent_from_link.copy()
     placed[:3, 3] *= s
     return replace(
         link,
         parent_from_link=placed,
-        joints=tuple(_joint(joint, s) for joint in link.joints),
+        joints=tuple(_joint(joint, s, slides) for joint in link.joints),
         inertial=None if link.inertial is None else _inertial(link.inertial, s),
         visual=tuple(_mesh(mesh, s) for mesh in link.visual),
         solids=tuple(_solid(solid, s) for solid in link.solids),
     )
 
 
-def _joint(joint: Joint, s: float) -> Joint:
+def _joint(joint: Joint, s: float, sliding: Set[str]) -> Joint:
     slides = joint.kind is JointKind.PRISMATIC
     way = s if slides else 1.0
     force, speed = (s**3, s**0.5) if slides else (s**4, s**-0.5)
     mimic = joint.mimic
-    if mimic is not None and mimic.offset:
-        mimic = replace(mimic, offset=mimic.offset * way)
+    if mimic is not None:
+        led = s if mimic.joint in sliding else 1.0
+        mimic = replace(mimic, multiplier=mimic.multiplier * way / led, offset=mimic.offset * way)
     return replace(
         joint,
         anchor=joint.anchor * s,

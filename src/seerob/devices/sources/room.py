@@ -38,6 +38,7 @@ class Room(LiveSource, frozen=True, kw_only=True):
     reads_variables: ClassVar[bool] = True
     pulled: ClassVar[bool] = True
     asked: ClassVar[bool] = True
+    tells_changes: ClassVar[bool] = True
     timeout: Seconds = 1.0
     """Age at which what it said no longer counts [s], beside the time-out of each variable."""
 

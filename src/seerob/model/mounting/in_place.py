@@ -232,12 +232,13 @@ def _payloads(model: Model) -> Iterator[Quantity]:
             continue
         bodies = [model.bodies[k] for k in model.mechanisms[robot.name].carried]
         masses = {body.owner: body.mass.value for body in bodies if body.mass is not None}
-        total = sum(masses.values())
-        said = (
-            f"{', '.join(f'{name} {m:.4g} kg' for name, m in masses.items())} of {row.kg:g} kg: {row.source}"
-        )
+        # One of another size is as strong as forces grow (`seerob.description.robots.scaled`).
+        rated, of = row.kg * robot.scale**3, "" if robot.scale == 1 else f", × {robot.scale**3:.4g}"
+        share = sum(masses.values()) / rated
+        carried = ", ".join(f"{name} {m:.4g} kg" for name, m in masses.items())
+        said = f"{carried} of {rated:.4g} kg: {row.source}{of}"
         yield Quantity(
-            f"robots[{i}].payload", "robots.payload", "", (total / row.kg,), (robot.name,), said, robot.name
+            f"robots[{i}].payload", "robots.payload", "", (share,), (robot.name,), said, robot.name
         )
 
 

@@ -1,4 +1,4 @@
-r"""What a robot that is heard live may have done while its samples were lost: nobody was told.
+r"""What a robot, a machine or a variable that is heard live may have done while its samples were lost.
 
 From one sample to the next the twin goes along a cubic through both. Of a joint whose acceleration is a at
 most, and whose cubic has b at most, the difference e from it has :math:`|\ddot e| \le a + b`, and vanishes at
@@ -7,6 +7,7 @@ both ends: with its derivative there, where samples say speeds, and else without
 .. math:: |\dot e| \le (a + b)\,T/4, \qquad |e| \le (a + b)\,T^2/16,
 
 or twice as much without speeds: it speeds up for T/4, brakes and turns round for T/2, and brakes for T/4.
+Of a machine nobody states a, so that it may have been anywhere; and a variable anything.
 """
 
 from __future__ import annotations
@@ -24,16 +25,20 @@ MISSING = 1.8
 QUICKEST = 35.0
 """No joint accelerates harder that states nothing [rad/s² or m/s²]: the hardest stop of the published tables,
 of the wrist of a UR3, comes to 34.7 rad/s² (its speed over its stopping time)."""
+BEATS = 0.05
+"""Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
+nobody says that it stopped."""
 SEEN = 5e-3
 """How far a joint may go away unseen and come back [rad or m]: what its samples, and the twin, are off by."""
 
 
 class Unheard:
-    """Looks at when samples of one robot were so, as the twin takes them, whether some between are missing.
+    """Looks at when samples of one were so, as the twin takes them, whether some between are missing.
 
     Args:
-        name: Of the robot.
-        acceleration: Largest acceleration of its joints [rad/s² or m/s²], shape (n,).
+        name: Of the robot, machine or variable.
+        acceleration: Largest acceleration of its joints [rad/s² or m/s²], shape (n,); infinite where nobody
+            knows it.
         timeout: After which the twin does not rely on it [s].
     """
 
@@ -41,7 +46,8 @@ class Unheard:
         self._name, self._acceleration = name, acceleration
         # A sample comes a delay before the twin shows its instant; the time-out is more than that delay.
         self._longest = 2 * timeout
-        self._least = 4 * math.sqrt(SEEN / float(acceleration.max(initial=1e-9)))
+        quickest = float(acceleration.max(initial=1e-9))
+        self._least = 4 * math.sqrt(SEEN / quickest) if math.isfinite(quickest) else BEATS
         """So long nobody has to know where it was [s]."""
         self._intervals: deque[float] = deque(maxlen=USUAL)
         self._t, self._seq, self._said = -math.inf, 0, False

@@ -219,6 +219,10 @@ class Loose:
 
     # -- hands ------------------------------------------------------------------------------
 
+    def held(self) -> dict[str, tuple[str, ...]]:
+        """Workpieces that hands hold, each with these."""
+        return {name: tuple(piece.hands) for name, piece in self._pieces.items() if piece.hands}
+
     def _grab(self, sample: GrabSample, t: float) -> None:
         hand = sample.target
         held = next((piece for piece in self._pieces.values() if hand in piece.hands), None)

@@ -1,0 +1,127 @@
+"""What people hold is of them for whoever asks how near they are, and of the load for whoever asks that.
+
+A workpiece `on` a hand is one of the person's shapes. A loose one (`seerob.twin.machines.loose`) is a thing
+of its own: while a hand holds it, what is asked of the person alone says nothing of how far it reaches,
+unless the same is asked of it. And a method that is told a load is not told enough where hands hold more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from seerob.core.figures import rounded_up
+from seerob.core.snapshot import Result
+from seerob.criteria.question import Bound
+from seerob.criteria.scoring.phases import Phase, entered_for, phase_at
+from seerob.model.model import Model
+from seerob.twin.state import State
+
+MORE = 1e-6
+"""Share by which what is held may be heavier than the load that is given [1]: rounding."""
+UNKNOWN = Phase()
+"""Of an instant that belongs to no phase: nothing is entered."""
+
+
+class InHand:
+    """Why what criteria say is not within while people hold something.
+
+    Args:
+        model: The compiled workstation.
+        bound: All of its criteria.
+    """
+
+    def __init__(self, model: Model, bound: Sequence[Bound]) -> None:
+        criteria = [one.criterion for one in bound]
+        self._model, self._criteria = model, criteria
+        # Postures are of bodies alone, and limits of contact of what touches them.
+        self._near = [
+            one.group == "safety" and one.criterion.by_shape and not one.criterion.adults for one in bound
+        ]
+        self._masses = {
+            name: float(sum(model.mj.body_mass[model.bodies[i].mj] for i in mechanism.bodies))
+            for name, mechanism in model.mechanisms.items()
+            if mechanism.role == "workpiece"
+        }
+        self._bodies = {body.name: body.index for body in model.bodies}
+        self._judged: list[set[int]] = []
+        self._always: dict[str, dict[str, float]] = defaultdict(dict)
+        """Person → what is mounted on a bone, by name [kg]."""
+        for thing in (*model.workstation.workpieces, *model.workstation.tools):
+            person = (thing.on or "").partition("/")[0]
+            if any(human.name == person for human in model.workstation.humans) and thing.mass is not None:
+                self._always[person][thing.name] = thing.mass
+        entered = ((i, entered_for(model, each)) for i, each in enumerate(criteria))
+        self._loads = {
+            i: phases for i, phases in entered if any(_load(phase) is not None for phase in phases)
+        }
+        self.never = not self._masses and not (self._always and self._loads)
+        """Whether nobody can hold anything that counts."""
+
+    def reasons(self, state: State, results: Sequence[Result]) -> dict[int, str]:
+        """Why what a criterion says of a state is not within, by its place in the file."""
+        held, found = state.held, dict[int, str]()
+        weights = {person: dict(things) for person, things in self._always.items()}
+        for piece, hands in held.items():
+            for hand in hands:
+                weights.setdefault(hand.partition("/")[0], {})[piece] = self._masses[piece]
+        for i, phases in self._loads.items():
+            if (load := _load(phase_at(phases, state.t, UNKNOWN))) is None:
+                continue
+            for person in self._criteria[i].subjects():
+                things = weights.get(person, {})
+                if sum(things.values()) > load * (1 + MORE):
+                    what = ", ".join(f"{name} ({mass:g} kg)" for name, mass in things.items())
+                    found[i] = f"{person} holds {what}, and load says {load:g} kg: give all that hands hold"
+        if held:
+            found |= self._nearer(state, results)
+        return found
+
+    def _nearer(self, state: State, results: Sequence[Result]) -> dict[int, str]:
+        """Who judges a hand, and nobody what it holds, with less room than that reaches."""
+        if not self._judged:
+            self._judged = [each.judged(self._model) for each in self._criteria]
+        found: dict[int, str] = {}
+        for i, (criterion, bodies) in enumerate(zip(self._criteria, self._judged, strict=True)):
+            if not self._near[i]:
+                continue
+            for piece, hands in state.held.items():
+                own = {*self._model.mechanisms[piece].bodies}
+                alike = zip(self._criteria, self._judged, strict=True)
+                holding = [self._bodies[hand] for hand in hands if self._bodies[hand] in bodies]
+                if not holding or any(own & b for c, b in alike if type(c) is type(criterion)):
+                    continue
+                reach = min(self._reach(state, own, hand) for hand in holding)
+                if _room(results[i]) > reach:
+                    continue
+                person = hands[0].partition("/")[0]
+                found[i] = (
+                    f"{person} holds {piece}, which reaches {rounded_up(reach)} m from the hand, and nobody "
+                    f"asks the same of it: add a criterion of this kind with {piece}, or mount it on the hand"
+                )
+        return found
+
+    def _reach(self, state: State, pieces: set[int], hand: int) -> float:
+        """How far a point of a workpiece is from a wrist until the next tick at most [m]."""
+        far = 0.0
+        for body in (self._model.bodies[i] for i in pieces):
+            points = body.corners @ state.rotations[body.index].T + state.positions[body.index]
+            away = np.linalg.norm(points - state.positions[hand], axis=1).max(initial=0.0)
+            far = max(far, float(away) + body.radius + body.deviation)
+        return far + float(state.largest_speeds().max(initial=0.0)) * self._model.workstation.engine.tick
+
+
+def _room(result: Result) -> float:
+    """How much farther than a distance has to be it is [m]; none of what is no distance."""
+    if result.unit != "m" or result.at_most or result.value is None or result.limit is None:
+        return -math.inf
+    return float(min((result.value, *(result.interval or ()))) - result.limit)
+
+
+def _load(phase: Phase) -> float | None:
+    """The handled mass that is entered for a phase [kg]."""
+    load: float | None = getattr(phase, "load", None)
+    return load

@@ -1,0 +1,94 @@
+"""What a hand holds is of the person: how far it reaches, and what it weighs."""
+
+from __future__ import annotations
+
+import pytest
+
+from made_cell import made, two_r
+from seerob.core.samples import GrabSample, JointSample
+from seerob.session.run import Judge, bind
+from seerob.twin.engine import Engine
+
+ROD = """
+[[workpieces]]
+name = "rod"
+shape = { box = [1.2, 0.04, 0.04] }
+mass = 3.0
+at = { position = [0.2, -0.25, 1.0] }
+"""
+TABLE = '[[parts]]\nname = "table"\nshape = { box = [0.6, 1.6, 0.97] }\nat = { position = [0.4, 0, 0.485] }\n'
+CELL = (
+    """
+[[humans]]
+name = "operator"
+stature = 1.75
+mass = 75
+sex = "male"
+[[robots]]
+name = "arm"
+model = "arm.urdf"
+base = { position = [1.6, 0, 1.0] }
+"""
+    + TABLE
+)
+DISTANCE = '[[safety]]\nkind = "minimum_distance"\nname = "{0}"\nbetween = ["arm", "{0}"]\nlimit = {1}\n'
+OWAS = (
+    '[[ergonomics]]\nkind = "owas"\nname = "load"\nhuman = "operator"\naction_category = 2\n'
+    'accuracy_deg = 1\nphases = [{{ load = {}, legs = "posture" }}]\n'
+)
+
+
+def said(folder, text, grab=True, seconds=0.6):
+    """What every criterion says while the right hand holds the rod."""
+    model = made(folder, text, {"arm.urdf": two_r()}).model
+    engine, judge = Engine(model, driven={"operator": 9.0, "arm": 9.0}), Judge(bind(model))
+    homes = {name: tuple(model.mechanisms[name].home) for name in ("operator", "arm")}
+    for k in range(round(seconds / 0.01)):
+        t = 0.01 * k
+        engine.take([JointSample(source="p", seq=k, t=t, target=n, q=q) for n, q in homes.items()])
+        if grab and k == 20:
+            engine.take([GrabSample(source="r", seq=0, t=t, target="operator/right_hand", piece="rod")])
+        state = engine.tick() if k else engine.start()
+        found = {result.name: result for result in judge(state)}
+    assert bool(state.held) == (grab and "rod" in text)
+    return found
+
+
+@pytest.mark.parametrize("grab", [True, False])
+def test_who_holds_a_rod_is_nearer_than_who_does_not(tmp_path, grab):
+    """The person is farther than the limit, and the rod may reach into it."""
+    found = said(tmp_path, CELL + ROD + DISTANCE.format("operator", 1.0), grab)["operator"]
+    assert found.value > 1.0
+    assert found.verdict == ("undecided" if grab else "within")
+    if grab:
+        assert "operator holds rod" in found.reason
+
+
+def test_farther_than_the_rod_reaches_it_counts_for_nothing(tmp_path):
+    found = said(tmp_path, CELL.replace("[1.6, 0", "[6.0, 0") + ROD + DISTANCE.format("operator", 1.0))
+    assert found["operator"].verdict == "within"
+
+
+def test_who_asks_the_same_of_the_rod_knows(tmp_path):
+    both = DISTANCE.format("operator", 1.0) + DISTANCE.format("rod", 0.01)
+    assert said(tmp_path, CELL + ROD + both)["operator"].verdict == "within"
+
+
+def test_what_is_held_in_reach_of_what_is_exceeded_stays_exceeded(tmp_path):
+    found = said(tmp_path, CELL + ROD + DISTANCE.format("operator", 5.0))
+    assert found["operator"].verdict == "exceeded"
+
+
+@pytest.mark.parametrize(("load", "verdict"), [(0, "undecided"), (2.9, "undecided"), (3.0, "within")])
+def test_hands_that_hold_more_than_the_load_leave_a_posture_open(tmp_path, load, verdict):
+    found = said(tmp_path, CELL + ROD + OWAS.format(load))["load"]
+    assert found.verdict == verdict, found.reason
+    if verdict == "undecided":
+        assert "operator holds rod (3 kg), and load says" in found.reason
+
+
+def test_what_is_mounted_on_a_hand_is_held(tmp_path):
+    mounted = ROD.replace('name = "rod"', 'name = "rod"\non = "operator/right_hand"')
+    found = said(tmp_path, CELL + mounted + OWAS.format(2.9), grab=False, seconds=0.02)
+    assert found["load"].verdict == "undecided"
+    assert "operator holds rod (3 kg)" in found["load"].reason

@@ -92,3 +92,25 @@ def test_what_is_mounted_on_a_hand_is_held(tmp_path):
     found = said(tmp_path, CELL + mounted + OWAS.format(2.9), grab=False, seconds=0.02)
     assert found["load"].verdict == "undecided"
     assert "operator holds rod (3 kg)" in found["load"].reason
+
+
+def test_what_a_hand_holds_is_where_the_hand_is_as_long_as_that_is_known(tmp_path):
+    """The person falls silent, and so does the rod in their hand; the rod on the table does not."""
+    far = CELL.replace("[1.6, 0", "[6.0, 0") + DISTANCE.format("rod", 0.5) + ROD
+    for grab, verdict in ((True, "undecided"), (False, "within")):
+        model = made(tmp_path / str(grab), far, {"arm.urdf": two_r()}).model
+        engine, judge = Engine(model, driven={"operator": 0.2, "arm": 9.0}), Judge(bind(model))
+        homes = {name: tuple(model.mechanisms[name].home) for name in ("operator", "arm")}
+        for k in range(60):
+            t = 0.01 * k
+            heard = [JointSample(source="p", seq=k, t=t, target="arm", q=homes["arm"])]
+            if k < 25:
+                heard.append(JointSample(source="p", seq=k, t=t, target="operator", q=homes["operator"]))
+            if grab and k == 10:
+                heard.append(GrabSample(source="r", seq=0, t=t, target="operator/right_hand", piece="rod"))
+            engine.take(heard)
+            (found,) = judge(engine.tick() if k else engine.start())
+            if k == 20:
+                assert found.verdict == "within", found.reason
+        assert found.verdict == verdict
+        assert not grab or "operator: not heard for" in found.reason

@@ -642,3 +642,41 @@ def test_what_nothing_moves_rests_where_it_is_at_home_for_ever(station):
     q, qd, why = posed.foresee("lift", np.array([0.0, 1.0, 2.0]))
     assert (q.tolist(), qd.tolist(), why) == ([[0.0]] * 3, [[0.0]] * 3, "")
     assert posed.foresee("other", np.array([0.0])) is None
+
+
+GRIPPED = """
+[[machines]]
+name = "hand"
+on = "arm/tip"
+shape = { box = [0.02, 0.02, 0.06] }
+mass = 0.2
+grip = { upper = 0.1 }
+[[workpieces]]
+name = "piece"
+on = "hand"
+shape = { box = [0.04, 0.04, 0.04] }
+mass = 2.0
+rest = { position = [2.0, 0, 0.01] }
+"""
+LOOSE = (
+    '[[workpieces]]\nname = "piece"\nshape = { box = [0.1, 0.1, 0.1] }\nmass = 0.8\n'
+    "at = { position = [0, 4, 0.05] }\n"
+)
+
+
+@pytest.mark.parametrize("piece", [GRIPPED, LOOSE])
+def test_where_what_is_picked_up_is_no_map_knows(tmp_path, piece):
+    """Where a run saw it last says nothing of where it is when the robot goes at another speed."""
+    text = FLOATING.replace("0, 0]", "0, -9.81]") + TWO_R + piece
+    model = made(tmp_path, text, {"arm.urdf": two_r()}).model
+    engine, witness = Engine(model, driven={"arm": 1.0, "hand": 1.0}), Witness(lambda state: ())
+    engine.take([heard("arm", 0.0, (0, 0), (0, 0))])
+    if "hand" in model.mechanisms:
+        engine.take([heard("hand", 0.0, (0.05,), (0.0,))])
+    witness(engine.start())
+    posed = Posed(model, model.robot("arm"), witness)
+    posed.place(0.0, 0.0, np.zeros(2), np.ones(2))
+    with pytest.raises(Undecided, match="only a run tells where it is"):
+        posed.closest(model.gap(model.select("piece"), model.select("arm/l1")))
+    # What moves by itself is known all the same.
+    assert posed.closest(model.gap(model.select("arm/l1"), model.select("arm/l2"))).distance < 1

@@ -135,8 +135,6 @@ class State(Validity):
         """Instants between which what `foresee` tells is one cubic, besides the ticks."""
         self.events: tuple[Event, ...] = ()
         """What happened to loose workpieces since the last tick."""
-        self.held: dict[str, tuple[str, ...]] = {}
-        """Loose workpiece → hands that hold it."""
         self.touches: list[tuple[int, int, float]] | None = None
         """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
         self._quicker: dict[str, Array] = {}

@@ -76,6 +76,8 @@ class Validity:
         """Those of them of which speeds were asked, or what holds them."""
         self.attachments = Attachments(model)
         """Which of MuJoCo's bodies moves each body."""
+        self.held: dict[str, tuple[str, ...]] = {}
+        """Loose workpiece → hands that hold it."""
         self._hearings = hearings
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False
@@ -232,7 +234,15 @@ class Validity:
         if reason:
             return f"{name}: {reason}"
         above = self._model.mechanisms[name].on
-        return self.invalid_place_reason(above) if above else ""
+        if above:
+            return self.invalid_place_reason(above)
+        return next(filter(None, map(self._invalid_hand, self.held.get(name, ()))), "")
+
+    def _invalid_hand(self, hand: str) -> str:
+        """Why a hand may not be where the twin shows it, nor what it holds; empty when it may."""
+        person, _, bone = hand.partition("/")
+        lost = self.invalid_place_reason(person)
+        return lost or (self.invalid_reason(person) if bone in self._invalid_bones(person) else "")
 
     def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
         """What is known of where a robot or human really is, bone by bone of a person.

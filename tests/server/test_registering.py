@@ -27,6 +27,7 @@ MIXED = replace(
     landmarks=(
         *(Place(name=f"corner_{k}", position=at, accuracy=0.001) for k, at in enumerate(BOX)),
         Place(name="flange", node="r/link_1", position=(0.0, 0.0, 0.1), accuracy=0.001),
+        *(Place(name=f"board_{k}", position=(1, 0, 0.8), accuracy_turn=0.01 * k) for k in (1, 2)),
     ),
     tips=(Place(name="r", node="r/link_2", position=(0.0, 0.0, 0.0)),),
 )
@@ -171,6 +172,17 @@ def test_steps_that_cannot_be_made_say_why(page, step, word):
     answer = page.step(step, landmark="corner_1", poses=poses)
     assert not answer.accepted
     assert word in answer.reason
+
+
+def test_a_controller_in_a_known_pose_counts_with_how_well_that_is_known(server, page):
+    known = Registering(pose=0.002, pose_turn=0.005, level=0.0, limit=0.5)
+    server.offers.wait("anna", "key", lambda _: None, known)
+    poses = page.grips(np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1)))
+    assert "give its accuracy_turn" in page.step("known", landmark="corner_1", poses=poses).reason
+    one, two = (page.step("known", landmark=f"board_{k}", poses=poses) for k in (1, 2))
+    turned = [np.reshape(answer.covariance, (6, 6))[5, 5] for answer in (one, two)]
+    np.testing.assert_allclose(turned, [1e-4 + 25e-6, 4e-4 + 25e-6])
+    assert two.error >= one.error
 
 
 def test_a_flange_is_touched_where_the_robot_is_heard_to_be_and_stands(server, live, page):

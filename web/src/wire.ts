@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "f9710133bbb911ff";
+export const SCHEMA = "b783ae3e91049b4c";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -464,6 +464,8 @@ export interface Place {
   wxyz: Vec4;
   /** How far it may be from there, standard deviation per axis [m]. */
   accuracy: number;
+  /** How far it may be turned from there, standard deviation per axis [rad]; None where nobody says. */
+  accuracy_turn: number | null;
 }
 
 /** Everything about a run that does not change while it runs; sent once. */

@@ -499,6 +499,8 @@ class Place(Struct, frozen=True, kw_only=True):
     wxyz: Vec4 = (1.0, 0.0, 0.0, 0.0)
     accuracy: float = 0.0
     """How far it may be from there, standard deviation per axis [m]."""
+    accuracy_turn: float | None = None
+    """How far it may be turned from there, standard deviation per axis [rad]; None where nobody says."""
 
 
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):

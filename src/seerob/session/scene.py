@@ -143,7 +143,14 @@ def scene_of(
     )
 
 
-def place_of(model: Model, name: str, frame: Frame | None, at: Array, accuracy: float = 0.0) -> Place:
+def place_of(
+    model: Model,
+    name: str,
+    frame: Frame | None,
+    at: Array,
+    accuracy: float = 0.0,
+    accuracy_turn: float | None = None,
+) -> Place:
     """A pose that goes along with a frame of the model, as a page knows it: in one of its nodes.
 
     Args:
@@ -152,6 +159,7 @@ def place_of(model: Model, name: str, frame: Frame | None, at: Array, accuracy: 
         frame: What carries it; the world when None.
         at: Pose in that frame, shape (4, 4).
         accuracy: Standard deviation per axis [m].
+        accuracy_turn: Of its turn [rad]; None where nobody says.
 
     Raises:
         UnknownName: What carries it has no shape, so that no node shows where it is.
@@ -167,7 +175,14 @@ def place_of(model: Model, name: str, frame: Frame | None, at: Array, accuracy: 
             raise UnknownName("link with a shape", frame.name, [body.name for body in model.bodies])
     x, y, z = at[:3, 3].tolist()
     w, i, j, k = map(float, wxyz_from_rotation(at[:3, :3]))
-    return Place(name=name, node=node, position=(x, y, z), wxyz=(w, i, j, k), accuracy=accuracy)
+    return Place(
+        name=name,
+        node=node,
+        position=(x, y, z),
+        wxyz=(w, i, j, k),
+        accuracy=accuracy,
+        accuracy_turn=accuracy_turn,
+    )
 
 
 def landmark_of(model: Model, landmark: Landmark) -> Place:
@@ -181,7 +196,8 @@ def landmark_of(model: Model, landmark: Landmark) -> Place:
         bodies = {body.name: body for body in model.bodies}
         body = bodies.get(landmark.on)
         frame = model.frame(landmark.on) if body is None else Frame(body.name, body.mj, np.eye(4))
-    return place_of(model, landmark.name, frame, placement(landmark.at), landmark.accuracy)
+    at = placement(landmark.at)
+    return place_of(model, landmark.name, frame, at, landmark.accuracy, landmark.accuracy_turn)
 
 
 def _tips(model: Model) -> Iterator[Place]:

@@ -441,6 +441,9 @@ class Landmark(_Table, frozen=True, kw_only=True):
     accuracy: Annotated[float, unit("m", ge=0, le=0.1)]
     """How far it may be from there, standard deviation per axis [m]: as it was measured, or as the robot that
     carries it is accurate."""
+    accuracy_turn: Annotated[float, unit("rad", ge=0, le=0.5)] | None = None
+    """How far it may be turned from there, standard deviation per axis [rad]; must be given of one in whose
+    pose a controller is laid."""
 
 
 class Contact(_Table, frozen=True, kw_only=True):

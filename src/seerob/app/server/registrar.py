@@ -162,7 +162,8 @@ class Registrar:
         try:
             if begun.straps:
                 cells, grips = (np.array([one[k] for one in begun.straps]) for k in (1, 2))
-                begun.found, _ = solve.strapped(cells, grips)
+                accuracy = max(self._places[landmark].accuracy for landmark, *_ in begun.straps)
+                begun.found, _ = solve.strapped(cells, grips, place_error=accuracy)
             elif begun.touches:
                 begun.found = solve.touched(
                     np.array([touch.room for touch in begun.touches]),
@@ -195,7 +196,9 @@ class Registrar:
     def _known(self, begun: _Begun, landmark: str, poses: Array, options: Registering) -> None:
         if options.pose is None or options.pose_turn is None:
             raise _Refused("nobody says how well the device sees it: give registration.pose and pose_turn")
-        cell, accuracy = self._still(landmark), self._places[landmark].accuracy
+        cell, place = self._still(landmark), self._places[landmark]
+        if place.accuracy_turn is None:
+            raise _Refused(f"nobody says how {landmark} may be turned: give its accuracy_turn")
         _held(poses)
         # Its axes are those of a room: x where it points, z up.
         looks = poses.copy()
@@ -203,7 +206,7 @@ class Registrar:
         begun.found = solve.placed(
             cell,
             looks,
-            place_error=(accuracy, 0.0),
+            place_error=(place.accuracy, place.accuracy_turn),
             pose_error=(options.pose, options.pose_turn),
             level=np.inf if options.level is None else options.level,
         )

@@ -434,12 +434,14 @@ def pivot(turns: Array, positions: Array) -> tuple[Array, Array, float]:
     return x[:3], s2 * alike * np.linalg.inv(A.T @ A)[:3, :3], cone
 
 
-def strapped(flange: Array, grip: Array) -> tuple[Registration, Array]:
+def strapped(flange: Array, grip: Array, *, place_error: float) -> tuple[Registration, Array]:
     """Registration from a controller that is fixed to a flange, wherever on it.
 
     Args:
         flange: Cell from flange at each pose, shape (n, 4, 4).
         grip: Room from grip at each pose, shape (n, 4, 4).
+        place_error: Standard deviation of where the flange is, per axis [m]. It is taken to be common to all
+            poses, so that no fit shows it.
 
     Returns:
         The registration, and flange from grip, shape (4, 4).
@@ -493,6 +495,7 @@ def strapped(flange: Array, grip: Array) -> tuple[Registration, Array]:
     freedom = np.array(float(6 * n - 12))
     scale = n / max(n - 2, 1) * float(_widened(freedom))
     covariance = np.linalg.inv(N)[:6, :6] * scale
+    covariance[:3, :3] += place_error**2 * np.eye(3)
     residuals = np.linalg.norm(off[:, :3], axis=-1)
     return Registration(Tx, covariance, about, residuals, freedom, np.zeros(n)), Ty
 

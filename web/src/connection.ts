@@ -3,7 +3,6 @@
 import { heardPresences, heardVisitors } from "./company";
 import { refused } from "./doing";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
-import { heardMeasured } from "./editing/measure";
 import type { Frame, FromWorker, ToWorker } from "./messages";
 import {
   beginScene,
@@ -26,6 +25,7 @@ import {
 } from "./page_state";
 import { PoseReader } from "./poses";
 import { traceFromWire } from "./traces";
+import { heardMeasured } from "./view/measure";
 import { type History, SCHEMA, type Scene } from "./wire";
 
 /** Numbers change at most this often: faster cannot be read. */

@@ -2,13 +2,13 @@
 
 import { ask, mayEdit } from "./editing/draft";
 import { gizmoMode } from "./editing/handles";
-import { measuring, toggleMeasure } from "./editing/measure";
 import { rows, select, selection, toggleMuted } from "./page_state";
 import type { Actions } from "./panels/app_context";
 import { keysShown } from "./panels/Keys";
 import { worstOf } from "./posture/instants";
 import { orderedRows } from "./row_order";
 import type { TimeControl } from "./time_control";
+import { mayMeasure, measuring, toggleMeasure } from "./view/measure";
 
 const BACK = -1;
 const AHEAD = 1;
@@ -77,7 +77,7 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
       };
     case "d":
     case "D":
-      return mayEdit.peek() ? toggleMeasure : null;
+      return mayMeasure.peek() ? toggleMeasure : null;
     case "?":
       return () => {
         keysShown.value = !keysShown.peek();

@@ -7,7 +7,6 @@ import { connectCompany, others, ownDevice, ownHuman } from "./company";
 import { Connection } from "./connection";
 import { connectDoing } from "./doing";
 import { connectDraft } from "./editing/draft";
-import { connectMeasure } from "./editing/measure";
 import { listenToKeys } from "./keyboard";
 import { now, selectedNodes } from "./page_state";
 import { App } from "./panels/App";
@@ -17,6 +16,7 @@ import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
 import { film } from "./view/handed_out";
 import { saveView } from "./view/kept";
+import { connectMeasure } from "./view/measure";
 import type { Register, Tracking, VisitorInfo } from "./wire";
 import { Visit } from "./xr/visit";
 
@@ -63,7 +63,10 @@ function begin(element: HTMLElement): void {
   actions.time.connect((message) => connection.send(message));
   connectDraft((edit) => connection.send({ kind: "edit", edit }));
   connectDoing((doing) => connection.send({ kind: "doing", doing }));
-  connectMeasure((measure) => connection.send({ kind: "measure", measure }));
+  connectMeasure(
+    (measure) => connection.send({ kind: "measure", measure }),
+    (name, face) => viewer.turned(name, face),
+  );
   connectCompany((said) => connection.send({ kind: "company", said }));
   const presence = new OwnPresence(viewer.stage, (said) => connection.send({ kind: "company", said }));
   let visit: Visit | null = null;

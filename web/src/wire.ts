@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "b783ae3e91049b4c";
+export const SCHEMA = "b66b00246d1246a8";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -281,7 +281,10 @@ export interface Result {
 export interface Measured {
   type: "measured";
   id: number;
-  /** Least distance of the surfaces where everybody begins, with the line between them; it has no limit. */
+  /**
+   * Least distance of the surfaces at the instant that was shown (`Result.t`), with the line between them;
+   * it has no limit, and an interval where the real surfaces may be nearer than the shapes.
+   */
   result: Result | null;
   /** Why there is none. */
   refusal: string;
@@ -542,7 +545,8 @@ export interface Hello {
   schema: string;
   /**
    * What this page may do, as its token says: `view`, `track` (offer what a headset sees), `control`
-   * (play, pause, seek), `edit` (change the workstation file).
+   * (play, pause, seek), `edit` (change the workstation file), `measure` (ask how far things are from one
+   * another).
    */
   may: string[];
   /** Number of this visitor, which no other has. */
@@ -743,13 +747,15 @@ export interface Edit {
   changes?: Change[];
 }
 
-/** What a page that may edit asks of the twin: how far two things are from one another. */
+/** What a page that may control asks of the twin: how far two things are from one another. */
 export interface Measure {
   type: "measure";
   /** The page's own number, by which it knows the answer. */
   id: number;
   /** Full names of bodies, or of all that belongs to a robot, a person or another entry. */
   between: [string, string];
+  /** Instant that the page shows [s]; None for the newest. */
+  t?: number | null;
 }
 
 /** One mistake that an edit would make, in the words of `seerob check-file`. */

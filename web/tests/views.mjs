@@ -5,11 +5,11 @@ import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import os from "node:os";
 import path from "node:path";
-import { createInterface } from "node:readline";
 import { fileURLToPath } from "node:url";
 import { openBrowser } from "./browser.mjs";
 import { edited, showEdited } from "./edited.mjs";
 import { python } from "./python.mjs";
+import { replayed } from "./replayed.mjs";
 
 const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
 const TO = path.join(ROOT, "docs/pictures/views");
@@ -25,20 +25,15 @@ const only = process.argv.slice(2);
 if (only.length === 0) fs.rmSync(TO, { recursive: true, force: true });
 fs.mkdirSync(TO, { recursive: true });
 
-async function replayed() {
+async function guarded() {
   const out = path.join(folder, "run");
   await new Promise((resolve) => python("-m", "seerob", "assess", cell, "-o", out).once("exit", resolve));
   const file = fs.readdirSync(out).find((name) => name.endsWith(".mcap"));
-  const child = python("-m", "seerob", "replay", path.join(out, file), "--port", "0");
-  for await (const line of createInterface({ input: child.stdout })) {
-    const url = line.match(/http:\/\/\S+/)?.[0];
-    if (url) return { url, close: () => child.kill("SIGINT") };
-  }
-  throw new Error("seerob replay ended");
+  return replayed(path.join(out, file));
 }
 
 const VIEWS = {
-  replay: { title: "A run that is replayed", of: replayed, ready: paused },
+  replay: { title: "A run that is replayed", of: guarded, ready: paused },
   view: {
     title: "A section, and what is taken along",
     of: null,

@@ -21,7 +21,8 @@ class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
     """Hash of the message types; a page built for another one must be built anew."""
     may: tuple[str, ...] = ()
     """What this page may do, as its token says: ``view``, ``track`` (offer what a headset sees), ``control``
-    (play, pause, seek), ``edit`` (change the workstation file)."""
+    (play, pause, seek), ``edit`` (change the workstation file), ``measure`` (ask how far things are from one
+    another)."""
     visitor: int = 0
     """Number of this visitor, which no other has."""
 
@@ -208,12 +209,14 @@ class Edit(Struct, frozen=True, kw_only=True, tag="edit"):
 
 
 class Measure(Struct, frozen=True, kw_only=True, tag="measure"):
-    """What a page that may edit asks of the twin: how far two things are from one another."""
+    """What a page that may control asks of the twin: how far two things are from one another."""
 
     id: int
     """The page's own number, by which it knows the answer."""
     between: tuple[str, str]
     """Full names of bodies, or of all that belongs to a robot, a person or another entry."""
+    t: float | None = None
+    """Instant that the page shows [s]; None for the newest."""
 
 
 class Mistake(Struct, frozen=True, kw_only=True):

@@ -296,7 +296,8 @@ class Measured(Struct, frozen=True, kw_only=True, tag="measured"):
 
     id: int
     result: Result | None = None
-    """Least distance of the surfaces where everybody begins, with the line between them; it has no limit."""
+    """Least distance of the surfaces at the instant that was shown (`Result.t`), with the line between them;
+    it has no limit, and an interval where the real surfaces may be nearer than the shapes."""
     refusal: str = ""
     """Why there is none."""
 

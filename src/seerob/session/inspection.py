@@ -73,7 +73,11 @@ def _of_recording(recording: Recording) -> list[Fact]:
     facts = [Fact("reads", f"{recording.path}, with {len(recording.files)} files in it")]
     facts += [Fact("reads", f"{name}, {len(data)} bytes, in it") for name, data in recording.files.items()]
     facts.append(
-        Fact("note", "replay opens none of its files and serves the page; report opens them, as here:")
+        Fact(
+            "note",
+            "replay serves the page, and opens none of its files before somebody measures there; "
+            "report opens them, as here:",
+        )
     )
     table = parsed_toml(recording.files[file], Path(file)) if file in recording.files else {}
     nowhere = recording.path.parent / "…"

@@ -14,7 +14,7 @@ const KEYS: readonly [keys: string, does: string][] = [
   ["W", word("to the worst instant of the selected criterion, or of the one that is worst now")],
   ["L", word("back to live")],
   ["F", word("frame the selection")],
-  ["D", word("while editing: measure a distance, or end that")],
+  ["D", word("measure a distance, or end that")],
   ["M R", word("while editing: handles to move, to turn what is selected")],
   ["Ctrl+Z Ctrl+Y", word("while editing: undo, redo")],
   ["1 … 9", word("markers of a criterion on and off")],

@@ -1,37 +1,47 @@
 // Under the tools of the room: what is measured, and how far it is.
 
-import { faceAngle, measuring } from "../editing/measure";
-import { formatFixed, formatNumber } from "../format";
+import { notRun } from "../editing/draft";
+import { atLeast, withUnit } from "../figures";
+import { formatNumber } from "../format";
+import { stale } from "../page_state";
+import { measuring } from "../view/measure";
 import { said } from "../words";
 
 export function MeasureNote() {
   const now = measuring.value;
   if (!now) return null;
   const [a, b] = now.picks;
-  const angle = faceAngle(now);
-  const value = now.result?.value;
+  const { result, refusal, angle } = now;
   return (
-    <output class="measure-note" aria-live="polite">
-      {!a && "Pick the first surface, in the room or in the tree"}
-      {a && !b && `${a.name}, and the second one …`}
+    <output class={`measure-note ${stale.value ? "stale" : ""}`} aria-live="polite">
+      {!a && said("Pick the first surface, in the room or in the tree")}
+      {a && !b && said("{name}, and the second one …", { name: a.name })}
       {a && b && (
         <>
           <span>
             {a.name} ↔ {b.name}
           </span>
-          {now.refusal !== "" && <span class="unknown">{now.refusal}</span>}
-          {now.refusal === "" && !now.result && <span>{said("measuring …")}</span>}
-          {value != null && <strong>{distance(value)}</strong>}
-          {now.result && value == null && <span class="unknown">{now.result.reason}</span>}
-          {angle !== null && <span>faces as drawn at {formatNumber(angle)}°</span>}
+          {refusal !== "" && <span class="unknown">{refusal}</span>}
+          {refusal === "" && !result && <span>{said("measuring …")}</span>}
+          {result?.value != null && <strong>{distance(result.value)}</strong>}
+          {result?.interval && (
+            <span>{said("real surfaces: from {size}", { size: size(result.interval[0]) })}</span>
+          )}
+          {result?.t != null && !notRun.value && <span>{said("at {t} s", { t: result.t.toFixed(2) })}</span>}
+          {angle !== null && (
+            <span>{said("faces as drawn at {angle}°", { angle: formatNumber(angle) })}</span>
+          )}
         </>
       )}
     </output>
   );
 }
 
-// To tenths of a millimetre, never farther and never less deep than it is.
+// Never farther and never less deep than it is.
 function distance(value: number): string {
-  const text = `${formatFixed(Math.floor(value * 1e4) / 1e4, 4).replace("−", "")} m`;
-  return value < 0 ? `overlap, ${text} deep at least` : text;
+  return value < 0
+    ? said("overlap, {size} deep at least", { size: size(value).replace("−", "") })
+    : size(value);
 }
+
+const size = (metres: number): string => withUnit(atLeast(metres, "m"), "m");

@@ -1,10 +1,9 @@
 // Over the room: viewpoints, and what is drawn in it.
 
 import { useSignal } from "@preact/signals";
-import { mayEdit } from "../editing/draft";
-import { measuring, toggleMeasure } from "../editing/measure";
 import { scene } from "../page_state";
 import type { Preset } from "../scene/viewpoint";
+import { mayMeasure, measuring, toggleMeasure } from "../view/measure";
 import { said, word } from "../words";
 import { useActions } from "./app_context";
 import { Icon } from "./Icon";
@@ -42,7 +41,7 @@ export function ViewTools() {
           <Icon name="frame" />
         </button>
       </fieldset>
-      {mayEdit.value && (
+      {mayMeasure.value && (
         <div class="tools">
           <button
             type="button"

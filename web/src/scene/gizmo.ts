@@ -6,8 +6,8 @@ import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { holding } from "../company";
 import { change, chosenEntry, draft, type Entry, mayEdit } from "../editing/draft";
 import { gizmoMode, STEPS, steps } from "../editing/handles";
-import { measuring } from "../editing/measure";
 import { moveTo, placing } from "../editing/pose";
+import { measuring } from "../view/measure";
 import type { Bodies, Body } from "./bodies";
 import type { Stage } from "./stage";
 

@@ -5,7 +5,6 @@ import { Quaternion, type Raycaster, Vector3 } from "three";
 import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
-import { measuring, withFace } from "../editing/measure";
 import { Glide } from "../glide";
 import { MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
@@ -21,6 +20,7 @@ import {
   stale,
 } from "../page_state";
 import { manikinTints } from "../posture/coloring";
+import { measuring, type Normal, withFace } from "../view/measure";
 import { followProbe, probeAt, probing } from "../view/probe";
 import { sectionPlanes } from "../view/section";
 import type { Scene } from "../wire";
@@ -82,7 +82,8 @@ export class Viewer {
           probeAt(body.node.name, point, body.group);
           this.probe();
         }
-        if (name !== null) withFace(normal, () => select({ kind: "node", name }));
+        if (name !== null)
+          withFace(normal && this.inBody(name, normal), () => select({ kind: "node", name }));
         else if (!measuring.peek()) select(null);
       },
       () => this.gizmo.held,
@@ -158,6 +159,18 @@ export class Viewer {
     group.updateWorldMatrix(true, false);
     const position = group.getWorldPosition(new Vector3()).toArray();
     return { position, quaternion: group.getWorldQuaternion(new Quaternion()).toArray() };
+  }
+
+  /** A direction of a body's frame in the world, three.js's own; null for an unknown name. */
+  turned(name: string, face: Normal): Normal | null {
+    const group = this.bodies.byName.get(name)?.group;
+    return group ? new Vector3(...face).transformDirection(group.matrixWorld).toArray() : null;
+  }
+
+  private inBody(name: string, direction: Normal): Normal | null {
+    const group = this.bodies.byName.get(name)?.group;
+    if (!group) return null;
+    return new Vector3(...direction).transformDirection(group.matrixWorld.clone().invert()).toArray();
   }
 
   /** Where a point of the world (z up) is on the screen [px]. */

@@ -6,7 +6,6 @@ import argparse
 import json
 import logging
 import time
-from functools import partial
 from typing import TYPE_CHECKING
 
 from seerob.app.console.interruption import Stopped
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from seerob.app.server.live import Shown
     from seerob.app.server.serving import Server
     from seerob.app.server.trial import Job, Trial
-    from seerob.core.snapshot import Result, Scene
     from seerob.session.station import Station
     from seerob.workstation.allowed import Allowed
 
@@ -145,7 +143,7 @@ def serving(
     """
     from seerob.app.commands.schema import schema
     from seerob.app.emulation.ports import at_ports
-    from seerob.app.server.desk import Checked, Desk
+    from seerob.app.server.desk import Desk
     from seerob.app.server.serving import Server
     from seerob.app.server.trial import Begun, Trial
     from seerob.workstation.workstation import locate
@@ -165,16 +163,23 @@ def serving(
     scene = station.scene()
     trial = Trial(Begun(station, scene, station.first(scene)), running=running, refusal=refusal)
 
-    def check(raw: bytes) -> Checked:
+    def check(raw: bytes) -> Callable[[], None]:
         edited = at_ports(compiled(path, allow, quiet=True, raw=raw), moves)
         scene = edited.scene()
         begun = Begun(edited, scene, edited.first(scene))
-        return Checked(lambda: trial.put(begun), partial(_distance, edited, scene))
+        return lambda: trial.put(begun)
 
-    begun = Checked(lambda: None, partial(_distance, station, scene))
-    desk = Desk(locate(path), begun, check, json.dumps(schema()).encode(), trial)
-    meshes = station.model.meshes
-    server = Server(scene=scene, meshes=meshes, feed=trial, desk=desk, host=host, port=port, **visits)
+    desk = Desk(locate(path), check, json.dumps(schema()).encode(), trial)
+    server = Server(
+        scene=scene,
+        meshes=station.model.meshes,
+        feed=trial,
+        desk=desk,
+        ruler=lambda: trial.ruler,
+        host=host,
+        port=port,
+        **visits,
+    )
     trial.connect(server.begin, desk.tell, server.call)
     return server, desk, trial
 
@@ -185,16 +190,3 @@ def _live_sources(station: Station) -> set[bytes]:
 
     live = (source for source in station.workstation.sources if isinstance(source, LiveSource))
     return {f"{type(source).__module__} {source!r}".encode() for source in live}
-
-
-def _distance(station: Station, scene: Scene, between: tuple[str, str]) -> Result:
-    """What a criterion of the least distance says of two things where everybody begins.
-
-    Raises:
-        SeerobError: A name leads nowhere, or they share a body.
-    """
-    from seerob.criteria.safety.minimum_distance import MinimumDistance
-
-    name = f"measured {between[0]} – {between[1]}"
-    asked = station.with_criteria(MinimumDistance(name=name, between=between))
-    return next(found for found in asked.first(scene).results if found.name == name)

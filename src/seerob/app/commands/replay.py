@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.app.console.interruption import Stopped
-from seerob.app.console.terminal import WORDS, Exit, exit_code, line, seconds
+from seerob.app.console.terminal import WORDS, Exit, cache_folder, exit_code, line, seconds
 from seerob.app.console.visiting import add_page, tell_pages, visiting
 from seerob.core.errors import InputError
 from seerob.core.snapshot import History, Verdict
 
 if TYPE_CHECKING:
     from seerob.app.server.player import Player
+    from seerob.model.model import Model
     from seerob.recording.recording import Recording
 
 HELP = "show a recording in the page: play, pause, seek; the exit code is the verdict that was recorded"
@@ -46,16 +47,19 @@ def show(path: Path, options: argparse.Namespace) -> int:
     from seerob.app.server.player import Player
     from seerob.app.server.serving import Server
     from seerob.recording.recording import Recording
+    from seerob.session.measuring import Ruler
 
     recording = Recording.open(path)
     line("recording", f"{recording.scene.title}: {recording.duration:.1f} s", "bold")
     for finding in recording.findings:
         line(finding.level, finding.text, "yellow")
+    ruler = Ruler(lambda: _model(recording))
     player = Player(recording, beside=_beside(getattr(options, "beside", None), recording))
     server = Server(
         scene=recording.scene,
         meshes=recording.meshes,
         feed=player,
+        ruler=lambda: ruler,
         host=options.host,
         port=options.port,
         **visiting(options),
@@ -69,6 +73,21 @@ def show(path: Path, options: argparse.Namespace) -> int:
         while not stopped() and (time.monotonic() < end or player.reading):
             time.sleep(0.1)
     return _verdict(recording, player)
+
+
+def _model(recording: Recording) -> Model:
+    """The workstation that a recording was made with, from the files in it: what one measures in.
+
+    Raises:
+        InputError: It cannot be compiled from them, or is another one here than it was then.
+    """
+    from seerob.session.station import load_recorded
+
+    model = load_recorded(recording, cache=cache_folder()).model
+    if [node.name for node in recording.scene.nodes] != [body.name for body in model.bodies]:
+        what = f"was recorded by seerob {recording.scene.version}, and has other bodies here"
+        raise InputError.at(recording.path, "", what, "measure with the version that recorded it")
+    return model
 
 
 def _beside(path: Path | None, recording: Recording) -> History:

@@ -177,6 +177,7 @@ def live(
     """Show, judge and record until Ctrl-C or the time is over."""
     from seerob.app.server.live import LiveView
     from seerob.outputs.sink import RecordsVisitors
+    from seerob.session.measuring import Ruler
 
     folder = run_folder(station.model.folder, options.output)
     sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False, pdf=options.pdf)
@@ -187,6 +188,7 @@ def live(
         meshes=station.model.meshes,
         host=options.host,
         port=options.port,
+        ruler=Ruler(lambda: station.model),
         **visiting(options),
     ) as view:
         if view.server.notice:

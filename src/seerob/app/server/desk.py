@@ -29,10 +29,7 @@ from seerob.core.snapshot import (
     Draft,
     Edit,
     Edited,
-    Measure,
-    Measured,
     Mistake,
-    Result,
 )
 from seerob.workstation import editing
 from seerob.workstation.editing import Event, Overlap, exchanged, undone
@@ -43,18 +40,9 @@ MOST_STEPS = 1000
 """That can be taken back, and revisions that an edit may be behind."""
 
 
-class Checked(NamedTuple):
-    """A draft that is right."""
-
-    show: Callable[[], None]
-    """Makes pages see it; called in the server's loop."""
-    measure: Callable[[tuple[str, str]], Result]
-    """The distance of two things in it; called in a thread of its own."""
-
-
-Check = Callable[[bytes], Checked]
+Check = Callable[[bytes], Callable[[], None]]
 """Reads a draft as ``seerob check-file`` does, in a thread of its own, and raises `InputError` of every
-mistake."""
+mistake; what it gives makes pages see the draft, and is called in the server's loop."""
 
 
 class Trying(Protocol):
@@ -118,7 +106,6 @@ class Desk:
 
     Args:
         file: The workstation file.
-        begun: What it is now.
         check: Says what is wrong with a draft.
         schema: JSON schema of the workstation file, for forms.
         trial: Where drafts are tried; None where none is.
@@ -127,10 +114,8 @@ class Desk:
         InputError: The file cannot be read.
     """
 
-    def __init__(
-        self, file: Path, begun: Checked, check: Check, schema: bytes = b"", trial: Trying | None = None
-    ) -> None:
-        self.schema, self._now, self._trial = schema, begun, trial
+    def __init__(self, file: Path, check: Check, schema: bytes = b"", trial: Trying | None = None) -> None:
+        self.schema, self._trial = schema, trial
         self._file, self._check = file, check
         self._tables, self._raw = read_toml(file)
         self._saved, self._saved_steps = self._raw, tuple[_Step, ...]()
@@ -177,18 +162,6 @@ class Desk:
                 _log.exception("an edit failed")
                 mistakes = (Mistake(key="", what=f"a fault of the program or of a plug-in: {error!r}"),)
         return Edited(id=edit.id, accepted=not mistakes, revision=self._revision, mistakes=mistakes)
-
-    async def measure(self, asked: Measure) -> Measured:
-        """How far two things are from one another in the draft, as the engine has it."""
-        async with self._lock:
-            try:
-                result = await asyncio.to_thread(self._now.measure, asked.between)
-            except SeerobError as error:
-                return Measured(id=asked.id, refusal=str(error))
-            except Exception as error:
-                _log.exception("a measurement failed")
-                return Measured(id=asked.id, refusal=f"a fault of the program or of a plug-in: {error!r}")
-        return Measured(id=asked.id, result=result)
 
     async def _take(self, page: Client, edit: Edit) -> None:
         match edit.action:
@@ -289,7 +262,7 @@ class Desk:
         self, raw: bytes, steps: tuple[_Step, ...], events: Sequence[Event], saved: bytes | None = None
     ) -> None:
         """Make a draft the one that pages see, if it is right."""
-        now, tables, diff = await asyncio.to_thread(
+        show, tables, diff = await asyncio.to_thread(
             self._looked_at, raw, self._saved if saved is None else saved
         )
         if saved is None and (why := self._held(changed_entries(self._tables, tables))):
@@ -297,14 +270,13 @@ class Desk:
         self._raw, self._steps, self._tables, self._diff = raw, steps[-MOST_STEPS:], tables, diff
         self._revision += 1
         self._done.append((self._revision, tuple(events)))
-        self._now = now
-        now.show()
+        show()
 
-    def _looked_at(self, raw: bytes, saved: bytes) -> tuple[Checked, dict[str, object], str]:
-        now = self._check(raw)
+    def _looked_at(self, raw: bytes, saved: bytes) -> tuple[Callable[[], None], dict[str, object], str]:
+        show = self._check(raw)
         before, after = (text.decode("utf-8-sig").splitlines() for text in (saved, raw))
         diff = "\n".join(unified_diff(before, after, self._file.name, self._file.name, n=2, lineterm=""))
-        return now, parsed_toml(raw, self._file), diff
+        return show, parsed_toml(raw, self._file), diff
 
     def _own(self, step: _Step, page: Client) -> bool:
         return step.page is page or step.page not in self._redo

@@ -43,6 +43,9 @@ class Feed(Protocol):
     def transport(self) -> Transport:
         """State of the player."""
 
+    def seen_at(self, t: float | None) -> Snapshot | None:
+        """Where everybody was when a page showed an instant [s], or is now; None when that is not kept."""
+
     def command(self, command: Command) -> None:
         """Do what a page asks, if it can be done; the page is told `transport` afterwards.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -21,6 +22,7 @@ from seerob.app.server.desk import Desk
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
 from seerob.app.server.registrar import Registrar
 from seerob.app.wire import schema
+from seerob.core.errors import SeerobError
 from seerob.core.markers import plain
 from seerob.core.snapshot import (
     PROTOCOL,
@@ -49,7 +51,9 @@ from seerob.core.snapshot import (
 )
 from seerob.devices.live import headset_offers
 from seerob.devices.live.headset_offers import Offers
+from seerob.session.measuring import Ruler
 
+_log = logging.getLogger(__name__)
 MOST_CLIENTS = 64
 PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
@@ -59,6 +63,7 @@ Message = Command | Tracking | Register | Edit | Measure | Introduction | Presen
 """Of a page."""
 _KINDS: dict[type, str] = {
     Tracking: "tracking",
+    Measure: "measure",
     Presence: "presence",
     Introduction: "introduction",
     Hold: "introduction",
@@ -73,6 +78,7 @@ RATES: dict[str, tuple[float, float]] = {
     "tracking": (160.0, 320.0),
     "command": (40.0, 80.0),
     "edit": (10.0, 20.0),
+    "measure": (10.0, 20.0),
     "presence": (60.0, 120.0),
     "introduction": (5.0, 20.0),
     "doing": (60.0, 120.0),
@@ -84,6 +90,7 @@ SHARED: dict[str, tuple[float, float]] = {
     "tracking": (640.0, 1280.0),
     "command": (100.0, 200.0),
     "edit": (20.0, 40.0),
+    "measure": (20.0, 40.0),
     "presence": (1920.0, 3840.0),
     "introduction": (40.0, 200.0),
     "doing": (240.0, 480.0),
@@ -101,6 +108,8 @@ def read_message(data: bytes) -> Message:
         command = _decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise ValueError(f"not a command: {error}") from None
+    if isinstance(command, Measure) and not isfinite(command.t or 0.0):
+        raise ValueError("measure needs a finite instant")
     if not isinstance(command, Command):
         return command
     if len(data) > LARGEST_COMMAND:
@@ -126,9 +135,11 @@ class Hub:
         offers: Offers,
         visits: Visits | None = None,
         desk: Desk | None = None,
+        ruler: Callable[[], Ruler] | None = None,
         patience: float = PATIENCE,
     ) -> None:
         self._feed, self._patience, self._offers, self._desk = feed, patience, offers, desk
+        self._ruler, self._measuring = ruler, asyncio.Lock()
         self._visits = Visits() if visits is None else visits
         self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
         self._greeted: dict[Client, Hello] = {}
@@ -201,7 +212,13 @@ class Hub:
             return
         client = Client(socket, patience=self._patience)
         edits = self._desk is not None and Role.CONTROL in state["roles"]
-        may, number = (*sorted(state["roles"]), *(("edit",) if edits else ())), self.company.number()
+        measures = self._ruler is not None and Role.CONTROL in state["roles"]
+        number = self.company.number()
+        may = (
+            *sorted(state["roles"]),
+            *(("measure",) if measures else ()),
+            *(("edit",) if edits else ()),
+        )
         self._greeted[client] = replace(self._hello, may=may, visitor=number)
         client.offer("Hello", _encode(self._greeted[client]))
         client.offer("Scene", self._scene)
@@ -315,12 +332,22 @@ class Hub:
         return lambda names: self.company.held_by_another(client, names)
 
     async def _measure(self, asked: Measure, visit: Visit, roles: frozenset[Role]) -> Measured:
-        if self._desk is not None and Role.CONTROL in roles:
-            return await asyncio.shield(self._desk.measure(asked))
-        visit.refuse("measure")
-        return Measured(
-            id=asked.id, refusal="nothing is measured here: seerob edit does, for who may control"
-        )
+        if self._ruler is None or Role.CONTROL not in roles:
+            visit.refuse("measure")
+            return Measured(id=asked.id, refusal="nothing is measured here, or not by who may only look")
+        async with self._measuring:
+            # Both in the loop: the draft may be another one soon.
+            ruler, seen = self._ruler(), self._feed.seen_at(asked.t)
+            if seen is None:
+                return Measured(id=asked.id, refusal="where everybody was then is not kept any more")
+            try:
+                result = await asyncio.to_thread(ruler.measure, asked.between, seen)
+            except SeerobError as error:
+                return Measured(id=asked.id, refusal=str(error))
+            except Exception as error:
+                _log.exception("a measurement failed")
+                return Measured(id=asked.id, refusal=f"a fault of the program: {error!r}")
+        return Measured(id=asked.id, result=result)
 
     async def _register(
         self, client: Client, asked: Register, visit: Visit, roles: frozenset[Role]

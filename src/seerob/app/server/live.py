@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import asyncio
 from array import array
+from bisect import bisect_right
 from collections import deque
 from math import ceil, inf, log2, nan
 from time import monotonic
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob.app.server.access import Tokens
@@ -25,6 +27,7 @@ from seerob.devices.live.headset_offers import Offers
 from seerob.outputs.sink import Closing
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES
+from seerob.session.measuring import Ruler
 
 KEPT_PER_BUCKET = 7
 """Smallest, largest, smallest margin, and the first of each verdict; the first of all is one of those."""
@@ -134,6 +137,29 @@ class Past:
         return History(traces=tuple(past.trace(name) for name, past in self._of.items()))
 
 
+class _Seen:
+    """Where everybody was in the last minutes of a run, as pages were shown it: what one measures in."""
+
+    def __init__(self, most: int = 16 * 2**20) -> None:
+        """Most bytes of poses that are kept."""
+        self._kept: list[Snapshot] = []
+        self._bytes, self._most = 0, most
+
+    def add(self, snapshot: Snapshot) -> None:
+        self._kept.append(replace(snapshot, results=()))
+        self._bytes += len(snapshot.poses)
+        if self._bytes > self._most:
+            gone = max(len(self._kept) // 10, 1)
+            self._bytes -= sum(len(each.poses) for each in self._kept[:gone])
+            del self._kept[:gone]
+
+    def at(self, t: float | None) -> Snapshot | None:
+        if t is None:
+            return self._kept[-1] if self._kept else None
+        k = bisect_right(self._kept, t, key=lambda each: each.t)
+        return self._kept[k - 1] if k else None
+
+
 WAITING = 8192
 """Snapshots that wait for the server's thread; more than that are missing in the history only."""
 
@@ -165,6 +191,7 @@ class Live:
         self._published: tuple[float, float] | None = None
         self._slow = 0.0
         self._past = Past()
+        self._seen = _Seen()
         self._newest = 0.0
         self._finished = False
         self.log: ResultLog | None = None
@@ -194,6 +221,10 @@ class Live:
         """What the run came to by now."""
         return None if self.log is None else self.log.so_far(whole=self._finished)
 
+    def seen_at(self, t: float | None) -> Snapshot | None:
+        """What was shown at an instant of the last minutes, or is now."""
+        return self._seen.at(t)
+
     def transport(self) -> Transport:
         """Always live; not playing once the run has ended."""
         return Transport(playing=not self._finished, t=self._newest, live=True)
@@ -217,6 +248,7 @@ class Live:
                 last = newest
                 self._newest = newest.t
                 if finished or monotonic() - then <= OLD:
+                    self._seen.add(newest)
                     audience.show(newest, inf if finished else then + OLD)
                 self._past.tidy()
             now = monotonic()
@@ -271,6 +303,7 @@ class LiveView(Shown):
         tokens: What visitors must know, by role.
         tls: Encrypts.
         clear_text: Whether others may be served unencrypted.
+        ruler: By which pages measure; None where they do not.
 
     Raises:
         InputError: As `Server.start`.
@@ -286,6 +319,7 @@ class LiveView(Shown):
         tokens: Tokens | None = None,
         tls: Tls | None = None,
         clear_text: bool = False,
+        ruler: Ruler | None = None,
     ) -> None:
         live = Live()
         self.server = Server(
@@ -297,6 +331,7 @@ class LiveView(Shown):
             tokens=tokens,
             tls=tls,
             clear_text=clear_text,
+            ruler=None if ruler is None else lambda: ruler,
         )
         super().__init__(live, self.server.offers)
         self.url = self.server.start()

@@ -102,6 +102,10 @@ class Player:
         """State of the player."""
         return Transport(playing=self._playing, t=self._now(), speed=self._speed, loop=self._loop)
 
+    def seen_at(self, t: float | None) -> Snapshot:
+        """The recorded snapshot at an instant, or at the one that is played now."""
+        return self._recording.snapshot_at(self._now() if t is None else t)
+
     def command(self, command: Command) -> None:
         """Play, pause, seek, speed, step or loop.
 

@@ -43,6 +43,7 @@ from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
 from seerob.devices.live.headset_offers import Offers
 from seerob.protocols.links.tcp_server import stop_accepting
+from seerob.session.measuring import Ruler
 
 FOLDER = Path(__file__).parent / "page"
 
@@ -182,6 +183,7 @@ class Server:
         clear_text: Whether others may be served unencrypted, so that anyone on the way reads and changes it.
         hosts: Names, besides addresses and ``localhost``, under which the server may be asked for.
         desk: Where pages edit the workstation; None where nobody does.
+        ruler: Gives that by which pages measure in what is shown; None where they do not.
         origins: Origins, such as ``https://line3.example``, whose pages may connect as well.
         page: Folder of the built page.
         patience: How long a page may leave a frame waiting before it is disconnected [s].
@@ -201,6 +203,7 @@ class Server:
         hosts: Iterable[str] = (),
         origins: Iterable[str] = (),
         desk: Desk | None = None,
+        ruler: Callable[[], Ruler] | None = None,
         page: Path = FOLDER,
         patience: float = PATIENCE,
     ) -> None:
@@ -212,7 +215,13 @@ class Server:
         self.offers = Offers()
         """What headsets that show a page see: the sources of the same run take it."""
         self.hub = Hub(
-            scene=scene, feed=feed, offers=self.offers, visits=self.visits, desk=desk, patience=patience
+            scene=scene,
+            feed=feed,
+            offers=self.offers,
+            visits=self.visits,
+            desk=desk,
+            ruler=ruler,
+            patience=patience,
         )
         self._meshes = dict(meshes)
         schema = b"" if desk is None else desk.schema

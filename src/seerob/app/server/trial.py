@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from seerob.app.server.feed import Audience, Feed
 from seerob.app.server.live import Live
 from seerob.core.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
+from seerob.session.measuring import Ruler
 from seerob.session.station import Station
 
 
@@ -45,6 +46,10 @@ class Still:
     def transport(self) -> Transport:
         """Not playing."""
         return Transport(playing=False, t=self._snapshot.t)
+
+    def seen_at(self, t: float | None) -> Snapshot:
+        """The snapshot."""
+        return self._snapshot
 
     def command(self, command: Command) -> None:
         """Nothing can be played."""
@@ -91,6 +96,7 @@ class Trial:
         self, begun: Begun, *, running: bool = False, refusal: Callable[[Station], str] = lambda _: ""
     ) -> None:
         self._begun, self._refusal = begun, refusal
+        self._ruler = Ruler(lambda: begun.station.model)
         self._seq = begun.first.seq
         self._feed: Feed = Still(begun.first)
         self._turned = asyncio.Event()
@@ -125,7 +131,7 @@ class Trial:
 
     def put(self, begun: Begun) -> None:
         """Another draft: shown where everybody begins, and tried from there when the one before it was."""
-        self._begun = begun
+        self._begun, self._ruler = begun, Ruler(lambda: begun.station.model)
         self._turn(running=self.running)
 
     def start(self) -> str:
@@ -192,6 +198,15 @@ class Trial:
     def transport(self) -> Transport:
         """Of the run, or that nothing plays."""
         return self._feed.transport()
+
+    def seen_at(self, t: float | None) -> Snapshot | None:
+        """Where everybody was in the run, or begins."""
+        return self._feed.seen_at(t)
+
+    @property
+    def ruler(self) -> Ruler:
+        """Measures in the draft."""
+        return self._ruler
 
     def command(self, command: Command) -> None:
         """The present cannot be played otherwise."""

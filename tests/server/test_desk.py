@@ -397,6 +397,8 @@ def test_what_one_holds_no_other_changes_nor_takes_back(desk):
         say[first](Hold(names=()))
         say[second](Hold(names=()))
         held(second)
+        while second.draft.revision < first.draft.revision:
+            second.read()
         assert second.edit(Change(kind="set", path=MOVE.path, value=[1, 0, 0.37])).accepted
         # What is held is not taken back either, and what is not said again is let go.
         say[first](Hold(names=("table",)))

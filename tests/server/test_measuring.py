@@ -133,6 +133,7 @@ def test_who_may_only_look_or_track_does_not_measure(cell):
     feed = Live()
     server = Server(scene=cell.scene(), meshes={}, feed=feed, port=0, tokens=tokens, ruler=lambda: ruler)
     feed.publish(cell.first(cell.scene()))
+    feed.finish()  # what was last is shown however long ago that was
     with ExitStack() as stack:
         stack.enter_context(server)
         for role, token in zip(Role, tokens, strict=True):

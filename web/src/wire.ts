@@ -508,12 +508,12 @@ export interface Event {
   /** Run time [s]. */
   t: number;
   /**
-   * `taken`, `handed` (another hand has it now), `torn` (out of a hand), `placed`, `dropped`,
+   * `taken`, `handed` (another hand has it now), `torn` (out of a hand or gripper), `placed`, `dropped`,
    * `refused` (a hand could not take it) or `round` (a round of work ended).
    */
   what: string;
   piece: string;
-  /** Hand that did it, such as `operator/right_hand`. */
+  /** Hand or gripper that did it, such as `operator/right_hand`. */
   by?: string;
   /** Place where it was put, or from which it was taken; empty where it is none. */
   where?: string;

@@ -11,11 +11,11 @@ class Event(Struct, frozen=True, kw_only=True, omit_defaults=True):
     t: float
     """Run time [s]."""
     what: str
-    """``taken``, ``handed`` (another hand has it now), ``torn`` (out of a hand), ``placed``, ``dropped``,
+    """``taken``, ``handed`` (another hand has it now), ``torn`` (out of a hand or gripper), ``placed``, ``dropped``,
     ``refused`` (a hand could not take it) or ``round`` (a round of work ended)."""
     piece: str
     by: str = ""
-    """Hand that did it, such as ``operator/right_hand``."""
+    """Hand or gripper that did it, such as ``operator/right_hand``."""
     where: str = ""
     """Place where it was put, or from which it was taken; empty where it is none."""
     took: float | None = None

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.model.model import Body, Mechanism, Model
+from seerob.model.mounting.loose import BODY
 
 Indices = NDArray[np.int64]
 
@@ -17,7 +18,9 @@ Indices = NDArray[np.int64]
 def unknown_place(body: Body) -> str:
     """Why nobody knows where a body is that a gripper picks up, without a run."""
     if body.holder == body.owner:
-        return f"{body.owner}: people take it and put it down, and only a run tells where it is"
+        if body.name != f"{body.owner}/{BODY}":
+            return f"{body.name}: only a run tells whether {body.owner} holds it"
+        return f"{body.owner}: it is loose, and only a run tells where it is"
     return f"{body.owner}: {body.holder} picks it up and lets it go, and only a run tells where it is"
 
 

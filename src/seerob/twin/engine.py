@@ -242,10 +242,10 @@ class Engine:
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = state(model, self._shown, self._hearings, self.signals)
         self.state.foresee, self.state.knots = self._foresee, self._knots_of
-        self._grips = Grips(self.state, self._mj)
         self._loose = Loose(model, self._mj, self._data, self._shown)
         for index in self._loose.bodies():
             self.state.attachments.unknown.pop(index, None)
+        self._grips = Grips(self.state, self._mj, self._loose)
         self._tick = 0
         self._now = 0.0
         """Instant of the last tick [s]."""
@@ -553,6 +553,8 @@ class Engine:
             gaps = tuple(gap for each in every for gap in each.ended(t + kernel.SLACK))
             self.state.path = replace(self.state.path, gaps=gaps)
         self.state.heard()
+        if self._loose.names:
+            self._loose.doubt(self.state)
         return self.state
 
     @property

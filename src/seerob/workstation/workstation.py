@@ -265,11 +265,11 @@ class Tool(Mounted, frozen=True, kw_only=True):
 
 
 class Workpiece(Mounted, frozen=True, kw_only=True):
-    """A payload: something a tool carries, or a loose part that people take and put down."""
+    """A payload: something a tool carries, or a loose part that people and grippers take and put down."""
 
     on: str = ""
     """Full name of the link that carries it, such as ``ur10/tool0``, or of another tool. Without it, it is
-    loose: it lies where ``at`` says, gravity and what touches it move it, and people take it."""
+    loose: it lies where ``at`` says, gravity and what touches it move it, people and grippers take it."""
     rest: Pose | None = None
     """Where it lies first, in the world: the gripper that ``on`` names picks it up and lets it go.
     Without it, it is on what carries it all the time."""

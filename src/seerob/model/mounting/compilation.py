@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -47,6 +48,7 @@ from seerob.model.mounting.things import (
 )
 from seerob.model.variables import Bound, bound
 from seerob.recording.format import filed
+from seerob.workstation.tables.machines import Fingers
 from seerob.workstation.workstation import (
     Area,
     Human,
@@ -158,6 +160,9 @@ class _Compiler:
         if not self.problems:
             self._mount_all()
         if not self.problems:
+            for i, machine in enumerate(self.station.machines):
+                if isinstance(machine.motion, Fingers):
+                    self._try(f"machines[{i}]", partial(self._grasps, machine, machine.motion))
             for i, area in enumerate(self.station.areas):
                 self._try(f"areas[{i}]", partial(self._area, area))
             for i, sensor in enumerate(self.station.sensors):
@@ -332,6 +337,20 @@ class _Compiler:
             if entry.owner == piece.name:
                 entry.holder = piece.name
         self.mounting.files |= filed(piece.name, thing.files, folder=self.folder, references=(piece.mesh,))
+
+    def _grasps(self, gripper: Machine, fingers: Fingers) -> None:
+        """Loose workpieces in the hand: in a file that is not run the heaviest of them weighs on it."""
+        names = [p.name for p in self.station.workpieces if p.loose and fnmatchcase(p.name, fingers.takes)]
+        weights = {name: self.chains[name].description.links[0].inertial for name in names}
+        heaviest = max(names, key=lambda name: w.mass if (w := weights[name]) else 0.0, default="")
+        between = np.eye(4)
+        finger = next(e for e in self.mounting.entries if e.owner == gripper.name)
+        ends = extreme_points(finger.solids)[0][:, 2]
+        between[2, 3] = 0.5 * (ends.min() + ends.max())
+        for entry in [e for e in self.mounting.entries if e.owner in weights]:
+            weighs = weights[entry.owner] if entry.owner == heaviest else None
+            machine_mounting.graspable(self.mounting, gripper.name, entry, weighs, between)
+            self.carriers[f"{gripper.name}/{entry.owner}"] = gripper.name
 
     def _place(self, place: Place) -> None:
         if place.on is not None and not self.mounting.has(self._body(place.on)):

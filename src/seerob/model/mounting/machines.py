@@ -10,8 +10,8 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.transforms import Array
-from seerob.description.description import Description, Joint, JointKind, Link, Mimic
-from seerob.model.mounting.specification import Mounting, extreme_points
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic
+from seerob.model.mounting.specification import Entry, Mounting, extreme_points
 from seerob.model.mounting.things import Color, LoadedThing, load_thing
 from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn
 from seerob.workstation.workstation import Machine, Workpiece
@@ -159,3 +159,27 @@ def picked_up(
         mounting.entries.append(
             replace(entry, name=name, role="part", owner=piece.name, carrier="", mass=None)
         )
+
+
+def graspable(
+    mounting: Mounting, gripper: str, piece: Entry, inertial: Inertial | None, palm_from_piece: Array
+) -> None:
+    """Add what a loose workpiece is while a gripper holds it: a part of the gripper, ``gripper/blank``.
+
+    Args:
+        mounting: With both.
+        gripper: The machine.
+        piece: The loose workpiece.
+        inertial: What it weighs there in a file that is not run; None for nothing: a gripper holds one.
+        palm_from_piece: Where it is held in a file that is not run, shape (4, 4).
+    """
+    away, name = f"{piece.owner}/{AWAY}", f"{gripper}/{piece.owner}"
+    if not mounting.has(away):
+        up = np.eye(4)
+        up[2, 3] = NOWHERE
+        mounting.body(away, None, up)
+    body = mounting.body(name, f"{gripper}/{BODY}", palm_from_piece)
+    if inertial is not None:
+        mounting.inertial(body, inertial)
+    held = replace(piece, name=name, owner=gripper, carrier=gripper, holder=gripper, mass=None)
+    mounting.entries.append(held)

@@ -75,6 +75,8 @@ class Riders:
         riders = self.of(name)
         things: dict[str, float | None] = {}
         for entry in self._entries:
+            if entry.role == "workpiece" and entry.holder == entry.owner:
+                continue  # loose: who holds it, and whether, only a run tells
             mounted = entry.carrier in (name, *riders) and entry.role in THINGS and entry.owner != name
             if entry.owner in riders or mounted:
                 mass = None if entry.mass is None else entry.mass.value

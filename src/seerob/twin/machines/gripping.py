@@ -7,12 +7,18 @@ fingers at it then, or while it lies, nobody knows where it is, nor what that gr
 begins with fingers that are not shut and no farther apart than if they held it, as the file has it in the
 hand, and it does not lie between them, nobody knows where it is.
 
+What is loose is held in the same way, one at a time, wherever it lies: the physics moves it, by a spring
+from the gripper, which feels its weight (`seerob.twin.machines.loose`). In masses and distances it is a part
+of the gripper meanwhile, put anew where the physics has it by more than `OFF`. Of two that are between the
+fingers nobody knows which is held.
+
 What grippers hold along a motion that was recorded: picked up and let go as in the run that it is of.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from fnmatch import fnmatchcase
 
 import mujoco
 import numpy as np
@@ -25,9 +31,10 @@ from seerob.model.model import Body, Model
 from seerob.model.mounting.machines import AWAY, BODY, FINGERS, RESTING
 from seerob.twin.attachments import Columns
 from seerob.twin.machines.following import ON_ITS_WAY
+from seerob.twin.machines.loose import Loose
 from seerob.twin.state import Hearing, State
 from seerob.workstation.tables.machines import Fingers
-from seerob.workstation.workstation import Workpiece
+from seerob.workstation.workstation import Machine, Workpiece
 
 
 class Held:
@@ -85,21 +92,35 @@ def own_masses(model: Model) -> Model:
     return replace(model, mj=model.mj.__copy__()) if changes else model
 
 
+OFF = 1e-4
+"""How far what a gripper holds may be from where masses and distances have it [m]."""
+
+
 class Grips:
     """The workpieces of a twin that are picked up and let go. None is held at first.
 
     Args:
         state: The twin, of a model from `own_masses`.
         physics: The `mujoco.MjModel` that is stepped.
+        loose: The loose workpieces; None where no physics moves them, and nobody knows who holds them.
 
     Raises:
         InputError: The fingers of a gripper do not face each other.
     """
 
-    def __init__(self, state: State, physics: mujoco.MjModel) -> None:
+    def __init__(self, state: State, physics: mujoco.MjModel, loose: Loose | None = None) -> None:
         models = (state.model.mj, physics)
-        pieces = [piece for piece in state.model.workstation.workpieces if piece.rest is not None]
-        self._grips = [_Grip(state, models, piece) for piece in pieces]
+        station = state.model.workstation
+        self._grips: list[_Grip | _Jaws] = [
+            _Grip(state, models, piece) for piece in station.workpieces if piece.rest is not None
+        ]
+        if loose is not None:
+            self._grips += [
+                _Jaws(state, models, loose, machine, machine.motion)
+                for machine in station.machines
+                if isinstance(machine.motion, Fingers)
+                and any(fnmatchcase(name, machine.motion.takes) for name in loose.names)
+            ]
         self._weigh(state)
 
     def follow(self, state: State) -> bool:
@@ -134,9 +155,7 @@ class _Grip:
         )
         mj = model.mj
         self._mass, self._inertia = float(mj.body_mass[self._in_hand]), mj.body_inertia[self._in_hand].copy()
-        plate = _between(self._fingers[0], np.array(machine.motion.along))
-        solids = tuple(solid for index in self._resting for solid in model.bodies[index].solids)
-        self._gap = Query(Shapes.build([("gap", (plate,)), ("piece", solids)]), (0,), (1,), cap=self._touch)
+        self._gap = _reaching_between(model, self._fingers[0], machine.motion, self._resting)
         cap = 2 * LET_GO * self._touch
         self._between_fingers = Query(model.shapes, *((finger.index,) for finger in self._fingers), cap=cap)
         self._queries = {
@@ -160,7 +179,7 @@ class _Grip:
         """Whether it was picked up, let go or lost."""
         if state.attachments.unknown.keys() & set(self._resting):
             return False
-        if self._silent(state):
+        if silent(state, self._hand):
             self._unheard = state.invalid_reason(self._hand) or "not heard"
             return False
         unheard, self._unheard = self._unheard, ""
@@ -194,16 +213,6 @@ class _Grip:
         else:
             self._let_go(state)
         return True
-
-    def _silent(self, state: State) -> bool:
-        """Whether the gripper or whoever carries it is not known to be where it is shown."""
-        name = self._hand
-        while name:
-            why = state.hearings[name].invalid_reason(state.t)
-            if why and not why.startswith(ON_ITS_WAY):
-                return True
-            name = state.model.mechanisms[name].on
-        return False
 
     def _grips(self, state: State) -> bool:
         """Whether both fingers are at it, or still near it, and it reaches between them."""
@@ -268,15 +277,7 @@ class _Grip:
 
     def _load(self, mj: mujoco.MjModel, held: bool) -> None:
         """Let it weigh on the hand, or not."""
-        body = self._in_hand
-        change = (self._mass if held else 0.0) - float(mj.body_mass[body])
-        mj.body_mass[body] += change
-        mj.body_inertia[body] = self._inertia if held else 0.0
-        while True:
-            mj.body_subtreemass[body] += change
-            if body == 0:
-                break
-            body = int(mj.body_parentid[body])
+        _weighs(mj, self._in_hand, self._mass if held else 0.0, self._inertia)
 
 
 class _Other:
@@ -292,6 +293,187 @@ class _Other:
         """Whether both of its fingers are as near to the piece as they are when they hold it."""
         R, x = state.rotations, state.positions
         return all(query.minimum(R, x).distance <= self._touch for query in self._queries)
+
+
+class _Jaws:
+    """A gripper and the loose workpieces that it may take."""
+
+    def __init__(
+        self,
+        state: State,
+        models: tuple[mujoco.MjModel, ...],
+        loose: Loose,
+        machine: Machine,
+        motion: Fingers,
+    ) -> None:
+        self._loose, self._hand, self._touch = loose, machine.name, motion.touch
+        self._mj, self._holds, self._unheard = state.model.mj, "", ""
+        self._taken_at = 0.0
+        """Width at which it took what it holds [m]."""
+        self._fingers = [_body(state.model, f"{machine.name}/{side}") for side in FINGERS]
+        self._palm = _mj_body(state.model, f"{machine.name}/{BODY}")
+        self._reach = max(
+            float(np.linalg.norm(f.corners, axis=1).max(initial=0.0)) + f.radius for f in self._fingers
+        )
+        self._may = {
+            name: _Graspable(state.model, self._hand, self._fingers, motion, name, loose.radius(name))
+            for name in sorted(loose.names)
+            if fnmatchcase(name, motion.takes)
+        }
+        for piece in self._may.values():
+            for mj in models:
+                _weighs(mj, piece.in_hand, 0.0, piece.inertia)
+            state.attachments.unknown.pop(piece.held, None)
+            self._bring(state, piece, held=False)
+
+    def follow(self, state: State) -> bool:
+        """Whether one was taken, let go or torn out, or is to be put anew."""
+        held, changed = self._loose.held_by(self._hand), False
+        if self._holds and held != self._holds:
+            torn = self._may[self._holds]
+            self._bring(state, torn, held=False)
+            changed, self._holds = True, ""
+            if torn.at_fingers(state, LET_GO * self._touch):
+                reason = f"{torn.name}: torn out of {self._hand}, and still between its fingers"
+                self._loose.lose([torn.name], f"{reason}: nobody knows whether it holds it", [torn.held])
+        if silent(state, self._hand):
+            self._unheard = state.invalid_reason(self._hand) or "not heard"
+            return self._keep(state) or changed
+        unheard, self._unheard = self._unheard, ""
+        if held:
+            if self._may[held].at_fingers(state, LET_GO * self._touch):
+                return self._keep(state) or changed
+            slid = self._width(state) <= self._taken_at + self._touch
+            self._loose.let_go(held, self._hand, state.t, unheard=unheard, slid=slid)
+            self._bring(state, self._may[held], held=False)
+            self._holds = ""
+            return True
+        found = [
+            p
+            for p in self._may.values()
+            if not self._loose.is_lost(p.name)
+            and self._near(state, p)
+            and p.is_between(state, self._touch, self._palm)
+        ]
+        if len(found) == 1:
+            self._loose.take(found[0].name, self._hand, self._palm, state.t)
+            self._holds, self._taken_at = found[0].name, self._width(state)
+            self._place(state)
+            self._bring(state, found[0], held=True)
+            return True
+        if found:
+            names = " and ".join(p.name for p in found)
+            self._loose.lose(
+                [p.name for p in found],
+                f"{names} are between the fingers of {self._hand}: nobody knows which it holds",
+                [p.held for p in found],
+            )
+        return changed
+
+    def _near(self, state: State, piece: _Graspable) -> bool:
+        """Whether it may be between the fingers: by the balls that contain both."""
+        far = np.linalg.norm(state.positions[piece.index] - state.data.xpos[self._palm])
+        return bool(far <= self._reach + self._spread(state) + piece.radius)
+
+    def _width(self, state: State) -> float:
+        """How far the fingers are apart [m], but for a constant."""
+        one, other = (state.positions[finger.index] for finger in self._fingers)
+        return float(np.linalg.norm(one - other))
+
+    def _spread(self, state: State) -> float:
+        """How far a finger is from the middle of the gripper [m]."""
+        palm = state.data.xpos[self._palm]
+        return max(float(np.linalg.norm(state.positions[f.index] - palm)) for f in self._fingers)
+
+    def _keep(self, state: State) -> bool:
+        """Put what it holds where the physics has it, when that is elsewhere."""
+        if not self._holds:
+            return False
+        piece = self._may[self._holds]
+        shift = np.linalg.norm(state.positions[piece.held] - state.positions[piece.index])
+        turn = np.linalg.norm(state.rotations[piece.held] - state.rotations[piece.index]) * piece.radius
+        if max(shift, turn) <= OFF:
+            return False
+        self._place(state)
+        return True
+
+    def _place(self, state: State) -> None:
+        piece = self._may[self._holds]
+        turn, origin = state.data.xmat[self._palm].reshape(3, 3), state.data.xpos[self._palm]
+        self._mj.body_pos[piece.in_hand] = turn.T @ (state.positions[piece.index] - origin)
+        self._mj.body_quat[piece.in_hand] = wxyz_from_rotation(turn.T @ state.rotations[piece.index])
+
+    def _bring(self, state: State, piece: _Graspable, *, held: bool) -> None:
+        """Into the hand, or out of it."""
+        _weighs(self._mj, piece.in_hand, piece.mass if held else 0.0, piece.inertia)
+        state.attachments.put(self._mj, piece.held, piece.in_hand if held else piece.away)
+        state.attachments.drawn[piece.held] = piece.index
+        away = {piece.held}
+        state.attachments.away = state.attachments.away - away if held else state.attachments.away | away
+
+
+class _Graspable:
+    """A loose workpiece before a gripper and in it."""
+
+    def __init__(
+        self, model: Model, hand: str, fingers: list[Body], motion: Fingers, name: str, radius: float
+    ) -> None:
+        self.name, self.radius = name, radius
+        own = _mj_body(model, f"{name}/{BODY}")
+        self.mass, self.inertia = float(model.mj.body_mass[own]), model.mj.body_inertia[own].copy()
+        self.index, self.held = _body(model, f"{name}/{BODY}").index, _body(model, f"{hand}/{name}").index
+        self.in_hand, self.away = _mj_body(model, f"{hand}/{name}"), _mj_body(model, f"{name}/{AWAY}")
+        model.mj.body_ipos[self.in_hand] = model.mj.body_ipos[own]
+        model.mj.body_iquat[self.in_hand] = model.mj.body_iquat[own]
+        cap = 2 * LET_GO * motion.touch
+        self._queries = [Query(model.shapes, (finger.index,), (self.index,), cap=cap) for finger in fingers]
+        self._gap = _reaching_between(model, fingers[0], motion, [self.index])
+
+    def at_fingers(self, state: State, near: float) -> bool:
+        """Whether both fingers are that near [m]."""
+        R, x = state.rotations, state.positions
+        return all(query.minimum(R, x).distance <= near for query in self._queries)
+
+    def is_between(self, state: State, near: float, palm: int) -> bool:
+        """Whether both fingers are that near [m], and it reaches between them."""
+        if not self.at_fingers(state, near):
+            return False
+        turn, origin = state.data.xmat[palm].reshape(3, 3), state.data.xpos[palm]
+        both = np.stack([turn, state.rotations[self.index]]), np.stack([origin, state.positions[self.index]])
+        return bool(self._gap.minimum(*both).distance <= 0)
+
+
+def silent(state: State, name: str) -> bool:
+    """Whether a gripper or whoever carries it is not known to be where it is shown."""
+    while name:
+        why = state.hearings[name].invalid_reason(state.t)
+        if why and not why.startswith(ON_ITS_WAY):
+            return True
+        name = state.model.mechanisms[name].on
+    return False
+
+
+def _weighs(mj: mujoco.MjModel, body: int, mass: float, inertia: Array) -> None:
+    """Let one of MuJoCo's bodies weigh as much on what carries it [kg, kg·m²], or nothing."""
+    change = mass - float(mj.body_mass[body])
+    mj.body_mass[body] += change
+    mj.body_inertia[body] = inertia if mass else 0.0
+    while True:
+        mj.body_subtreemass[body] += change
+        if body == 0:
+            break
+        body = int(mj.body_parentid[body])
+
+
+def _reaching_between(model: Model, finger: Body, motion: Fingers, pieces: list[int]) -> Query:
+    """From the plate in the middle between two fingers, in the palm's frame, to a workpiece."""
+    plate = _between(finger, np.array(motion.along))
+    solids = tuple(solid for index in pieces for solid in model.bodies[index].solids)
+    return Query(Shapes.build([("gap", (plate,)), ("piece", solids)]), (0,), (1,), cap=motion.touch)
+
+
+def _mj_body(model: Model, name: str) -> int:
+    return int(mujoco.mj_name2id(model.mj, mujoco.mjtObj.mjOBJ_BODY, name))
 
 
 def _body(model: Model, name: str) -> Body:

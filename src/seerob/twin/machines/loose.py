@@ -9,7 +9,7 @@ toward where it would be if it were fixed to the hand as it was when it was take
 The opposite force acts on the hand's joint, so that arm and trunk carry its weight; the moment about the
 wrist is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put
 anywhere: a table that is in the way stops it, and farther than ``torn`` from where it should be it is torn
-out. One that was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring
+out. In a gripper it hangs on a stiffer one, whose moment the wrist feels. One that was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring
 pulls it into the place's pose.
 
 Its joints are three ways and three turns. The frame they are counted from is put anew between two ticks
@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
@@ -27,6 +28,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.core.errors import Undecided
 from seerob.core.samples import GrabSample
 from seerob.core.snapshot import Event
 from seerob.core.transforms import (
@@ -40,10 +42,14 @@ from seerob.core.transforms import (
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.machines import BODY
+from seerob.twin.state import State
+from seerob.workstation.tables.machines import Fingers
 from seerob.workstation.workstation import Place
 
 STIFFNESS = 8.0
 """Natural frequency of the spring [Hz]: as stiff as arms that hold something; our choice."""
+FIRM = 20.0
+"""Natural frequency of what a gripper holds [Hz]: under 5 m/s² it lags by 0.3 mm; our choice."""
 HEAVY = 1.0
 """What weighs more is pulled no harder [kg], beside its weight: the spring stays stable on a light hand."""
 FASTEST, QUICKEST = 4.0, 20.0
@@ -78,6 +84,8 @@ class _Spring:
     """Where it pulls to, shape (4, 4)."""
     reels: bool = False
     """Whether the workpiece is still on its way to the hand."""
+    firm: bool = False
+    """Whether fingers of a gripper hold it: stiffer, and its wrist feels moments."""
 
 
 @dataclass
@@ -85,7 +93,10 @@ class _Piece:
     """A loose workpiece at one instant."""
 
     name: str
+    index: int
+    """Of its shape."""
     body: int
+    """MuJoCo's."""
     q: Indices
     """Columns of its joints in ``qpos``, shape (6,)."""
     v: Indices
@@ -120,7 +131,7 @@ class Loose:
 
     Attributes:
         names: Of the workpieces.
-        events: What happened since the last tick.
+        events: What happened since `said` was asked last.
     """
 
     def __init__(
@@ -140,7 +151,20 @@ class Loose:
             for human in model.workstation.humans
             for hand in HANDS
         }
+        self._holding: dict[str, tuple[int, ...]] = {
+            b.name: (b.index,) for b in model.bodies if b.role == "human"
+        }
+        """Bodies of whoever may hold something, by hand or gripper."""
+        for machine in model.workstation.machines:
+            if isinstance(machine.motion, Fingers):
+                own = model.mechanisms[machine.name].bodies
+                self._holding[machine.name] = tuple(i for i in own if model.bodies[i].role == "machine")
+        self._lost: dict[int, str] = {}
+        """Bodies of which nobody knows where they are, with the reason."""
+        self._doubted: dict[int, str] = {}
+        """Likewise, while who holds them is not relied on."""
         self._omega = min(2 * math.pi * STIFFNESS, 0.2 / physics.opt.timestep)
+        self._firm = min(2 * math.pi * FIRM, 0.2 / physics.opt.timestep)
         self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
         self._rounds: dict[str, float] = {}
         """When the last round ended at each place [s]."""
@@ -182,7 +206,7 @@ class Loose:
 
     def _pull(self, piece: _Piece, spring: _Spring, dt: float) -> float:
         """Set the forces of a spring; how far the workpiece is from where it pulls [m]."""
-        mj, data, omega = self._mj, self._data, self._omega
+        mj, data, omega = self._mj, self._data, self._firm if spring.firm else self._omega
         carrier = _pose(data, spring.carrier)
         wanted = carrier @ spring.carrier_from_piece
         here = _pose(data, piece.body)
@@ -213,8 +237,9 @@ class Loose:
         torque = 2 * omega * inertia @ (wanted_spin - velocity[:3])
         data.xfrc_applied[piece.body] += np.concatenate([force, torque])
         if spring.carrier:
-            lever = carrier[:3, 3] - data.xipos[spring.carrier]
-            data.xfrc_applied[spring.carrier] += np.concatenate([-force, -np.cross(lever, force)])
+            lever = (com if spring.firm else carrier[:3, 3]) - data.xipos[spring.carrier]
+            moment = np.cross(lever, force) + (torque if spring.firm else 0.0)
+            data.xfrc_applied[spring.carrier] += np.concatenate([-force, -moment])
         return float(np.linalg.norm(gap))
 
     # -- hands ------------------------------------------------------------------------------
@@ -246,13 +271,16 @@ class Loose:
             self._say(t, "refused", piece, by=hand, reason=reason)
             return
         fixed = inverse(_pose(self._data, body)) @ _pose(self._data, piece.body)
+        self._hold(piece, hand, _Spring(body, fixed, reels=far > NEAR), t)
+
+    def _hold(self, piece: _Piece, hand: str, spring: _Spring, t: float) -> None:
         if piece.hands:
             self._say(t, "handed", piece, by=hand)
         else:
             self._say(t, "taken", piece, by=hand, where=piece.place)
             piece.taken = t
             self._first = t if self._first is None else self._first
-        piece.hands[hand] = _Spring(body, fixed, reels=far > NEAR)
+        piece.hands[hand] = spring
         piece.pulled, piece.place, piece.falls, self._pulls = None, "", False, True
 
     def _let_go(self, piece: _Piece, hand: str) -> None:
@@ -272,15 +300,66 @@ class Loose:
         local = inverse(_pose(self._data, body) @ fixed) @ _pose(self._data, piece.body)
         return bool((np.abs(local[:3, 3]) <= 0.5 * np.array(place.size)).all())
 
+    # -- grippers ---------------------------------------------------------------------------
+
+    def radius(self, name: str) -> float:
+        """Of the ball about the centre of mass of a workpiece that contains it [m]."""
+        return self._pieces[name].radius
+
+    def held_by(self, gripper: str) -> str:
+        """What a gripper holds; empty for nothing."""
+        return next((name for name, piece in self._pieces.items() if gripper in piece.hands), "")
+
+    def take(self, name: str, gripper: str, palm: int, t: float) -> None:
+        """Let a gripper hold a workpiece as it is.
+
+        Args:
+            name: Of the workpiece.
+            gripper: Name of the gripper.
+            palm: MuJoCo's body that holds its fingers.
+            t: Now [s].
+        """
+        piece = self._pieces[name]
+        fixed = inverse(_pose(self._data, palm)) @ _pose(self._data, piece.body)
+        self._hold(piece, gripper, _Spring(palm, fixed, firm=True), t)
+
+    def let_go(self, name: str, gripper: str, t: float, *, unheard: str, slid: bool) -> None:
+        """Let a gripper hold a workpiece no more.
+
+        Args:
+            name: Of the workpiece.
+            gripper: Name of the gripper.
+            t: Now [s].
+            slid: Whether it did not open: it slid off what something stopped.
+            unheard: Why the gripper was not relied on until now; empty when it was.
+        """
+        piece = self._pieces[name]
+        del piece.hands[gripper]
+        if slid:
+            self._say(t, "torn", piece, by=gripper, reason="its fingers slid off")
+        self._let_go(piece, gripper)
+        self._pulls = True  # forces are to be taken back
+        if unheard:
+            self.lose(
+                [name], f"{name}: let go while its gripper was not relied on ({unheard}), nobody knows where"
+            )
+
+    def is_lost(self, name: str) -> bool:
+        """Whether nobody knows where a workpiece is."""
+        return self._pieces[name].index in self._lost
+
+    def lose(self, names: Iterable[str], reason: str, bodies: Iterable[int] = ()) -> None:
+        """From now on nobody knows where workpieces are, nor what else there is of them in grippers."""
+        self._lost |= dict.fromkeys((*(self._pieces[name].index for name in names), *bodies), reason)
+
     # -- ticks ------------------------------------------------------------------------------
 
     def begin(self, before: Array) -> None:
-        """Before a tick: forget what happened, and put frames anew.
+        """Before a tick: put frames anew.
 
         Args:
             before: Velocities before the last step, shape (nv,); written.
         """
-        self.events.clear()
         for piece in self._pieces.values():
             if abs(self._data.qpos[piece.q[4]]) > TILTED:
                 self._put_frame_anew(piece, before)
@@ -370,8 +449,26 @@ class Loose:
         self.events.append(said)
 
     def said(self) -> tuple[Event, ...]:
-        """What happened in the last tick."""
-        return tuple(self.events)
+        """What happened since this was asked last."""
+        said, self.events = tuple(self.events), []
+        return said
+
+    def doubt(self, state: State) -> None:
+        """Of what hands and grippers hold nobody knows more than of them; say so, once all were heard."""
+        unknown, asked = state.attachments.unknown, state.asked
+        for index in self._doubted:
+            unknown.pop(index, None)
+        self._doubted.clear()
+        state.asked = set()
+        for piece in self._pieces.values():
+            for hand in piece.hands:
+                try:
+                    state.require_bodies(self._holding[hand], strayed=True)
+                except Undecided as why:
+                    self._doubted[piece.index] = f"{piece.name}: {hand} holds it, and {why}"
+        state.asked = asked
+        unknown |= self._doubted
+        unknown |= self._lost
 
 
 def _piece(model: Model, name: str, torn: float) -> _Piece:
@@ -381,7 +478,16 @@ def _piece(model: Model, name: str, torn: float) -> _Piece:
     own = [b for b in model.bodies if b.owner == name]
     reach = [float(np.linalg.norm(b.corners - com, axis=1).max(initial=0.0)) + b.radius for b in own]
     mass = float(model.mj.body_mass[body])
-    return _Piece(name, body, mechanism.q_address, mechanism.v_address, mass, torn, max(reach, default=0.0))
+    return _Piece(
+        name,
+        own[0].index,
+        body,
+        mechanism.q_address,
+        mechanism.v_address,
+        mass,
+        torn,
+        max(reach, default=0.0),
+    )
 
 
 def _fixed(model: Model, place: Place) -> tuple[int, Array, float]:

@@ -9,6 +9,8 @@ import math
 from enum import StrEnum
 from typing import Annotated
 
+from msgspec import Meta
+
 from seerob.core.quantities import Corner, Length, Seconds, Table, unit
 from seerob.core.shapes import Track
 
@@ -209,8 +211,10 @@ class Fingers(Table, frozen=True, kw_only=True):
     travel: Seconds | None = None
     """Time from one end to the other [s], where ``open`` is told."""
     touch: Annotated[float, unit("m", gt=0, le=0.1)] = 0.005
-    """A workpiece with ``rest`` is held once both fingers are as near to it as this [m], and let go once one
-    of them is twice as far."""
+    """A workpiece that is loose or has ``rest`` is held once both fingers are as near to it as this [m], and
+    let go once one of them is twice as far."""
+    takes: Annotated[str, Meta(min_length=1, max_length=300)] = "*"
+    """Names of the loose workpieces that it takes, one at a time, wildcards allowed."""
 
     def __post_init__(self) -> None:
         _direction("along", self.along)

@@ -11,8 +11,9 @@ class Event(Struct, frozen=True, kw_only=True, omit_defaults=True):
     t: float
     """Run time [s]."""
     what: str
-    """``taken``, ``handed`` (another hand has it now), ``torn`` (out of a hand or gripper), ``placed``, ``dropped``,
-    ``refused`` (a hand could not take it) or ``round`` (a round of work ended)."""
+    """``taken``, ``handed`` (another hand has it now), ``torn`` (out of a hand or gripper), ``placed``,
+    ``dropped``, ``returned`` (to where it begins again), ``refused`` (a hand could not take it) or ``round``
+    (a round of work ended)."""
     piece: str
     by: str = ""
     """Hand or gripper that did it, such as ``operator/right_hand``."""

@@ -89,6 +89,9 @@ def uses(station: Workstation) -> Iterator[tuple[str, str, str]]:
     for i, machine in enumerate(station.machines):
         for name, what in machine.motion.variables().items():
             yield f"machines[{i}] ({machine.name})", name, what
+    for i, part in enumerate(station.parts):
+        for name, what in ({} if part.conveyor is None else part.conveyor.variables()).items():
+            yield f"parts[{i}] ({part.name})", name, what
     for i, display in enumerate(station.displays):
         yield f"displays[{i}] ({display.of})", display.variable, ""
     for group in ("safety", "ergonomics"):

@@ -242,7 +242,7 @@ class Engine:
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = state(model, self._shown, self._hearings, self.signals)
         self.state.foresee, self.state.knots = self._foresee, self._knots_of
-        self._loose = Loose(model, self._mj, self._data, self._shown)
+        self._loose = Loose(model, self._mj, self._data, self._shown, self.signals)
         for index in self._loose.bodies():
             self.state.attachments.unknown.pop(index, None)
         self._grips = Grips(self.state, self._mj, self._loose)
@@ -535,7 +535,7 @@ class Engine:
             hearing.forget(start)
         self.signals.forget(start)
         self._broken.clear()
-        self._loose.begin(self._before)
+        self._broken.update(self._loose.begin(self._before))
         if self.physics:
             self._step(start, t)
         else:

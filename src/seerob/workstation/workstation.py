@@ -31,7 +31,7 @@ from seerob.core.quantities import (
 from seerob.core.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.core.quantities import Pose as Pose  # noqa: PLC0414
 from seerob.workstation.tables.controls import Control as Control  # noqa: PLC0414
-from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
+from seerob.workstation.tables.machines import Belt, Conveyor, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.workstation.tables.places import Place as Place  # noqa: PLC0414
 from seerob.workstation.tables.sensors import Sensor
 from seerob.workstation.tables.simple_shape import Shape as Shape  # noqa: PLC0414
@@ -296,6 +296,8 @@ class Workpiece(Mounted, frozen=True, kw_only=True):
 class Part(Thing, frozen=True, kw_only=True):
     """Something of the environment that stands still."""
 
+    conveyor: Conveyor | None = None
+    """Its surface runs: loose workpieces on it ride along."""
     real: bool = False
     """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
     there, hides what is behind it, and counts in every figure as before."""

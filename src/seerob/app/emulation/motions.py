@@ -1,4 +1,4 @@
-"""Motions that an emulated robot plays: one that was recorded, or a calm swing.
+"""Motions that an emulated robot plays: one that was recorded, or a calm swing; tables of a PLC's values.
 
 The program of an emulated PLC: a belt that brings parts and stops, a light curtain, a sliding door.
 
@@ -7,9 +7,18 @@ Every emulated PLC plays it, whatever it speaks; times are from its start, so a 
 
 from __future__ import annotations
 
+import csv
 import math
+import re
+import time
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from seerob.core.errors import InputError
+from seerob.core.files.bounded import content
+from seerob.core.files.toml_file import MAX_FILE_SIZE
 
 CYCLE = 10.0
 """Of the belt [s]."""
@@ -105,3 +114,70 @@ def _cubic(s: float, T: float, q0: float, q1: float, v0: float, v1: float) -> tu
     a, b, chord = T * v0, T * v1, q1 - q0
     c2, c3 = 3 * chord - 2 * a - b, a + b - 2 * chord
     return q0 + s * (a + s * (c2 + s * c3)), (a + s * (2 * c2 + s * 3 * c3)) / T
+
+
+def in_step(motion: Motion, period: float) -> Motion:
+    """A motion that goes round and round, begun with the clock of this machine: such motions are in step.
+
+    Its time 0 is at whole multiples of the period of the clock's seconds, whenever it was begun.
+
+    Args:
+        motion: What it is.
+        period: Of a round [s].
+    """
+    ahead: list[float] = []
+
+    def stepped(t: float) -> tuple[Joints, Joints]:
+        if not ahead:
+            ahead.append(time.time() - t)
+        return motion((t + ahead[0]) % period)
+
+    return stepped
+
+
+@dataclass(frozen=True)
+class ValueTable:
+    """Values of variables over time, round and round; read from a table by `values`."""
+
+    times: tuple[float, ...]
+    """Ascending, from 0 to the period [s]."""
+    columns: dict[str, tuple[str, tuple[float, ...]]]
+    """By path: unit, or ``bool``, and a value at each instant."""
+
+    def value(self, path: str, t: float) -> float | bool:
+        """Between two rows on the line between them; a bool as in the row before."""
+        unit, values = self.columns[path]
+        t %= self.times[-1]
+        k = bisect_right(self.times, t) - 1
+        if unit == "bool":
+            return bool(values[k])
+        share = (t - self.times[k]) / (self.times[k + 1] - self.times[k])
+        return values[k] + share * (values[k + 1] - values[k])
+
+
+def values(path: Path) -> ValueTable:
+    """Read a table: ``t [s]`` and a column for each variable, ``Belt/speed [mm/s]``, ``Door/open [bool]``.
+
+    Raises:
+        InputError: With the row or the header that is wrong.
+    """
+    rows = list(csv.reader(content(path, MAX_FILE_SIZE).decode("utf-8-sig").splitlines()))
+    heads = [re.fullmatch(r"(\S+) \[(\S+)\]", head.strip()) for head in rows[0]] if rows else []
+    if len(rows) < 3 or not all(heads) or (heads[0] and heads[0].groups() != ("t", "s")):
+        what, remedy = "no table of values", "begin with t [s],Belt/speed [mm/s],… and two rows or more"
+        raise InputError.at(str(path), "", what, remedy)
+    found: list[list[float]] = []
+    for number, row in enumerate(rows[1:], 2):
+        try:
+            found.append([float(cell) for cell in row])
+        except ValueError:
+            found.append([])
+        late = len(found) > 1 and len(found[-1]) == len(heads) and not found[-1][0] > found[-2][0]
+        if len(found[-1]) != len(heads) or late or not all(map(math.isfinite, found[-1])):
+            remedy = "a number in every cell, times ascending"
+            raise InputError.at(str(path), f"row {number}", ",".join(row), remedy)
+    if found[0][0] != 0:
+        raise InputError.at(str(path), "row 2", f"t = {found[0][0]:g}", "begin at t = 0")
+    times, *columns = zip(*found, strict=True)
+    named = [head.groups() for head in heads if head][1:]
+    return ValueTable(times, {name: (unit, c) for (name, unit), c in zip(named, columns, strict=True)})

@@ -163,6 +163,7 @@ class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
 
 # -- robots -------------------------------------------------------------------------------------
 
+IN_STEP = "period of its rounds, which begin at whole multiples of it by the clock of this machine"
 CALM = {
     "joint_speed": 0.5,
     "joint_acceleration": 1.0,
@@ -182,6 +183,7 @@ class RobotOptions(EmulatorOptions, frozen=True, kw_only=True):
     robot: Annotated[str, option("robot of the library, whose limits hold")] = "ur10"
     file: Annotated[str, option("motion to play: a table with joint columns (.csv, .xlsx)")] | None = None
     waypoints: Annotated[str, option(_WAYPOINTS)] | None = None
+    in_step: Annotated[float, option(IN_STEP, "s", gt=0)] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -216,9 +218,17 @@ class RobotOptions(EmulatorOptions, frozen=True, kw_only=True):
         Raises:
             InputError: The file is missing or wrong, or the robot cannot do what it says.
         """
-        from seerob.app.emulation.motions import SWING, swing
+        from seerob.app.emulation.motions import SWING, in_step
 
         start = home_of(target, SWING) if home is None else home
+        motion, what = self._motion(target, start)
+        if self.in_step is None:
+            return motion, what
+        return in_step(motion, self.in_step), f"{what}, every {self.in_step:g} s"
+
+    def _motion(self, target: Target, start: Sequence[float]) -> tuple[Motion, str]:
+        from seerob.app.emulation.motions import swing
+
         if self.waypoints is not None:
             return _through(Path(self.waypoints), target, start), f"through the waypoints of {self.waypoints}"
         if self.file is not None:

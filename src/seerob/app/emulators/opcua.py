@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 from seerob.app.emulation import motions
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion, swing
-from seerob.app.emulation.options import EmulatorOptions, Ready, port
+from seerob.app.emulation.options import EmulatorOptions, Ready, option, port
 from seerob.core.extras import need
 from seerob.protocols.plc.opcua_client import CODES, NAMESPACE, SILENT, content, number
 from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SAFETY, SYSTEM
@@ -329,14 +329,23 @@ OUTPUT = "Twin/warning"
 """A bool that a trigger may write."""
 
 
+VALUES = "table of values to play round and round (.csv): t [s],Belt/speed [mm/s],Gripper/open [bool]"
+
+
 class Opcua(EmulatorOptions, frozen=True, kw_only=True):
     """An OPC UA server: a PLC with a belt, a light curtain and a door, and a robot by OPC 40010."""
 
     port: Annotated[int, port()] = 4840
+    values: Annotated[str, option(VALUES)] | None = None
+    in_step: Annotated[bool, option("rounds of values begin at whole multiples by this machine's clock")] = (
+        False
+    )
 
     def ready(self) -> Ready:
         """The server."""
         need("asyncua")
+        if self.values is not None:
+            return self._playing(Path(self.values))
         variables = {
             "Belt/running": Emulated(motions.running),
             "Belt/speed": Emulated(motions.speed, "mm/s"),
@@ -350,3 +359,18 @@ class Opcua(EmulatorOptions, frozen=True, kw_only=True):
         what = f"variables {', '.join(variables)}; one robot; {OUTPUT} may be written"
         hear = ("seerob probe opcua_robot opc.tcp://{at}", "seerob probe opcua opc.tcp://{at}")
         return Ready(server, what, f"{self.host}:{self.port}", hear)
+
+    def _playing(self, path: Path) -> Ready:
+        table = motions.values(path)
+        ahead = time.time() if self.in_step else 0.0
+
+        def at(name: str) -> Callable[[float], object]:
+            return lambda t: table.value(name, t + ahead)
+
+        variables = {
+            name: Emulated(at(name), "" if unit == "bool" else unit)
+            for name, (unit, _) in table.columns.items()
+        }
+        server = OpcuaServer(variables, host=self.host, port=self.port, outputs=(OUTPUT,))
+        what = f"variables {', '.join(variables)} of {path}; {OUTPUT} may be written"
+        return Ready(server, what, f"{self.host}:{self.port}", ("seerob probe opcua opc.tcp://{at}",))

@@ -174,8 +174,15 @@ class _Compiler:
         bodies = listed(self.mounting)
         self._actuators()
         loose = {piece.name: piece.friction for piece in self.station.workpieces if piece.loose}
+        conveyors = {part.name for part in self.station.parts if part.conveyor is not None}
         add_contacts(
-            self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache, loose=loose
+            self.mounting,
+            bodies,
+            self.station.contacts,
+            file=self.file,
+            cache=self.cache,
+            loose=loose,
+            conveyors=conveyors,
         )
         self.progress("compiling")
         try:
@@ -355,6 +362,9 @@ class _Compiler:
     def _place(self, place: Place) -> None:
         if place.on is not None and not self.mounting.has(self._body(place.on)):
             raise UnknownName("part, machine or link", place.on, [*self.carriers, *self._parts()])
+        names = [other.name for other in self.station.places]
+        if place.returns is not None and place.returns not in names:
+            raise UnknownName("place", place.returns, names)
         if sum(other.name == place.name for other in self.station.places) > 1:
             what = f"the name {place.name!r} is taken by another place"
             raise InputError.at(self.file, "name", what, "choose another")

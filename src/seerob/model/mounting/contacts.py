@@ -7,7 +7,7 @@ one set never touch each other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ def add_contacts(
     file: str,
     cache: Path | None,
     loose: Mapping[str, float],
+    conveyors: Collection[str] = (),
 ) -> None:
     """Give the bodies that may touch their contact shapes.
 
@@ -47,6 +48,7 @@ def add_contacts(
         file: The workstation file, for messages.
         cache: Folder that keeps convex pieces.
         loose: Coefficient of friction of each loose workpiece, by name.
+        conveyors: Parts whose surface runs: the twin says how they drag (`seerob.twin.machines.loose`).
 
     Raises:
         InputError: More pairs than there are bits, or a name that means no body.
@@ -79,7 +81,8 @@ def add_contacts(
         body = bodies[index]
         friction = loose.get(body.owner) if body.role == "workpiece" else None
         hull = bool(loose) and body.role == "robot" and not contype and conaffinity == bit
-        _add_geoms(mounting, body, contype, conaffinity, cache, friction=friction, hull=hull)
+        runs = body.role == "part" and body.owner in conveyors
+        _add_geoms(mounting, body, contype, conaffinity, cache, friction=friction, hull=hull, runs=runs)
 
 
 def select(bodies: Sequence[Body], name: str) -> list[Body]:
@@ -105,6 +108,7 @@ def _add_geoms(
     *,
     friction: float | None = None,
     hull: bool = False,
+    runs: bool = False,
 ) -> None:
     mj_body = mounting.get(body.name)
     for i, solid in enumerate(body.solids):
@@ -113,6 +117,8 @@ def _add_geoms(
         if friction is not None:
             # Its own coefficient counts, whatever it touches.
             masks |= {"friction": [friction, 0.005, 0.0001], "priority": 1, "condim": 4}
+        if runs:
+            masks |= {"priority": 2, "condim": 1}
         if solid.points is not None and len(solid.points) == 2:
             _capsule(mj_body, name, solid, masks)
         else:

@@ -9,8 +9,14 @@ toward where it would be if it were fixed to the hand as it was when it was take
 The opposite force acts on the hand's joint, so that arm and trunk carry its weight; the moment about the
 wrist is left out, since what pulls a twin's wrist is set for a hand without a load. It is never put
 anywhere: a table that is in the way stops it, and farther than ``torn`` from where it should be it is torn
-out. In a gripper it hangs on a stiffer one, whose moment the wrist feels. One that was taken from afar comes to the hand with `REEL`. In a place with ``snap`` the same spring
-pulls it into the place's pose.
+out. In a gripper it hangs on a stiffer one, whose moment the wrist feels. One that was taken from
+afar comes to the hand with `REEL`. In a place with ``snap`` the same spring pulls it into the place's pose.
+
+A surface that runs drags what lies on it by friction toward its speed v_b, no harder than within two steps h:
+
+.. math:: F = -\min(\mu N, \tfrac{m}{2 h} |v - v_b|)\, \frac{v - v_b}{|v - v_b|}
+
+at the centre of mass, and what turns on it likewise. N is the normal force of all contacts with it.
 
 Its joints are three ways and three turns. The frame they are counted from is put anew between two ticks
 before the second turn comes near a right angle, where the others would be one.
@@ -42,9 +48,10 @@ from seerob.core.transforms import (
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.machines import BODY
+from seerob.twin.signals import Signals
 from seerob.twin.state import State
 from seerob.workstation.tables.machines import Fingers
-from seerob.workstation.workstation import Place
+from seerob.workstation.workstation import Part, Place
 
 STIFFNESS = 8.0
 """Natural frequency of the spring [Hz]: as stiff as arms that hold something; our choice."""
@@ -105,6 +112,9 @@ class _Piece:
     torn: float
     radius: float
     """Of the ball about its centre of mass that contains it [m]."""
+    friction: float
+    inertia: float
+    """Largest moment about its centre of mass [kg·m²]."""
     hands: dict[str, _Spring] = field(default_factory=dict)
     place: str = ""
     """Where it lies, or whose spring pulls it."""
@@ -117,7 +127,9 @@ class _Piece:
     since: float = math.inf
     """Since when it is still [s]."""
     by: str = ""
-    """Hand that let it go."""
+    """Hand that let it go, or what it rode on."""
+    rides: Array | None = None
+    """Velocity of the surface that it lies on [m/s], where one runs."""
 
 
 class Loose:
@@ -128,6 +140,7 @@ class Loose:
         physics: The `mujoco.MjModel` that is stepped.
         data: Of that.
         shown: Data of the other one.
+        signals: What machines say.
 
     Attributes:
         names: Of the workpieces.
@@ -135,7 +148,12 @@ class Loose:
     """
 
     def __init__(
-        self, model: Model, physics: mujoco.MjModel, data: mujoco.MjData, shown: mujoco.MjData
+        self,
+        model: Model,
+        physics: mujoco.MjModel,
+        data: mujoco.MjData,
+        shown: mujoco.MjData,
+        signals: Signals,
     ) -> None:
         self._model, self._mj, self._data, self._shown = model, physics, data, shown
         self.events: list[Event] = []
@@ -162,9 +180,21 @@ class Loose:
         self._lost: dict[int, str] = {}
         """Bodies of which nobody knows where they are, with the reason."""
         self._doubted: dict[int, str] = {}
-        """Likewise, while who holds them is not relied on."""
+        """Bodies whose holder is not relied on at this tick, with the reason."""
         self._omega = min(2 * math.pi * STIFFNESS, 0.2 / physics.opt.timestep)
         self._firm = min(2 * math.pi * FIRM, 0.2 / physics.opt.timestep)
+        self._signals = signals
+        self._running = {
+            body.mj: _Running(part.name, part.conveyor.speed, _way(part))
+            for part in model.workstation.parts
+            if part.conveyor is not None
+            for body in model.bodies
+            if body.role == "part" and body.owner == part.name
+        }
+        """Surfaces that run, by MuJoCo's body."""
+        self._by_body = {piece.body: piece for piece in self._pieces.values()}
+        self._back: list[tuple[_Piece, str]] = []
+        """What is put into the pose of a place at the next tick."""
         self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
         self._rounds: dict[str, float] = {}
         """When the last round ended at each place [s]."""
@@ -187,10 +217,11 @@ class Loose:
         """Before a step: take and let go what was heard until ``t`` [s], and set the springs' forces."""
         while self._waiting and self._waiting[0].t <= t + SLACK:
             self._grab(self._waiting.popleft(), t)
-        if not self._pulls:
-            return
-        self._data.xfrc_applied[:] = 0.0
-        self._pulls = False
+        if self._pulls:
+            self._data.xfrc_applied[:] = 0.0
+            self._pulls = False
+        if self._running:
+            self._drag(t, dt)
         for piece in self._pieces.values():
             for hand, spring in tuple(piece.hands.items()):
                 self._pulls = True
@@ -203,6 +234,57 @@ class Loose:
                 self._pulls = True
                 if self._pull(piece, piece.pulled, dt) > 2 * piece.torn + self._places[piece.place][3]:
                     piece.pulled, piece.place = None, ""
+
+    def _drag(self, t: float, dt: float) -> None:
+        """Let surfaces that run drag what lies on them."""
+        data, force = self._data, np.zeros(6)
+        pressed: dict[int, dict[int, Array]] = {}
+        """By MuJoCo's body of a workpiece and of what runs: the sum of normal forces [N]."""
+        for k, (one, other) in enumerate(self._mj.geom_bodyid[data.contact.geom].tolist()):
+            if not (
+                (one in self._running and other in self._by_body)
+                or (other in self._running and one in self._by_body)
+            ):
+                continue
+            mujoco.mj_contactForce(self._mj, data, k, force)
+            normal = data.contact.frame[k][:3] * (force[0] if one in self._running else -force[0])
+            below, piece = (one, other) if one in self._running else (other, one)
+            on = pressed.setdefault(piece, {})
+            on[below] = on.get(below, np.zeros(3)) + normal
+        for piece in self._pieces.values():
+            if piece.rides is not None and piece.body not in pressed:
+                piece.rides = None
+                if not piece.hands:
+                    piece.falls, piece.since = True, math.inf
+        for body, on in pressed.items():
+            for below, normal in on.items():
+                self._ride(self._by_body[body], self._running[below], normal, t, dt)
+
+    def _ride(self, piece: _Piece, runs: _Running, normal: Array, t: float, dt: float) -> None:
+        known = self._signals.at(runs.variable, t)
+        if known.value is None or known.invalid_reason:
+            why = known.invalid_reason or f"{runs.variable}: not heard"
+            if not self.is_lost(piece.name) and not piece.hands:
+                reason = f"{piece.name}: how far {runs.part} took it along nobody knows ({why})"
+                self.lose([piece.name], reason)
+        speed = float(known.value or 0.0)
+        piece.rides, piece.by = speed * runs.way, piece.by or runs.part
+        pressure = float(np.linalg.norm(normal))
+        if not pressure:
+            return
+        up = normal / pressure
+        velocity = np.zeros(6)
+        mujoco.mj_objectVelocity(self._mj, self._data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
+        slip = velocity[3:] - piece.rides
+        slip = slip - up * (up @ slip)
+        fast, spin = float(np.linalg.norm(slip)), float(up @ velocity[:3])
+        most = piece.friction * pressure
+        if fast > 0:
+            drag = min(most, 0.5 * piece.mass * fast / dt)
+            self._data.xfrc_applied[piece.body, :3] -= drag * slip / fast
+        turn = min(0.5 * most * piece.radius, 0.5 * piece.inertia * abs(spin) / dt)
+        self._data.xfrc_applied[piece.body, 3:] -= math.copysign(turn, spin) * up
+        self._pulls = True
 
     def _pull(self, piece: _Piece, spring: _Spring, dt: float) -> float:
         """Set the forces of a spring; how far the workpiece is from where it pulls [m]."""
@@ -354,15 +436,33 @@ class Loose:
 
     # -- ticks ------------------------------------------------------------------------------
 
-    def begin(self, before: Array) -> None:
-        """Before a tick: put frames anew.
+    def begin(self, before: Array) -> tuple[str, ...]:
+        """Before a tick: put back what is to begin again, and frames anew.
 
         Args:
             before: Velocities before the last step, shape (nv,); written.
+
+        Returns:
+            What was put elsewhere.
         """
+        back, self._back = self._back, []
+        for piece, to in back:
+            _, carrier, fixed, _ = self._places[to]
+            pose = _pose(self._shown, carrier) @ fixed
+            for model in (self._mj, self._model.mj):
+                model.body_pos[piece.body] = pose[:3, 3]
+                model.body_quat[piece.body] = wxyz_from_rotation(pose[:3, :3])
+            for rates in (self._data.qvel, before, self._shown.qvel):
+                rates[piece.v] = 0.0
+            for positions in (self._data.qpos, self._shown.qpos):
+                positions[piece.q] = 0.0
+            self._data.qacc_warmstart[piece.v] = 0.0
+            piece.place, piece.rides = "", None
+            self._before.pop(piece.name, None)
         for piece in self._pieces.values():
             if abs(self._data.qpos[piece.q[4]]) > TILTED:
                 self._put_frame_anew(piece, before)
+        return tuple(piece.name for piece, _ in back)
 
     def _put_frame_anew(self, piece: _Piece, before: Array) -> None:
         mj, q, v = self._mj, piece.q, piece.v
@@ -402,6 +502,8 @@ class Loose:
             here = _pose(self._shown, piece.body)
             carrier = 0 if piece.pulled is None else piece.pulled.carrier
             local = inverse(_pose(self._shown, carrier)) @ here
+            if piece.rides is not None:
+                local[:3, 3] -= t * piece.rides
             last = self._before.get(piece.name)
             self._before[piece.name] = local[:3, 3], np.array([t, carrier])
             if not piece.falls:
@@ -428,9 +530,11 @@ class Loose:
             return
         piece.place = place.name
         self._say(t, "placed", piece, by=piece.by, where=place.name, took=took)
+        if place.returns is not None:
+            self._back.append((piece, place.returns))
+            self._say(t, "returned", piece, where=place.returns)
         if place.ends_round:
-            begun = self._rounds.get(place.name, self._first)
-            assert begun is not None
+            begun = self._rounds.get(place.name, self._first or 0.0)
             self._rounds[place.name] = t
             self._say(t, "round", piece, by=piece.by, where=place.name, took=t - begun)
 
@@ -454,7 +558,7 @@ class Loose:
         return said
 
     def doubt(self, state: State) -> None:
-        """Of what hands and grippers hold nobody knows more than of them; say so, once all were heard."""
+        """Say that what hands and grippers hold is known no better than they are, once all were heard."""
         unknown, asked = state.attachments.unknown, state.asked
         for index in self._doubted:
             unknown.pop(index, None)
@@ -471,22 +575,40 @@ class Loose:
         unknown |= self._lost
 
 
+@dataclass(frozen=True)
+class _Running:
+    """A part whose surface runs."""
+
+    part: str
+    variable: str
+    way: Array
+    """Direction in the world, shape (3,)."""
+
+
+def _way(part: Part) -> Array:
+    assert part.conveyor is not None
+    along = np.array(part.conveyor.along)
+    return np.asarray(pose_matrix(part.at)[:3, :3] @ along / np.linalg.norm(along))
+
+
 def _piece(model: Model, name: str, torn: float) -> _Piece:
     mechanism = model.mechanisms[name]
     body = model.frames[f"{name}/{BODY}"].mj
     com = model.mj.body_ipos[body]
     own = [b for b in model.bodies if b.owner == name]
     reach = [float(np.linalg.norm(b.corners - com, axis=1).max(initial=0.0)) + b.radius for b in own]
-    mass = float(model.mj.body_mass[body])
+    table = next(piece for piece in model.workstation.workpieces if piece.name == name)
     return _Piece(
         name,
         own[0].index,
         body,
         mechanism.q_address,
         mechanism.v_address,
-        mass,
+        float(model.mj.body_mass[body]),
         torn,
         max(reach, default=0.0),
+        table.friction,
+        float(model.mj.body_inertia[body].max()),
     )
 
 

@@ -135,6 +135,22 @@ class Belt(Table, frozen=True, kw_only=True):
         return _given({self.position: "m", self.speed: "m/s", self.placed: YES})
 
 
+class Conveyor(Table, frozen=True, kw_only=True):
+    """A surface that runs: loose workpieces on it ride along."""
+
+    along: Direction = FORTH
+    """Direction in which it runs, in the frame of the part."""
+    speed: str
+    """Variable of its speed. While that is not known, what lies on it rides where nobody knows."""
+
+    def __post_init__(self) -> None:
+        _direction("along", self.along)
+
+    def variables(self) -> dict[str, str]:
+        """Variables and the SI unit that each must have."""
+        return {self.speed: "m/s"}
+
+
 class Vehicle(Table, frozen=True, kw_only=True):
     """On the floor: a cart or an AGV that tells its pose in the frame that ``at`` gives."""
 

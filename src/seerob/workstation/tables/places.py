@@ -24,5 +24,7 @@ class Place(Table, frozen=True, kw_only=True):
     """Whether a workpiece that is let go in it is pulled into its pose: a fixture. It takes one at a time."""
     of: Annotated[str, Meta(min_length=1, max_length=300)] = "*"
     """Names of the workpieces that belong here, wildcards allowed."""
+    returns: str | None = None
+    """Place in whose pose a workpiece that comes to rest here is at the next tick: an endless supply."""
     ends_round: bool = False
     """Whether a workpiece that is put here ends a round, of which the cycle time is told."""

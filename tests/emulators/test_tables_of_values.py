@@ -15,7 +15,13 @@ def test_between_rows_numbers_are_on_a_line_and_bools_as_before(tmp_path):
     (tmp_path / "plc.csv").write_text(TABLE)
     table = motions.values(tmp_path / "plc.csv")
     assert [table.value("Belt/speed", t) for t in (0.0, 1.0, 2.0, 3.0, 4.0, 9.0)] == [0, 50, 100, 50, 0, 50]
-    assert [table.value("Door/open", t) for t in (0.0, 1.9, 2.0, 3.9, 4.0)] == [False, False, True, True, False]
+    assert [table.value("Door/open", t) for t in (0.0, 1.9, 2.0, 3.9, 4.0)] == [
+        False,
+        False,
+        True,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(

@@ -508,8 +508,9 @@ export interface Event {
   /** Run time [s]. */
   t: number;
   /**
-   * `taken`, `handed` (another hand has it now), `torn` (out of a hand or gripper), `placed`, `dropped`,
-   * `refused` (a hand could not take it) or `round` (a round of work ended).
+   * `taken`, `handed` (another hand has it now), `torn` (out of a hand or gripper), `placed`,
+   * `dropped`, `returned` (to where it begins again), `refused` (a hand could not take it) or `round`
+   * (a round of work ended).
    */
   what: string;
   piece: string;

@@ -91,13 +91,15 @@ class InHand:
             for piece, hands in state.held.items():
                 own = {*self._model.mechanisms[piece].bodies}
                 alike = zip(self._criteria, self._judged, strict=True)
-                holding = [self._bodies[hand] for hand in hands if self._bodies[hand] in bodies]
+                # A gripper's body is a part of it, and counts by itself (`seerob.twin.machines.gripping`).
+                own_hands = [hand for hand in hands if self._bodies.get(hand) in bodies]
+                holding = [self._bodies[hand] for hand in own_hands]
                 if not holding or any(own & b for c, b in alike if type(c) is type(criterion)):
                     continue
                 reach = min(self._reach(state, own, hand) for hand in holding)
                 if _room(results[i]) > reach:
                     continue
-                person = hands[0].partition("/")[0]
+                person = own_hands[0].partition("/")[0]
                 found[i] = (
                     f"{person} holds {piece}, which reaches {rounded_up(reach)} m from the hand, and nobody "
                     f"asks the same of it: add a criterion of this kind with {piece}, or mount it on the hand"

@@ -552,9 +552,8 @@ class Engine:
             every = (*self._unheard.values(), *self._untold.values())
             gaps = tuple(gap for each in every for gap in each.ended(t + kernel.SLACK))
             self.state.path = replace(self.state.path, gaps=gaps)
+        self.state.attachments.unknown |= self._loose.lost()
         self.state.heard()
-        if self._loose.names:
-            self._loose.doubt(self.state)
         return self.state
 
     @property

@@ -34,7 +34,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.errors import Undecided
 from seerob.core.samples import GrabSample
 from seerob.core.snapshot import Event
 from seerob.core.transforms import (
@@ -49,8 +48,6 @@ from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.machines import BODY
 from seerob.twin.signals import Signals
-from seerob.twin.state import State
-from seerob.workstation.tables.machines import Fingers
 from seerob.workstation.workstation import Part, Place
 
 STIFFNESS = 8.0
@@ -169,18 +166,8 @@ class Loose:
             for human in model.workstation.humans
             for hand in HANDS
         }
-        self._holding: dict[str, tuple[int, ...]] = {
-            b.name: (b.index,) for b in model.bodies if b.role == "human"
-        }
-        """Bodies of whoever may hold something, by hand or gripper."""
-        for machine in model.workstation.machines:
-            if isinstance(machine.motion, Fingers):
-                own = model.mechanisms[machine.name].bodies
-                self._holding[machine.name] = tuple(i for i in own if model.bodies[i].role == "machine")
         self._lost: dict[int, str] = {}
         """Bodies of which nobody knows where they are, with the reason."""
-        self._doubted: dict[int, str] = {}
-        """Bodies whose holder is not relied on at this tick, with the reason."""
         self._omega = min(2 * math.pi * STIFFNESS, 0.2 / physics.opt.timestep)
         self._firm = min(2 * math.pi * FIRM, 0.2 / physics.opt.timestep)
         self._signals = signals
@@ -327,7 +314,7 @@ class Loose:
     # -- hands ------------------------------------------------------------------------------
 
     def held(self) -> dict[str, tuple[str, ...]]:
-        """Workpieces that hands hold, each with these."""
+        """Workpieces that hands and grippers hold, each with these."""
         return {name: tuple(piece.hands) for name, piece in self._pieces.items() if piece.hands}
 
     def _grab(self, sample: GrabSample, t: float) -> None:
@@ -557,22 +544,9 @@ class Loose:
         said, self.events = tuple(self.events), []
         return said
 
-    def doubt(self, state: State) -> None:
-        """Say that what hands and grippers hold is known no better than they are, once all were heard."""
-        unknown, asked = state.attachments.unknown, state.asked
-        for index in self._doubted:
-            unknown.pop(index, None)
-        self._doubted.clear()
-        state.asked = set()
-        for piece in self._pieces.values():
-            for hand in piece.hands:
-                try:
-                    state.require_bodies(self._holding[hand], strayed=True)
-                except Undecided as why:
-                    self._doubted[piece.index] = f"{piece.name}: {hand} holds it, and {why}"
-        state.asked = asked
-        unknown |= self._doubted
-        unknown |= self._lost
+    def lost(self) -> dict[int, str]:
+        """Bodies of which nobody knows where they are, with the reason."""
+        return self._lost
 
 
 @dataclass(frozen=True)

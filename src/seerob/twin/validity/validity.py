@@ -77,7 +77,7 @@ class Validity:
         self.attachments = Attachments(model)
         """Which of MuJoCo's bodies moves each body."""
         self.held: dict[str, tuple[str, ...]] = {}
-        """Loose workpiece → hands that hold it."""
+        """Loose workpiece → hands and grippers that hold it."""
         self._hearings = hearings
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False

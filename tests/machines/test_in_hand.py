@@ -87,6 +87,26 @@ def test_hands_that_hold_more_than_the_load_leave_a_posture_open(tmp_path, load,
         assert "operator holds rod (3 kg), and load says" in found.reason
 
 
+LIFT = (
+    '[[ergonomics]]\nkind = "niosh"\nname = "lift"\nhuman = "operator"\nlimit = 3\nwork = 3000\n'
+    'recovery = 3000\nexclusions = []\nlifts = [{{ {}, coupling = "good", control = false, '
+    "per_minute = 2, origin = {{ horizontal = 0.3, vertical = 0.7, asymmetry = 0 }}, "
+    "destination = {{ horizontal = 0.3, vertical = 1.1, asymmetry = 0 }} }}]\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("entered", "verdict"),
+    [
+        ("load = 2.9", "undecided"),
+        ("load = 1, heaviest = 3", "within"),
+        ("load = 2, heaviest = 2.9", "undecided"),
+    ],
+)
+def test_who_holds_more_than_any_lift_that_is_entered_lifts_something_else(tmp_path, entered, verdict):
+    assert said(tmp_path, CELL + ROD + LIFT.format(entered), seconds=0.3)["lift"].verdict == verdict
+
+
 def test_what_is_mounted_on_a_hand_is_held(tmp_path):
     mounted = ROD.replace('name = "rod"', 'name = "rod"\non = "operator/right_hand"')
     found = said(tmp_path, CELL + mounted + OWAS.format(2.9), grab=False, seconds=0.02)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from seerob.core.figures import rounded_up
 from seerob.core.snapshot import Result
+from seerob.criteria.criterion import Criterion
 from seerob.criteria.question import Bound
 from seerob.criteria.scoring.phases import Phase, entered_for, phase_at
 from seerob.model.model import Model
@@ -54,10 +55,9 @@ class InHand:
             person = (thing.on or "").partition("/")[0]
             if any(human.name == person for human in model.workstation.humans) and thing.mass is not None:
                 self._always[person][thing.name] = thing.mass
-        entered = ((i, entered_for(model, each)) for i, each in enumerate(criteria))
-        self._loads = {
-            i: phases for i, phases in entered if any(_load(phase) is not None for phase in phases)
-        }
+        loads = ((i, _entered_load(model, each)) for i, each in enumerate(criteria))
+        self._loads = {i: load for i, load in loads if load is not None}
+        """Place of each that is told a load → that load at an instant of the run [s]."""
         self.never = not self._masses and not (self._always and self._loads)
         """Whether nobody can hold anything that counts."""
 
@@ -68,8 +68,8 @@ class InHand:
         for piece, hands in held.items():
             for hand in hands:
                 weights.setdefault(hand.partition("/")[0], {})[piece] = self._masses[piece]
-        for i, phases in self._loads.items():
-            if (load := _load(phase_at(phases, state.t, UNKNOWN))) is None:
+        for i, load_at in self._loads.items():
+            if (load := load_at(state.t)) is None:
                 continue
             for person in self._criteria[i].subjects():
                 things = weights.get(person, {})
@@ -123,7 +123,15 @@ def _room(result: Result) -> float:
     return float(min((result.value, *(result.interval or ()))) - result.limit)
 
 
-def _load(phase: Phase) -> float | None:
-    """The handled mass that is entered for a phase [kg]."""
-    load: float | None = getattr(phase, "load", None)
-    return load
+def _entered_load(model: Model, criterion: Criterion) -> Callable[[float], float | None] | None:
+    """The handled mass that a method is told, at an instant of the run [s]; None where it is told none.
+
+    Of lifts, which have no instants, that is the greatest.
+    """
+    if lifts := getattr(criterion, "lifts", ()):
+        masses = [lift.load if lift.heaviest is None else lift.heaviest for lift in lifts]
+        return None if None in masses else lambda t: max(masses)
+    phases = entered_for(model, criterion)
+    if all(getattr(phase, "load", None) is None for phase in phases):
+        return None
+    return lambda t: getattr(phase_at(phases, t, UNKNOWN), "load", None)

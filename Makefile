@@ -42,8 +42,9 @@ demo-xr: $(DEV) $(PAGE)
 demo-plc: $(DEV) $(PAGE)
 	scripts/demo-plc $(BIN) || [ $$? -le 2 ]
 
-# Either keeps one core busy; the others want both.
-test: setup
+# Each of those before keeps one core busy, as what they need does: one pip at a time, beside npm. The others
+# want both.
+test: $(RUN) $(NODE)
 	$(MAKE) --no-print-directory -j2 check compiled package
 	$(MAKE) --no-print-directory unit web-test
 
@@ -97,7 +98,7 @@ imports: $(DEV)
 
 # What the workers of `unit` would all compile at the same time: modules and inner loops.
 compiled: export PYTHONDONTWRITEBYTECODE :=
-compiled: $(DEV) $(LOOPS)/.made
+compiled: $(DEV) $(PAGE) $(LOOPS)/.made
 	mkdir -p $(BROUGHT) && find $(LOOPS) -name '*.nb?' -exec cp -p {} $(BROUGHT) \;
 	said=$$($(BIN)/pytest --collect-only -qq) || { echo "$$said"; exit 1; }
 	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && $(BIN)/seerob new "$$folder/cell" >/dev/null && \

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import seerob as sr
+from kept_run import Chapters
 from seerob import api
 from seerob.app.cli import main
 from seerob.protocols.links.tcp_server import close_server
@@ -132,22 +133,26 @@ def test_a_live_source_of_ones_own_is_heard_and_its_silence_is_undecided(tmp_pat
     controller = Controller()
     text = f'[[sources]]\nkind = "acme.cell_controller"\nrobot = "arm"\nport = {controller.port}\n'
     station = sr.load(cell(tmp_path, text + "frequency = 125\n"), allow_plugins=True)
-    begun = []
+    fastest = 0.6 * 0.2329
 
-    def stop():
-        begun.append(time.monotonic())  # with the first tick: a busy machine takes seconds until then
-        passed = time.monotonic() - begun[0]
-        if passed > 4.0:
-            controller.silent.set()
-        return passed > 5.5
+    def seen_at_its_fastest(snapshot):
+        (speed,) = snapshot.results
+        return speed.verdict == "within" and speed.value > 0.9 * fastest
 
-    run = station.run(live=True, stop=stop)
-    controller.stop()
+    def not_heard(snapshot):
+        (speed,) = snapshot.results
+        return speed.verdict == "undecided" and "not heard" in speed.reason
+
+    story = Chapters((seen_at_its_fastest, controller.silent.set), (not_heard, lambda: None))
+    try:
+        run = station.run(live=True, writers=[story], stop=story.stop)
+    finally:
+        controller.stop()
     speed = run.results["speed"]
     verdicts = speed.verdicts
     within, undecided = (CODES[v] for v in (sr.Verdict.WITHIN, sr.Verdict.UNDECIDED))
     assert (verdicts == within).any()
-    assert speed.max() == pytest.approx(0.6 * 0.2329, rel=0.1)
+    assert speed.max() == pytest.approx(fastest, rel=0.1)
     assert verdicts[-1] == undecided
     assert run.verdict is sr.Verdict.UNDECIDED
 

@@ -61,10 +61,9 @@ def test_a_controller_that_hangs_on_its_last_sample_is_not_relied_on(kind, rates
             joints = lambda: [s for s in list(heard) if isinstance(s, JointSample)]  # noqa: E731
             wait_for(lambda: len(joints()) > 60)
             motions[0].hangs, begun = True, time.monotonic()
-            wait_for(lambda: joints()[-1].t > begun + 1.0)
+            told = lambda: [s for s in joints() if s.t > begun + source.timeout + LATE]  # noqa: E731
+            # A busy machine asks a PLC less often.
+            wait_for(lambda: len(told()) > 5 and any("stands" in s.reason for s in told()))
     finally:
         found.server.stop()
-    told = [s for s in joints() if s.t > begun + source.timeout + LATE]
-    assert len(told) > 5
-    assert all(s.reason for s in told)
-    assert any("stands" in s.reason for s in told)
+    assert all(s.reason for s in told())

@@ -46,7 +46,7 @@ export async function open(options, { before, ...size } = {}) {
 /** Open the page and wait until it shows something. */
 export async function show(page, url) {
   await page.goto(url);
-  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 30_000 });
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t));
   await page.waitForSelector("tr[data-criterion]");
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -108,7 +109,21 @@ def animated(file: str, *, folder: Path = Path(), person: Description | None = N
     Raises:
         InputError: The file is missing or wrong.
     """
-    someone = person or manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
+    if person is None and file.startswith("library:"):
+        return _of_library(file)
+    return _posed(file, folder, person or _medium())
+
+
+@cache
+def _of_library(file: str) -> Person:
+    return _posed(file, Path(), _medium())
+
+
+def _medium() -> Description:
+    return manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
+
+
+def _posed(file: str, folder: Path, someone: Description) -> Person:
     played = keyframes.sample(keyframes.read(file, someone, folder=folder), someone, RATE)
     return _of_postures(someone, played.t, played.q)
 
@@ -128,7 +143,7 @@ def followed(path: Path, *, person: Description | None = None) -> Person:
     Raises:
         InputError: The file is missing or wrong, or its names are nobody's that is known.
     """
-    someone = person or manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
+    someone = person or _medium()
     target = Target(name="person", joints=(), units=(), lower=(), upper=(), velocity=(), description=someone)
     opened = bvh.Bvh(human="person", file=path.name).open(path.parent, target)
     fitter = Fitter(someone)
@@ -179,6 +194,8 @@ def _of_postures(person: Description, times: Array, q: Array) -> Person:
 def _repeated(times: Array, positions: Array, turns: Array) -> Person:
     """The nearest sample before; from the end it starts again."""
     duration = float(times[-1]) if len(times) > 1 else 0.0
+    for shared in (positions, turns):
+        shared.flags.writeable = False
 
     def pose(t: float) -> Pose:
         at = t % duration if duration else 0.0

@@ -101,7 +101,6 @@ def demo(tmp_path_factory):
     return station, record(station, folder, TICKS)
 
 
-@pytest.mark.xdist_group("demo")
 def test_replay_of_the_demo_is_the_run(demo):
     station, recording = demo
     then = list(recording.snapshots())
@@ -125,7 +124,6 @@ print(hashlib.sha256(b"".join(encoded(now))).hexdigest())
 """
 
 
-@pytest.mark.xdist_group("demo")
 def test_a_fresh_process_recomputes_the_demo_from_the_recording_alone(demo, tmp_path):
     import hashlib
 
@@ -232,7 +230,6 @@ def test_workstation_file_of_another_name_is_found_in_the_recording(tmp_path):
     assert load_recorded(recording).model.files == station.model.files
 
 
-@pytest.mark.xdist_group("demo")
 def test_replay_refuses_another_tick(demo, tmp_path):
     _, recording = demo
     other = made(tmp_path, "engine = { tick = 0.004 }\n" + TWO_R, {"arm.urdf": two_r()})
@@ -325,7 +322,6 @@ def test_value_that_is_not_finite_is_undecided(tmp_path):
         assert (result.verdict, result.value) == ("undecided", None)
 
 
-@pytest.mark.xdist_group("demo")
 def test_every_result_has_its_basis_in_the_scene(demo):
     _, recording = demo
     bases = {info.name: info.basis for info in recording.scene.criteria}
@@ -336,7 +332,6 @@ def test_every_result_has_its_basis_in_the_scene(demo):
         assert bases[result.name].inputs
 
 
-@pytest.mark.xdist_group("demo")
 def test_every_value_of_the_demo_is_finite_or_undecided_with_a_reason(demo):
     """Standing still has no direction of motion and no limit to be judged by."""
     _, recording = demo

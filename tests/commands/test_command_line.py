@@ -107,9 +107,10 @@ def test_a_command_ends_at_once_after_what_is_to_be_done_at_the_end():
     program = (
         "import atexit, sys\n"
         "from seerob.__main__ import program\n"
+        "from seerob.app import cli\n"
         "atexit.register(print, 'done at the end')\n"
-        "sys.argv = ['seerob', 'kinds']\n"
-        "sys.settrace({trace})\n"
+        "sys.argv, asked = ['seerob', 'kinds'], cli.main\n"
+        "cli.main = lambda: (asked(), sys.settrace({trace}))[0]\n"
         "program()\n"
         "print('not at once')\n"
     )

@@ -17,7 +17,6 @@ from seerob.core import plugin
 from seerob.session.reading import convert_workstation
 from seerob.workstation.workstation import PLUGINS, TABLES
 
-pytestmark = pytest.mark.xdist_group("schema")
 """What all of them ask is made once: it takes seconds."""
 
 STARTER = tomllib.loads((resources.files("seerob.app.commands") / "starter" / "workstation.toml").read_text())

@@ -11,7 +11,6 @@ from seerob.core.snapshot import Highlight
 from seerob.description.humans.skeleton import JOINTS, mirrored
 
 STILL = np.zeros(len(JOINTS))
-pytestmark = pytest.mark.xdist_group("mirrored rules")
 """One process says it all once."""
 HUMAN = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 ARM = 'supported_arms = "left", back_supported = false, legs = "posture", load = 1'

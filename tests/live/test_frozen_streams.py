@@ -99,13 +99,13 @@ def test_a_device_that_hangs_on_its_last_picture_is_silent(kind, monkeypatch):
         with listening(source) as heard:
             wait_for(lambda: len(bodies(heard)) > 2 * STEPS)
             switch.hang()
-            time.sleep(TIMEOUT + 2 * LATE)
+            # What a loaded machine heard late is doubted for that first.
+            wait_for(lambda: bodies(heard)[-1].reason.endswith(STILL))
             told = bodies(heard)
     finally:
         found.server.stop()
     news = [s for s in told if not s.reason]
     assert news[-1].t < switch.at + LATE
-    assert told[-1].reason.endswith(STILL)
     assert told[-1].t < switch.at + LATE  # it stays as old as it is
 
 

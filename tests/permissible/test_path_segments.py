@@ -35,7 +35,6 @@ def mapped(tmp_path_factory):
     return folder, station, station.permissible_speed(wish=Wish(spacing=0.05))
 
 
-@pytest.mark.xdist_group("mapped")
 def test_segments_follow_each_other_and_carry_the_least(mapped):
     _, _, found = mapped
     (stations,) = found.map.stations
@@ -58,7 +57,6 @@ def test_segments_follow_each_other_and_carry_the_least(mapped):
         segments(found.map, length=1e-9)
 
 
-@pytest.mark.xdist_group("mapped")
 def test_the_plan_is_asked_again_every_millisecond(mapped):
     _, station, found = mapped
     assert found.verified.kept
@@ -92,7 +90,6 @@ def test_too_few_stations_are_noticed_and_added(tmp_path):
     assert found.verified.use <= 1 + 1e-6
 
 
-@pytest.mark.xdist_group("mapped")
 def test_a_run_is_watched_against_the_map(mapped, tmp_path):
     _, _, found = mapped
     data = csv_bytes(map_head(found.map), map_rows(found.map))
@@ -138,7 +135,6 @@ def test_on_the_way_back_the_way_back_counts():
     assert passed(q, np.zeros(2), (start, way)).legs.tolist() == [0, 1]
 
 
-@pytest.mark.xdist_group("mapped")
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -157,7 +153,6 @@ def test_a_map_that_cannot_be_is_refused(mapped, wrong, message):
         read_map(wrong(text).encode(), name="map.csv", units=("rad", "rad"))
 
 
-@pytest.mark.xdist_group("mapped")
 def test_a_map_is_read_back_as_it_was_written(mapped):
     _, _, found = mapped
     (stations,) = found.map.stations

@@ -28,8 +28,6 @@ from seerob.protocols.plc.opcua_security import (
 from seerob.workstation.source import Target
 from seerob.workstation.variables import Kind, Variable
 
-pytestmark = pytest.mark.xdist_group("opcua")
-
 
 def words(text):
     return " ".join(text.split())

@@ -42,7 +42,6 @@ from seerob.protocols.plc.opcua_robotics import Robot, natural
 from seerob.workstation.source import Target
 from seerob.workstation.variables import UNITS, Kind, Variable
 
-pytestmark = pytest.mark.xdist_group("opcua")
 """One server for all: starting one takes seconds."""
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])

@@ -103,7 +103,6 @@ def node_of(url, name):
     return f'kind = "opcua"\nurl = "{url}"', f'"nsu={URI};s={name}"'
 
 
-@pytest.mark.xdist_group("foreign opcua")
 def test_a_node_of_another_makers_server_is_written(tmp_path, server):
     url, node = server
     edges(
@@ -115,7 +114,6 @@ def test_a_node_of_another_makers_server_is_written(tmp_path, server):
     assert node["other"].read_value() is False
 
 
-@pytest.mark.xdist_group("foreign opcua")
 def test_a_node_that_its_server_protects_stays_as_it_is(tmp_path, server, caplog):
     url, node = server
     edges(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from seerob.core.errors import InputError, suggestion
 from seerob.core.files.bounded import TooLarge, content, missing_file
@@ -51,7 +52,9 @@ def load_robot(
     if model.startswith("library:"):
         description = library.load(model.removeprefix("library:"), name=name)
     else:
-        description = _from_file(model, folder, packages or {}, arguments or {}, name, outside, visuals)
+        asked = _Asked(model, folder, packages or {}, arguments or {}, name, outside, visuals)
+        read = _from_published if model.startswith("description:") else _from_file
+        description = read(asked)
         # Numba is imported only where a file brings shapes of its own.
         from seerob.description.robots.maker_geometry import with_protrusions
 
@@ -62,39 +65,43 @@ def load_robot(
     return with_geometry_of(description, maker)
 
 
-def _from_file(
-    model: str,
-    folder: Path,
-    packages: Mapping[str, str],
-    arguments: Mapping[str, str],
-    name: str,
-    outside: bool,
-    visuals: bool,
-) -> Description:
-    if model.startswith("description:"):
-        return _from_published(model, folder, packages, arguments, name, outside, visuals)
-    path, home = _path(model, folder)
-    roots = {package: folder / root for package, root in packages.items()}
-    resolver = Resolver(model, path.parent, roots, within=(folder, home), outside=outside)
-    return _read(path, resolver, arguments, name, visuals)
+class _Asked(NamedTuple):
+    """Which robot of a file, and how it is read: arguments of `load_robot`."""
+
+    model: str
+    folder: Path
+    packages: Mapping[str, str]
+    arguments: Mapping[str, str]
+    name: str
+    outside: bool
+    visuals: bool
+
+    def resolver(self, path: Path, home: Path, known: Mapping[str, Path]) -> Resolver:
+        """What finds the files that a description names.
+
+        Args:
+            path: The description.
+            home: A folder of which it may name files, beside that of the workstation.
+            known: Folders of ROS packages that nobody need name.
+        """
+        named = {package: self.folder / root for package, root in self.packages.items()}
+        within, roots = (self.folder, home), {**known, **named}
+        return Resolver(self.model, path.parent, roots, within=within, outside=self.outside)
 
 
-def _from_published(
-    model: str,
-    folder: Path,
-    packages: Mapping[str, str],
-    arguments: Mapping[str, str],
-    name: str,
-    outside: bool,
-    visuals: bool,
-) -> Description:
+def _from_file(asked: _Asked) -> Description:
+    path, home = _path(asked.model, asked.folder)
+    return _read(asked, path, asked.resolver(path, home, {}))
+
+
+def _from_published(asked: _Asked) -> Description:
+    model, name = asked.model, asked.name
     found = published.find(model.removeprefix("description:"))
-    if arguments and found.path.suffix != ".xacro":
+    if asked.arguments and found.path.suffix != ".xacro":
         raise InputError.at(model, "arguments", "is not a xacro file and takes none", "leave them out")
-    roots = {found.package.name: found.package, **{key: folder / root for key, root in packages.items()}}
-    within = (folder, found.repository)
-    resolver = Resolver(model, found.path.parent, roots, within=within, outside=outside)
-    read = _read(found.path, resolver, {**found.arguments, **arguments}, name, visuals)
+    asked = asked._replace(arguments={**found.arguments, **asked.arguments})
+    known = {found.package.name: found.package}
+    read = _read(asked, found.path, asked.resolver(found.path, found.repository, known))
     source = f"{model}: {found.address} {found.commit[:12]}"
     said = f"licence {found.licence}" if found.licence else "whose licence is not known to the package"
     finding = Finding(level="note", subject=name, text=f"read from {source}, {said}")
@@ -103,12 +110,10 @@ def _from_published(
     return replace(read, source=source, findings=(finding, *read.findings), files={**files, **licence})
 
 
-def _read(
-    path: Path, resolver: Resolver, arguments: Mapping[str, str], name: str, visuals: bool
-) -> Description:
-    model = resolver.file
+def _read(asked: _Asked, path: Path, resolver: Resolver) -> Description:
+    model, name, visuals = asked.model, asked.name, asked.visuals
     if path.suffix.lower() == ".xacro":
-        text, files = expanded(path, resolver, arguments)
+        text, files = expanded(path, resolver, asked.arguments)
         robot = urdf.from_text(text, resolver=resolver, name=name, visuals=visuals)
         return replace(robot, files={**robot.files, **files})
     if path.suffix.lower() not in {".urdf", ".xml"}:

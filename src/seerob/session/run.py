@@ -31,6 +31,7 @@ from seerob.outputs.over_time import plotted
 from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
 from seerob.recording.frames import told_of
 from seerob.recording.result_log import ResultLog
+from seerob.session.huge_pages import use_huge_pages
 from seerob.session.opening import coarse, gappy, signal_timeouts, untimed
 from seerob.session.scene import Looks, invalid_reasons, landmark_of
 from seerob.twin.engine import Engine, last_tick
@@ -298,10 +299,11 @@ def _spared() -> bool:
 
 @contextmanager
 def settled() -> Iterator[None]:
-    """Spare the garbage collector what was made before the loop: it all lives as long as the loop does.
+    """Spare the garbage collector what was made before the loop, in large pages: it lives as long as that.
 
     Who has done so already, around many loops, is left to it: it took longer than short loops do.
     """
+    use_huge_pages()
     if _spared() or gc.get_freeze_count():
         yield
         return

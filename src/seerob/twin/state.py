@@ -32,6 +32,7 @@ from seerob.kernels.speed import PLACED, Placed, by_coordinate, carried, fastest
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.attachments import Columns, moving_dofs
 from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
+from seerob.twin.drawn_points import DrawnPoints, Local
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
@@ -73,49 +74,6 @@ class _Point(NamedTuple):
     velocity: Array
     sigma: list[float]
     wxyz: list[float]
-
-
-Local = tuple[Frame, int, float, float, float]
-"""A frame, MuJoCo's body that it is on, and a point of it as that body has it [m]."""
-
-
-class _DrawnPoints:
-    """Where MuJoCo's bodies were at one tick, for what is drawn later.
-
-    Args:
-        xmat: World from body, row by row, shape (m, 9).
-        xpos: [m], shape (m, 3).
-        local: What of the points that are drawn is the same at all ticks.
-    """
-
-    def __init__(self, xmat: Array, xpos: Array, local: dict[tuple[int, bytes], Local]) -> None:
-        # MuJoCo writes through its own at the next tick.
-        self._xmat, self._xpos = xmat.copy(), xpos.copy()
-        self._local = local
-        self._points: dict[tuple[int, bytes], tuple[Frame, Array]] = {}
-
-    def point(self, frame: Frame, offset: Array) -> Array:
-        """Where a point of a frame was [m], shape (3,): worked out once for all that draw there."""
-        key = id(frame), offset.tobytes()
-        kept = self._points.get(key)
-        if kept is None:
-            bound = self._local.get(key)
-            if bound is None or bound[0] is not frame:
-                ox, oy, oz = offset.tolist()
-                x, y, z = (a * ox + b * oy + c * oz + d for a, b, c, d in frame.body_from_frame[:3].tolist())
-                if len(self._local) >= MOST_PLACES:
-                    self._local.clear()
-                bound = self._local[key] = frame, frame.mj, x, y, z
-            _, body, x, y, z = bound
-            a, b, c, d, e, f, g, h, i = self._xmat[body].tolist()
-            px, py, pz = self._xpos[body].tolist()
-            found = np.array(
-                (px + (a * x + b * y + c * z), py + (d * x + e * y + f * z), pz + (g * x + h * y + i * z))
-            )
-            found.setflags(write=False)
-            # With the frame itself: another one may get the id of one that is forgotten.
-            kept = self._points[key] = frame, found
-        return kept[1]
 
 
 class State(Validity):
@@ -701,7 +659,7 @@ class State(Validity):
         self._require_frame(frame)
         placed = self._cache.get("placed once")
         if placed is None:
-            placed = self._cache["placed once"] = _DrawnPoints(self._xmat, self._xpos, self._drawn)
+            placed = self._cache["placed once"] = DrawnPoints(self._xmat, self._xpos, self._drawn)
         return partial(placed.point, frame, offset)
 
     def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
@@ -104,6 +105,25 @@ class Assembly:
     def names(self) -> list[str]:
         """Full name of each instance, unique and as names may be here."""
         return told_apart(full_name(instance.path) for instance in self.instances)
+
+
+def link_row(name: str, parent: int) -> dict[str, Any]:
+    """A link where its parent is, with nothing on it: what a reader of mechanisms fills in.
+
+    Args:
+        name: Of the link, as the file has it.
+        parent: Number of its parent's row, -1 for the base.
+    """
+    return {
+        "name": name,
+        "parent": parent,
+        "matrix": np.eye(4).tolist(),
+        "anchor": [0.0, 0.0, 0.0],
+        "joints": [],
+        "inertial": None,
+        "pieces": [],
+        "collision": [],
+    }
 
 
 def baked(assembly: Assembly) -> Assembly:

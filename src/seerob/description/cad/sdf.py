@@ -18,7 +18,7 @@ from seerob.core.errors import InputError, Problem
 from seerob.core.files.bounded import TooLarge, content
 from seerob.core.shapes import Mesh
 from seerob.core.transforms import Array, inverse, rotation_from_rpy, rotation_from_wxyz, transform
-from seerob.description.cad.assembly import Assembly
+from seerob.description.cad.assembly import Assembly, link_row
 from seerob.description.cad.containing import ball, cylinder, rounded
 from seerob.description.cad.linked import assembled
 from seerob.description.formats.resolve import Resolver
@@ -218,13 +218,13 @@ class _File:
     ) -> tuple[list[dict[str, Any]], set[str]]:
         rows: list[dict[str, Any]] = []
         if base:
-            rows.append(_row("world_link", -1))
+            rows.append(link_row("world_link", -1))
         waiting = [(begin, len(rows) - 1)]
         names: set[str] = set()
         while waiting:
             name, parent = waiting.pop(0)
             link = self.links[name]
-            row = _row(link.path[-1], parent)
+            row = link_row(link.path[-1], parent)
             row["inertial"] = _inertial(link)
             row["pieces"], row["collision"] = self._pieces(link, "visual"), self._pieces(link, "collision")
             row["pieces"] = row["pieces"] or row["collision"]
@@ -412,19 +412,6 @@ class _Frames:
     def shape(self, element: Element) -> Array:
         """Link from a shape of it (4, 4); of one that is relative to another frame, as if to the link."""
         return _pose(element.find("pose"))
-
-
-def _row(name: str, parent: int) -> dict[str, Any]:
-    return {
-        "name": name,
-        "parent": parent,
-        "matrix": np.eye(4).tolist(),
-        "anchor": [0.0, 0.0, 0.0],
-        "joints": [],
-        "inertial": None,
-        "pieces": [],
-        "collision": [],
-    }
 
 
 def _named(link: _Link) -> list[str]:

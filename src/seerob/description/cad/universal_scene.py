@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.transforms import Array, rotation_from_axis_angle, rotation_from_wxyz, transform
-from seerob.description.cad.assembly import nearest_rotation
+from seerob.description.cad.assembly import link_row, nearest_rotation
 from seerob.description.cad.containing import ball, cylinder, rounded
 from seerob.description.mesh_files import MeshSource, triangles
 from seerob.description.shapes.shapes import box_mesh
@@ -559,17 +559,7 @@ class _Stage:
         bodies: dict[Any, Any],
         owned: dict[Any, list[Any]],
     ) -> dict[str, Any]:
-        row: dict[str, Any] = {
-            "name": "world_link",
-            "path": body,
-            "parent": parent,
-            "matrix": np.eye(4).tolist(),
-            "anchor": [0.0, 0.0, 0.0],
-            "joints": [],
-            "inertial": None,
-            "pieces": [],
-            "collision": [],
-        }
+        row = {**link_row("world_link", parent), "path": body}
         if body is not None:
             prim = bodies[body]
             shapes = owned.get(body, [])

@@ -170,6 +170,19 @@ def test_a_variable_is_as_old_as_the_answer_that_told_it(station):
     assert "undecided" in verdicts(station, old)["distance"]
 
 
+@pytest.mark.parametrize("lost", [False, True])
+def test_between_two_answers_a_server_that_speaks_of_changes_says_the_same_again(station, lost):
+    """It is asked every 0.1 s; pictures in between are as old as the last answer."""
+    every = []
+    for k in range(round(SECONDS / 0.02)):
+        asked = 0.1 * (k // 5)
+        if lost and 1.45 < asked < 1.65:
+            asked = 1.4
+        ages = dict.fromkeys(picture(0.0, STANDS), 0.02 * k - asked)
+        every.append(replace(said(0.02 * k, STANDS), ages=ages))
+    assert ("undecided" in verdicts(station, every)["force"]) == lost
+
+
 def test_a_criterion_that_applied_on_both_sides_was_asked_meanwhile(station):
     """Whether it applied in between is of no account: it was judged all the time."""
     near = {"x": 0.0, "y": 0.0, "heading": 0.0, "force": 0.0, "near": True}

@@ -28,6 +28,8 @@ of the wrist of a UR3, comes to 34.7 rad/s² (its speed over its stopping time).
 BEATS = 0.05
 """Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
 nobody says that it stopped."""
+SAME = 1e-6
+"""Instants that differ by less are the same [s]: a picture of variables may say once more what was known."""
 SEEN = 5e-3
 """How far a joint may go away unseen and come back [rad or m]: what its samples, and the twin, are off by."""
 
@@ -61,6 +63,8 @@ class Unheard:
             seq: Its number: those between were heard, and a newer one took their place.
             speeds: Whether it says speeds.
         """
+        if t <= self._t + SAME:
+            return
         interval, said = t - self._t, speeds and self._said
         each = interval / max(seq - self._seq, 1)
         begin, self._t, self._seq, self._said = self._t, t, seq, speeds

@@ -133,6 +133,26 @@ def test_a_sensor_that_is_mounted_a_quarter_turn_off_is_never_silently_followed(
     assert all("right_shank" in doubt for _, doubt, *_ in told)
 
 
+def test_a_sample_that_is_said_again_moves_nobody():
+    """As a run that was held up does: a headset's three points leave the fit room to go on within them."""
+    rng, person = np.random.default_rng(1), Following(PERSON, np.eye(4))
+    seen = points(("head", "left_hand", "right_hand"), walking(0.1)[1][0])
+    q = []
+    for k in range(20):
+        t = 0.9 * k
+        shaken = tuple(
+            replace(p, position=tuple(np.array(p.position) + rng.normal(0, 0.01, 3))) for p in seen
+        )
+        sample = BodySample(source="headset", seq=k, target="operator", t=t, points=shaken)
+        for said in (sample, replace(sample, t=t + 1e-6, quality=Quality.LATE)):
+            assert person.hear(said)
+            q += [found.q for found in person.until(said.t)]
+    assert len(q) == 40
+    first, again = np.array(q[::2]), np.array(q[1::2])
+    assert np.abs(np.diff(first, axis=0)).max(initial=0) > 1e-3
+    assert np.array_equal(first, again)
+
+
 def test_dropped_and_reordered_frames_change_little():
     t, q = walking()
     frames = frames_of(t, q)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from itertools import pairwise
 
 import pytest
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError
-from seerob.core.samples import JointSample, SignalSample
+from seerob.core.samples import GrabSample, JointSample, Mailbox, SignalSample
 from seerob.devices.live.receivers import Clock, hear, require_recorded
 from seerob.devices.sources.rtde import Rtde
 from seerob.workstation.source import Source
@@ -125,6 +126,28 @@ def test_several_pictures_of_one_instant_are_all_heard():
     for said, heard in ((signal, 3), (joint, 1)):
         feed = hear(iter(lambda: (), None), Said([said(t=start)], [said(t=start)] * 2), Clock())
         assert len([*next(feed), *next(feed)]) == heard
+
+
+def test_what_a_hand_took_and_let_go_while_the_run_was_held_up_is_heard_once_each_and_in_order():
+    """A release that is lost leaves the piece in the hand for good; a grab told twice is no grab."""
+
+    def grab(seq, t, piece=""):
+        return GrabSample(source="room", seq=seq, target="anna/right_hand", piece=piece, t=t)
+
+    clock, box = Clock(), Mailbox()
+    start = time.monotonic()
+    feed = hear(iter(lambda: (), None), box, clock)
+    box.first, box.delay = box.take, 0.0
+    box.post(grab(0, start, "nut"))
+    heard = [*next(feed)]
+    # Set back by half a second, in which two things were done.
+    clock.start += 0.5
+    clock.slipped += 0.5
+    for each in (grab(1, start + 0.1), grab(2, start + 0.2, "bolt"), grab(3, start + 0.2)):
+        box.post(each)
+    heard += [s for _ in range(3) for s in next(feed)]
+    assert [(s.seq, s.piece) for s in heard] == [(0, "nut"), (1, ""), (2, "bolt"), (3, "")]
+    assert all(a.t < b.t < a.t + 0.01 for a, b in pairwise(heard))
 
 
 def test_a_live_source_is_refused_where_time_is_not_real():

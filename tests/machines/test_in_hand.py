@@ -6,6 +6,7 @@ import pytest
 
 from made_cell import made, two_r
 from seerob.core.samples import GrabSample, JointSample
+from seerob.criteria.ergonomics.owas import Owas
 from seerob.session.run import Judge, bind
 from seerob.twin.engine import Engine
 
@@ -79,6 +80,13 @@ def test_what_is_held_in_reach_of_what_is_exceeded_stays_exceeded(tmp_path):
     assert found["operator"].verdict == "exceeded"
 
 
+@pytest.fixture(name="told")
+def a_method_that_is_told_the_load_alone(monkeypatch):
+    """As one of somebody's own may be; those that ship count what hands hold."""
+    monkeypatch.setattr(Owas, "weighs_hands", False)
+
+
+@pytest.mark.usefixtures("told")
 @pytest.mark.parametrize(("load", "verdict"), [(0, "undecided"), (2.9, "undecided"), (3.0, "within")])
 def test_hands_that_hold_more_than_the_load_leave_a_posture_open(tmp_path, load, verdict):
     found = said(tmp_path, CELL + ROD + OWAS.format(load))["load"]
@@ -107,6 +115,7 @@ def test_who_holds_more_than_any_lift_that_is_entered_lifts_something_else(tmp_p
     assert said(tmp_path, CELL + ROD + LIFT.format(entered), seconds=0.3)["lift"].verdict == verdict
 
 
+@pytest.mark.usefixtures("told")
 def test_what_is_mounted_on_a_hand_is_held(tmp_path):
     mounted = ROD.replace('name = "rod"', 'name = "rod"\non = "operator/right_hand"')
     found = said(tmp_path, CELL + mounted + OWAS.format(2.9), grab=False, seconds=0.02)

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "b66b00246d1246a8";
+export const SCHEMA = "499c31298cfae13a";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -471,6 +471,19 @@ export interface Place {
   accuracy_turn: number | null;
 }
 
+/** A source to which waypoints can be added by hand: the tool point that they are of, and their frame. */
+export interface Taught {
+  /** Its number among `sources` of the workstation file. */
+  source: number;
+  robot: string;
+  /** The tool point. */
+  tip: Place;
+  /** In whose frame the file has poses. */
+  base: Place;
+  /** How many it has already. */
+  points: number;
+}
+
 /** Everything about a run that does not change while it runs; sent once. */
 export interface Scene {
   type: "scene";
@@ -501,6 +514,8 @@ export interface Scene {
   landmarks: Place[];
   /** Point of interest of each robot, by its name. */
   tips: Place[];
+  /** Where waypoints can be added by hand. */
+  taught: Taught[];
 }
 
 /** What happened to a loose workpiece. */

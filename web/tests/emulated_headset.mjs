@@ -57,3 +57,29 @@ export function put(page, head, hand = null, direction = [0, 0, -1]) {
     [head, hand, direction],
   );
 }
+
+/** Press or let go of the right controller's trigger, and wait until a picture of the session knows it. */
+export async function trigger(page, value) {
+  await page.evaluate((v) => window.headset.controllers.right.updateButtonValue("trigger", v), value);
+  // Whoever leaves sees no more pictures.
+  if (await page.evaluate(() => window.headset.activeSession !== undefined)) await pictures(page, 2);
+}
+
+/** Press a button of the menu at the left wrist with the right hand's beam, the head being at a point of the room. */
+export async function pressInRoom(page, label, head = [0, 1.6, 0]) {
+  const there = await page.evaluate((name) => {
+    const at = window.seerob.button(name);
+    return at && window.seerob.inRoom(at);
+  }, label);
+  if (!there) throw new Error(`there is no button ${label}`);
+  const from = [0.25, head[1] + 0.1, head[2]];
+  await put(
+    page,
+    head,
+    from,
+    there.map((v, i) => v - from[i]),
+  );
+  await pictures(page, 3);
+  await trigger(page, 1);
+  await trigger(page, 0);
+}

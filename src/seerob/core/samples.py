@@ -227,7 +227,7 @@ def key(sample: Sample) -> tuple[str, ...]:
 
 
 class Mailbox:
-    """Where sources write and the engine reads: per target only the newest sample is kept.
+    """Where sources write and the engine reads: per target only the newest sample is kept, of grabs each.
 
     Safe to post from any thread; `take` empties it.
     """
@@ -237,9 +237,13 @@ class Mailbox:
         self._lock = Lock()
 
     def post(self, sample: Sample) -> None:
-        """Put a sample; it replaces an earlier one about the same target that nobody took."""
+        """Put a sample; it replaces an earlier one about the same target that nobody took.
+
+        What a hand took and let go again happened, however late the run is.
+        """
+        each = (str(sample.seq),) if isinstance(sample, GrabSample) else ()
         with self._lock:
-            self._latest[key(sample)] = sample
+            self._latest[key(sample) + each] = sample
 
     def waits(self, what: tuple[str, ...]) -> bool:
         """Whether there is a sample of a kind (`key`) that nobody took."""

@@ -504,6 +504,20 @@ class Place(Struct, frozen=True, kw_only=True):
     """How far it may be turned from there, standard deviation per axis [rad]; None where nobody says."""
 
 
+class Taught(Struct, frozen=True, kw_only=True):
+    """A source to which waypoints can be added by hand: the tool point that they are of, and their frame."""
+
+    source: int
+    """Its number among ``sources`` of the workstation file."""
+    robot: str
+    tip: Place
+    """The tool point."""
+    base: Place
+    """In whose frame the file has poses."""
+    points: int
+    """How many it has already."""
+
+
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     """Everything about a run that does not change while it runs; sent once."""
 
@@ -530,6 +544,8 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     """By which the room of a visitor, or a camera, is placed in the cell."""
     tips: tuple[Place, ...] = ()
     """Point of interest of each robot, by its name."""
+    taught: tuple[Taught, ...] = ()
+    """Where waypoints can be added by hand."""
 
     def __repr__(self) -> str:
         count = f"{len(self.nodes)} bodies, {len(self.criteria)} criteria, {len(self.findings)} findings"

@@ -126,8 +126,12 @@ def _room(result: Result) -> float:
 def _entered_load(model: Model, criterion: Criterion) -> Callable[[float], float | None] | None:
     """The handled mass that a method is told, at an instant of the run [s]; None where it is told none.
 
+    Who counts what hands hold is told enough.
+
     Of lifts, which have no instants, that is the greatest.
     """
+    if getattr(criterion, "weighs_hands", False):
+        return None
     if lifts := getattr(criterion, "lifts", ()):
         masses = [lift.load if lift.heaviest is None else lift.heaviest for lift in lifts]
         return None if None in masses else lambda t: max(masses)

@@ -19,6 +19,7 @@ from seerob.core.snapshot import (
     Node,
     Place,
     Scene,
+    Taught,
 )
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.criteria.question import Bound
@@ -32,6 +33,7 @@ from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
 from seerob.session.opening import coarse
 from seerob.twin.state import State
+from seerob.workstation.source import TaughtByHand
 from seerob.workstation.variables import Value, WhenStale
 from seerob.workstation.workstation import Landmark, Pose, Workstation, real_names
 
@@ -140,6 +142,7 @@ def scene_of(
         },
         landmarks=tuple(landmark_of(model, landmark) for landmark in station.landmarks),
         tips=tuple(_tips(model)),
+        taught=tuple(_taught(model)),
     )
 
 
@@ -206,6 +209,25 @@ def _tips(model: Model) -> Iterator[Place]:
             with suppress(UnknownName):  # a robot without a shape is not shown
                 tip = mechanism.tip
                 yield place_of(model, mechanism.name, Frame(tip.name, tip.mj, np.eye(4)), tip.body_from_frame)
+
+
+def _taught(model: Model) -> Iterator[Taught]:
+    for number, source in enumerate(model.workstation.sources):
+        robot = model.mechanisms.get(source.target())
+        if not isinstance(source, TaughtByHand) or robot is None:
+            continue
+        hand = source.by_hand(robot.description)
+        if hand is None:
+            continue
+        with suppress(UnknownName):  # a link that is not there, or a robot without a shape
+            tip, base = (model.frame(f"{robot.name}/{link}") for link in (hand.tip, hand.base))
+            yield Taught(
+                source=number,
+                robot=robot.name,
+                tip=place_of(model, robot.name, tip, hand.tip_from_tool),
+                base=place_of(model, robot.name, base, np.eye(4)),
+                points=hand.points,
+            )
 
 
 def _floor(at: Pose) -> tuple[float, float, float, float, float, float, float]:

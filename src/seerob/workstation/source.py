@@ -12,7 +12,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -21,6 +21,7 @@ from seerob.core.errors import InputError
 from seerob.core.quantities import NotBefore, Seconds
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
 from seerob.description.description import Description
 from seerob.workstation.tables.controls import Control
 from seerob.workstation.variables import Variable
@@ -284,3 +285,26 @@ def _jumps(last: Sample | None, first: Sample) -> bool:
         turn = 4 * math.asin(min(1.0, chord / 2))
         return max(turn, math.dist(last.position, first.position)) > SAME_PLACE
     return True
+
+
+class ByHand(NamedTuple):
+    """Waypoints that the workstation file itself has: what their poses are of, and in which frame."""
+
+    tip: str
+    """Link that carries the tool point."""
+    tip_from_tool: Array
+    """The tool point in that link's frame, shape (4, 4)."""
+    base: str
+    """Link in whose frame poses are."""
+    points: int
+    """How many there are."""
+
+
+@runtime_checkable
+class TaughtByHand(Protocol):
+    """A source to which waypoints can be added by hand."""
+
+    robot: str
+
+    def by_hand(self, description: Description) -> ByHand | None:
+        """What its waypoints are of; None where they are a file's."""

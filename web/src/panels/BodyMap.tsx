@@ -3,8 +3,6 @@
 import { signal } from "@preact/signals";
 import {
   type Aspect,
-  contactRows,
-  dominantHand,
   LOOK_WORDS,
   type Look,
   lookOf,
@@ -12,11 +10,11 @@ import {
   type Told,
   toldOf,
   toldOfRegion,
-  worst,
 } from "../body_map/exposure";
-import { type Spot, spots } from "../body_map/figure";
+import type { Spot } from "../body_map/figure";
+import { aspect, contacts, only } from "../body_map/shown";
 import { percent } from "../figures";
-import { frame, scene, stale } from "../page_state";
+import { scene, stale } from "../page_state";
 import { said } from "../words";
 import { BodyFigure, type DrawnSpot } from "./BodyFigure";
 import { ContactDetails, ContactHead } from "./ContactCard";
@@ -38,17 +36,13 @@ const LEGEND: readonly Look[] = [
   "none",
 ];
 
-const aspect = signal<Aspect>("worst");
-const only = signal<string | null>(null);
 const pointed = signal<string | null>(null);
 const pinned = signal<string | null>(null);
 
 export function BodyMap() {
   const run = scene.value;
-  const results = frame.value?.results ?? [];
-  const sources = results.filter((result) => contactRows([result], null).length > 0).map((r) => r.name);
-  const possible = run?.criteria.filter((c) => c.kind === "power_and_force").map((c) => c.name) ?? [];
-  if (!run || (possible.length === 0 && sources.length === 0)) {
+  const { judged, sources, from, all, governing, spots } = contacts.value;
+  if (!run || !judged) {
     return (
       <section class="body-map scroll" aria-label={said("Body map")}>
         <p class="empty">
@@ -58,10 +52,7 @@ export function BodyMap() {
       </section>
     );
   }
-  const from = only.value !== null && sources.includes(only.value) ? only.value : null;
-  const all = contactRows(results, from);
-  const drawn = spots(dominantHand(all)).map((spot) => drawnSpot(spot, all));
-  const governing = worst(all, aspect.value);
+  const drawn = spots.map((spot) => drawnSpot(spot, all));
   const keyOf = (told: Told | undefined): string | null =>
     drawn.find((spot) => told && toldOf(spot, all, aspect.value) === told)?.key ?? null;
   const shownKey = pointed.value ?? pinned.value ?? keyOf(governing);

@@ -37,8 +37,8 @@ export function MeasureNote() {
   );
 }
 
-// Never farther and never less deep than it is.
-function distance(value: number): string {
+/** A distance in words: never farther and never less deep than it is. */
+export function distance(value: number): string {
   return value < 0
     ? said("overlap, {size} deep at least", { size: size(value).replace("−", "") })
     : size(value);

@@ -1,17 +1,16 @@
 // Handles on what is selected, to move and to turn it; the bodies go along until the server has said what it is.
 
 import { effect } from "@preact/signals";
-import { MathUtils, Matrix4, Object3D, Quaternion, Vector3 } from "three";
+import { MathUtils, Matrix4, Object3D } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { holding } from "../company";
-import { change, chosenEntry, draft, type Entry, mayEdit } from "../editing/draft";
+import { chosenEntry, draft, type Entry, mayEdit } from "../editing/draft";
 import { gizmoMode, STEPS, steps } from "../editing/handles";
-import { moveTo, placing } from "../editing/pose";
+import { placing } from "../editing/pose";
 import { measuring } from "../view/measure";
-import type { Bodies, Body } from "./bodies";
+import type { Bodies } from "./bodies";
+import { Carried, frameOf } from "./carried";
 import type { Stage } from "./stage";
-
-const ONE = new Vector3(1, 1, 1);
 
 export class Gizmo {
   private readonly controls: TransformControls;
@@ -21,7 +20,7 @@ export class Gizmo {
   /** Frame that the file's place is given in, in the world. */
   private readonly frame = new Matrix4();
   private readonly start = new Matrix4();
-  private carried: { body: Body; from: Matrix4 }[] = [];
+  private carried: Carried | null = null;
 
   constructor(
     private readonly stage: Stage,
@@ -66,7 +65,7 @@ export class Gizmo {
   place(): void {
     if (this.controls.dragging) return;
     const { entry } = this;
-    if (!entry || !this.frameOf(entry) || !isFixed(entry)) {
+    if (!entry || !frameOf(entry, this.bodies, this.frame)) {
       this.controls.detach();
       this.stage.invalidate();
       return;
@@ -79,59 +78,21 @@ export class Gizmo {
     this.stage.invalidate();
   }
 
-  private frameOf({ table }: Entry): boolean {
-    this.frame.identity();
-    if (typeof table.on !== "string") return true;
-    const carrier = this.bodies.byName.get(table.on);
-    if (carrier) this.frame.copy(carrier.group.matrix);
-    return carrier !== undefined;
-  }
-
   private take(): void {
     this.handle.updateMatrix();
     this.start.copy(this.handle.matrix).invert();
-    const name = this.entry?.name;
-    this.carried = [...this.bodies.byName.values()]
-      .filter(({ node }) => node.owner === name || node.mover === name)
-      .map((body) => ({ body, from: body.group.matrix.clone() }));
+    this.carried = this.entry && Carried.of(this.entry, this.bodies, () => this.stage.moved());
   }
 
   private carry(): void {
-    if (!this.controls.dragging) return;
+    if (!this.controls.dragging || !this.carried) return;
     this.handle.updateMatrix();
-    const by = this.handle.matrix.clone().multiply(this.start);
-    for (const { body, from } of this.carried) {
-      body.group.matrix.multiplyMatrices(by, from);
-      body.group.matrixWorldNeedsUpdate = true;
-    }
-    this.stage.moved();
+    this.carried.motion.multiplyMatrices(this.handle.matrix, this.start);
+    this.carried.show();
   }
 
   private async put(): Promise<void> {
-    const { entry } = this;
-    if (!entry) return;
-    const before = placing(entry);
-    const back = this.frame.clone().invert();
-    const now = this.frame
-      .clone()
-      .multiply(new Matrix4().compose(before.position, before.rotation, ONE))
-      .premultiply(this.handle.matrix.clone().multiply(this.start))
-      .premultiply(back);
-    const [position, rotation] = [new Vector3(), new Quaternion()];
-    now.decompose(position, rotation, new Vector3());
-    const turned = gizmoMode.peek() === "turn";
-    const changes = turned ? moveTo(entry, null, rotation) : moveTo(entry, position, null);
-    const done = await change(...changes);
-    if (!done) {
-      for (const { body, from } of this.carried) body.group.matrix.copy(from);
-      for (const { body } of this.carried) body.group.matrixWorldNeedsUpdate = true;
-      this.stage.moved();
-      this.place();
-    }
+    const { carried } = this;
+    if (carried && !(await carried.put(gizmoMode.peek() === "turn"))) this.place();
   }
-}
-
-// What is swept has no place of its own.
-function isFixed({ table }: Entry): boolean {
-  return table.swept === undefined;
 }

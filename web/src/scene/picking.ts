@@ -44,8 +44,12 @@ export function nodeAlong(ray: Raycaster, bodies: Bodies): string | null {
   return nodeOf(hitAlong(ray, bodies)?.object ?? null);
 }
 
-// What a section takes away is not clicked.
-function hitAlong(ray: Raycaster, bodies: Bodies, planes: readonly Plane[] = []): Intersection | undefined {
+/** What a ray of the world meets first; what a section takes away is not met. */
+export function hitAlong(
+  ray: Raycaster,
+  bodies: Bodies,
+  planes: readonly Plane[] = [],
+): Intersection | undefined {
   return ray
     .intersectObject(bodies.root, true)
     .find(
@@ -54,8 +58,8 @@ function hitAlong(ray: Raycaster, bodies: Bodies, planes: readonly Plane[] = [])
     );
 }
 
-// Hidden bodies are hit by rays all the same.
-function nodeOf(object: Object3D | null): string | null {
+/** Name of the node that something drawn is of; null for none, and for what is hidden: rays meet that, too. */
+export function nodeOf(object: Object3D | null): string | null {
   for (let at = object; at; at = at.parent) {
     if (!at.visible) return null;
     if (typeof at.userData.node === "string") return at.userData.node;

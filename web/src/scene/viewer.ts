@@ -167,7 +167,7 @@ export class Viewer {
     return group ? new Vector3(...face).transformDirection(group.matrixWorld).toArray() : null;
   }
 
-  private inBody(name: string, direction: Normal): Normal | null {
+  inBody(name: string, direction: Normal): Normal | null {
     const group = this.bodies.byName.get(name)?.group;
     if (!group) return null;
     return new Vector3(...direction).transformDirection(group.matrixWorld.clone().invert()).toArray();

@@ -1,7 +1,8 @@
 // What a visitor's hands take and pull: a workpiece or a control that they are at, or that the beam meets.
 
+import { effect } from "@preact/signals";
 import { Raycaster, Vector3 } from "three";
-import { controlOf, grab, isLoose, press, pull, release, standsAt } from "../doing";
+import { controlOf, grab, isLoose, press, pull, refused, release, standsAt } from "../doing";
 import { scene } from "../page_state";
 import { nodeAlong } from "../scene/picking";
 import type { Viewer } from "../scene/viewer";
@@ -23,6 +24,7 @@ export class Hands {
   private readonly at = new Vector3();
   private readonly held = new Map<XRHandedness, string>();
   private readonly pulling = new Map<XRHandedness, Pulling>();
+  private readonly forget: () => void;
 
   /**
    * @param human Whose hands they are; null for a visitor who looks, and who pulls all the same.
@@ -30,7 +32,13 @@ export class Hands {
   constructor(
     private readonly viewer: Viewer,
     private readonly human: string | null,
-  ) {}
+  ) {
+    // What the server does not take, the hand does not have: it may close again.
+    this.forget = effect(() => {
+      const what = refused.value?.what;
+      for (const side of ["left", "right"] as const) if (what === this.handName(side)) this.held.delete(side);
+    });
+  }
 
   /** What a hand holds now. */
   holds(side: XRHandedness): string {
@@ -84,6 +92,7 @@ export class Hands {
 
   /** Let go of everything. */
   end(): void {
+    this.forget();
     for (const side of ["left", "right"] as const) this.open(side);
   }
 

@@ -17,14 +17,22 @@ import {
   SpriteMaterial,
   Vector3,
 } from "three";
+import { select } from "../page_state";
+import { distance } from "../panels/MeasureNote";
 import type { Bodies } from "../scene/bodies";
+import { hitAlong, nodeOf } from "../scene/picking";
 import type { Stage } from "../scene/stage";
+import type { Viewer } from "../scene/viewer";
+import { type Measuring, measuring, withFace } from "../view/measure";
 
 /** Letters of the ruler are 16 mm high. */
 const TEXT = { width: 0.22, height: 0.05, pixels: 512 };
 const GHOST = 0x8fb7ff;
 
-/** A line between two points that a beam met on surfaces as they are drawn, with its length. */
+/**
+ * How far two things are from one another: the least distance of their surfaces as the engine has it, by what
+ * measures on the desk; where this page may not measure, of two points on meshes as they are drawn.
+ */
 export class Ruler {
   readonly root = new Group();
   private readonly line = new Line(
@@ -35,8 +43,9 @@ export class Ruler {
   private readonly words: Sprite;
   private readonly brush: CanvasRenderingContext2D;
   private points: Vector3[] = [];
-  /** Length [m]; null before there are two points. */
-  length: number | null = null;
+  private told: Measuring | null = null;
+  /** What stands beside it now. */
+  text = "";
 
   constructor() {
     const canvas = document.createElement("canvas");
@@ -52,30 +61,64 @@ export class Ruler {
 
   /** Take the point where a beam meets a surface; the third begins anew. Whether it met one. */
   take(ray: Raycaster, bodies: Bodies): boolean {
-    const hit = ray.intersectObject(bodies.root, true).find(({ object }) => object instanceof Mesh);
+    const hit = hitAlong(ray, bodies);
     if (!hit) return false;
     if (this.points.length === 2) this.points = [];
     this.points.push(hit.point.clone());
     const [a, b] = [this.points[0]!, this.points.at(-1)!];
-    this.length = this.points.length === 2 ? a.distanceTo(b) : null;
     this.line.geometry.setFromPoints([a, b]);
+    this.line.visible = true;
     this.words.position.copy(a).lerp(b, 0.5);
-    this.words.position.y += 0.04;
+    const far = this.points.length === 2 ? `${(1000 * a.distanceTo(b)).toFixed(0)} mm as drawn` : "to …";
+    this.write(far);
+    return true;
+  }
+
+  /** Pick the body that a beam meets, for the engine to measure; whether it met one. */
+  ask(ray: Raycaster, viewer: Viewer): boolean {
+    const hit = hitAlong(ray, viewer.bodies);
+    const name = hit && nodeOf(hit.object);
+    if (!hit || !name) return false;
+    this.words.position.copy(hit.point);
+    this.line.visible = false; // the engine says between which points
+    const face = hit.face?.normal.clone().transformDirection(hit.object.matrixWorld);
+    withFace(face ? viewer.inBody(name, [face.x, face.y, face.z]) : null, () =>
+      select({ kind: "node", name }),
+    );
+    this.tell();
+    return true;
+  }
+
+  /** Write what the engine said, where that is news. */
+  tell(): void {
+    const now = measuring.peek();
+    if (now === this.told) return;
+    this.told = now;
+    const [a, b] = now?.picks ?? [];
+    if (!now || !a) return;
+    const value = now.result?.value;
+    if (!b) this.write("to …");
+    else if (now.refusal !== "" || (now.result && value == null))
+      this.write(now.refusal || now.result!.reason);
+    else this.write(value == null ? "measuring …" : distance(value));
+  }
+
+  private write(text: string): void {
+    this.text = text;
     const { canvas } = this.brush;
     this.brush.clearRect(0, 0, canvas.width, canvas.height);
-    this.brush.font = "bold 84px sans-serif";
+    this.brush.font = "bold 72px sans-serif";
     this.brush.textAlign = "center";
     this.brush.fillStyle = "#fbe36a";
-    const said = this.length === null ? "to …" : `${(1000 * this.length).toFixed(0)} mm`;
-    this.brush.fillText(said, canvas.width / 2, 92);
+    this.brush.fillText(text, canvas.width / 2, 92, canvas.width);
     this.texture.needsUpdate = true;
     this.root.visible = true;
-    return true;
   }
 
   clear(): void {
     this.points = [];
-    this.length = null;
+    this.told = null;
+    this.text = "";
     this.root.visible = false;
   }
 

@@ -1,32 +1,19 @@
 // A panel in the room with the selected criterion over the last half minute, its limit, and what happened last.
 
-import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace } from "three";
 import { now, rows, selection, soFar, traces } from "../page_state";
 import { eventLine } from "../panels/event_line";
 import { orderedRows } from "../row_order";
+import { INK, Panel } from "./panel";
 
-const WIDTH = 0.54;
 const PIXELS = { width: 1080, height: 640 };
 const SPAN_S = 30;
-const EVERY_MS = 200;
 const EVENTS = 4;
 /** Of the curve, left, top, right and bottom [px]. */
 const FRAME = { left: 110, top: 80, right: 1050, bottom: 410 };
 
-export class PlotPanel {
-  readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
-  private readonly brush: CanvasRenderingContext2D;
-  private readonly texture: CanvasTexture;
-  private drawnAt = Number.NEGATIVE_INFINITY;
-
+export class PlotPanel extends Panel {
   constructor() {
-    const canvas = document.createElement("canvas");
-    Object.assign(canvas, PIXELS);
-    this.brush = canvas.getContext("2d")!;
-    this.texture = new CanvasTexture(canvas);
-    this.texture.colorSpace = SRGBColorSpace;
-    const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
-    this.mesh = new Mesh(new PlaneGeometry(WIDTH, (WIDTH * PIXELS.height) / PIXELS.width), material);
+    super(PIXELS);
   }
 
   /** Name of the criterion that is shown: the selected one, else the worst. */
@@ -36,29 +23,20 @@ export class PlotPanel {
     return orderedRows.peek()[0]?.info.name ?? null;
   }
 
-  update(time: number): void {
-    if (!this.mesh.visible || time - this.drawnAt < EVERY_MS) return;
-    this.drawnAt = time;
-    const { brush } = this;
-    brush.clearRect(0, 0, PIXELS.width, PIXELS.height);
-    brush.fillStyle = "rgba(13, 19, 28, 0.92)";
-    brush.fillRect(0, 0, PIXELS.width, PIXELS.height);
+  protected news(): boolean {
+    return true; // time goes on
+  }
+
+  protected draw(): void {
     const name = PlotPanel.shown();
     const unit = rows.peek().find(({ info }) => info.name === name)?.info.unit ?? "";
-    this.write(name ? `${name}${unit ? ` [${unit}]` : ""}` : "no criterion", 28, 52, "bold 38px sans-serif");
+    this.line(name ? `${name}${unit ? ` [${unit}]` : ""}` : "no criterion", 28, 52, "bold 38px sans-serif");
     const trace = name === null ? undefined : traces.get(name);
     const end = now.peek();
     if (trace && Number.isFinite(end)) this.curve(trace, end);
     (soFar.peek()?.events ?? []).slice(-EVENTS).forEach((event, k) => {
-      this.write(eventLine(event), 28, 480 + 44 * k, "32px sans-serif");
+      this.line(eventLine(event), 28, 480 + 44 * k, "32px sans-serif");
     });
-    this.texture.needsUpdate = true;
-  }
-
-  dispose(): void {
-    this.texture.dispose();
-    this.mesh.material.dispose();
-    this.mesh.geometry.dispose();
   }
 
   private curve(
@@ -79,7 +57,7 @@ export class PlotPanel {
     brush.strokeStyle = "#46566b";
     brush.lineWidth = 2;
     brush.strokeRect(FRAME.left, FRAME.top, FRAME.right - FRAME.left, FRAME.bottom - FRAME.top);
-    for (const v of [low + room, high - room]) this.write(v.toPrecision(3), 10, y(v) + 10, "28px sans-serif");
+    for (const v of [low + room, high - room]) this.line(v.toPrecision(3), 10, y(v) + 10, "28px sans-serif");
     for (const [of, color, dash] of [
       [trace.values, "#7ee7f1", []],
       [trace.limits, "#ff8fa6", [12, 8]],
@@ -103,9 +81,7 @@ export class PlotPanel {
     brush.setLineDash([]);
   }
 
-  private write(text: string, x: number, y: number, font: string): void {
-    this.brush.font = font;
-    this.brush.fillStyle = "#dbe3ee";
-    this.brush.fillText(text, x, y, PIXELS.width - x - 20);
+  private line(text: string, x: number, y: number, font: string): void {
+    this.write(text, x, y, INK, font, PIXELS.width - x - 20);
   }
 }

@@ -17,18 +17,26 @@ import {
   Vector3,
 } from "three";
 import { ownScale } from "../company";
+import { ask, draft, mayEdit } from "../editing/draft";
+import { gizmoMode } from "../editing/handles";
 import { hidden, isLive, lookingAt, overReality, registered, rows, scene, transport } from "../page_state";
 import type { Sighted } from "../scene/own_presence";
+import { nodeAlong } from "../scene/picking";
 import type { Viewer } from "../scene/viewer";
 import type { TimeControl } from "../time_control";
+import { mayMeasure, measuring, toggleMeasure } from "../view/measure";
 import type { Register, Tracking } from "../wire";
 import { Board } from "./board";
+import { BodyBoard } from "./body_board";
 import { isOn, leftHanded, seated, smooth, sound, tone, turnOver, vignette } from "./comfort";
+import { Designing } from "./designing";
 import { Hands } from "./hands";
 import { Ghost, Ruler, Section, Vignette } from "./instruments";
 import { type Item, Menu } from "./menu";
+import type { Panel } from "./panel";
 import { PlotPanel } from "./plot_panel";
 import { placeOfRoom, Registering } from "./registering";
+import { ReviewPanel } from "./review_panel";
 import { bodyJoints, sight } from "./sight";
 
 export type Mode = "immersive-vr" | "immersive-ar";
@@ -50,7 +58,8 @@ const PULSE = { strength: 0.7, ms: 150 };
 const TAKEN = { strength: 0.3, ms: 40 };
 const OVER_WRIST = new Vector3(0, 0.14, -0.05);
 const OVER_MENU = new Vector3(0, 0.44, -0.07);
-const PLOT_ABOVE = 0.36;
+/** Between two panels [m]. */
+const GAP = 0.01;
 /** Turning while the stick is pushed [rad/s], and eyes of one who stands [m]. */
 const TURNING = Math.PI / 2;
 const STANDING = 1.6;
@@ -96,6 +105,11 @@ export class Visit implements Sighted {
   private readonly hands: Hands;
   private readonly menu: Menu;
   private readonly plot = new PlotPanel();
+  private readonly bodyMap = new BodyBoard();
+  private readonly review = new ReviewPanel();
+  /** Panels that are shown when asked for. */
+  private readonly aside = [this.plot, this.bodyMap, this.review] as const;
+  private readonly designing: Designing;
   private readonly ruler = new Ruler();
   private readonly section: Section;
   private readonly ghost: Ghost;
@@ -134,9 +148,11 @@ export class Visit implements Sighted {
     this.before = this.remember();
     this.section = new Section(stage);
     this.ghost = new Ghost(stage, viewer.bodies);
-    this.menu = new Menu(this.items());
-    this.plot.mesh.visible = false;
-    this.things.add(this.board.mesh, this.landing, this.menu.mesh, this.plot.mesh, this.vignette.mesh);
+    this.designing = new Designing(viewer);
+    this.menu = new Menu([...this.items(), ...(mayEdit.peek() ? this.edits() : [])]);
+    for (const { mesh } of this.aside) mesh.visible = false;
+    this.things.add(this.board.mesh, this.landing, this.menu.mesh, this.vignette.mesh);
+    this.things.add(...this.aside.map(({ mesh }) => mesh));
     stage.scene.add(this.ruler.root);
     for (const { ball, beam } of Object.values(this.pointers)) this.things.add(ball, beam);
     this.landing.visible = false;
@@ -220,22 +236,30 @@ export class Visit implements Sighted {
     this.landing.visible = false;
     this.sit();
     for (const source of this.session.inputSources) this.hold(frame, space, source);
-    const { menu, board, plot } = this;
+    const { menu, board } = this;
     const wrist = this.pointers[leftHanded.value === "on" ? "right" : "left"].ball;
     menu.mesh.visible = wrist.visible;
     if (wrist.visible) {
       menu.mesh.position.copy(wrist.position).add(OVER_WRIST);
       board.mesh.position.copy(wrist.position).add(OVER_MENU);
     } else board.mesh.position.copy(FACING);
-    plot.mesh.position.copy(board.mesh.position);
-    plot.mesh.position.y += PLOT_ABOVE;
     this.rig.localToWorld(this.at.copy(this.eyes));
     registering?.panel.lookAt(this.at);
-    for (const mesh of [menu.mesh, board.mesh, plot.mesh]) mesh.lookAt(this.at);
+    menu.mesh.lookAt(this.at);
+    board.mesh.lookAt(this.at);
+    // One above the other, over the board.
+    let top = board.mesh.position.y + 0.5 * board.height;
+    for (const panel of this.aside) {
+      if (!panel.mesh.visible) continue;
+      panel.mesh.position.copy(board.mesh.position).y = top + 0.5 * panel.height + GAP;
+      panel.mesh.lookAt(this.at);
+      top += panel.height + GAP;
+    }
     this.vignette.update(this.moved && vignette.value === "on", this.elapsed);
     menu.update();
     board.update(time);
-    plot.update(time);
+    for (const panel of this.aside) panel.update(time);
+    if (measuring.peek()) this.ruler.tell();
     this.viewer.stage.invalidate();
   }
 
@@ -338,6 +362,7 @@ export class Visit implements Sighted {
       // A person of the twin has hands there.
       pointer.ball.visible = true;
       this.hands.move(source.handedness, pointer.ball.getWorldPosition(this.at));
+      this.designing.move(source.handedness, pointer.ball.matrixWorld);
     }
     const aimed = frame.getPose(source.targetRaySpace, space);
     if (!aimed) return;
@@ -399,19 +424,17 @@ export class Visit implements Sighted {
       { label: () => "last limit", press: () => time.violation(false) },
       { label: () => "next limit", press: () => time.violation(true) },
       { label: () => "ghost", on: () => ghost.on, press: () => ghost.turnOver() },
-      {
-        label: () => "plot",
-        on: () => this.plot.mesh.visible,
-        press: () => {
-          this.plot.mesh.visible = !this.plot.mesh.visible;
-        },
-      },
+      showing("plot", this.plot),
+      showing("body map", this.bodyMap),
       {
         label: () => "ruler",
         on: () => this.measures,
         press: () => {
           this.measures = !this.measures;
-          if (!this.measures) ruler.clear();
+          ruler.clear();
+          // The engine is asked, as on the desk.
+          if (this.measures === (measuring.peek() === null) && (mayMeasure.peek() || !this.measures))
+            toggleMeasure();
         },
       },
       {
@@ -437,6 +460,51 @@ export class Visit implements Sighted {
       choice("seated", seated),
       choice("left hand", leftHanded),
       { label: () => "leave", press: () => void this.session.end() },
+    ];
+  }
+
+  /** What else is at the wrist of whoever may edit the workstation file. */
+  private edits(): Item[] {
+    const { designing, review } = this;
+    return [
+      {
+        label: () => "design",
+        on: () => designing.on,
+        press: () => {
+          designing.on = !designing.on;
+          if (!designing.on) designing.teaches = false;
+        },
+      },
+      {
+        label: () => "turn",
+        on: () => gizmoMode.value === "turn",
+        press: () => {
+          gizmoMode.value = gizmoMode.peek() === "turn" ? "move" : "turn";
+        },
+      },
+      {
+        label: () => "teach",
+        on: () => designing.teaches,
+        press: () => {
+          designing.teaches = !designing.teaches;
+          designing.on ||= designing.teaches;
+        },
+      },
+      { label: () => "undo", press: () => void ask("undo") },
+      { label: () => "redo", press: () => void ask("redo") },
+      showing("review", review),
+      {
+        // Nobody saves what they have not seen.
+        label: () => (review.mesh.visible ? "save" : "review, then save"),
+        press: () => {
+          if (review.mesh.visible) void ask("save");
+          else review.mesh.visible = true;
+        },
+      },
+      {
+        label: () => (draft.value?.runs ? "stop" : "run"),
+        press: () => void ask(draft.peek()?.runs ? "stop" : "run"),
+      },
     ];
   }
 
@@ -516,10 +584,16 @@ export class Visit implements Sighted {
       return;
     }
     if (type === "selectstart" && this.measures) {
-      if (this.ruler.take(this.ray, this.viewer.bodies)) pulse(inputSource, TAKEN);
+      const met = measuring.peek()
+        ? this.ruler.ask(this.ray, this.viewer)
+        : this.ruler.take(this.ray, this.viewer.bodies);
+      if (met) pulse(inputSource, TAKEN);
       return;
     }
-    const taken = this.hands.close(side, ball.getWorldPosition(this.at), from, along);
+    ball.updateWorldMatrix(true, false);
+    const taken =
+      this.designing.close(side, nodeAlong(this.ray, this.viewer.bodies), ball.matrixWorld) ||
+      (!this.designing.on && this.hands.close(side, ball.getWorldPosition(this.at), from, along));
     if (taken) pulse(inputSource, TAKEN);
     if (taken || type !== "selectstart") return;
     this.ray.set(from, along);
@@ -527,7 +601,9 @@ export class Visit implements Sighted {
   };
 
   private readonly open = ({ inputSource }: XRInputSourceEvent): void => {
-    this.hands.open(inputSource.handedness);
+    const side = inputSource.handedness;
+    this.hands.open(side);
+    if (side !== "none") this.designing.open(side);
   };
 
   /** A pulse in both hands as soon as a limit is exceeded. */
@@ -573,9 +649,11 @@ export class Visit implements Sighted {
     const { rig, things, viewer } = this;
     this.forget();
     this.hands.end();
+    this.designing.end();
+    if (this.measures && measuring.peek()) toggleMeasure();
     viewer.stage.scene.remove(this.ruler.root);
     this.section.clear();
-    for (const each of [this.menu, this.plot, this.ruler, this.ghost, this.vignette]) each.dispose();
+    for (const each of [this.menu, ...this.aside, this.ruler, this.ghost, this.vignette]) each.dispose();
     rig.remove(things);
     rig.position.set(0, 0, 0);
     rig.quaternion.identity();
@@ -588,6 +666,16 @@ export class Visit implements Sighted {
     viewer.stage.renderer.xr.enabled = false;
     viewer.stage.resize();
   }
+}
+
+function showing(words: string, { mesh }: Panel): Item {
+  return {
+    label: () => words,
+    on: () => mesh.visible,
+    press: () => {
+      mesh.visible = !mesh.visible;
+    },
+  };
 }
 
 function isPlaying(): boolean {

@@ -10,7 +10,8 @@ import itertools
 import math
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, Literal, NamedTuple, cast
+from functools import partial
+from typing import Any, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from msgspec import Struct
@@ -19,8 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from seerob.core.domains import number, whole
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
-from seerob.criteria.figure import Compute, Figure, Present, Shown
+from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
+from seerob.criteria.scoring.handled import NOTE, NOTHING, Handled, bind_handled, load_range
 from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, shared_phases
 from seerob.criteria.scoring.rule import PostureRule, bind_posture, by_phase
@@ -126,12 +128,13 @@ def only(code: int, of: int) -> Possible:
     return np.asarray(np.arange(1, int(whole("of", of, 1, 99)) + 1) == whole("code", code, 1, of))
 
 
-def load_codes(kg: float | None) -> Possible:
-    """1 below 10 kg, 2 up to 20 kg, 3 beyond; all when nobody said."""
-    if kg is None:
-        return np.ones(3, bool)
-    number("load", kg, 0, unit="kg")
-    return only(1 + (kg >= 10) + (kg > 20), 3)
+def load_codes(kg: float | None, least: float = 0.0) -> Possible:
+    """1 below 10 kg, 2 up to 20 kg, 3 beyond; when nobody said, all from that of ``least`` [kg] on."""
+    if kg is not None:
+        number("load", kg, 0, unit="kg")
+    lowest = least if kg is None else kg
+    code = 1 + (lowest >= 10) + (lowest > 20)
+    return np.arange(1, 4) >= code if kg is None else only(code, 3)
 
 
 def back_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
@@ -238,6 +241,8 @@ class Coded(NamedTuple):
 class Owas(PostureRule, frozen=True, kw_only=True):
     """OWAS action category of a person's posture."""
 
+    weighs_hands: ClassVar[bool] = True
+
     action_category: Literal[1, 2, 3, 4] | None = None
     """Highest admissible action category."""
     phases: tuple[OwasPhase, ...] = ()
@@ -261,12 +266,13 @@ class Owas(PostureRule, frozen=True, kw_only=True):
 
     def compute(self, model: Model) -> Compute:
         """Look up every name in the model once and return the function that computes the category."""
-        read = bind_posture(model, self.human, self.unmeasured)
+        read, held = bind_posture(model, self.human, self.unmeasured), bind_handled(model, self.human)
         phases, unknown, error = self.entered(model), OwasPhase(), self.error(model)
 
-        def category(angles: Angles, phase: OwasPhase) -> Figure:
-            measured = settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
-            spread = None if error is None else self.codes(angles, phase, error)
+        def category(handled: Handled, angles: Angles, phase: OwasPhase) -> Figure:
+            codes = partial(self.codes, angles, phase, handled=handled)
+            measured = settled(codes(), codes(ROUNDING))
+            spread = None if error is None else codes(error)
             span = category_span(**measured)
             reach = span if spread is None else category_span(**spread)
             if span.low.ndim:
@@ -284,7 +290,10 @@ class Owas(PostureRule, frozen=True, kw_only=True):
                 beside=Coded(angles, measured, spread, span, (low, high), missing),
             )
 
-        return lambda twin: by_phase(twin.t, read(twin), phases, unknown, category)
+        def compute(twin: Twin) -> Figure:
+            return by_phase(twin.t, read(twin), phases, unknown, partial(category, held(twin)))
+
+        return compute
 
     def present(self, model: Model) -> Present:
         """Return the function that says and colours what drives the category."""
@@ -294,8 +303,11 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         """Nothing: the category is of one posture."""
         return ""
 
-    def codes(self, angles: Angles, phase: OwasPhase, accuracy: Accuracy = 0.0) -> dict[str, Possible]:
+    def codes(
+        self, angles: Angles, phase: OwasPhase, accuracy: Accuracy = 0.0, handled: Handled = NOTHING
+    ) -> dict[str, Possible]:
         """Possible codes of postures in a phase, each of shape (..., number of codes)."""
+        least, most = load_range(phase.load, handled)
         if phase.legs is None:
             legs = np.ones(7, bool)
         elif phase.legs == Legs.POSTURE:
@@ -306,7 +318,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             "back": back_codes(angles, self.thresholds, accuracy),
             "arms": arm_codes(angles, accuracy),
             "legs": legs,
-            "load": load_codes(phase.load),
+            "load": load_codes(None if most == math.inf else most, least),
         }
 
     def _shown(self, figure: Figure, verdict: Verdict | None) -> Shown:
@@ -402,6 +414,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             ),
             not_modelled=(
                 "categories of the shares of time of single codes: the category is of one posture",
+                NOTE,
                 *((ACCURACY_NOTE,) if self.error(model) is not None else ()),
             ),
         )

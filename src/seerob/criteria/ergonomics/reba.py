@@ -7,6 +7,7 @@ An edge of a band belongs to the stricter side (`seerob.criteria.scoring.spans`)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike
 from seerob.core.domains import number, whole
 from seerob.core.snapshot import Basis
 from seerob.core.transforms import Array
+from seerob.criteria.scoring.handled import NOTE, NOTHING, Handled, load_range
 from seerob.criteria.scoring.held_work import WorkMonitor, activity
 from seerob.criteria.scoring.judgement import Method
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, Measured, arm_score, one_foot_up
@@ -165,11 +167,14 @@ def wrist(flexion: Array) -> Ints:
     return 1 + reached(np.abs(flexion), 15 * _RAD).astype(np.int64)
 
 
-def load(kg: float | None, shock: bool | None) -> Span:
-    """Score of a load [kg], one more for shock or rapid build-up; what is not given may be anything."""
+def load(kg: float | None, shock: bool | None, least: float = 0.0) -> Span:
+    """Score of a load [kg], one more for shock or rapid build-up.
+
+    What is not given may be anything, a load from ``least`` on.
+    """
     if kg is not None:
         number("load", kg, 0, unit="kg")
-    weight = between(0, 2) if kg is None else exactly((kg >= 5) + (kg > 10))
+    weight = between((least >= 5) + (least > 10), 2) if kg is None else exactly((kg >= 5) + (kg > 10))
     sudden = between(0, 1) if shock is None else exactly(int(shock))
     return weight + sudden
 
@@ -331,7 +336,12 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
         return 60.0
 
     def components(
-        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: WorkMonitor | None = None
+        self,
+        angles: Angles,
+        phase: Phase,
+        accuracy: Accuracy = 0.0,
+        watch: WorkMonitor | None = None,
+        handled: Handled = NOTHING,
     ) -> dict[str, Span]:
         """Score the components of postures in a phase: shapes (..., 2) of sided, (...) of central ones."""
         assert isinstance(phase, RebaPhase)
@@ -349,7 +359,8 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
             accuracy=accuracy,
             policy=self.arm,
         )
-        empty = phase.load == 0
+        least, most = load_range(phase.load, handled)
+        empty = most == 0
         grip = Coupling.GOOD if empty and phase.coupling is None else phase.coupling
         static, repeated = answer(phase.static), answer(phase.repeated)
         if watch is not None:
@@ -358,7 +369,11 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
             repeated = seen[1] if phase.repeated is None else repeated
         return {
             **found,
-            "load": load(phase.load, False if empty and phase.shock is None else phase.shock),
+            "load": load(
+                None if most == math.inf else most,
+                False if empty and phase.shock is None else phase.shock,
+                least,
+            ),
             "coupling": coupling(grip),
             "activity": static + repeated + answer(phase.rapid),
         }
@@ -375,5 +390,6 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
                 if self.detect is None
                 else "rapid large changes of posture are entered, not detected",
                 "the coupling of both hands is the same",
+                NOTE,
             ),
         )

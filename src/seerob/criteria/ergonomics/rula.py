@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from seerob.core.domains import number, whole
 from seerob.core.snapshot import Basis, Input, Origin
 from seerob.core.transforms import Array
+from seerob.criteria.scoring.handled import NOTE, NOTHING, Handled, holding, load_range
 from seerob.criteria.scoring.held_work import WorkMonitor, muscle_use
 from seerob.criteria.scoring.judgement import Method
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, Measured, arm_score, one_foot_up
@@ -185,8 +186,8 @@ def wrist(flexion: Array, neutral: float) -> Ints:
     return 1 + (reached(size, neutral) | far).astype(np.int64) + far
 
 
-def force(load: float | None, use: LoadUse | None, profile: Profile) -> Span:
-    """Force score of a handled load [kg]; what is not given may be anything.
+def force(load: float | None, use: LoadUse | None, profile: Profile, least: float = 0.0) -> Span:
+    """Force score of a handled load [kg]; what is not given may be anything from ``least`` on.
 
     Less than 2 kg, static or repeated, has no row: it counts as 0, muscle use apart.
     """
@@ -194,7 +195,7 @@ def force(load: float | None, use: LoadUse | None, profile: Profile) -> Span:
         number("load", load, 0, unit="kg")
     uses = list(LoadUse) if use is None else [LoadUse(use)]
     heavy = 3 if Profile(profile) is Profile.WORKSHEET else 2
-    loads = [0.0, math.inf] if load is None else [load]
+    loads = [least, math.inf] if load is None else [load]
     scores = []
     for each in uses:
         for kg in loads:
@@ -365,7 +366,12 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
         return Profile(self.profile).static
 
     def components(
-        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: WorkMonitor | None = None
+        self,
+        angles: Angles,
+        phase: Phase,
+        accuracy: Accuracy = 0.0,
+        watch: WorkMonitor | None = None,
+        handled: Handled = NOTHING,
     ) -> dict[str, Span]:
         """Score the components of postures in a phase: shapes (..., 2) of sided, (...) of central ones."""
         assert isinstance(phase, RulaPhase)
@@ -378,9 +384,10 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
             accuracy=accuracy,
             policy=self.arm,
         )
-        use = LoadUse.INTERMITTENT if phase.load == 0 and phase.load_use is None else phase.load_use
-        exerted = force(phase.load, use, self.profile)
-        carries = on_sides(phase.hand)
+        least, most = load_range(phase.load, handled)
+        use = LoadUse.INTERMITTENT if most == 0 and phase.load_use is None else phase.load_use
+        exerted = force(None if most == math.inf else most, use, self.profile, least)
+        carries, holds = on_sides(phase.hand), holding(handled)
         arms, body = answer(phase.muscle_arms), answer(phase.muscle_body)
         if watch is not None:
             seen = muscle_use(watch)
@@ -389,7 +396,10 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
         return {
             **found,
             "muscle use of the arms": arms,
-            "force of the arms": Span(exerted.low * carries.low, exerted.high * carries.high),
+            "force of the arms": Span(
+                exerted.low * np.maximum(carries.low, holds).astype(np.int64),
+                exerted.high * np.maximum(carries.high, holds).astype(np.int64),
+            ),
             "muscle use of the body": body,
             "force of the body": exerted,
         }
@@ -422,5 +432,6 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
                 ),
                 "less than 2 kg, static or repeated, has no row in the method and counts as force 0",
                 "an extended trunk has no row in the method and counts as 2",
+                NOTE,
             ),
         )

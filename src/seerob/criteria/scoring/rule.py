@@ -6,6 +6,7 @@ What it asks of the twin are the anatomical angles of a person at this tick.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from typing import Annotated, ClassVar, cast
 
 import numpy as np
@@ -26,6 +27,7 @@ from seerob.criteria.scoring.basis import (
     posture_quality,
     watched,
 )
+from seerob.criteria.scoring.handled import NOTHING, Handled, bind_handled
 from seerob.criteria.scoring.held_work import GAP, WorkDetection, WorkMonitor
 from seerob.criteria.scoring.judgement import Method, score, shown, together
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, JointAccuracy, accuracy_of
@@ -114,6 +116,8 @@ class PostureRule(Criterion, frozen=True, kw_only=True):
         "accepted: the method scores postures that are looked at, not the way between them"
     )
     whole: ClassVar[bool] = False  # bones that nobody sees are not assessed
+    weighs_hands: ClassVar[bool] = False
+    """Whether what is in hands counts beside the load that is entered (`seerob.criteria.scoring.handled`)."""
 
     human: str
     """Who is judged."""
@@ -150,6 +154,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
 
     METHOD: ClassVar[Method]
     PHASE: ClassVar[type[Phase]]
+    weighs_hands: ClassVar[bool] = True
     REPEATED: ClassVar[int]
     """Movements per minute from which on work is repeated."""
 
@@ -177,7 +182,12 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         raise NotImplementedError
 
     def components(
-        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: WorkMonitor | None = None
+        self,
+        angles: Angles,
+        phase: Phase,
+        accuracy: Accuracy = 0.0,
+        watch: WorkMonitor | None = None,
+        handled: Handled = NOTHING,
     ) -> dict[str, Span]:
         """Component scores of postures in a phase, in the order of the method.
 
@@ -186,6 +196,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
             phase: What was entered.
             accuracy: Of each angle [rad].
             watch: What was found of static and repeated work so far.
+            handled: What the hands hold now.
 
         Returns:
             Shapes (..., 2) of sided components and (...) of central ones.
@@ -199,7 +210,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
 
     def compute(self, model: Model) -> Compute:
         """Look up every name in the model once and return the function that computes scores."""
-        read = bind_posture(model, self.human, self.unmeasured)
+        read, held = bind_posture(model, self.human, self.unmeasured), bind_handled(model, self.human)
         phases, unknown, error = self.entered(model), self.PHASE(), self.error(model)
         watch = (
             None if self.detect is None else WorkMonitor(self.detect, hold=self.static, count=self.REPEATED)
@@ -212,16 +223,16 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
                 f"at most {GAP:g} s, or none",
             )
 
-        def scored(angles: Angles, phase: Phase) -> Figure:
-            measured = self.components(angles, phase, watch=watch)
-            spread = None if error is None else self.components(angles, phase, error, watch)
+        def scored(handled: Handled, angles: Angles, phase: Phase) -> Figure:
+            measured = self.components(angles, phase, watch=watch, handled=handled)
+            spread = None if error is None else self.components(angles, phase, error, watch, handled)
             return score(self.METHOD, angles, measured, spread, self.limit)
 
         def compute(twin: Twin) -> Figure:
             angles = read(twin)
             if watch is not None:
                 watch.add(float(twin.t), angles)
-            return by_phase(twin.t, angles, phases, unknown, scored)
+            return by_phase(twin.t, angles, phases, unknown, partial(scored, held(twin)))
 
         return compute
 

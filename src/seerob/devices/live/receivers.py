@@ -6,6 +6,7 @@ what this process has.
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,7 +16,7 @@ from typing import Self
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.samples import Mailbox, Quality, Sample, SignalSample, key
+from seerob.core.samples import GrabSample, Mailbox, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import SourceLine
 from seerob.devices.live.headset_offers import Offers, TakesOffers
 from seerob.devices.live.listening import Listener, LiveSource, delay_of, name_of, stop
@@ -170,6 +171,7 @@ def hear(
     speaks of is a delay old, and samples on either side of it have been heard. The run begins at the
     first sample, or without one when that takes too long. Where the clock slipped, what each source said
     last is older than run time shows, and is late from then on; so are its next and those of `SETTLE`.
+    Of grabs none is left out or told twice: a hand that let go while the run stood still holds nothing.
 
     Args:
         recorded: From `seerob.session.run.pump`, endless.
@@ -182,6 +184,7 @@ def hear(
     newest: dict[tuple[str, ...], Sample] = {}
     invalid: set[tuple[str, ...]] = set()
     settled: dict[tuple[str, ...], float] = {}
+    grabbed = -math.inf
     slipped = clock.slipped
     for samples in recorded:
         waiting: set[tuple[str, ...]] = set()
@@ -195,6 +198,11 @@ def hear(
         taken: list[Sample] = []
         for sample in came:
             t = sample.t - zero
+            if isinstance(sample, GrabSample):
+                # In the order in which they came, also where the clock was set back between two.
+                grabbed = max(t, grabbed + AFTER)
+                taken.append(replace(sample, t=grabbed))
+                continue
             what = key(sample)
             if what in newest and not _is_newer(sample, t, newest[what].t):
                 continue

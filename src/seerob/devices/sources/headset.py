@@ -33,7 +33,7 @@ from seerob.protocols.tracking.vive import world_positions, world_turns
 _log = logging.getLogger(__name__)
 
 SILENCE = 2.0
-"""Without an offer the connection counts as lost [s]."""
+"""Without an offer for so long, and for the source's ``timeout``, the connection counts as lost [s]."""
 GATHER = 0.3
 """Names that appear later than this begin a new layout [s]."""
 GUESSED = 0.3
@@ -142,7 +142,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
         try:
             while True:
                 try:
-                    async with asyncio.timeout(SILENCE):
+                    async with asyncio.timeout(max(SILENCE, self.timeout)):
                         await arrived.wait()
                 except TimeoutError as error:
                     what = f"no page offers a headset of {self.human!r}"

@@ -22,6 +22,7 @@ from seerob.core.quantities import Pose, Radians, unit
 from seerob.core.same_names import by_name
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
+from seerob.description.description import Description
 from seerob.devices.motion_files import TrajectoryFile, notes
 from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.files.waypoints.arm import Arm
@@ -30,7 +31,7 @@ from seerob.files.waypoints.inverse import parse
 from seerob.files.waypoints.reading import Point, read_program
 from seerob.files.waypoints.timing import JointLimits
 from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Program, Waypoint
-from seerob.workstation.source import Target
+from seerob.workstation.source import ByHand, Target
 
 HEAD = 16 << 10
 """Of a file in which its header is looked for [bytes]."""
@@ -197,6 +198,14 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
             )
         )
         return Arm(target.description, link=tip, link_from_tcp=tcp, base=base), said
+
+    def by_hand(self, description: Description) -> ByHand | None:
+        """What ``points`` are of; None where a file has the waypoints."""
+        if self.file:
+            return None
+        tool, _ = self._tcp(Program(IN_TABLE, ()))
+        base = self.base or description.links[0].name
+        return ByHand(self.at or description.tip, tool, base, len(self.points))
 
     def _tcp(self, program: Program) -> tuple[Array, str]:
         if self.tcp is not None:

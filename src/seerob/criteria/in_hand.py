@@ -8,7 +8,6 @@ unless the same is asked of it. And a method that is told a load is not told eno
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -43,22 +42,22 @@ class InHand:
             one.group == "safety" and one.criterion.by_shape and not one.criterion.adults for one in bound
         ]
         self._masses = {
-            name: float(sum(model.mj.body_mass[model.bodies[i].mj] for i in mechanism.bodies))
+            name: float(sum(model.mj.body_mass[mj] for mj in {model.bodies[i].mj for i in mechanism.bodies}))
             for name, mechanism in model.mechanisms.items()
             if mechanism.role == "workpiece"
         }
         self._bodies = {body.name: body.index for body in model.bodies}
         self._judged: list[set[int]] = []
-        self._always: dict[str, dict[str, float]] = defaultdict(dict)
+        self._always: dict[str, dict[str, float]] = {}
         """Person → what is mounted on a bone, by name [kg]."""
-        for thing in (*model.workstation.workpieces, *model.workstation.tools):
-            person = (thing.on or "").partition("/")[0]
-            if any(human.name == person for human in model.workstation.humans) and thing.mass is not None:
-                self._always[person][thing.name] = thing.mass
+        for name, mechanism in model.mechanisms.items():
+            if mechanism.role == "human":
+                carried = (model.bodies[i] for i in mechanism.carried)
+                self._always[name] = {b.owner: b.mass.value for b in carried if b.mass is not None}
         loads = ((i, _entered_load(model, each)) for i, each in enumerate(criteria))
         self._loads = {i: load for i, load in loads if load is not None}
         """Place of each that is told a load → that load at an instant of the run [s]."""
-        self.never = not self._masses and not (self._always and self._loads)
+        self.never = not self._masses and not (any(self._always.values()) and self._loads)
         """Whether nobody can hold anything that counts."""
 
     def reasons(self, state: State, results: Sequence[Result]) -> dict[int, str]:

@@ -6,9 +6,9 @@ import random
 import socket
 
 _CHOICE = random.SystemRandom()  # other processes choose, too
-_RANGE = range(20_000, 32_000)
+_RANGE = range(21_000, 30_000)
 """Below those that the system gives to whoever asks for any: a server that is killed and restarted would now
-and then find its port taken by a client."""
+and then find its port taken by a client. Between the usual ones of devices, which cells that run may have."""
 
 
 def free_port(kind=socket.SOCK_DGRAM):

@@ -26,8 +26,8 @@ from seerob.workstation.tables.writing import CartesianTarget, TargetWire
 if TYPE_CHECKING:
     from seerob.session.station import Station
 
-_FREE = range(20_000, 32_000)
-"""Below those that systems give to whoever asks for any, and where registered ones are rare."""
+_FREE = range(21_000, 30_000)
+"""Below those that systems give to whoever asks for any, and between the usual ones of devices."""
 _USUAL = {"opc.tcp": 4840, "http": 80, "ws": 80, "https": 443, "wss": 443}
 """Port of a URL that has none."""
 _CHOICE = random.SystemRandom()  # other runs choose, too

@@ -28,6 +28,7 @@ import seerob as sr
 from seerob.app.console.terminal import cache_folder
 from seerob.core.markers import plain
 from seerob.session import run as road
+from seerob.session.huge_pages import use_huge_pages
 from seerob.twin.engine import Engine
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "two_robots"
@@ -85,6 +86,8 @@ def measure(seconds: float) -> dict[str, float]:
     stages: dict[str, list[float]] = {"engine": [], "criteria": [], "snapshot": []}
     whole, computed, twin, with_page, alone, worst_distance = [], [], [], [], [], np.inf
     page, size = 0.0, 0
+    if seconds >= road.LONG:
+        use_huge_pages()
     with road.settled():
         for seq, samples in enumerate(feed):
             begin, began = time.perf_counter(), time.thread_time()

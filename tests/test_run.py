@@ -26,6 +26,7 @@ from seerob.outputs.sink import Closing
 from seerob.outputs.sinks.dossier import Dossier
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
+from seerob.session import run as road
 from seerob.session.run import Clock, Judge, bind, engine_of, pump, ticks
 from seerob.session.station import load_recorded
 from seerob.twin.engine import Engine, last_tick
@@ -387,6 +388,16 @@ def test_what_takes_long_begins_when_no_tick_comes_any_more_and_before_any_write
         station.run(writers=writers, stop=up_to(1), progress=progress)
     begins = [] if fails else [("a", "begin"), ("b", "begin")]
     assert told == [("a", 0), ("b", 0), *begins, "writing b", ("b", "close"), ("a", "close")]
+
+
+@pytest.mark.parametrize(("seconds", "times"), [(0.8, 0), (12.0, 1)])
+def test_memory_is_made_ready_for_a_long_motion_alone(tmp_path, monkeypatch, seconds, times):
+    asked = []
+    monkeypatch.setattr(road, "use_huge_pages", lambda: asked.append(1))
+    motion = f"t [s],j1 [rad],j2 [rad]\n0,0,0.3\n{seconds},0.1,0.3\n"
+    station = made(tmp_path, FLOATING + TWO_R + MOVED, {"arm.urdf": two_r(), "motion.csv": motion})
+    station.run(stop=up_to(2))
+    assert len(asked) == times
 
 
 def test_a_run_that_breaks_off_is_recorded_whole_and_nothing_of_it_is_within(tmp_path):

@@ -297,13 +297,17 @@ def _spared() -> bool:
     return gc.get_freeze_count() > 0
 
 
+LONG = 10.0
+"""Motion that is worth the tenth of a second that larger pages take [s]: some 800 ticks of
+``benchmarks/everything.py`` save as much."""
+
+
 @contextmanager
 def settled() -> Iterator[None]:
-    """Spare the garbage collector what was made before the loop, in large pages: it lives as long as that.
+    """Spare the garbage collector what was made before the loop: it all lives as long as the loop does.
 
     Who has done so already, around many loops, is left to it: it took longer than short loops do.
     """
-    use_huge_pages()
     if _spared() or gc.get_freeze_count():
         yield
         return
@@ -428,6 +432,8 @@ def run(
             found = writer.lines(found)
         return found
 
+    if end >= LONG:
+        use_huge_pages()
     with ExitStack() as open_writers, settled():
         for writer in writers:
             open_writers.enter_context(writer)

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import re
 import runpy
 import tomllib
 import zipfile
@@ -319,9 +320,15 @@ def test_what_is_left_out_on_request_is_listed_and_stays_out(tmp_path, capsys):
     assert names == {"line/table", "line/post", "line/fixture_1/base", "line/fixture_2/base"}
     rows = {row["name"]: row["why"] for row in json.loads((cell / "import.json").read_text())["left_out"]}
     assert len(rows) == 6
-    assert rows["line/fixture_1/clamp_1"] == "as asked: --without */clamp_*"
+    assert rows["line/fixture_1/clamp_1"].startswith("as asked: --without */clamp_*; ")
     # A pin of 12 mm by 45 mm.
-    assert rows["line/fixture_1/pin"] == "as asked: 45 mm, smaller than 50 mm"
+    assert rows["line/fixture_1/pin"] == "as asked: --smaller 50; 45 mm"
+    assert [(one["name"], one["why"].split()[0], "accepted" in one) for one in table["left_out"]] == [
+        ("--without */clamp_*", "4", True),
+        ("--smaller 50", "2", True),
+    ]
+    said = [f for f in load(cell).model.findings if "left out" in f.text]
+    assert [(f.level, f.holds) for f in said] == [("assumed", ()), ("assumed", ())]
     assert not (cell / "cad/clamp.glb").exists()
     assert imported(file, cell)[1] == table
     capsys.readouterr()
@@ -332,3 +339,176 @@ def test_what_is_left_out_on_request_is_listed_and_stays_out(tmp_path, capsys):
     ):
         assert cli.main(["import", str(file), str(tmp_path / "new"), *options]) == Exit.ERROR
         assert says in capsys.readouterr().err
+
+
+def test_what_is_missing_keeps_everything_from_being_within_until_somebody_accepts_it(tmp_path, capsys):
+    made = MADE["Step"]()
+    block = made.box("block", (4.0, 2.0, 1.0))
+    made.assembly("line", [(block, "base", MADE["place"]())])
+    text = made.text().replace(
+        "ENDSEC;\nEND-ISO", "#9001=DOCUMENT_FILE('gone.stp','','',#9002,'','');\nENDSEC;\nEND-ISO"
+    )
+    (tmp_path / "a.step").write_text(text)
+    cell = tmp_path / "cell"
+    _, table = imported(tmp_path / "a.step", cell)
+    (row,) = table["left_out"]
+    assert row == {"name": "gone.stp", "why": "a file that is not there"}
+    (said,) = (f for f in load(cell).model.findings if f.subject == "gone.stp")
+    assert (said.level, said.holds) == ("warning", ("*",))
+    assert "accepted" in said.text
+    # What somebody writes there stays with the next revision, which has nothing new.
+    file = cell / "workstation.toml"
+    file.write_text(file.read_text() + 'accepted = "stands in the next hall"\n')
+    capsys.readouterr()
+    again = imported(tmp_path / "a.step", cell)[1]
+    assert again["left_out"][0]["accepted"] == "stands in the next hall"
+    (said,) = (f for f in load(cell).model.findings if f.subject == "gone.stp")
+    assert (said.level, said.holds) == ("assumed", ())
+    # The file came: it is not missing any more.
+    (tmp_path / "gone.stp").write_text(made.text())
+    assert "left_out" not in imported(tmp_path / "a.step", cell)[1]
+
+
+@pytest.fixture
+def kept_in(tmp_path, monkeypatch):
+    """A folder of its own for what is kept, and how often OpenCASCADE is asked."""
+    from seerob.app.commands import import_
+    from seerob.description.cad import step
+
+    asked, parsed = [], step.parsed_one_by_one
+
+    def counted(*arguments, **more):
+        asked.append(more["file"])
+        return parsed(*arguments, **more)
+
+    monkeypatch.setattr(import_, "cache_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr(step, "parsed_one_by_one", counted)
+    return asked
+
+
+def test_the_second_import_of_a_content_asks_nobody_and_makes_the_same(tmp_path, kept_in):
+    file = tmp_path / "line.step"
+    file.write_text(MADE["line"]().text())
+    for name in ("one", "two"):
+        assert imported(file, tmp_path / name)[0] == Exit.WITHIN
+    assert len(kept_in) == 1
+    for path in (tmp_path / "one").rglob("*.*"):
+        assert path.read_bytes() == (tmp_path / "two" / path.relative_to(tmp_path / "one")).read_bytes()
+    imported(file, tmp_path / "finer", "--tolerance", "0.05")
+    assert len(kept_in) == 2
+    # Axes come from what is kept, too; a damaged entry is none.
+    imported(file, tmp_path / "axes", "--axes", "--density", "2700")
+    assert len(kept_in) == 2
+    for entry in (tmp_path / "kept").iterdir():
+        entry.write_bytes(entry.read_bytes()[:-200])
+    imported(file, tmp_path / "three")
+    assert len(kept_in) == 3
+    file.write_text(file.read_text().replace("'post'", "'pole'"))
+    assert "line/pole" in str(imported(file, tmp_path / "four")[1])
+    assert len(kept_in) == 4
+
+
+def test_what_a_file_names_is_part_of_its_content(tmp_path, kept_in):
+    def part(size):
+        made = MADE["Step"]()
+        made.box("block", (size, 2.0, 1.0))
+        return made.text()
+
+    named = part(4.0).replace(
+        "ENDSEC;\nEND-ISO", "#9001=DOCUMENT_FILE('b.stp','','',#9002,'','');\nENDSEC;\nEND-ISO"
+    )
+    (tmp_path / "a.step").write_text(named)
+    for number in (1, 2):
+        # It is missing today; tomorrow it may be there.
+        imported(tmp_path / "a.step", tmp_path / f"missing_{number}")
+        assert len(kept_in) == number
+    for number, size, folder in ((3, 5.0, "five"), (3, 5.0, "again"), (4, 6.0, "six")):
+        (tmp_path / "b.stp").write_text(part(size))
+        imported(tmp_path / "a.step", tmp_path / folder)
+        assert len(kept_in) == number
+
+
+def test_ctrl_c_leaves_nothing_half_written_and_no_process(tmp_path, monkeypatch, kept_in):
+    from contextlib import contextmanager
+
+    from seerob.app.commands import import_
+    from seerob.core.files import parser_process
+
+    said, children, made = [], [], parser_process._Child
+
+    class Watched(made):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            children.append(self)
+
+    @contextmanager
+    def until_cut():
+        def say(text):
+            said.append(text)
+            if "triangles: 2 of 5" in text:
+                raise KeyboardInterrupt
+
+        yield say
+
+    parser_process._end_all()
+    monkeypatch.setattr(parser_process, "_Child", Watched)
+    monkeypatch.setattr(import_, "spinner", until_cut)
+    file = tmp_path / "line.step"
+    file.write_text(MADE["line"]().text())
+    with pytest.raises((KeyboardInterrupt, SystemExit)):
+        import_.run(cli.parser().parse_args(["import", str(file), str(tmp_path / "cell")]))
+    assert said[:2] == ["reading line.step", "cutting line.step into triangles: 1 of 5 products"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["line.step"]
+    parser_process._end_all()
+    assert children
+    assert all(child.process.poll() is not None for child in children)
+
+
+def test_a_revision_that_is_interrupted_is_there_whole_or_not_at_all(tmp_path, monkeypatch, kept_in):
+    file, cell = tmp_path / "line.step", tmp_path / "cell"
+    file.write_text(MADE["line"]().text())
+    imported(file, cell)
+    before = (cell / "workstation.toml").read_bytes()
+    replace, count = Path.replace, [0]
+
+    def interrupted(self, target):
+        count[0] += 1
+        if count[0] == 3:
+            raise KeyboardInterrupt
+        return replace(self, target)
+
+    file.write_text(file.read_text().replace("'post'", "'pole'"))
+    monkeypatch.setattr(Path, "replace", interrupted)
+    cli.main(["import", str(file), str(cell)])
+    monkeypatch.undo()
+    assert (cell / "workstation.toml").read_bytes() != before
+    table = json.loads((cell / "import.json").read_text())
+    assert {row["mesh"] for row in table["parts"]} <= {f"cad/{p.name}" for p in (cell / "cad").iterdir()}
+    assert cli.main(["check-file", str(cell)]) == Exit.WITHIN
+    assert not [path for path in cell.iterdir() if path.name.startswith(".")]
+
+
+def test_densities_of_a_table_go_by_material_and_their_masses_are_summed(tmp_path, capsys):
+    file, table = tmp_path / "line.step", tmp_path / "ours.toml"
+    file.write_text(MADE["line"]().text())
+    table.write_text('S235JR = 7850\n"AlMgSi1" = 2700.5\nUnobtainium = 1\n')
+    code, made = imported(file, tmp_path / "cell", "--densities", str(table), "--density", "AlMgSi1=2700")
+    assert code == Exit.WITHIN
+    densities = {part["name"]: part.get("density") for part in made["parts"]}
+    assert {densities["line/post"], densities["line/fixture_1/base"]} == {7850, 2700}
+    rows = json.loads((tmp_path / "cell/import.json").read_text())["parts"]
+    own = sum(
+        trimesh.load(tmp_path / "cell" / row["mesh"], force="mesh").volume * row["density"]
+        for row in rows
+        if row["density"]
+    )
+    said = re.search(r"([\d.]+) kg in (\d+) of 10 parts", capsys.readouterr().out)
+    assert float(said[1]) == pytest.approx(own, rel=1e-3)
+    assert int(said[2]) == sum(row["density"] is not None for row in rows)
+    # A new revision needs the table no more.
+    table.unlink()
+    assert imported(file, tmp_path / "cell")[1] == made
+    for text in ("S235JR = 0", 'S235JR = "heavy"', "S235JR = true", "[S235JR]", "="):
+        table.write_text(text)
+        assert cli.main(["import", str(file), str(tmp_path / "new"), "--densities", str(table)]) == Exit.ERROR
+        assert "ours.toml" in capsys.readouterr().err

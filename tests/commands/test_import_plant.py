@@ -207,6 +207,9 @@ def test_nothing_outside_the_plant_is_read(tmp_path, capsys, box, uri):
         assert cli.main(["import", str(file), str(folder / "made")]) == Exit.WITHIN
         assert "0 parts with a shape" in capsys.readouterr().out
         assert not list((folder / "made" / "cad").iterdir())
+        # What could not be brought keeps everything from being within.
+        (missing,) = tomllib.loads((folder / "made/workstation.toml").read_text())["left_out"]
+        assert set(missing) == {"name", "why"}
 
 
 def test_a_folder_with_something_in_it_is_not_touched(tmp_path, capsys, box):

@@ -36,6 +36,8 @@ POINT = 1e-8
 """A radius of gyration up to this is none [m]."""
 DENSITIES = (10.0, 25_000.0)
 """From foam to the heaviest metals [kg/m³]."""
+LARGEST = 1e12
+"""No body here has an inertia beyond this [kg·m²]."""
 REPAIRABLE = 0.02
 """Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
 CONCENTRATED = 0.04
@@ -99,6 +101,14 @@ def plausible_inertial(inertial: Inertial, *, body: bool) -> tuple[Inertial | No
             return None, "", ""
         least = NOTHING if mass > 0 else 0
         return None, "warning", f"mass is {mass:g} kg, expected more than {least:g}: mass and inertia unknown"
+    with np.errstate(over="ignore"):
+        far = float(np.abs(inertia).sum())
+    if not far <= LARGEST:
+        return (
+            None,
+            "warning",
+            f"has an inertia of {far:.4g} kg·m², which nothing has: mass and inertia unknown",
+        )
     moments = np.linalg.eigvalsh(inertia)
     largest = float(np.abs(moments).max())
     shown = ", ".join(f"{m:.4g}" for m in moments)

@@ -468,6 +468,20 @@ class Confirmed(_Table, frozen=True, kw_only=True):
     """Why it is right, in words; it stands in the report."""
 
 
+class LeftOut(_Table, frozen=True, kw_only=True):
+    """Something that stands in the real cell and not in this file, so that nobody is warned of it.
+
+    As long as nobody says why that does not matter, nothing is within.
+    """
+
+    name: Annotated[str, Meta(min_length=1, max_length=500)]
+    """What it is called where it comes from."""
+    why: Annotated[str, Meta(max_length=1000)] = ""
+    """Why it is not here."""
+    accepted: Annotated[str, Meta(min_length=1, max_length=1000, pattern=r"\w")] | None = None
+    """Why it does not matter that nobody is warned of it, in words; it stands in the report."""
+
+
 class Workstation(_Table, frozen=True, kw_only=True):
     """A workstation file."""
 
@@ -500,6 +514,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     targets: tuple[CartesianTarget, ...] = ()
     contacts: tuple[Contact, ...] = ()
     confirmed: tuple[Confirmed, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     sources: tuple[Any, ...] = ()
     """`Source`s, each of the type that its ``kind`` names."""
     safety: tuple[Any, ...] = ()
@@ -548,6 +563,7 @@ TABLES: dict[str, type[Struct]] = {
     "targets": CartesianTarget,
     "contacts": Contact,
     "confirmed": Confirmed,
+    "left_out": LeftOut,
 }
 """Lists of tables and the type of their entries."""
 

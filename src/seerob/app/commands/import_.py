@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seerob.app.console.terminal import Exit, line, tell
+from seerob.app.console.progress import spinner
+from seerob.app.console.terminal import Exit, cache_folder, line, tell
 from seerob.core.errors import InputError, suggestion
-from seerob.core.files.whole_file import whole_file, whole_folder
+from seerob.core.files.whole_file import hidden_folder, whole_folder
 
 if TYPE_CHECKING:
     from seerob.app.importing.folder import Files
@@ -21,11 +22,8 @@ EXAMPLE = "seerob import line.step my_line"
 
 _KEPT = ("density", "tolerance", "units", "up", "accept", "ground", "without", "smaller")
 """Options that a new revision takes over where they are not given again."""
-_TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 _SHOWN = 20
 """Lines about what was left out."""
-FINEST, COARSEST = 1e-3, 50.0
-"""Tolerances that are taken [mm]."""
 
 
 def add(sub: argparse.ArgumentParser) -> None:
@@ -37,6 +35,8 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--tolerance", type=float, metavar="MM", help=text)
     text = "density of every part [kg/m³], or of one material as S235JR=7850; may be given several times"
     sub.add_argument("--density", action="append", default=[], metavar="[NAME=]DENSITY", help=text)
+    text = "TOML file of densities by material name, S235JR = 7850 [kg/m³]; --density goes before it"
+    sub.add_argument("--densities", type=Path, metavar="FILE", help=text)
     sub.add_argument("--units", help="unit of lengths of a file that does not say it: mm, m, inch")
     text = "leave out parts by full name, with wildcards, as '*/screw*'; may be given several times"
     sub.add_argument("--without", action="append", default=[], metavar="PATTERN", help=text)
@@ -92,33 +92,49 @@ def _before(folder: Path) -> dict[str, Any] | None:
             for key in ("name", "mesh", "shape", "box", "written"):
                 row[key]
         before["options"].get("density")
+        before["left_out"] = before.get("missing", [])
     except (ValueError, LookupError, TypeError, AttributeError, OSError) as error:
         raise InputError.at(folder / TABLE, "", f"cannot be read ({error})", "import anew") from error
     return before
 
 
 def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: dict[str, Any] | None) -> Exit:
-    from seerob.app.importing.folder import densities, files
+    from seerob.app.importing import reading
+    from seerob.app.importing.folder import densities, densities_of_table, files
     from seerob.app.importing.picture import FILE, picture
-    from seerob.description.cad.assembly import baked
 
+    if options.densities is not None:
+        # Of the table the figures are kept, for the next revision.
+        options.density = [*densities_of_table(options.densities), *options.density]
     former = {} if before is None else before["options"]
     for key in _KEPT:
         if not getattr(options, key):
             setattr(options, key, former.get(key) or getattr(options, key))
     kept = {key: getattr(options, key) for key in _KEPT}
     given = densities(options.density)
-    assembly = _moving(options, _wanted(options, baked(_read(options, ending))))
+    with spinner() as say:
+        assembly = reading.read(
+            options.file,
+            ending,
+            tolerance=options.tolerance,
+            units=options.units,
+            up=options.up,
+            cache=cache_folder(),
+            progress=say,
+        )
+    assembly = _moving(options, _wanted(options, assembly))
+    own = set[str]()
+    if before is not None:
+        made_before = {row["mesh"] for row in before["parts"]}
+        own = {f"cad/{file.name}" for file in (folder / "cad").glob("*")} - made_before
+    with spinner() as say:
+        made = files(assembly, options.file, given, options=kept, taken=own, progress=say)
+        say("drawing the picture")
+        shown = picture(assembly)
     if before is None:
-        made = files(assembly, options.file, given, options=kept)
-        _write(folder, made.texts, {**made.meshes, FILE: picture(assembly)})
-        _say(options.file, assembly, made)
-        return Exit.WITHIN
-    own = {f"cad/{file.name}" for file in (folder / "cad").glob("*")} - {
-        row["mesh"] for row in before["parts"]
-    }
-    made = files(assembly, options.file, given, options=kept, taken=own)
-    _revise(folder, before, made, picture(assembly))
+        _write(folder, made.texts, {**made.meshes, FILE: shown})
+    else:
+        _revise(folder, before, made, shown)
     _say(options.file, assembly, made)
     return Exit.WITHIN
 
@@ -188,15 +204,20 @@ def _revise(folder: Path, before: dict[str, Any], made: Files, shown: bytes) -> 
     try:
         revision = revised(file.read_bytes(), before, made.rows(), str(file))
         contents = {
-            file.name: revision.text,
             **made.meshes,
             FILE: shown,
             TABLE: made.texts[TABLE].encode(),
+            file.name: revision.text,
         }
-        for name, content in contents.items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            with whole_file(folder / name) as hidden:
-                hidden.write_bytes(content)
+        with hidden_folder(folder / "new") as working:
+            for name, content in contents.items():
+                (working / name).parent.mkdir(parents=True, exist_ok=True)
+                (working / name).write_bytes(content)
+            try:
+                _replace(working, folder, contents)
+            except KeyboardInterrupt:  # half of it would be worse, and the rest takes no time
+                _replace(working, folder, contents)
+                raise
         for name in revision.unused:
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
@@ -209,32 +230,12 @@ def _revise(folder: Path, before: dict[str, Any], made: Files, shown: bytes) -> 
         line("same", "no part was added, moved, resized or lost")
 
 
-def _read(options: argparse.Namespace, ending: str) -> Assembly:
-    from seerob.description.cad import described, scene, sdf, step, threedxml, usd
-    from seerob.description.mesh import MAX_BYTES, MAX_FACES, file_content
-    from seerob.description.mesh_files import MeshSource
-
-    file: Path = options.file
-    if ending in scene.FORMATS:
-        if options.tolerance is not None:
-            raise InputError.at("--tolerance", "", f"a {scene.FORMATS[ending]} file has triangles already")
-        return scene.read(file, ending, units=options.units, up=options.up)
-    if options.units or options.up:
-        what = "only a mesh file does not say its unit or which axis is up"
-        raise InputError.at("--units" if options.units else "--up", "", what, "leave it out")
-    source = MeshSource(file, file_content(file, MAX_BYTES), MAX_BYTES, MAX_FACES)
-    source.files[file.name] = source.data
-    if ending in _TRIANGLES:
-        if options.tolerance is not None:
-            what = f"a {_TRIANGLES[ending]} file has triangles already"
-            raise InputError.at("--tolerance", "", what)
-        read = {".3dxml": threedxml.read, ".usd": usd.read, ".sdf": sdf.read}
-        return read[ending](source) if ending in read else described.read(source, ending)
-    tolerance = step.TOLERANCE * 1e3 if options.tolerance is None else options.tolerance
-    if not FINEST <= tolerance <= COARSEST:
-        what = f"{tolerance:g} mm"
-        raise InputError.at("--tolerance", "", what, f"from {FINEST:g} to {COARSEST:g} mm")
-    return step.read(source, iges=ending == ".igs", tolerance=tolerance * 1e-3)
+def _replace(working: Path, folder: Path, names: Iterable[str]) -> None:
+    """Move files into a folder that may have older ones of their names; those that are moved already stay."""
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        if (working / name).exists():
+            (working / name).replace(folder / name)
 
 
 def _say(file: Path, assembly: Assembly, made: Files) -> None:
@@ -247,6 +248,7 @@ def _say(file: Path, assembly: Assembly, made: Files) -> None:
         several = "" if len(made.parts) == 1 else "s"
         parts = f"{len(made.parts)} part{several} of {len(assembly.shapes)} shapes"
         line("found", f"{parts}, {triangles} triangles, {size} m")
+        _say_masses(made.parts)
     for row in made.robots:
         mass = "no mass stated" if row["mass"] is None else f"{row['mass']:.4g} kg"
         missing = f", no mass of {', '.join(row['without_mass'][:5])}" if row["without_mass"] else ""
@@ -259,6 +261,16 @@ def _say(file: Path, assembly: Assembly, made: Files) -> None:
         line("left out", f"{name}: {why}", "yellow")
     if len(assembly.left_out) > _SHOWN:
         line("left out", f"and {len(assembly.left_out) - _SHOWN} more, which import.json lists", "yellow")
+
+
+def _say_masses(parts: Sequence[Mapping[str, Any]]) -> None:
+    """The sum of masses that are known, and of how many parts none is."""
+    known = [row["density"] * row["volume"] for row in parts if row["density"] and row["volume"]]
+    known += [row["written"]["mass"] for row in parts if "mass" in row["written"]]
+    if known:
+        without = len(parts) - len(known)
+        rest = f"; of {without} it is not known" if without else ""
+        line("found", f"{sum(known):.6g} kg in {len(known)} of {len(parts)} parts{rest}")
 
 
 def _plant(file: Path, folder: Path) -> Exit:

@@ -193,10 +193,12 @@ def spinner(*, quiet: bool = False) -> Iterator[Callable[[str], None]]:
     if quiet or not STATUS.is_terminal:
         yield (lambda _: None) if quiet else lines()
         return
+    from rich.markup import escape
+
     status = STATUS.status("")
 
     def say(text: str) -> None:
-        status.update(text)
+        status.update(escape(printable(text)))
         status.start()
 
     try:

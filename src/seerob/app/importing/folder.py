@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Collection, Mapping
+import tomllib
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -13,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.files import bounded
+from seerob.core.printable import printable
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
-from seerob.description.cad.assembly import Assembly, Instance, Moving, Shape
+from seerob.description.cad.assembly import ASKED, NOTHING, Assembly, Instance, Moving, Shape
 from seerob.description.cad.names import plain_name, told_apart
 from seerob.description.description import Inertial
 from seerob.description.formats.urdf_writing import written
@@ -30,6 +33,8 @@ from seerob.workstation.editing import literal
 
 TABLE = "import.json"
 """What was found, mended, guessed and left out, beside the workstation file."""
+LARGEST_TABLE = 1 << 20
+"""Of densities [byte]."""
 GRID = 8
 """Decimals of a coordinate [m] that are kept: what differs by less is one corner."""
 NEGLIGIBLE = 1e-6
@@ -59,10 +64,12 @@ class Files:
     findings: tuple[Finding, ...]
     robots: tuple[dict[str, Any], ...] = ()
     """Rows of the table: one for each mechanism."""
+    missing: tuple[dict[str, Any], ...] = ()
+    """What the workstation file says is not in it: everything that became no part, by request or not."""
 
     def rows(self) -> dict[str, tuple[dict[str, Any], ...]]:
         """Rows by the table of the workstation file that they are written to."""
-        return {"parts": self.parts, "robots": self.robots}
+        return {"parts": self.parts, "robots": self.robots, "left_out": self.missing}
 
 
 def files(
@@ -72,6 +79,7 @@ def files(
     *,
     options: Mapping[str, Any],
     taken: Collection[str] = (),
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Files:
     """Content of each file of the folder by its name.
 
@@ -81,11 +89,13 @@ def files(
         densities: For the masses.
         options: Of the command, for the next revision.
         taken: Names of mesh files that are the user's.
+        progress: Told how far it is.
     """
     findings = list(assembly.findings)
     names = _mesh_names(assembly.shapes, taken)
     meshes, facts = {}, []
-    for shape, name in zip(assembly.shapes, names, strict=True):
+    for number, (shape, name) in enumerate(zip(assembly.shapes, names, strict=True)):
+        progress(f"making meshes: {number} of {len(names)}")
         meshes[name], known = _measured(shape, findings)
         facts.append(known)
     parts: list[dict[str, Any]] = []
@@ -116,6 +126,7 @@ def files(
     if unknown:
         text = f"no part is of {', '.join(unknown)}: its density is not used"
         findings.append(Finding(level="warning", subject=source.name, text=text))
+    missing = tuple(left_out_rows(assembly.left_out))
     table = {
         "file": source.name,
         "sha256": hashlib.sha256(assembly.files[source.name]).hexdigest(),
@@ -125,6 +136,7 @@ def files(
         "parts": parts,
         "robots": robots,
         "left_out": [{"name": name, "why": why} for name, why in assembly.left_out],
+        "missing": missing,
         "findings": [{"level": f.level, "subject": f.subject, "text": f.text} for f in findings],
     }
     texts = {
@@ -134,11 +146,37 @@ def files(
                 "",
                 *(table_text("robots", row["written"]) for row in robots),
                 *(table_text("parts", row["written"]) for row in parts),
+                *(table_text("left_out", row["written"]) for row in missing),
             ]
         ),
         TABLE: json.dumps(table, indent=1, ensure_ascii=False) + "\n",
     }
-    return Files(texts, meshes, tuple(parts), tuple(findings), tuple(robots))
+    return Files(texts, meshes, tuple(parts), tuple(findings), tuple(robots), missing)
+
+
+def left_out_rows(left_out: Sequence[tuple[str, str]]) -> Iterator[dict[str, Any]]:
+    """Rows of what became no part: one for each request of the user, which accepts it, and for each thing.
+
+    Args:
+        left_out: Full names and why, of which those on request begin with `ASKED`.
+    """
+    asked: dict[str, int] = {}
+    known: set[str] = set()
+    for name, why in left_out:
+        if why.startswith(ASKED):
+            option = why.removeprefix(ASKED).rpartition("; ")[0]
+            asked[option] = asked.get(option, 0) + 1
+        elif not why.startswith(NOTHING) and (label := printable(name)[:500]) not in known:
+            known.add(label)
+            yield _row(label, printable(why)[:1000], None)
+    for option, count in asked.items():
+        parts = "1 part, which" if count == 1 else f"{count} parts, which"
+        yield _row(option[:500], f"{parts} {TABLE} lists", "asked for when the CAD file was brought")
+
+
+def _row(name: str, why: str, accepted: str | None) -> dict[str, Any]:
+    written = {"name": name, "why": why} | ({} if accepted is None else {"accepted": accepted})
+    return {"name": name, "shape": "", "written": written}
 
 
 def _robot_names(assembly: Assembly) -> list[str]:
@@ -189,11 +227,6 @@ def _head(assembly: Assembly, source: Path) -> list[str]:
     # Names are of others: as values they cannot end a comment.
     origin = f"{toml_value(source.name)} ({toml_value(assembly.format)}, unit {toml_value(assembly.unit)})"
     head = [f"# Made by `seerob import` from {origin}; {TABLE} lists what became of it."]
-    if assembly.left_out:
-        head.append(
-            f"# {len(assembly.left_out)} things of the file became no part: nothing is judged of them."
-        )
-        head += [f"#   {toml_value(name)}: {toml_value(why)}" for name, why in assembly.left_out[:20]]
     return [*head, f"title = {toml_value(source.stem)}"]
 
 
@@ -304,3 +337,20 @@ def densities(words: list[str]) -> Densities:
         else:
             of_all = density
     return Densities(of_all, by_material)
+
+
+def densities_of_table(file: Path) -> list[str]:
+    """Words as of ``--density`` from a TOML file of densities by material name.
+
+    Raises:
+        InputError: It cannot be read, or something in it is no density.
+    """
+    try:
+        table = tomllib.loads(bounded.content(file, LARGEST_TABLE).decode("utf-8-sig"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError.at(file, "", f"cannot be read: {error}", 'lines such as "S235JR" = 7850') from error
+    for name, density in table.items():
+        if isinstance(density, bool) or not isinstance(density, int | float) or not 0 < density <= 1e5:
+            what = f"{density!r} is no density"
+            raise InputError.at(file, name, what, "a number in kg/m³, as 7850")
+    return [f"{name}={density}" for name, density in table.items()]

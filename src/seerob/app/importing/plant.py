@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-from seerob.app.importing.folder import place
+from seerob.app.importing.folder import place, table_text
 from seerob.core.errors import InputError
+from seerob.core.printable import printable
 from seerob.core.snapshot import Finding
 from seerob.description.cad.names import plain_name
 from seerob.files.tables.mapping import toml_value
@@ -91,6 +92,8 @@ class Made:
             data = self._loaded[uri] if uri in self._loaded else self.plant.load(uri)
         except InputError as error:
             self.findings.append(Finding(level="warning", subject=path, text=str(error)))
+            why = "; ".join(problem.what for problem in error.problems)[:1000]
+            yield table_text("left_out", {"name": path, "why": printable(why)})
             return
         self._loaded[uri] = data
         if "#" in uri:

@@ -42,6 +42,8 @@ KEPT = 2
 """So many processes wait for the next file."""
 TIRED = 512 << 20
 """One that has taken so much [byte] is not kept."""
+MOST_AHEAD = 1024
+"""Items of a generator that are fetched at once, after fewer at first."""
 
 COMMAND = (sys.executable, "-P", "-m", "seerob.core.files.parser_process")
 """``-P``: the folder it is started in is none to take modules from."""
@@ -83,13 +85,14 @@ def parsed_one_by_one(
     remedy: str = "export it again",
     memory: int = MEMORY,
     seconds: float = SECONDS,
+    ahead: int = MOST_AHEAD,
 ) -> Iterator[T]:
     """What a generator yields that runs in the parsers' process, as it is asked for.
 
-    Arguments and errors are those of `parsed`; the time is that until the next items, some of which are
-    fetched ahead.
+    Arguments and errors are those of `parsed`; the time is that until the next items, of which up to
+    ``ahead`` are fetched at once; 1 where each is to be told as it comes.
     """
-    return _Conversation(function, arguments, file, remedy, memory, seconds).each()
+    return _Conversation(function, arguments, file, remedy, memory, seconds, ahead).each()
 
 
 class _Ended(Exception):
@@ -246,9 +249,10 @@ class _Conversation:
         remedy: str,
         memory: int,
         seconds: float,
+        ahead: int = MOST_AHEAD,
     ) -> None:
         self.name = f"{function.__module__}:{function.__qualname__}"
-        self.request = pickle.dumps((self.name, arguments, memory, seconds, os.path.realpath(".")))
+        self.request = pickle.dumps((self.name, arguments, memory, seconds, ahead, os.path.realpath(".")))
         self.file, self.remedy, self.memory, self.seconds = file, remedy, memory, seconds
 
     def only(self) -> Any:
@@ -348,7 +352,7 @@ def _answer(request: bytes, questions: BinaryIO, out: BinaryIO) -> None:
         _send(out, pickle.dumps((kind, value, last, _peak() > TIRED)))
 
     # Of the process that started this one.
-    name, arguments, memory, seconds, folder = pickle.loads(request)  # noqa: S301
+    name, arguments, memory, seconds, ahead, folder = pickle.loads(request)  # noqa: S301
     with contextlib.suppress(OSError):  # relative paths are from where that one is now
         os.chdir(folder)
     module, _, function = name.partition(":")
@@ -360,7 +364,7 @@ def _answer(request: bytes, questions: BinaryIO, out: BinaryIO) -> None:
         if not isinstance(value, Iterator):
             say("is", value)
             return
-        size = 16
+        size = min(16, ahead)
         while True:
             items = list(islice(value, size))
             if len(items) < size:
@@ -373,7 +377,7 @@ def _answer(request: bytes, questions: BinaryIO, out: BinaryIO) -> None:
                 del value  # closes what it has open
                 say("is", [])
                 return
-            size = min(2 * size, 1024)
+            size = min(2 * size, ahead)
             _limit_time(seconds)
     except MissingPackage as error:
         say("missing", error.package)

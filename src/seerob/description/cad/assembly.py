@@ -18,6 +18,17 @@ from seerob.description.mesh_files import Color
 
 RIGID = 1e-6
 """A transform is rigid where the rotation nearest to it moves no corner by more than this [m]."""
+ASKED = "as asked: "
+"""Begin of why a part is left out that the user does not want."""
+NOTHING = (
+    "nothing but triangles without area",
+    "an assembly of nothing",
+    "has no surface: points or curves only",
+    "a mesh without faces",
+    "a joint",
+    "closes a loop of joints",
+)
+"""Begins of why something became no part that nobody could touch."""
 SINGLE = 6e-8
 """Rounding of a coordinate to four bytes, as a share of it."""
 
@@ -180,9 +191,9 @@ def without(assembly: Assembly, patterns: Sequence[str], smaller: float | None) 
         vertices = np.vstack([mesh.vertices for mesh in assembly.shapes[instance.shape].pieces])
         extent = float(np.ptp(vertices, axis=0).max())
         if found:
-            left_out.append((name, f"as asked: --without {found[0]}"))
+            left_out.append((name, f"{ASKED}--without {found[0]}; {extent * 1e3:.4g} mm"))
         elif smaller is not None and extent < smaller:
-            left_out.append((name, f"as asked: {extent * 1e3:.4g} mm, smaller than {smaller * 1e3:g} mm"))
+            left_out.append((name, f"{ASKED}--smaller {smaller * 1e3:g}; {extent * 1e3:.4g} mm"))
         else:
             kept.append(instance)
     if unused := [pattern for pattern in patterns if pattern not in used]:

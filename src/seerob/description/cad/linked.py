@@ -221,12 +221,14 @@ def _inertial(
     frame = np.array(row["frame"], float)
     rotation = frame[:3, :3]
     moments = np.array(row["moments"], float)
-    inertia = rotation @ (np.diag(moments) if moments.ndim == 1 else moments) @ rotation.T
     # A moment of inertia has the unit of a mass times that of a length squared.
+    with np.errstate(all="ignore"):  # what is no number, or too large, is told below
+        inertia = rotation @ (np.diag(moments) if moments.ndim == 1 else moments) @ rotation.T
+        inertia = 0.5 * (inertia + inertia.T) * meters**2
     made = Inertial(
         float(row["mass"]),
         frame[:3, 3] * meters,
-        0.5 * (inertia + inertia.T) * meters**2,
+        inertia,
         Origin.STATED,
         str(source.path),
     )

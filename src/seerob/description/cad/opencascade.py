@@ -31,6 +31,10 @@ MAX_CORNERS = 64
 """Corners of a plane face that are told."""
 MAX_SAMPLES = 40_000
 """Points of a shape's curved surfaces at which its triangles are compared with it."""
+AMID = np.array([[1, 1, 1], [1.5, 1.5, 0], [0, 1.5, 1.5], [1.5, 0, 1.5]]) / 3
+"""Shares of a triangle's corners at its middle and those of its edges."""
+ALL_OVER = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)]) / 8
+"""Shares of its corners at points an eighth of its edges apart."""
 _REFERENCES = re.compile(
     rb"(?:APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|DOCUMENT_FILE)\s*\(\s*'((?:[^']|'')*)'", re.I
 )
@@ -41,11 +45,11 @@ _SCHEMAS = {"CONFIG_CONTROL_DESIGN": "AP203", "AP203": "AP203", "AUTOMOTIVE": "A
 
 def plain(
     path: Path, data: bytes, max_bytes: int, max_faces: int, iges: bool, tolerance: float
-) -> dict[str, Any]:
-    """Shapes, instances, findings and files that were read, in numbers, texts and bytes."""
+) -> Iterator[dict[str, Any]]:
+    """What a file holds, in numbers, texts and bytes: how many products, each of them, and all the rest."""
     source = MeshSource(path, data, max_bytes, max_faces)
     with source.parsing("IGES file" if iges else "STEP file"), tempfile.TemporaryDirectory() as folder:
-        return _Document(source, Path(folder), iges, tolerance).told()
+        yield from _Document(source, Path(folder), iges, tolerance).told()
 
 
 class _Document:
@@ -67,9 +71,10 @@ class _Document:
         else:
             self._read_step(folder)
         self.labels = XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
-        self.shapes: dict[str, int | str] = {}
-        self.rows: list[dict[str, Any]] = []
-        self.instances: list[tuple[list[str], int, list[list[float]], Any]] = []
+        self.products: dict[str, tuple[Any, str]] = {}
+        """Label and name of each that is no assembly, by its entry."""
+        self.placed: list[tuple[tuple[str, ...], str, list[list[float]], Any]] = []
+        """Names, entry of the product, place [m] and colour of each part."""
         self.left_out: list[tuple[str, str]] = []
         self.faces = 0
 
@@ -146,8 +151,8 @@ class _Document:
             return
         to.write_bytes(self._local(held, to.parent, depth + 1))
 
-    def told(self) -> dict[str, Any]:
-        """Plain data of it."""
+    def told(self) -> Iterator[dict[str, Any]]:
+        """How many products there are, plain data of each as it is cut into triangles, and of the whole."""
         from OCP.collections import Sequence_TDF_Label
 
         roots = Sequence_TDF_Label()
@@ -155,8 +160,26 @@ class _Document:
         found = [roots.Value(i) for i in range(1, roots.Length() + 1)]
         for name, label in zip(told_apart(map(_label_name, found)), found, strict=True):
             self._walk(label, (name,), np.eye(4), None)
+        yield {"products": len(self.products)}
+        numbers: dict[str, int | str] = {}
+        count = 0
+        for entry, (label, name) in self.products.items():
+            row = self._row(label, name)
+            if isinstance(row, str):
+                numbers[entry] = row
+            else:
+                numbers[entry] = count
+                count += 1
+            yield {"shape": None if isinstance(row, str) else row}
+        instances = []
+        for path, entry, world, color in self.placed:
+            number = numbers[entry]
+            if isinstance(number, str):
+                self.left_out.append(("/".join(path), number))
+            else:
+                instances.append((list(path), number, world, color))
         self.left_out += [(name, "a file that is not there") for name in self.missing]
-        if not self.instances:
+        if not instances:
             missing = f"; it refers to {', '.join(self.missing[:5])}" if self.missing else ""
             self.source.fail(
                 f"holds no surface{missing}",
@@ -164,12 +187,12 @@ class _Document:
             )
         if len(found) > 1:
             self.source.note(f"has {len(found)} roots, which stand beside each other")
-        return {
+        yield {
             "format": self.format,
             "unit": self.unit,
-            "shapes": self.rows,
-            "instances": self.instances,
+            "instances": instances,
             "left_out": self.left_out,
+            "missing": self.missing,
             "findings": [(f.level, f.subject, f.text) for f in self.source.findings],
             "files": self.source.files,
         }
@@ -177,25 +200,15 @@ class _Document:
     def _walk(self, label: Any, path: tuple[str, ...], above: Array, color: Any) -> None:
         from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
-        if len(path) > MAX_DEPTH or len(self.instances) > MAX_INSTANCES:
+        if len(path) > MAX_DEPTH or len(self.placed) > MAX_INSTANCES:
             what = f"nests deeper than {MAX_DEPTH} or has more than {MAX_INSTANCES} parts"
             self.source.fail(what, "export the cell alone")
         if XCAFDoc_ShapeTool.IsAssembly_s(label):
             self._components(label, path, above, color)
             return
-        key = _entry(label)
-        if key not in self.shapes:
-            row = self._row(label, path[-1])
-            if isinstance(row, str):
-                self.shapes[key] = row
-            else:
-                self.shapes[key] = len(self.rows)
-                self.rows.append(row)
-        number = self.shapes[key]
-        if isinstance(number, str):
-            self.left_out.append(("/".join(path), number))
-        else:
-            self.instances.append((list(path), number, above.tolist(), color))
+        entry = _entry(label)
+        self.products.setdefault(entry, (label, path[-1]))
+        self.placed.append((path, entry, above.tolist(), color))
 
     def _components(self, label: Any, path: tuple[str, ...], above: Array, color: Any) -> None:
         from OCP.collections import Sequence_TDF_Label
@@ -246,7 +259,7 @@ class _Document:
         most = max(20, MAX_SAMPLES // len(faces))
         for face in faces:
             vertices, triangles, uv = _triangles(face)
-            points.append(_samples(face, triangles, uv, most))
+            points.append(_samples(face, vertices, triangles, uv, most))
             if not len(triangles):
                 lost += 1
                 continue
@@ -417,27 +430,37 @@ def _triangles(face: Any) -> tuple[Array, NDArray[np.int32], Array]:
     return vertices, triangles, np.array([(p.X(), p.Y()) for p in pairs], float)
 
 
-def _samples(face: Any, triangles: NDArray[np.int32], uv: Array, most: int) -> Array:
-    """Points [mm] of a curved face amid its triangles and their edges; all over it when it has none."""
+def _samples(face: Any, vertices: Array, triangles: NDArray[np.int32], uv: Array, most: int) -> Array:
+    """Points [mm] of a curved face: amid its triangles and their edges, many where it is farthest from them.
+
+    All over it when it has no triangles.
+    """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
 
     surface = BRepAdaptor_Surface(face, True)
     if len(triangles) and (surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane or not len(uv)):
         return np.empty((0, 3))
-    if len(triangles):
-        corners = uv[triangles]
-        middles = (corners + corners[:, [1, 2, 0]]) / 2
-        inner = np.vstack([corners.mean(axis=1), middles.reshape(-1, 2)])
-    else:
+    if not len(triangles):
         u = surface.FirstUParameter(), surface.LastUParameter()
         v = surface.FirstVParameter(), surface.LastVParameter()
         # A surface that ends nowhere is looked at within 100 m.
         (u0, u1), (v0, v1) = np.clip([u, v], -1e5, 1e5).tolist()
         grid = np.meshgrid(np.linspace(u0, u1, 9), np.linspace(v0, v1, 9))
-        inner = np.column_stack([axis.ravel() for axis in grid])
-    inner = inner[:: max(1, len(inner) // most)]
-    found = [surface.Value(float(u), float(v)) for u, v in inner]
+        return _at(surface, np.column_stack([axis.ravel() for axis in grid]))
+    some = triangles[:: max(1, 4 * len(triangles) // most)]
+    first = _at(surface, AMID @ uv[some]).reshape(len(some), -1, 3)
+    a, b, c = np.moveaxis(vertices[some], 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    away = np.abs(np.einsum("tki,ti->tk", first - a[:, None], normal)).max(axis=1) / np.maximum(length, 1e-30)
+    worst = some[np.argsort(-away)[: max(4, most // (20 * len(ALL_OVER)))]]
+    return np.vstack([first.reshape(-1, 3), _at(surface, ALL_OVER @ uv[worst])])
+
+
+def _at(surface: Any, uv: Array) -> Array:
+    """Points [mm] of a surface at parameters, (n, 3)."""
+    found = [surface.Value(u, v) for u, v in uv.reshape(-1, 2).tolist()]
     return np.array([(p.X(), p.Y(), p.Z()) for p in found], float).reshape(-1, 3)
 
 

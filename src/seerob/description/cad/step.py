@@ -6,16 +6,20 @@ comes back is compared here with what it said of areas, volumes and points of th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seerob.core.extras import need
-from seerob.core.files.parser_process import parsed
+from seerob.core.files.parser_process import parsed_one_by_one
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
+from seerob.description.cad import kept
 from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape, Surface
 from seerob.description.cad.opencascade import plain
 from seerob.description.mesh_files import MeshSource
@@ -34,33 +38,93 @@ AREA, VOLUME = 0.02, 0.02
 """Shares of area and volume by which triangles may be off without a warning."""
 
 
-def read(source: MeshSource, *, iges: bool = False, tolerance: float = TOLERANCE) -> Assembly:
+BETWEEN = 1.02
+"""How much farther a surface may be from triangles between points that are an eighth of an edge apart: a
+parabola is 1/64 higher."""
+
+
+def read(
+    source: MeshSource,
+    *,
+    iges: bool = False,
+    tolerance: float = TOLERANCE,
+    cache: Path | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Assembly:
     """The assembly of a STEP or IGES file.
 
     Args:
         source: The file.
         iges: Whether it is IGES.
         tolerance: Largest distance of triangles from the surface [m].
+        cache: Folder that keeps what was read, by content.
+        progress: Told how far it is.
 
     Raises:
         InputError: It cannot be read, holds no surface, or crashes OpenCASCADE.
         MissingPackage: OpenCASCADE is not installed.
     """
+    edition = _edition()
+    if cache is None or edition is None:
+        return _asked(source, iges, tolerance, progress)[0]
+    key = kept.key(source, (iges, tolerance, edition))
+    found = kept.read(cache, key, source)
+    if found is None:
+        found, whole = _asked(source, iges, tolerance, progress)
+        # What is missing today may be there tomorrow.
+        if whole:
+            kept.write(cache, key, found)
+    return found
+
+
+def _edition() -> str | None:
+    """Which OpenCASCADE is installed, without loading it; None where nobody knows."""
+    for name in ("cadquery-ocp-novtk", "cadquery-ocp"):
+        with suppress(PackageNotFoundError):
+            return f"{name} {version(name)}"
+    return None
+
+
+def _asked(
+    source: MeshSource, iges: bool, tolerance: float, progress: Callable[[str], None]
+) -> tuple[Assembly, bool]:
+    """What OpenCASCADE says of a file, and whether every file was there that it names."""
     need("OCP")
-    arguments = (source.path, source.data, source.max_bytes, source.max_faces, iges, tolerance)
-    remedy = "export it again, perhaps as another edition of STEP, or as glTF"
-    told = parsed(plain, *arguments, file=str(source.path), remedy=remedy, memory=MEMORY, seconds=SECONDS)
+    name = source.path.name
+    answers = parsed_one_by_one(
+        plain,
+        *(source.path, source.data, source.max_bytes, source.max_faces, iges, tolerance),
+        file=str(source.path),
+        remedy="export it again, perhaps as another edition of STEP, or as glTF",
+        memory=MEMORY,
+        seconds=SECONDS,
+        ahead=1,
+    )
+    findings: list[Finding] = []
+    shapes: list[Shape] = []
+    products = done = 0
+    for answer in answers:
+        if "products" in answer:
+            products = answer["products"]
+        elif "shape" in answer:
+            done += 1
+            progress(f"cutting {name} into triangles: {done} of {products} products")
+            if answer["shape"] is not None:
+                shapes.append(_shape(answer["shape"], tolerance, findings))
+        else:
+            told = answer
     source.files.update(told["files"])
-    findings = [Finding(level=level, subject=subject, text=text) for level, subject, text in told["findings"]]
-    shapes = tuple(_shape(row, tolerance, findings) for row in told["shapes"])
+    said = [Finding(level=level, subject=subject, text=text) for level, subject, text in told["findings"]]
     instances = tuple(
         Instance(tuple(path), shape, np.array(matrix, float), color)
         for path, shape, matrix, color in told["instances"]
     )
     left_out = tuple((name, why) for name, why in told["left_out"])
-    return Assembly(
-        told["format"], told["unit"], shapes, instances, tuple(findings), left_out, dict(source.files)
+    files = dict(source.files)
+    assembly = Assembly(
+        told["format"], told["unit"], tuple(shapes), instances, (*said, *findings), left_out, files
     )
+    return assembly, not told["missing"]
 
 
 def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Shape:
@@ -71,7 +135,7 @@ def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Sh
     name = row["name"]
     whole, _ = joined(pieces)
     points = np.frombuffer(row["points"], "<f8").reshape(-1, 3)
-    far = _farthest(whole, points)
+    far = BETWEEN * _farthest(whole, points)
     rounding = SINGLE * float(np.abs(whole.vertices).max(initial=0.0))
     deviation = (0.0 if row["flat"] else max(tolerance, far)) + rounding
 

@@ -144,6 +144,7 @@ class _Compiler:
     def run(self) -> Model:
         self.mounting.option(timestep=self.station.engine.timestep, gravity=self.station.engine.gravity)
         self._try("", self._variables)
+        self.mounting.findings += left_out(self.station)
         for i, robot in enumerate(self.station.robots):
             if robot.on is None:
                 self._try(f"robots[{i}]", partial(self._robot, robot))
@@ -556,6 +557,18 @@ def _weight(inertial: Inertial) -> Quantity:
 
 def _body_id(mj: mujoco.MjModel, name: str) -> int:
     return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))
+
+
+def left_out(station: Workstation) -> Iterator[Finding]:
+    """What is said of things that the file says are not in it."""
+    for thing in station.left_out:
+        what = "is left out of the twin" + (f" ({thing.why})" if thing.why else "")
+        if thing.accepted is None:
+            text = f'{what}: bring it, or say in [[left_out]] why that does not matter, accepted = "…"'
+            yield Finding(level="warning", subject=thing.name, text=text, holds=("*",))
+        else:
+            text = f"{what}, so that nothing is judged of it: {thing.accepted}"
+            yield Finding(level="assumed", subject=thing.name, text=text)
 
 
 def unasked(model: Model) -> Iterator[Finding]:

@@ -17,13 +17,14 @@ before(async () => {
 
 after(() => opened?.close());
 
-/** A busy machine sends nothing for a while now and then, and the page says so: it is looked at again, for a minute. */
+/** A busy machine sends nothing for a while now and then, and the page says so: it is looked at again, for a while. */
 async function eventually(check) {
-  for (let again = 0; ; again++) {
+  const end = Date.now() + 120_000;
+  for (;;) {
     try {
       return await check();
     } catch (error) {
-      if (again === 300) throw error;
+      if (Date.now() > end) throw error;
       await page.waitForTimeout(200);
     }
   }

@@ -237,7 +237,8 @@ test("the run again gives the same verdicts, poses and events bit for bit", {
   assert.ok(found.ticks > 100);
   assert.deepEqual(found.grabs.slice(0, 2), ["blank", ""]);
   assert.deepEqual(found.events.slice(0, 3), ["taken", "placed", "round"]);
-  // However seldom a loaded machine says where the visitor is, and however often its run stands still.
-  assert.ok(found.away < 0.6, `who stood all the time was ${found.away} m away`);
+  // Between two pictures, seconds apart on a loaded machine, a person goes on at the speed of hands that shake until
+  // the time-out; with that of a sample that is said again within a microsecond it was metres per second.
+  assert.ok(found.away < 3, `who stood all the time was ${found.away} m away`);
   assert.ok(found.same, "verdicts, poses and events are the same");
 });

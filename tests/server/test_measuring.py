@@ -14,8 +14,9 @@ from seerob.app.server.access import Role, Tokens
 from seerob.app.server.live import Live, LiveView
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
+from seerob.app.server.trial import Still
 from seerob.core.errors import InputError, Undecided
-from seerob.core.snapshot import Hello, Measure, Measured, Snapshot
+from seerob.core.snapshot import Hello, Measure, Measured, Reach, Snapshot
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 from seerob.session.measuring import Ruler
@@ -125,6 +126,32 @@ def test_a_live_run_is_measured_where_it_was_shown_also_a_moment_ago(cell):
         finally:
             over.set()
             runs.join()
+
+
+def test_reach_goes_along_with_who_reaches_and_is_told_to_who_may_measure(cell):
+    seen, ruler = cell.first(cell.scene()), Ruler(lambda: cell.model)
+    found = ruler.reach("operator/right_hand", seen)
+    (hull,) = found.markers
+    assert 0 < found.value < 0.5
+    # Where the hand is now is inside.
+    vertices = np.array(hull.vertices)
+    poses = np.frombuffer(seen.poses, "<f4").reshape(-1, 7).copy()
+    names = [node.name for node in cell.scene().nodes]
+    hand = poses[names.index("operator/right_hand"), :3]
+    assert (vertices.min(axis=0) < hand).all()
+    assert (hand < vertices.max(axis=0)).all()
+    poses[[name.startswith("operator/") for name in names], 0] += 1.0
+    (moved,) = ruler.reach("operator/right_hand", replace(seen, poses=poses.tobytes())).markers
+    assert np.array(moved.vertices) == pytest.approx(vertices + np.array([1, 0, 0]), abs=1e-5)
+    with pytest.raises(Undecided, match="fell silent"):
+        ruler.reach("operator/right_hand", replace(seen, doubts={"operator": "it fell silent"}))
+    server = Server(scene=cell.scene(), meshes={}, feed=Still(seen), port=0, ruler=lambda: ruler)
+    with server, Page(server) as page:
+        page.socket.send(msgspec.msgpack.encode(Reach(id=-1, of="ur5e")))
+        answer = page.of(Measured)
+        assert (answer.id, answer.result.name, len(answer.result.markers)) == (-1, "reach of ur5e", 1)
+        page.socket.send(msgspec.msgpack.encode(Reach(id=-2, of="nobody")))
+        assert page.of(Measured).refusal
 
 
 def test_who_may_only_look_or_track_does_not_measure(cell):

@@ -26,6 +26,7 @@ import {
 import { PoseReader } from "./poses";
 import { traceFromWire } from "./traces";
 import { heardMeasured } from "./view/measure";
+import { heardReach } from "./view/reach";
 import { type History, SCHEMA, type Scene } from "./wire";
 
 /** Numbers change at most this often: faster cannot be read. */
@@ -129,7 +130,7 @@ export class Connection {
         registered.value = message.registered;
         return;
       case "measured":
-        heardMeasured(message.measured);
+        if (!heardReach(message.measured)) heardMeasured(message.measured);
         return;
       case "edited":
         heardEdited(message.edited);

@@ -14,9 +14,10 @@ import { type Actions, ActionsContext } from "./panels/app_context";
 import { OwnPresence } from "./scene/own_presence";
 import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
-import { film } from "./view/handed_out";
+import { film } from "./view/film";
 import { saveView } from "./view/kept";
 import { connectMeasure } from "./view/measure";
+import { connectReach } from "./view/reach";
 import type { Register, Tracking, VisitorInfo } from "./wire";
 import { Visit } from "./xr/visit";
 
@@ -63,6 +64,7 @@ function begin(element: HTMLElement): void {
   actions.time.connect((message) => connection.send(message));
   connectDraft((edit) => connection.send({ kind: "edit", edit }));
   connectDoing((doing) => connection.send({ kind: "doing", doing }));
+  connectReach((measure) => connection.send({ kind: "measure", measure }));
   connectMeasure(
     (measure) => connection.send({ kind: "measure", measure }),
     (name, face) => viewer.turned(name, face),
@@ -95,7 +97,7 @@ function begin(element: HTMLElement): void {
   actions.keepView = () => saveView(viewer.viewpoint.where());
   actions.goTo = (view) => viewer.viewpoint.stand(view);
   actions.picture = () => viewer.stage.picture();
-  actions.film = () => film(viewer.stage.renderer.domElement);
+  actions.film = () => film(viewer.stage);
   viewer.stage.run((time, frame) => {
     connection.tick(time);
     viewer.tick(time);
@@ -137,7 +139,7 @@ const actions: Actions = {
   keepView: () => {},
   goTo: () => {},
   picture: () => Promise.reject(new Error("there is no room yet")),
-  film: () => null,
+  film: () => Promise.resolve(null),
   frameSelection: () => {},
 };
 listenToKeys(actions);

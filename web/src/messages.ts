@@ -14,6 +14,7 @@ import type {
   Presence,
   Presences,
   Pull,
+  Reach,
   Refused,
   Register,
   Registered,
@@ -93,7 +94,7 @@ export type ToWorker =
   | { kind: "doing"; doing: Grab | Pull }
   | { kind: "register"; asked: Register }
   | { kind: "edit"; edit: Edit }
-  | { kind: "measure"; measure: Measure }
+  | { kind: "measure"; measure: Measure | Reach }
   /** What this visitor says of themselves. */
   | { kind: "company"; said: Introduction | Presence | Hold }
   /** While live: show the kept snapshot of this run time, or follow the newest (null). */

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "499c31298cfae13a";
+export const SCHEMA = "d0a09dc3eaf25779";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -277,13 +277,14 @@ export interface Result {
   nothing: boolean;
 }
 
-/** What a page's `Measure` came to. */
+/** What a page's `Measure` or `Reach` came to. */
 export interface Measured {
   type: "measured";
   id: number;
   /**
    * Least distance of the surfaces at the instant that was shown (`Result.t`), with the line between them;
-   * it has no limit, and an interval where the real surfaces may be nearer than the shapes.
+   * it has no limit, and an interval where the real surfaces may be nearer than the shapes. Of a `Reach` how
+   * far outside of the outline, which its markers are, places can be [m].
    */
   result: Result | null;
   /** Why there is none. */
@@ -774,6 +775,17 @@ export interface Measure {
   t?: number | null;
 }
 
+/** What a page that may control asks of the twin: where somebody can reach. */
+export interface Reach {
+  type: "reach";
+  /** The page's own number, by which it knows the answer; not one of a `Measure`. */
+  id: number;
+  /** A robot (its working point), a person (both hands), or the full name of a body of them. */
+  of: string;
+  /** Instant that the page shows [s]; None for the newest. */
+  t?: number | null;
+}
+
 /** One mistake that an edit would make, in the words of `seerob check-file`. */
 export interface Mistake {
   /** The place: `robots[0].base.position`; empty for the whole file. */
@@ -956,4 +968,4 @@ export const FIELDS = {
 
 export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked | Registered | Draft | Edited | Measured | Visitors | Presences | Refused;
 
-export type PageMessage = Command | Tracking | Register | Edit | Measure | Introduction | Presence | Hold | Grab | Pull;
+export type PageMessage = Command | Tracking | Register | Edit | Measure | Reach | Introduction | Presence | Hold | Grab | Pull;

@@ -49,6 +49,7 @@ FROM_PAGE = (
     snapshot.Register,
     snapshot.Edit,
     snapshot.Measure,
+    snapshot.Reach,
     snapshot.Introduction,
     snapshot.Presence,
     snapshot.Hold,

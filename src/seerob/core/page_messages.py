@@ -219,6 +219,17 @@ class Measure(Struct, frozen=True, kw_only=True, tag="measure"):
     """Instant that the page shows [s]; None for the newest."""
 
 
+class Reach(Struct, frozen=True, kw_only=True, tag="reach"):
+    """What a page that may control asks of the twin: where somebody can reach."""
+
+    id: int
+    """The page's own number, by which it knows the answer; not one of a `Measure`."""
+    of: str
+    """A robot (its working point), a person (both hands), or the full name of a body of them."""
+    t: float | None = None
+    """Instant that the page shows [s]; None for the newest."""
+
+
 class Mistake(Struct, frozen=True, kw_only=True):
     """One mistake that an edit would make, in the words of ``seerob check-file``."""
 

@@ -47,6 +47,7 @@ from seerob.core.page_messages import (
     Presence,
     Presences,
     Pull,
+    Reach,
     Refused,
     Register,
     Registered,
@@ -105,6 +106,7 @@ __all__ = [
     "Prism",
     "Pull",
     "Rays",
+    "Reach",
     "Refused",
     "Register",
     "Registered",
@@ -292,12 +294,13 @@ class Result(Struct, frozen=True, kw_only=True, array_like=True):
 
 
 class Measured(Struct, frozen=True, kw_only=True, tag="measured"):
-    """What a page's `Measure` came to."""
+    """What a page's `Measure` or `Reach` came to."""
 
     id: int
     result: Result | None = None
     """Least distance of the surfaces at the instant that was shown (`Result.t`), with the line between them;
-    it has no limit, and an interval where the real surfaces may be nearer than the shapes."""
+    it has no limit, and an interval where the real surfaces may be nearer than the shapes. Of a `Reach` how
+    far outside of the outline, which its markers are, places can be [m]."""
     refusal: str = ""
     """Why there is none."""
 

@@ -14,6 +14,7 @@ import { PageTools } from "./PageTools";
 import { Plots } from "./Plots";
 import { ProbeNote } from "./ProbeNote";
 import { Properties } from "./Properties";
+import { ReachNote } from "./ReachNote";
 import { RightSide } from "./RightSide";
 import { SceneTree } from "./SceneTree";
 import { Timeline } from "./Timeline";
@@ -47,6 +48,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <ViewTools />
         <MeasureNote />
         <ProbeNote />
+        <ReachNote />
         <Legend />
         <VisitedInstant />
       </main>

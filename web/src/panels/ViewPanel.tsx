@@ -1,10 +1,13 @@
 // How the room is looked at, and what is taken along of it.
 
-import { useSignal } from "@preact/signals";
+import { signal, useSignal } from "@preact/signals";
 import { outlinesOnly } from "../scene/viewer";
+import type { EndFilm } from "../view/film";
 import { figures, figuresTable, fileName, save } from "../view/handed_out";
 import { folded, forgetView, PANELS, type Panel, toggleFolded, views } from "../view/kept";
+import { mayMeasure } from "../view/measure";
 import { probing, toggleProbe } from "../view/probe";
+import { reaching, toggleReach } from "../view/reach";
 import { SECTIONS, sectionAt, sectionAxis } from "../view/section";
 import { said, word } from "../words";
 import { useActions } from "./app_context";
@@ -16,17 +19,20 @@ const PANEL_NAMES: Record<Panel, string> = {
   bottom: word("Plots and time"),
 };
 
+/** Ends the clip that is taken, also where the panel was closed meanwhile. */
+const stop = signal<EndFilm | null>(null);
+
 export function ViewPanel() {
   const actions = useActions();
-  const stop = useSignal<(() => Promise<Blob>) | null>(null);
   const chosen = useSignal("");
   const clip = async (): Promise<void> => {
     if (!stop.value) {
-      stop.value = actions.film();
+      stop.value = await actions.film();
       return;
     }
-    const filmed = await stop.value();
+    const end = stop.value;
     stop.value = null;
+    const filmed = await end();
     save(filmed, fileName(filmed.type.includes("mp4") ? "mp4" : "webm"));
   };
   const text = (content: string, kind: string) => new Blob([content], { type: kind });
@@ -49,6 +55,9 @@ export function ViewPanel() {
         </label>
       )}
       <Tick title={said("Speed of a point")} on={probing.value} turn={toggleProbe} />
+      {mayMeasure.value && (
+        <Tick title={said("Reach of what is selected")} on={reaching.value !== null} turn={toggleReach} />
+      )}
       <Tick
         title={said("Volumes as outlines")}
         on={outlinesOnly.value}

@@ -4,6 +4,7 @@ import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Preset } from "../scene/viewpoint";
 import type { TimeControl } from "../time_control";
+import type { EndFilm } from "../view/film";
 import type { SavedView } from "../view/kept";
 import type { Mode } from "../xr/visit";
 
@@ -18,7 +19,7 @@ export interface Actions {
   goTo(view: SavedView): void;
   picture(): Promise<Blob>;
   /** Film the room until the answer is called; null where this browser cannot. */
-  film(): (() => Promise<Blob>) | null;
+  film(): Promise<EndFilm | null>;
   /** Fill the view with the selection, or with everything. */
   frameSelection(): void;
 }

@@ -37,6 +37,8 @@ export class Stage {
   readonly grid = makeGrid();
   private dirty = true;
   private tickedAt = Number.NEGATIVE_INFINITY;
+  /** Told after each picture, while it can still be read. */
+  drawn: (() => void) | null = null;
   private drawnAt = Number.NEGATIVE_INFINITY;
   private readonly sharpest: number;
   private readonly sharpness: Sharpness;
@@ -99,13 +101,18 @@ export class Stage {
     this.dirty = false;
     this.drawnAt = time;
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.redraw();
+  }
+
+  /** Draw at once: what was drawn before is not kept. */
+  redraw(): void {
     this.renderer.render(this.scene, this.camera);
+    this.drawn?.();
   }
 
   /** What is drawn now, as a PNG file. */
   picture(): Promise<Blob> {
-    // Drawn at once: what was drawn before is not kept.
-    this.renderer.render(this.scene, this.camera);
+    this.redraw();
     return new Promise((resolve, reject) => {
       this.renderer.domElement.toBlob((png) => (png ? resolve(png) : reject(new Error("no picture"))));
     });

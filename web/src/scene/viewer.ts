@@ -22,6 +22,7 @@ import {
 import { manikinTints } from "../posture/coloring";
 import { measuring, type Normal, withFace } from "../view/measure";
 import { followProbe, probeAt, probing } from "../view/probe";
+import { reaching } from "../view/reach";
 import { sectionPlanes } from "../view/section";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
@@ -209,9 +210,10 @@ export class Viewer {
   private draw(): void {
     const chosen = selection.peek();
     const measured = measuring.peek()?.result;
+    const asked = [measured, reaching.peek()?.result].filter((result) => result != null);
     const results = this.frame?.results ?? [];
     this.markers.update(
-      measured ? [measured, ...results] : results,
+      [...asked, ...results],
       mutedCriteria.peek(),
       measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null),
       showCaptions.peek() ? this.labelled() : 0,
@@ -285,7 +287,7 @@ export class Viewer {
     });
     effect(() => {
       // Read to be told of changes.
-      void [mutedCriteria.value, selection.value, showCaptions.value, measuring.value];
+      void [mutedCriteria.value, selection.value, showCaptions.value, measuring.value, reaching.value];
       this.draw();
     });
     effect(() => {

@@ -1,9 +1,7 @@
-// What one takes along: a picture of the room, a clip of it, and the figures of the instant that is shown.
+// What one takes along of the instant that is shown: a file of it, and its figures.
 
 import { frame, scene, stale } from "../page_state";
 import type { Result } from "../wire";
-
-const PICTURES_PER_S = 25;
 
 export function save(content: Blob, name: string): void {
   const link = document.createElement("a");
@@ -57,26 +55,4 @@ function cell(value: unknown): string {
   if (typeof value !== "string") return String(value);
   const text = /^[=+\-@\t\r]/.test(value) ? `'${value}` : value;
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-}
-
-/** Film the room until the answer is called, which gives the clip; null where this browser cannot. */
-export function film(canvas: HTMLCanvasElement): (() => Promise<Blob>) | null {
-  if (typeof MediaRecorder === "undefined" || !canvas.captureStream) return null;
-  const kind = ["video/mp4;codecs=avc1", "video/webm;codecs=vp9", "video/webm"].find((one) =>
-    MediaRecorder.isTypeSupported(one),
-  );
-  if (!kind) return null;
-  const stream = canvas.captureStream(PICTURES_PER_S);
-  const recorder = new MediaRecorder(stream, { mimeType: kind });
-  const parts: Blob[] = [];
-  recorder.ondataavailable = ({ data }) => parts.push(data);
-  recorder.start(1000);
-  return () =>
-    new Promise((resolve) => {
-      recorder.onstop = () => {
-        for (const track of stream.getTracks()) track.stop();
-        resolve(new Blob(parts, { type: kind.split(";")[0]! }));
-      };
-      recorder.stop();
-    });
 }

@@ -39,6 +39,7 @@ from seerob.core.snapshot import (
     Mistake,
     Presence,
     Pull,
+    Reach,
     Refused,
     Register,
     Registered,
@@ -59,11 +60,14 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
-Message = Command | Tracking | Register | Edit | Measure | Introduction | Presence | Hold | Grab | Pull
+Message = (
+    Command | Tracking | Register | Edit | Measure | Reach | Introduction | Presence | Hold | Grab | Pull
+)
 """Of a page."""
 _KINDS: dict[type, str] = {
     Tracking: "tracking",
     Measure: "measure",
+    Reach: "measure",
     Presence: "presence",
     Introduction: "introduction",
     Hold: "introduction",
@@ -108,7 +112,7 @@ def read_message(data: bytes) -> Message:
         command = _decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise ValueError(f"not a command: {error}") from None
-    if isinstance(command, Measure) and not isfinite(command.t or 0.0):
+    if isinstance(command, Measure | Reach) and not isfinite(command.t or 0.0):
         raise ValueError("measure needs a finite instant")
     if not isinstance(command, Command):
         return command
@@ -287,7 +291,7 @@ class Hub:
                     client.offer("Edited", _encode(await self._edit(client, message, visit, roles)))
                 elif isinstance(message, Register):
                     client.offer("Registered", _encode(await self._register(client, message, visit, roles)))
-                elif isinstance(message, Measure):
+                elif isinstance(message, Measure | Reach):
                     client.offer("Measured", _encode(await self._measure(message, visit, roles)))
                 elif kind == "ack":
                     client.acknowledge(int(message.value or 0))
@@ -331,7 +335,7 @@ class Hub:
     def _held_from(self, client: Client) -> Callable[[Collection[str]], str]:
         return lambda names: self.company.held_by_another(client, names)
 
-    async def _measure(self, asked: Measure, visit: Visit, roles: frozenset[Role]) -> Measured:
+    async def _measure(self, asked: Measure | Reach, visit: Visit, roles: frozenset[Role]) -> Measured:
         if self._ruler is None or Role.CONTROL not in roles:
             visit.refuse("measure")
             return Measured(id=asked.id, refusal="nothing is measured here, or not by who may only look")
@@ -341,7 +345,10 @@ class Hub:
             if seen is None:
                 return Measured(id=asked.id, refusal="where everybody was then is not kept any more")
             try:
-                result = await asyncio.to_thread(ruler.measure, asked.between, seen)
+                if isinstance(asked, Reach):
+                    result = await asyncio.to_thread(ruler.reach, asked.of, seen)
+                else:
+                    result = await asyncio.to_thread(ruler.measure, asked.between, seen)
             except SeerobError as error:
                 return Measured(id=asked.id, refusal=str(error))
             except Exception as error:

@@ -189,7 +189,12 @@ class Moving:
 
 def chain_of(model: Model, body: int) -> tuple[int, ...]:
     """Joints that move a body, from base to tip."""
-    mj, at, chain = model.mj, model.bodies[body].mj, list[int]()
+    return joints_above(model.mj, model.bodies[body].mj)
+
+
+def joints_above(mj: mujoco.MjModel, at: int) -> tuple[int, ...]:
+    """Joints that move one of MuJoCo's bodies, from base to tip."""
+    chain = list[int]()
     while at > 0:
         first = int(mj.body_jntadr[at])
         chain = [*range(first, first + int(mj.body_jntnum[at])), *chain] if first >= 0 else chain

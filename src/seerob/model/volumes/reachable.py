@@ -17,7 +17,7 @@ the sum. What rounding can have added in all is counted step by step (`Swept.exc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -30,7 +30,7 @@ from seerob.kernels.fields import cells_field
 from seerob.kernels.revolve import cut_to_ball, profile, revolve
 from seerob.kernels.voxels import stamp
 from seerob.model.model import Model
-from seerob.model.volumes.moving import Core, Moving, Progress, reach_box, with_field
+from seerob.model.volumes.moving import Core, Joints, Moving, Progress, reach_box, with_field
 from seerob.model.volumes.swept import SLACK, SPACING, Swept
 
 CELLS = 2e7
@@ -43,7 +43,7 @@ HALF_DIAGONAL = np.sqrt(3) / 2
 
 
 @dataclass(frozen=True, eq=False)
-class _Screw:
+class Screw:
     """The axis of a joint at the reference position, and how far it may go from there."""
 
     slide: bool
@@ -62,7 +62,7 @@ class _Screw:
         return rotation, self.anchor - rotation @ self.anchor
 
 
-STILL = _Screw(True, np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0)
+STILL = Screw(True, np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0)
 
 
 def reachable_volume(
@@ -98,7 +98,8 @@ def reachable_volume(
         raise _without_limits()
     check_room(low, high, voxel, memory)
     rotations, positions = moving.place(np.asarray(model.mj.qpos0, float))
-    screws = _screws(model, moving)
+    joints = {j for chain in moving.chains for j in chain}
+    screws = screws_of(model, joints, moving.anchors, moving.axes)
     balls = _balls(moving, screws, rotations, positions)
     work = _Work(voxel, slack, memory, stop)
     beyond: dict[int, list[_Set]] = {}
@@ -143,7 +144,7 @@ class _Work:
 
     def sweep(
         self,
-        screw: _Screw,
+        screw: Screw,
         cores: Sequence[tuple[Core, Array, Array]],
         beyond: Sequence[_Set],
         ball: tuple[Array, float],
@@ -200,7 +201,7 @@ class _Work:
         return _Set(grid, excess)
 
     def _stamped(
-        self, grid: VoxelGrid, screw: _Screw, core: Core, rotation: Array, position: Array
+        self, grid: VoxelGrid, screw: Screw, core: Core, rotation: Array, position: Array
     ) -> float | None:
         """How far the centre of a voxel that was marked can be from the set [m]; None when stopped."""
         pitch = grid.pitch
@@ -229,7 +230,7 @@ class _Work:
         self.stamps += count
         return _stamped_excess(core, bound, pitch)
 
-    def _turned(self, screw: _Screw, sets: Sequence[_Set], pitch: float) -> _Set | None:
+    def _turned(self, screw: Screw, sets: Sequence[_Set], pitch: float) -> _Set | None:
         sets = [each for each in sets if each.grid.count]
         if self.stop():
             return None
@@ -288,7 +289,7 @@ def _stamped_excess(core: Core, bound: float, pitch: float) -> float:
 
 
 def _balls(
-    moving: Moving, screws: dict[int, _Screw], rotations: Array, positions: Array
+    moving: Moving, screws: dict[int, Screw], rotations: Array, positions: Array
 ) -> dict[int, tuple[Array, float]]:
     """Of each joint a ball that what it moves cannot leave: its centre on the axis (3,), its radius [m]."""
     ways: list[tuple[tuple[int, ...], Array, float]] = []
@@ -343,13 +344,24 @@ def _without_limits() -> InputError:
     return InputError.at("reachable volume", "of", what, "give lower and upper, or sweep a trajectory")
 
 
-def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
-    """Axes at the last placement and what is left of each joint's range from there."""
+def screws_of(model: Model, joints: Iterable[int], anchors: Array, axes: Array) -> dict[int, Screw]:
+    """Axes of joints where the file has them, and what is left of each joint's range from there.
+
+    Args:
+        model: The compiled workstation.
+        joints: Of `mujoco`, by index.
+        anchors: A point of each joint's axis there, in the world [m], shape (nj, 3).
+        axes: Each joint's axis there, shape (nj, 3).
+
+    Raises:
+        InputError: A slide without limits.
+    """
+    every = Joints.of(model.mj)
     limits: dict[str, tuple[float | None, float | None]] = {}
     for name, mechanism in model.mechanisms.items():
-        every = [joint for link in mechanism.description.links for joint in link.joints]
+        own = [joint for link in mechanism.description.links for joint in link.joints]
         span = np.array([mechanism.lower, mechanism.upper])
-        for row, joint in enumerate(every):
+        for row, joint in enumerate(own):
             low, high = joint.lower, joint.upper
             if joint.mimic is not None:
                 # As far as the joint that it follows takes it; where that has no limits its own count.
@@ -360,15 +372,15 @@ def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
                     low, high = float(reached.min()), float(reached.max())
             limits[f"{name}/{joint.name}"] = low, high
     screws = {}
-    for j in {j for chain in moving.chains for j in chain}:
+    for j in joints:
         name = mujoco.mj_id2name(model.mj, mujoco.mjtObj.mjOBJ_JOINT, j) or ""
         low, high = limits[name]
-        now = float(model.mj.qpos0[moving.joints.q_address[j]])
-        slide = bool(moving.joints.slides[j])
+        now = float(model.mj.qpos0[every.q_address[j]])
+        slide = bool(every.slides[j])
         ends = (-np.pi, np.pi)
         if low is not None and high is not None and np.isfinite(high - low):
             ends = low - now, high - now
         elif slide:
             raise _without_limits()
-        screws[j] = _Screw(slide, moving.anchors[j].copy(), moving.axes[j].copy(), *ends)
+        screws[j] = Screw(slide, anchors[j].copy(), axes[j].copy(), *ends)
     return screws

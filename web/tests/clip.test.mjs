@@ -1,0 +1,89 @@
+// A clip of the room is read by OpenCV: its pictures, when they are shown, and what is on them.
+
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { open, settled } from "./expect.mjs";
+import { askPython } from "./python.mjs";
+
+// What is on the last picture beside the picture that the page saved of it, and when each is shown.
+const READ = `
+import json, sys
+import cv2
+import numpy as np
+clip, picture = json.load(sys.stdin)
+video = cv2.VideoCapture(clip, cv2.CAP_FFMPEG)
+count, size = video.get(cv2.CAP_PROP_FRAME_COUNT), [video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT)]
+shown, frames = [], []
+while True:
+    good, frame = video.read()
+    if not good:
+        break
+    shown.append(video.get(cv2.CAP_PROP_POS_MSEC))
+    frames.append(frame)
+png = cv2.resize(cv2.imread(picture), frames[-1].shape[1::-1])
+far = lambda a, b: float(np.abs(a.astype(float) - b).mean())
+print(json.dumps(dict(count=count, size=size, shown=shown, same=far(frames[-1], png), moved=far(frames[0], frames[-1]))))
+`;
+const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-clip-"));
+let opened;
+let page;
+
+before(async () => {
+  opened = await open(["--mode", "replay", "--seconds", "6"], { width: 900, height: 600 });
+  page = opened.page;
+  page.setDefaultTimeout(60_000);
+});
+
+after(async () => {
+  await opened?.close();
+  fs.rmSync(folder, { recursive: true });
+});
+
+async function taken(name, file) {
+  const [download] = await Promise.all([
+    page.waitForEvent("download", { timeout: 60_000 }),
+    page.getByRole("button", { name, exact: true }).click(),
+  ]);
+  const to = path.join(folder, file);
+  await download.saveAs(to);
+  return { to, called: download.suggestedFilename() };
+}
+
+test("a clip has every picture that was drawn, in its time, and ends with what is shown", async () => {
+  await settled(page);
+  const view = page.getByRole("button", { name: "View", exact: true });
+  await view.click();
+  await page.getByRole("button", { name: "Clip", exact: true }).click();
+  await page.getByRole("button", { name: "End the clip" }).waitFor();
+  const begun = Date.now();
+  // A panel that is closed meanwhile ends nothing.
+  await view.click();
+  const from = await page.evaluate(() => window.seerob.t);
+  await page.keyboard.press("Space");
+  await page.waitForFunction((t) => window.seerob.t > t + 1.5, from, { timeout: 60_000 });
+  await page.keyboard.press("Space");
+  await settled(page);
+  await view.click();
+  const clip = await taken("End the clip", "clip.webm");
+  const lasted = Date.now() - begun;
+  const picture = await taken("Picture", "picture.png");
+  assert.match(clip.called, /\.webm$/);
+  const read = await askPython(READ, JSON.stringify([clip.to, picture.to]));
+  assert.ok(read.shown.length >= 5, `${read.shown}`);
+  assert.ok(read.count > 0, `${read.count}`); // as the file says how long it is
+  assert.ok(
+    read.shown.every((ms, k) => k === 0 || ms > read.shown[k - 1]),
+    `${read.shown}`,
+  );
+  assert.equal(read.shown[0], 0);
+  assert.ok(
+    read.shown.at(-1) > 1000 && read.shown.at(-1) <= lasted + 100,
+    `${read.shown.at(-1)} of ${lasted}`,
+  );
+  // Colours are coded coarsely; the arm has moved by far more than that.
+  assert.ok(read.same < 4 && read.moved > 0.3, JSON.stringify(read));
+  assert.deepEqual(opened.browser.complaints, []);
+});

@@ -30,6 +30,8 @@ LIVE = {
     "empty_room",
     "three_robots",
     "giant_niryo",
+    "niryo_picking",
+    "two_places",
 }
 """Run in real time only; see test_live_workstation.py and test_plc_cell.py."""
 EVERY = sorted(

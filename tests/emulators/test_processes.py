@@ -138,6 +138,8 @@ def test_a_run_says_so_when_there_is_none(tmp_path, capsys):
         ("empty_room", {"ur5", "visitor"}, 2),
         ("three_robots", {"iiwa_left", "ur10", "iiwa_right", "visitor"}, 1),
         ("giant_niryo", {"niryo", "operator"}, 2),
+        ("niryo_picking", {"niryo"}, 2),
+        ("two_places", {"niryo", "operator"}, 5),
     ],
 )
 def test_cells_of_the_paper_run_without_their_devices(tmp_path, cell, sources, emulators):

@@ -29,6 +29,8 @@ SHIPPED = {
     "empty_room": "live: a UR5 in an empty room, its line virtual, a tracker on a hand; emulated",
     "giant_niryo": "live: a Niryo One ten times as large, a person in VR who fills a box; emulated",
     "three_robots": "live: two LBR iiwa and a UR10 on a line, a visitor with a headset, who is emulated",
+    "niryo_picking": "live: a Niryo One and a conveyor; virtual castings are picked and ride away; emulated",
+    "two_places": "live: a robot at one place, a captured person at another, visitors of both; emulated",
     "plc_cell": "live: a UR10 and a PLC with a belt, a light curtain and a door, both emulated",
 }
 """What each shows; the first is run when none is named."""

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -17,8 +17,8 @@ from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.mvn_person import Person
 from seerob.app.emulation.options import COMMAND, PersonOptions, Ready, option, port
 from seerob.core.errors import InputError
-from seerob.core.page_messages import Command, Grab, Tracking
-from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.core.page_messages import Command, Grab, Introduction, Presence, Tracking
+from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
 from seerob.protocols.tracking.mvn_pose import SEGMENTS
 from seerob.protocols.tracking.vive import xr_positions, xr_turns
 
@@ -86,6 +86,19 @@ def seen(person: Person, *, body: bool) -> Callable[[float], tuple[tuple[str, ..
     return at
 
 
+def in_world(poses: Array, introduction: Introduction) -> Array:
+    """Poses of a visitor's room in the world.
+
+    Args:
+        poses: As `Tracking.poses` has them, shape (n, 7).
+        introduction: Where and how large they stand.
+    """
+    turn = rotation_from_wxyz(introduction.turn)
+    places = introduction.scale * poses[:, :3] @ turn.T + introduction.position
+    turns = [wxyz_from_rotation(turn @ rotation_from_wxyz(wxyz)) for wxyz in poses[:, 3:]]
+    return np.concatenate([places, turns], axis=-1)
+
+
 class _Received(Struct):
     """Kind and number of a message of the server: snapshots are acknowledged."""
 
@@ -104,6 +117,8 @@ class Visitor(LoopEmulator):
         rate: Pictures per second [Hz].
         body: Whether joints of the whole body are seen.
         grabs: What hands hold from when on [s]; time begins with the first picture of the run.
+        introduction: How they introduce themselves; None for not at all. Who is no person of the twin says
+            where head and hands are in the world.
     """
 
     def __init__(
@@ -116,8 +131,10 @@ class Visitor(LoopEmulator):
         rate: float,
         body: bool,
         grabs: Sequence[tuple[float, Grab]] = (),
+        introduction: Introduction | None = None,
     ) -> None:
         super().__init__()
+        self._introduction = introduction
         self.human, self.rate, self.to = human, rate, (host, port)
         self.sent = 0
         """Messages so far."""
@@ -161,16 +178,27 @@ class Visitor(LoopEmulator):
 
     async def _be_seen(self, connection: ClientConnection, begun: float) -> None:
         grabs = deque(self._grabs)
+        introduction = self._introduction
+        if introduction is not None:
+            await connection.send(msgspec.msgpack.encode(introduction))
         while True:
             k = int((time.monotonic() - begun) * self.rate) + 1
             await asyncio.sleep(max(0.0, begun + k / self.rate - time.monotonic()))
             while grabs and grabs[0][0] <= k / self.rate:
                 await connection.send(msgspec.msgpack.encode(grabs.popleft()[1]))
             names, poses = self._seen(k / self.rate)
-            told = Tracking(
-                human=self.human, t=k / self.rate, names=names, poses=poses.astype("<f4").tobytes()
-            )
-            await connection.send(msgspec.msgpack.encode(told))
+            if introduction is not None and not self.human:
+                world = in_world(poses[: len(THREE)], introduction)
+                said: Presence | Tracking = Presence(poses=world.astype("<f4").tobytes())
+            else:
+                said = Tracking(
+                    human=self.human,
+                    t=k / self.rate,
+                    names=names,
+                    poses=poses.astype("<f4").tobytes(),
+                    scale=1.0 if introduction is None else introduction.scale,
+                )
+            await connection.send(msgspec.msgpack.encode(said))
             self.sent += 1
 
     async def _acknowledge(self, connection: ClientConnection, runs: asyncio.Event) -> None:
@@ -193,7 +221,13 @@ class Visitor(LoopEmulator):
 class Headset(PersonOptions, frozen=True, kw_only=True):
     """A headset that shows the page of a run: what it sees of the moving person who wears it."""
 
-    human: Annotated[str, option("whom of the workstation that person is")] = "operator"
+    human: Annotated[str, option("whom of the workstation that person is; empty for one who looks on")] = (
+        "operator"
+    )
+    name: Annotated[str, option("by which others know them; who looks on needs one")] = ""
+    device: Annotated[Literal["vr", "ar"], option("what they wear")] = "vr"
+    scale: Annotated[float, option("how many times as large as the twin they are", ge=0.01, le=100)] = 1.0
+    stands: Annotated[str, option("where the floor of their room lies in the world: X Y Z, in m")] = "0 0 0"
     to: Annotated[str, option("machine that serves the page")] = "127.0.0.1"
     port: Annotated[int, port("port of the page; `seerob run --emulated` tells its own")] = 8080
     rate: Annotated[float, option("pictures per second", "Hz", ge=30, le=144)] = 72.0
@@ -209,6 +243,10 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
             raise ValueError(
                 "--drop, --delay, --jitter and --garble are of devices with a network of their own"
             )
+        if not self.human and not self.name:
+            raise ValueError("--human is empty: who looks on needs a --name")
+        if not self.human and self.grabs:
+            raise ValueError("--grabs are of a --human: who looks on has no hands in the twin")
 
     def ready(self) -> Ready:
         """The visitor."""
@@ -220,9 +258,28 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
             rate=self.rate,
             body=self.body,
             grabs=tuple(self._grabs()),
+            introduction=self._introduction() if self.name else None,
         )
-        hear = (f"seerob run CELL --port {{port}}     (with a source headset of {self.human})",)
-        return Ready(visitor, f"a headset on {self.human}, {self.file}", f"{self.to}:{self.port}", hear)
+        hear = ("seerob run CELL --port {port}",)
+        if self.human:
+            hear = (f"seerob run CELL --port {{port}}     (with a source headset of {self.human})",)
+        who = self.human or f"{self.name}, who looks on"
+        return Ready(visitor, f"a headset on {who}, {self.file}", f"{self.to}:{self.port}", hear)
+
+    def _introduction(self) -> Introduction:
+        place = [at for text in self.stands.split() if (at := _number(text)) is not None]
+        if len(place) != 3 or len(self.stands.split()) != 3:
+            raise InputError.at(COMMAND, "--stands", f"{self.stands!r} is no place", "write X Y Z, in m")
+        upright = wxyz_from_rotation(rotation_from_rpy((np.pi / 2, 0.0, 0.0)))
+        w, x, y, z = map(float, upright)
+        return Introduction(
+            name=self.name,
+            device=self.device,
+            human=self.human,
+            scale=self.scale,
+            position=(place[0], place[1], place[2]),
+            turn=(w, x, y, z),
+        )
 
     def _grabs(self) -> Iterator[tuple[float, Grab]]:
         for text in filter(None, map(str.strip, self.grabs.split(","))):

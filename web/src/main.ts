@@ -14,6 +14,7 @@ import { type Actions, ActionsContext } from "./panels/app_context";
 import { OwnPresence } from "./scene/own_presence";
 import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
+import { cameraShown } from "./view/camera";
 import { film } from "./view/film";
 import { saveView } from "./view/kept";
 import { connectMeasure } from "./view/measure";
@@ -79,6 +80,7 @@ function begin(element: HTMLElement): void {
           ? { kind: "tracking", tracking: message }
           : { kind: "register", asked: message },
       );
+    cameraShown.value = null;
     visit = await Visit.begin(viewer, mode, human, offer, actions.time);
     ownDevice.value = mode === "immersive-ar" ? "ar" : "vr";
     ownHuman.value = human ?? "";

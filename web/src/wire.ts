@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "d0a09dc3eaf25779";
+export const SCHEMA = "056ffab44be2d069";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -485,6 +485,29 @@ export interface Taught {
   points: number;
 }
 
+/** A camera that looks at the real cell; over its picture the twin is shown. */
+export interface CameraInfo {
+  name: string;
+  /** Width and height of its pictures [px]. */
+  size: [number, number];
+  /** fx, fy, cx, cy [px], k1, k2, p1, p2, k3, as OpenCV has them. */
+  lens: [number, number, number, number, number, number, number, number, number];
+  /** Where it is: x to the right, y down, z ahead of it; None where nobody knows. */
+  place: Place | null;
+  /** What 95 % of the error at `tool` stay within, across the line of sight [m]. */
+  error: number | null;
+  tool: string;
+  /** Root mean square of what corners of boards are off in its pictures [px]. */
+  error_px: number | null;
+  /**
+   * Whether the server has its pictures, at `/camera/<its number here>`; else it is one of the device
+   * that shows the page.
+   */
+  fetched: boolean;
+  /** Why the twin is not drawn over its picture; empty where it is. */
+  mistake: string;
+}
+
 /** Everything about a run that does not change while it runs; sent once. */
 export interface Scene {
   type: "scene";
@@ -517,6 +540,8 @@ export interface Scene {
   tips: Place[];
   /** Where waypoints can be added by hand. */
   taught: Taught[];
+  /** That look at the real cell. */
+  cameras: CameraInfo[];
 }
 
 /** What happened to a loose workpiece. */
@@ -898,6 +923,8 @@ export interface VisitorInfo {
   calls: boolean;
   /** What nobody else may change meanwhile. */
   holds: string[];
+  /** Whether they were there when what is replayed was recorded; then the number is negative. */
+  recorded: boolean;
 }
 
 /** What a hand of the person whose headset a page is holds from now on. */

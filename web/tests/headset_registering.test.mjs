@@ -94,8 +94,9 @@ function inRoom([x, y, z]) {
   return [-left, z, -ahead];
 }
 
-const trigger = (value) =>
-  page.evaluate((v) => window.headset.controllers.right.updateButtonValue("trigger", v), value);
+const trigger = (value, hand = "right") =>
+  page.evaluate(([v, h]) => window.headset.controllers[h].updateButtonValue("trigger", v), [value, hand]);
+const stick = (y) => page.evaluate((v) => window.headset.controllers.right.updateAxes("thumbstick", 0, v), y);
 const asked = (words, timeout = 60_000) =>
   page.waitForFunction((w) => window.seerob.asked.some((line) => line.includes(w)), words, { timeout });
 
@@ -149,6 +150,19 @@ test("touches put the twin where the cell is, and what was undecided is decided"
     null,
     { timeout: 60_000 },
   );
+  // Other ways than touches, and what the server says of one for which the file has no figures.
+  for (const words of ["Strap it to what carries a", "Lay it at a,"]) {
+    await stick(1);
+    await asked(words);
+    await stick(0);
+    await pictures(page, 2);
+  }
+  await trigger(1, "left");
+  await asked("nobody says how well the device sees it");
+  await trigger(0, "left");
+  await stick(1);
+  await asked("Where is the tip");
+  await stick(0);
   const leans = Array.from({ length: 30 }, (_, k) => [
     0.3 * Math.cos(k / 2) * ((k + 4) / 34),
     0.3 * Math.sin(k / 2) * ((k + 4) / 34),

@@ -338,6 +338,8 @@ class VisitorInfo(Struct, frozen=True, kw_only=True):
     calls: bool
     holds: tuple[str, ...]
     """What nobody else may change meanwhile."""
+    recorded: bool = False
+    """Whether they were there when what is replayed was recorded; then the number is negative."""
 
 
 class Grab(Struct, frozen=True, kw_only=True, tag="grab"):

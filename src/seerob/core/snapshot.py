@@ -521,6 +521,28 @@ class Taught(Struct, frozen=True, kw_only=True):
     """How many it has already."""
 
 
+class CameraInfo(Struct, frozen=True, kw_only=True):
+    """A camera that looks at the real cell; over its picture the twin is shown."""
+
+    name: str
+    size: tuple[int, int]
+    """Width and height of its pictures [px]."""
+    lens: tuple[float, float, float, float, float, float, float, float, float]
+    """fx, fy, cx, cy [px], k1, k2, p1, p2, k3, as OpenCV has them."""
+    place: Place | None = None
+    """Where it is: x to the right, y down, z ahead of it; None where nobody knows."""
+    error: float | None = None
+    """What 95 % of the error at ``tool`` stay within, across the line of sight [m]."""
+    tool: str = ""
+    error_px: float | None = None
+    """Root mean square of what corners of boards are off in its pictures [px]."""
+    fetched: bool = False
+    """Whether the server has its pictures, at ``/camera/<its number here>``; else it is one of the device
+    that shows the page."""
+    mistake: str = ""
+    """Why the twin is not drawn over its picture; empty where it is."""
+
+
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     """Everything about a run that does not change while it runs; sent once."""
 
@@ -549,6 +571,8 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
     """Point of interest of each robot, by its name."""
     taught: tuple[Taught, ...] = ()
     """Where waypoints can be added by hand."""
+    cameras: tuple[CameraInfo, ...] = ()
+    """That look at the real cell."""
 
     def __repr__(self) -> str:
         count = f"{len(self.nodes)} bodies, {len(self.criteria)} criteria, {len(self.findings)} findings"

@@ -11,7 +11,7 @@ import json
 import math
 import os
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -20,7 +20,9 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.Color_pb2 import Color
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CubePrimitive_pb2 import CubePrimitive
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -51,6 +53,7 @@ from seerob.core.samples import Sample
 from seerob.core.snapshot import (
     Arrow,
     Box,
+    CameraInfo,
     Ellipsoid,
     Highlight,
     Hull,
@@ -76,8 +79,10 @@ from seerob.recording.format import (
     DIGEST,
     END_METADATA,
     FILE_PREFIX,
+    LENS,
     MESH_PREFIX,
     METADATA,
+    PICTURES,
     PRESENCES,
     SAMPLES,
     SCENE,
@@ -116,6 +121,22 @@ def timestamp(t: float) -> Timestamp:
     """Run time [s] as a message."""
     seconds, nanos = divmod(nanoseconds(t), 1_000_000_000)
     return Timestamp(seconds=seconds, nanos=nanos)
+
+
+def calibration_of(info: CameraInfo, t: float) -> CameraCalibration:
+    """A camera's lens, as viewers put a picture in a scene."""
+    fx, fy, cx, cy, *distortion = info.lens
+    return CameraCalibration(
+        timestamp=timestamp(t),
+        frame_id=frame_of(info),
+        width=info.size[0],
+        height=info.size[1],
+        distortion_model="plumb_bob",
+        D=distortion,
+        K=[fx, 0, cx, 0, fy, cy, 0, 0, 1],
+        R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
+        P=[fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0],
+    )
 
 
 def scene_update(scene: Scene, meshes: dict[str, bytes]) -> SceneUpdate:
@@ -158,21 +179,32 @@ def clear_color(data: bytes) -> Color | None:
 
 
 def frame_transforms(scene: Scene, snapshot: Snapshot) -> FrameTransforms:
-    """Pose of every node in the world."""
+    """Pose of every node in the world, and of cameras."""
     stamp = timestamp(snapshot.t)
     poses = np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7).tolist()
+    frames: list[tuple[str, str, Sequence[float]]] = [
+        (ROOT, node.name, pose) for node, pose in zip(scene.nodes, poses, strict=True)
+    ]
+    for camera in scene.cameras:
+        if (at := camera.place) is not None:
+            frames.append((at.node or ROOT, frame_of(camera), (*at.position, *at.wxyz)))
     return FrameTransforms(
         transforms=[
             FrameTransform(
                 timestamp=stamp,
-                parent_frame_id=ROOT,
-                child_frame_id=node.name,
+                parent_frame_id=parent,
+                child_frame_id=child,
                 translation=Vector3(x=x, y=y, z=z),
                 rotation=Quaternion(w=qw, x=qx, y=qy, z=qz),
             )
-            for node, (x, y, z, qw, qx, qy, qz) in zip(scene.nodes, poses, strict=True)
+            for parent, child, (x, y, z, qw, qx, qy, qz) in frames
         ]
     )
+
+
+def frame_of(camera: CameraInfo) -> str:
+    """What viewers call the frame of a camera."""
+    return f"camera {camera.name}"
 
 
 def marker_update(snapshot: Snapshot) -> SceneUpdate:
@@ -468,6 +500,7 @@ class McapTape:
             OSError: The file exists or cannot be written.
         """
         self._scene = scene
+        self._cameras = {camera.name: camera for camera in scene.cameras}
         self._people = {m.name: [j.name for j in m.joints] for m in scene.mechanisms if m.role == "human"}
         self._encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
         self._next_view = -math.inf
@@ -579,6 +612,18 @@ class McapTape:
             for one in told.visitors
         ]
         self._put(PRESENCES, 0, t, msgspec.json.encode({"t": t, "visitors": visitors}))
+
+    def picture(self, t: float, camera: str, jpeg: bytes) -> None:
+        """Append what a camera saw; before its first picture, its lens."""
+        topic = f"{PICTURES}{camera}"
+        if topic not in self._channels:
+            for name, kind in ((topic, CompressedImage), (topic + LENS, CameraCalibration)):
+                schema = register_schema(self._mcap, kind)
+                self._channels[name] = self._mcap.register_channel(name, "protobuf", schema)
+            self._put(topic + LENS, 0, t, calibration_of(self._cameras[camera], t).SerializeToString())
+        frame = frame_of(self._cameras[camera])
+        image = CompressedImage(timestamp=timestamp(t), frame_id=frame, format="jpeg", data=jpeg)
+        self._put(topic, 0, t, image.SerializeToString())
 
     def flush(self) -> None:
         """End the chunk and hand it to the disk: what was written so far survives the process."""

@@ -89,6 +89,21 @@ class RecordsVisitors(Protocol):
         """Record them, too, from now on."""
 
 
+class Pictured(Protocol):
+    """Where pictures of cameras come from."""
+
+    def taken(self) -> list[tuple[str, bytes]]:
+        """Name of a camera and its picture, JPEG, for each that is newer than at the last call."""
+
+
+@runtime_checkable
+class RecordsPictures(Protocol):
+    """A writer that records what cameras see."""
+
+    def look(self, pictured: Pictured) -> None:
+        """Record it, too, from now on."""
+
+
 class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of every sink: one file, one class, one ``kind``. The fields are its table in the file."""
 

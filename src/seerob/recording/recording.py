@@ -6,6 +6,7 @@ file's real size before it is used, and sizes after decompression are bounded.
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from bisect import bisect_right
@@ -34,13 +35,16 @@ from seerob.recording.format import (
     FILE_PREFIX,
     MESH_PREFIX,
     METADATA,
+    PRESENCES,
     SAMPLES,
     SCENE,
     SNAPSHOT,
     VERSION,
     VIEW_SCENE,
+    VISITORS,
     WITH_NAMES,
     Tick,
+    Visitor,
     content_hash,
     nanoseconds,
 )
@@ -289,6 +293,7 @@ _DISTRUST = "do not trust this recording"
 _decode_scene = msgspec.msgpack.Decoder(Scene).decode
 _decode_snapshot = msgspec.msgpack.Decoder(Snapshot).decode
 _decode_tick = msgspec.msgpack.Decoder(Tick).decode
+_decode_visitor: Callable[[bytes], Visitor] = msgspec.json.Decoder(Visitor).decode
 
 
 def snapshot_reader(layout: str) -> Callable[[bytes], Snapshot]:
@@ -582,6 +587,35 @@ class Recording:
         self.__init__(path, scan(path))  # type: ignore[misc]
         if (path.stat().st_size, self._index.metadata) != (state["size"], state["metadata"]):
             raise InputError.at(path, "", "changed since it was pickled", "open it again in this process")
+
+    def visits(self) -> tuple[tuple[float, Visitor], ...]:
+        """Who came, introduced themselves, left or was refused, with run time [s], in order.
+
+        Raises:
+            InputError: One is not what it should be.
+        """
+        return self._visits
+
+    @cached_property
+    def _visits(self) -> tuple[tuple[float, Visitor], ...]:
+        return tuple(
+            (message.time / 1e9, printable_record(self._decode(_decode_visitor, message, VISITORS)))
+            for chunk in self._with(VISITORS)
+            for message in self._messages(chunk, VISITORS)
+        )
+
+    def presences_at(self, t: float) -> bytes:
+        """What was last said before ``t`` [s] of where visitors are, JSON; empty when nothing was."""
+        for chunk in reversed(self._with(PRESENCES, nanoseconds(t))):
+            for message in reversed(self._messages(chunk, PRESENCES)):
+                if message.time <= nanoseconds(t):
+                    return message.data
+        return b""
+
+    def _with(self, topic: str, until: float = math.inf) -> list[ChunkPlace]:
+        """Chunks that begin until then [ns] and hold something of a topic, as far as their index says."""
+        chunks = (chunk for chunk in self._tick_chunks if chunk.start <= until)
+        return [c for c in chunks if not c.channels or {topic, None} & set(self._listed(c))]
 
     def ticks(self) -> Iterator[Tick]:
         """What the engine consumed at each tick, in order: playing it back repeats the run exactly.

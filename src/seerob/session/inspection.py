@@ -17,6 +17,7 @@ from seerob.core import plugin
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.files.bounded import leads_outside
 from seerob.core.files.toml_file import parsed_toml, read_toml
+from seerob.devices.live.camera_pictures import allowed
 from seerob.devices.live.listening import SECRETS, Contact, LiveSource
 from seerob.recording.recording import Recording
 from seerob.workstation.allowed import Named, named_outside, texts
@@ -181,6 +182,11 @@ def _rest(table: Mapping[str, object], file: Path) -> Iterator[Fact]:
             elif group == "sinks":
                 yield Fact("writes", f"{entry.get('file', kind)}, in the folder of results (sinks[{i}])")
     yield from _writing(table)
+    cameras = table.get("cameras", [])
+    for i, camera in enumerate(cameras if isinstance(cameras, list) else ()):
+        if isinstance(camera, dict) and isinstance(address := camera.get("address"), str):
+            host = "" if allowed(address, ()) else ", only with run --allow-camera"
+            yield Fact("connects", f"run: cameras[{i}] fetches pictures from {address[:200]}{host}")
     yield Fact("starts", "at the first start on a machine, processes that compile the inner loops")
     yield Fact("listens", "run and replay serve the page on 127.0.0.1; --host says where else")
     yield Fact("writes", "what takes long to make, in seerob's cache folder")

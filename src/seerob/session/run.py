@@ -33,7 +33,7 @@ from seerob.recording.frames import told_of
 from seerob.recording.result_log import ResultLog
 from seerob.session.huge_pages import use_huge_pages
 from seerob.session.opening import coarse, gappy, signal_timeouts, untimed
-from seerob.session.scene import Looks, invalid_reasons, landmark_of
+from seerob.session.scene import Looks, camera_of, invalid_reasons, landmark_of
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
 from seerob.twin.state import State
@@ -72,6 +72,11 @@ def bind(model: Model) -> tuple[Bound, ...]:
             landmark_of(model, landmark)
         except SeerobError as error:
             problems.append(Problem(file, f"landmarks[{i}].on", str(error)))
+    for i, camera in enumerate(model.workstation.cameras):
+        try:
+            camera_of(model, camera)
+        except SeerobError as error:
+            problems.append(Problem(file, f"cameras[{i}].calibration", str(error)))
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:

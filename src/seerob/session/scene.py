@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from importlib.metadata import version
@@ -11,6 +12,7 @@ import numpy as np
 from seerob.core.errors import UnknownName
 from seerob.core.plugin import kind_of
 from seerob.core.snapshot import (
+    CameraInfo,
     ControlInfo,
     CriterionInfo,
     Finding,
@@ -24,6 +26,7 @@ from seerob.core.snapshot import (
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.criteria.question import Bound
 from seerob.criteria.scoring.phases import entered_for
+from seerob.description.camera import lens
 from seerob.description.norms.editions import headline
 from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
@@ -35,7 +38,7 @@ from seerob.session.opening import coarse
 from seerob.twin.state import State
 from seerob.workstation.source import TaughtByHand
 from seerob.workstation.variables import Value, WhenStale
-from seerob.workstation.workstation import Landmark, Pose, Workstation, real_names
+from seerob.workstation.workstation import Camera, Landmark, Pose, Workstation, real_names
 
 
 def unmet_phases(model: Model, bound: Sequence[Bound], end: float) -> Iterator[Finding]:
@@ -143,6 +146,7 @@ def scene_of(
         landmarks=tuple(landmark_of(model, landmark) for landmark in station.landmarks),
         tips=tuple(_tips(model)),
         taught=tuple(_taught(model)),
+        cameras=tuple(camera_of(model, camera) for camera in station.cameras),
     )
 
 
@@ -194,13 +198,48 @@ def landmark_of(model: Model, landmark: Landmark) -> Place:
     Raises:
         UnknownName: Nothing carries that name, or it has no shape.
     """
-    frame = None
-    if landmark.on is not None:
-        bodies = {body.name: body for body in model.bodies}
-        body = bodies.get(landmark.on)
-        frame = model.frame(landmark.on) if body is None else Frame(body.name, body.mj, np.eye(4))
+    frame = _carrier(model, landmark.on)
     at = placement(landmark.at)
     return place_of(model, landmark.name, frame, at, landmark.accuracy, landmark.accuracy_turn)
+
+
+def _carrier(model: Model, name: str | None) -> Frame | None:
+    """The frame of a body, link or tool; None for the world."""
+    if name is None:
+        return None
+    body = next((body for body in model.bodies if body.name == name), None)
+    return model.frame(name) if body is None else Frame(body.name, body.mj, np.eye(4))
+
+
+def camera_of(model: Model, camera: Camera) -> CameraInfo:
+    """A camera with its lens and its pose, in a node of the page.
+
+    Raises:
+        InputError: Its file is none that ``seerob calibrate camera`` wrote.
+        UnknownName: Nothing carries the name that its file has, or it has no shape.
+    """
+    found = lens.read(model.folder / camera.calibration)
+    place, mistake = None, ""
+    if found.error is None or math.isnan(found.error):
+        mistake = "where it stands is not known: seerob calibrate camera, with --placed and --at"
+    else:
+        place = place_of(model, camera.name, _carrier(model, found.on), found.world_from_camera)
+        if found.error > camera.limit:
+            off = f"{1e3 * found.error:.0f} mm at {found.tool}, more than {1e3 * camera.limit:.0f} mm"
+            mistake = (
+                f"it may be off by {off}: calibrate it again, nearer, or with a board that is known better"
+            )
+    return CameraInfo(
+        name=camera.name,
+        size=(found.width, found.height),
+        lens=(found.fx, found.fy, found.cx, found.cy, *found.distortion),
+        place=place,
+        error=found.error,
+        tool=found.tool,
+        error_px=found.error_px,
+        fetched=camera.address is not None,
+        mistake=mistake,
+    )
 
 
 def _tips(model: Model) -> Iterator[Place]:

@@ -197,7 +197,7 @@ class Station:
             name for rule in station.safety if isinstance(name := getattr(rule, "measurements", None), str)
         ]
         named += [*measured, *(curve for name in measured for curve in curves(self.model.folder / name))]
-        named.append(station.report.logo)
+        named += [station.report.logo, *(camera.calibration for camera in station.cameras)]
         named += [getattr(each, name, None) for each in station.emulators for name in ("file", "waypoints")]
         references = [name for name in named if isinstance(name, str)]
         return {

@@ -30,6 +30,7 @@ from seerob.core.quantities import (
 )
 from seerob.core.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.core.quantities import Pose as Pose  # noqa: PLC0414
+from seerob.workstation.tables.cameras import Camera as Camera  # noqa: PLC0414
 from seerob.workstation.tables.controls import Control as Control  # noqa: PLC0414
 from seerob.workstation.tables.machines import Belt, Conveyor, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.workstation.tables.places import Place as Place  # noqa: PLC0414
@@ -509,6 +510,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     humans: tuple[Human, ...] = ()
     phases: tuple[TaskPhase, ...] = ()
     landmarks: tuple[Landmark, ...] = ()
+    cameras: tuple[Camera, ...] = ()
     displays: tuple[Display, ...] = ()
     triggers: tuple[Trigger, ...] = ()
     targets: tuple[CartesianTarget, ...] = ()
@@ -558,6 +560,7 @@ TABLES: dict[str, type[Struct]] = {
     "humans": Human,
     "phases": TaskPhase,
     "landmarks": Landmark,
+    "cameras": Camera,
     "displays": Display,
     "triggers": Trigger,
     "targets": CartesianTarget,

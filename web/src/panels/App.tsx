@@ -6,6 +6,7 @@ import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
 import { folded } from "../view/kept";
 import { said } from "../words";
+import { CameraNote } from "./CameraNote";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
 import { Legend } from "./Legend";
@@ -49,6 +50,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <MeasureNote />
         <ProbeNote />
         <ReachNote />
+        <CameraNote />
         <Legend />
         <VisitedInstant />
       </main>

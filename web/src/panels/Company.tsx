@@ -17,7 +17,7 @@ export function Company() {
       </summary>
       <fieldset class="company-list" aria-label={said("Visitors")}>
         <ul>
-          {there.map(({ id, name, color, role, scale, device, human, holds }) => (
+          {there.map(({ id, name, color, role, scale, device, human, holds, recorded }) => (
             <li key={id}>
               <span aria-hidden="true" style={{ color }}>
                 ●
@@ -26,6 +26,7 @@ export function Company() {
                 {name}, {role}
                 {human && ` as ${human}`}
                 {device !== "desk" && ` (${device})`}
+                {recorded && `, ${said("as recorded")}`}
                 {scale !== 1 && ` ×${Number(scale.toPrecision(3))}`}
                 {holds.length > 0 && `, ${said("holds {things}", { things: holds.join(", ") })}`}
               </span>

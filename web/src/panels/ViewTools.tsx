@@ -3,6 +3,7 @@
 import { useSignal } from "@preact/signals";
 import { scene } from "../page_state";
 import type { Preset } from "../scene/viewpoint";
+import { cameraShown, cameras, showCamera } from "../view/camera";
 import { mayMeasure, measuring, toggleMeasure } from "../view/measure";
 import { said, word } from "../words";
 import { useActions } from "./app_context";
@@ -28,8 +29,26 @@ export function ViewTools() {
       <fieldset class="tools">
         <legend class="visually-hidden">{said("Viewpoint")}</legend>
         {PRESETS.filter(([preset]) => preset !== "operator" || person).map(([preset, title]) => (
-          <button key={preset} type="button" onClick={() => actions.look(preset)}>
+          <button
+            key={preset}
+            type="button"
+            onClick={() => {
+              cameraShown.value = null;
+              actions.look(preset);
+            }}
+          >
             {said(title)}
+          </button>
+        ))}
+        {cameras.value.map(({ name }, number) => (
+          <button
+            key={name}
+            type="button"
+            title={said("The twin over the picture of this camera")}
+            aria-pressed={cameraShown.value === number}
+            onClick={() => showCamera(number)}
+          >
+            {name}
           </button>
         ))}
         <button

@@ -35,6 +35,8 @@ export class Stage {
   /** Everything that is given in world coordinates: z up, metres. */
   readonly world = new Group();
   readonly grid = makeGrid();
+  /** Makes the projection, in place of one by the element's shape. */
+  project: (() => void) | null = null;
   private dirty = true;
   private tickedAt = Number.NEGATIVE_INFINITY;
   /** Told after each picture, while it can still be read. */
@@ -123,7 +125,8 @@ export class Stage {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (width === 0 || height === 0 || this.renderer.xr.isPresenting) return;
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    if (this.project) this.project();
+    else this.camera.updateProjectionMatrix();
     this.renderer.setSize(width, height);
     // Drawn at once: a cleared canvas would flash.
     this.renderer.render(this.scene, this.camera);

@@ -20,12 +20,14 @@ import {
   stale,
 } from "../page_state";
 import { manikinTints } from "../posture/coloring";
+import { camera, cameraShown, device } from "../view/camera";
 import { measuring, type Normal, withFace } from "../view/measure";
 import { followProbe, probeAt, probing } from "../view/probe";
 import { reaching } from "../view/reach";
 import { sectionPlanes } from "../view/section";
-import type { Scene } from "../wire";
+import type { CameraInfo, Scene } from "../wire";
 import { Bodies } from "./bodies";
+import { CameraView } from "./camera_view";
 import { Companions } from "./companions";
 import { DoubtCaptions } from "./doubt_captions";
 import { Gizmo } from "./gizmo";
@@ -57,6 +59,8 @@ export class Viewer {
   private readonly view: View;
   readonly gizmo: Gizmo;
   private readonly glide = new Glide();
+  /** The camera through which one looks; null in the room. */
+  private through: CameraView | null = null;
   private feed: PoseFeed | null = null;
   private frame: Frame | null = null;
   /** Heard, and shown as soon as the bodies are where it speaks of. */
@@ -137,8 +141,11 @@ export class Viewer {
     }
     if (this.companions.tick(time)) this.stage.invalidate();
     if (!this.stage.renderer.xr.isPresenting) {
-      this.followVisitor();
-      this.viewpoint.update();
+      if (this.through) this.through.tick();
+      else {
+        this.followVisitor();
+        this.viewpoint.update();
+      }
     }
     const { camera, element } = this.stage;
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
@@ -241,6 +248,20 @@ export class Viewer {
     this.stage.invalidate();
   }
 
+  /** Look through a real camera, or no more. */
+  private lookThrough(info: CameraInfo | null): void {
+    this.through?.end();
+    this.through = null;
+    const { stage, bodies } = this;
+    const number = cameraShown.peek();
+    if (info && number !== null && !stage.renderer.xr.isPresenting) {
+      following.value = null;
+      this.through = new CameraView(stage, bodies, info, number);
+    }
+    this.viewpoint.controls.enabled = this.through === null;
+    stage.moved();
+  }
+
   /** Look with the eyes of the visitor whom one follows. */
   private followVisitor(): void {
     const id = following.peek();
@@ -255,6 +276,11 @@ export class Viewer {
     });
     this.viewpoint.controls.addEventListener("start", () => {
       following.value = null;
+    });
+    effect(() => {
+      // Another device is another picture.
+      void device.value;
+      this.lookThrough(camera.value);
     });
     effect(() => {
       this.companions.list(others.value);

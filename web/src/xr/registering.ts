@@ -34,7 +34,13 @@ const RELEASED = 0.3;
 const DONE = 4;
 const ONE = new Vector3(1, 1, 1);
 
-type Step = "sweep" | "touch" | "check" | "align" | "done";
+/** How the room is found out: by touches with a tip that is found first, or by where the controller itself is. */
+const WAYS = ["sweep", "strapped", "known"] as const;
+type Step = (typeof WAYS)[number] | "touch" | "check" | "align" | "done";
+/** Steps at a landmark. */
+const AT_LANDMARK: readonly Step[] = ["touch", "check", "strapped", "known"];
+/** Steps after which one may say that it is enough. */
+const SOLVED: readonly Step[] = ["touch", "strapped", "known"];
 
 /** The part of an `XRAnchor` that not every browser has. */
 interface Kept {
@@ -112,7 +118,17 @@ export class Registering {
       sweep: [
         "Where is the tip of your controller?",
         "Put it on a fixed point, hold the trigger,",
-        "and turn the controller about it for 3 s.",
+        "turn the controller about it for 3 s. Stick up or down: other ways.",
+      ],
+      strapped: [
+        `Strap it to what carries ${name}`,
+        "In several poses of the robot, standing: trigger of the other one.",
+        "Squeeze begins anew, stick up or down: other ways, A ends.",
+      ],
+      known: [
+        `Lay it at ${name}, upright, along its x`,
+        "Pull the trigger of the other one.",
+        "Stick aside: another landmark, up or down: other ways, A ends.",
       ],
       touch: [
         `Touch ${name} with the tip`,
@@ -180,7 +196,11 @@ export class Registering {
   private readonly press = ({ inputSource }: XRInputSourceEvent): void => {
     if (!this.active || this.waits || this.step === "align") return;
     if (inputSource.hand) this.said = "take a controller: a finger is not good enough";
-    else if (this.step !== "sweep" && inputSource.handedness !== this.hand)
+    else if (this.step === "strapped" || this.step === "known") {
+      // Whoever pulled its own trigger would move it.
+      this.hand = this.other(inputSource.handedness);
+      this.pressed = { hand: this.hand, since: this.now, poses: [] };
+    } else if (this.step !== "sweep" && inputSource.handedness !== this.hand)
       this.said = "use the controller that you turned about its tip";
     else {
       this.hand = inputSource.handedness;
@@ -193,8 +213,15 @@ export class Registering {
     if (this.step === "sweep" && this.pressed?.hand === inputSource.handedness) this.finish();
   };
 
+  /** The other controller, where there is one. */
+  private other(hand: XRHandedness): XRHandedness {
+    const all = [...this.session.inputSources].filter((one) => one.gripSpace && !one.hand);
+    return all.find(({ handedness }) => handedness !== hand && handedness !== "none")?.handedness ?? hand;
+  }
+
   private readonly takeBack = (): void => {
     if (this.step === "touch" && !this.waits) this.ask("drop");
+    if (this.step === "strapped" && !this.waits) this.ask("forget");
   };
 
   /** What one controller does: poses while its trigger is held, sticks, and the button that ends. */
@@ -227,7 +254,7 @@ export class Registering {
   }
 
   private pushX(hand: XRHandedness, way: number): void {
-    if (this.step === "touch" || this.step === "check") {
+    if (AT_LANDMARK.includes(this.step)) {
       const count = scene.peek()?.landmarks.length ?? 1;
       this.index = (this.index + way + count) % count;
       this.write();
@@ -236,6 +263,12 @@ export class Registering {
   }
 
   private pushY(hand: XRHandedness, way: number): void {
+    const now = WAYS.indexOf(this.step as (typeof WAYS)[number]);
+    if (now >= 0 && !this.waits && !this.pressed) {
+      this.step = WAYS[(now + way + WAYS.length) % WAYS.length]!;
+      this.index = 0;
+      this.write();
+    }
     if (this.step === "align")
       this.nudge([0, hand === "left" ? -way * NUDGE : 0, hand === "left" ? 0 : -way * NUDGE, 0, 0, 0]);
   }
@@ -246,7 +279,7 @@ export class Registering {
 
   private next(): void {
     const known = registered.peek();
-    if (this.step === "touch" && known?.error != null && !known.doubt) this.step = "align";
+    if (SOLVED.includes(this.step) && known?.error != null && !known.doubt) this.step = "align";
     else if (this.step === "align") {
       this.step = "done";
       void this.keep();
@@ -287,7 +320,7 @@ export class Registering {
   }
 
   private show(): void {
-    const next = this.step === "touch" || this.step === "check" ? this.landmark : undefined;
+    const next = AT_LANDMARK.includes(this.step) ? this.landmark : undefined;
     this.panel.visible = this.active;
     this.mark.visible = next !== undefined;
     if (!next) return;

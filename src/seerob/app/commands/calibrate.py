@@ -42,6 +42,9 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--at", metavar="LANDMARK", help="entry of [[landmarks]] at which the board's corner lies"
     )
+    sub.add_argument(
+        "--on", metavar="NAME", help="link, tool, part or machine that carries the camera, where it begins"
+    )
     sub.add_argument("--out", default="camera.toml", help="file to write, default: camera.toml")
 
 
@@ -75,10 +78,10 @@ def run(options: argparse.Namespace) -> int:
         )
         line("warning", "where it stands is not known: give --placed, --at and the cell", "yellow")
     else:
-        cell_from_board, accuracy, tools = _places(options)
+        cell_from_board, accuracy, tools, carrier = _places(options)
         seen = [one for picture in _read(options.placed) if (one := calibration.corners(picture, board))]
         placed = calibration.placed(found, seen, cell_from_board, accuracy=accuracy, tools=tools, board=board)
-        camera = placed.camera
+        camera = _carried(placed.camera, carrier, options.on)
         assert camera.error is not None  # it is placed
         text = f"pose: {camera.error_px:.2f} px, {1e3 * camera.error:.1f} mm at {camera.tool} (95 %)"
         line("note", f"{text}; the camera itself within {1e3 * placed.along:.1f} mm", "")
@@ -144,13 +147,19 @@ def _taken(device: str) -> Iterator[Array]:
         camera.release()
 
 
-def _places(options: argparse.Namespace) -> tuple[Array, float, dict[str, Array]]:
-    """Cell from board, its accuracy [m], and the robots' points of interest [m], where everybody begins.
+def _places(options: argparse.Namespace) -> tuple[Array, float, dict[str, Array], Array]:
+    """Cell from board, its accuracy [m], the robots' points of interest [m], and what carries the camera.
+
+    All where everybody begins.
 
     Raises:
         InputError: There is no cell, no such landmark, or it moves.
     """
+    import numpy as np
+
+    from seerob.core.transforms import transform
     from seerob.devices.capture.options import placement
+    from seerob.model.model import Frame
     from seerob.session.station import load
     from seerob.twin.engine import Engine
 
@@ -164,12 +173,33 @@ def _places(options: argparse.Namespace) -> tuple[Array, float, dict[str, Array]
         what = f"no landmark {options.at!r} that stands in the world"
         raise InputError.at("--at", "", what, f"[[landmarks]] has {', '.join(landmarks) or 'none'}")
     state = Engine(station.model, controllers=False).start()
+    carrier = np.eye(4)
+    if options.on is not None:
+        bodies = {body.name: body for body in station.model.bodies}
+        body = bodies.get(options.on)
+        frame = station.model.frame(options.on) if body is None else Frame(body.name, body.mj, np.eye(4))
+        carrier = transform(*state._pose(frame))
     tips = {m.name: m.tip for m in station.model.mechanisms.values() if m.role == "robot"}
     return (
         placement(landmark.at),
         landmark.accuracy,
         {name: state._pose(tip)[1] for name, tip in tips.items()},
+        carrier,
     )
+
+
+def _carried(camera: Camera, carrier: Array, name: str | None) -> Camera:
+    """A camera of which the pose is in the frame of what carries it, shape (4, 4)."""
+    from msgspec.structs import replace
+
+    from seerob.core.transforms import inverse, wxyz_from_rotation
+
+    if name is None:
+        return camera
+    there = inverse(carrier) @ camera.world_from_camera
+    x, y, z = there[:3, 3].tolist()
+    w, i, j, k = wxyz_from_rotation(there[:3, :3]).tolist()
+    return replace(camera, position=(x, y, z), wxyz=(w, i, j, k), on=name)
 
 
 def _write(camera: Camera, path: Path) -> None:

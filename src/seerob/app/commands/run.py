@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from msgspec.structs import replace
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from seerob.app.emulation.ports import Move
     from seerob.app.emulation.processes import Running
     from seerob.core.snapshot import Scene
+    from seerob.devices.live.camera_pictures import Cameras
     from seerob.outputs.sink import Writer
     from seerob.session.station import Station
     from seerob.session.writing import CartesianTargets, Triggers
@@ -73,6 +75,8 @@ def add_live(sub: argparse.ArgumentParser) -> None:
     )
     text = "also record what visitors call themselves; without it they are numbers"
     sub.add_argument("--record-names", action="store_true", help=text)
+    text = "fetch pictures of [[cameras]] from this host, too; those on this machine always are"
+    sub.add_argument("--allow-camera", action="append", default=[], metavar="HOST", help=text)
     sub.add_argument("--no-record", action="store_true", help="no recording and no report")
     sub.add_argument("--seconds", type=seconds, help="end the run after this time")
 
@@ -176,21 +180,28 @@ def live(
 ) -> int:
     """Show, judge and record until Ctrl-C or the time is over."""
     from seerob.app.server.live import LiveView
-    from seerob.outputs.sink import RecordsVisitors
+    from seerob.outputs.sink import RecordsPictures, RecordsVisitors
     from seerob.session.measuring import Ruler
 
     folder = run_folder(station.model.folder, options.output)
     sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False, pdf=options.pdf)
     refuse_existing(sinks, folder)
+    scene, cameras = _cameras(station, scene, options.allow_camera)
     stopped = Stopped()
-    with LiveView(
-        scene=scene,
-        meshes=station.model.meshes,
-        host=options.host,
-        port=options.port,
-        ruler=Ruler(lambda: station.model),
-        **visiting(options),
-    ) as view:
+    with (
+        ExitStack() as seen,
+        LiveView(
+            scene=scene,
+            meshes=station.model.meshes,
+            host=options.host,
+            port=options.port,
+            ruler=Ruler(lambda: station.model),
+            cameras=cameras,
+            **visiting(options),
+        ) as view,
+    ):
+        for camera in cameras.of.values():
+            seen.enter_context(camera)
         if view.server.notice:
             line("note", view.server.notice)
         now = 0.0
@@ -209,6 +220,8 @@ def live(
                 if isinstance(writer, RecordsVisitors):
                     writer.watch(view.server.visits)
                     view.server.visits.names = options.record_names
+                if isinstance(writer, RecordsPictures):
+                    writer.look(cameras)
             tell_pages(view.server, "Ctrl-C ends the run", options)
             for each in emulators:
                 each.find_page(view.server.port)
@@ -229,6 +242,27 @@ def live(
         line("late", text, "yellow" if late > bound else "")
     tell_results(summary)
     return exit_code(summary.verdict) if tell_files(sinks, folder, files) else Exit.ERROR
+
+
+def _cameras(station: Station, scene: Scene, hosts: Sequence[str]) -> tuple[Scene, Cameras]:
+    """Cameras whose pictures may be fetched; of the others the scene says why they are not."""
+    from seerob.devices.live.camera_pictures import CameraPictures, Cameras, allowed
+
+    of, recorded, infos = {}, {}, []
+    for i, (camera, info) in enumerate(zip(station.workstation.cameras, scene.cameras, strict=True)):
+        infos.append(info)
+        if camera.address is None:
+            continue
+        if not allowed(camera.address, hosts):
+            why = f"its pictures are on another machine: --allow-camera {urlsplit(camera.address).hostname}"
+            line("note", f"camera {camera.name}: {why}")
+            infos[i] = replace(info, mistake=why)
+            continue
+        line("camera", f"{camera.name}: {camera.address}" + (", recorded" if camera.record else ""))
+        of[i] = CameraPictures(camera.address, info.size, always=camera.record)
+        if camera.record:
+            recorded[camera.name] = of[i]
+    return replace(scene, cameras=tuple(infos)), Cameras(of, recorded)
 
 
 def _tell_ends(station: Station) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from itertools import count
 from math import hypot, inf, isnan
-from struct import Struct
+from struct import Struct, unpack
 from time import monotonic
 
 import msgspec
@@ -81,7 +81,13 @@ def checked(said: Introduction) -> Introduction:
     return msgspec.structs.replace(said, name=printable(said.name.strip()), human=printable(said.human))
 
 
-def place_mistake(said: Presence) -> str:
+def titled(role: str, human: str) -> str:
+    """What people call a visitor: by the role of the token, or where none is asked for by whom they are."""
+    found = next((TITLES[one] for one in Role if one.value == role), "")
+    return found or ("operator" if human else "supervisor")
+
+
+def place_mistake(said: Presence | VisitorPresence) -> str:
     """Why a visitor cannot be where they say; empty when they can.
 
     Raises:
@@ -98,8 +104,10 @@ def place_mistake(said: Presence) -> str:
             return f"a pose beyond {FARTHEST:g} m, or that is no number"
         if not abs(a * a + b * b + c * c + d * d - 1) < 1e-2:
             return "an orientation that is no unit quaternion"
-    if said.points or said.laser:
-        numbers = np.frombuffer(said.points + said.laser, "<u4")
+    more = said.points + said.laser
+    # Where all together are near, each is; and it is no number where one is none.
+    if more and not hypot(*unpack(f"<{len(more) // 4}f", more)) <= FARTHEST:
+        numbers = np.frombuffer(more, "<u4")
         # As integers, so that a number that is none is no matter for whoever is told of such.
         if int((numbers & 0x7FFFFFFF).max()) > _FARTHEST_BITS:
             return f"a point beyond {FARTHEST:g} m, or that is no number"
@@ -127,10 +135,9 @@ class Companion:
     def info(self) -> VisitorInfo:
         """What all know of them."""
         said = self.said or Introduction(device="program")
-        role = next((TITLES[role] for role in Role if role.value == self.visit.role), "")
         return VisitorInfo(
             id=self.id,
-            role=role or ("operator" if said.human else "supervisor"),
+            role=titled(self.visit.role, said.human),
             introduced=self.said is not None,
             name=self.name,
             color=said.color or COLORS[self.id % len(COLORS)],
@@ -155,6 +162,8 @@ class Company:
     def __init__(self, see: Callable[[Presences], None] = lambda _: None) -> None:
         self._see = see
         self._of: dict[Client, Companion] = {}
+        self._recorded: tuple[VisitorInfo, ...] = ()
+        self._recorded_presences: tuple[VisitorPresence, ...] = ()
         self._numbers = count(1)
         self._told = -inf
         self._due: asyncio.TimerHandle | None = None
@@ -204,6 +213,15 @@ class Company:
             return
         one.presence = VisitorPresence(id=one.id, poses=said.poses, points=said.points, laser=said.laser)
         self._soon()
+
+    def recall(self, visitors: tuple[VisitorInfo, ...], presences: tuple[VisitorPresence, ...]) -> None:
+        """Who was there when it was recorded, and where, at the instant that is shown."""
+        if visitors != self._recorded:
+            self._recorded = visitors
+            self._tell()
+        if presences != self._recorded_presences:
+            self._recorded_presences = presences
+            self._soon()
 
     def hold(self, client: Client, said: Hold, *, may: bool) -> None:
         """Somebody says what they hold; what another holds is not theirs.
@@ -256,14 +274,15 @@ class Company:
     def _tell(self) -> None:
         listeners = [one.client for one in self._of.values() if one.said is not None]
         if listeners:
-            payload = _encode(Visitors(visitors=tuple(one.info() for one in self._of.values())))
+            payload = _encode(
+                Visitors(visitors=(*(one.info() for one in self._of.values()), *self._recorded))
+            )
             for client in listeners:
                 client.offer("Visitors", payload)
 
     def _presences(self) -> Presences:
-        return Presences(
-            visitors=tuple(one.presence for one in self._of.values() if one.presence is not None)
-        )
+        there = (one.presence for one in self._of.values() if one.presence is not None)
+        return Presences(visitors=(*there, *self._recorded_presences))
 
     def _soon(self) -> None:
         """Say where all are with the next frame, or as soon as it may be said again."""

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import struct
 from typing import Any, cast
 from weakref import WeakSet
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 from websockets.protocol import State
@@ -136,6 +138,15 @@ class PromptRequests(H11Protocol):
             self.transport.abort()
 
 
+def header(length: int) -> bytes:
+    """Of a whole binary message that is not masked (RFC 6455 5.2)."""
+    if length < 126:
+        return bytes((0x82, length))
+    return (
+        struct.pack(">BBH", 0x82, 126, length) if length < 1 << 16 else struct.pack(">BBQ", 0x82, 127, length)
+    )
+
+
 AHEAD = 2
 """Messages that wait to be taken, from which on no more are read."""
 
@@ -185,13 +196,16 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
     async def send(self, message: Any) -> None:
         """Send; who was refused has been answered, too, which is no error for the log.
 
-        A ``websocket.send`` may have ``every``: messages that are written at once.
+        A ``websocket.send`` may have ``every``: messages that are written at once, as they are. What a server
+        sends is not masked, so that a frame is its header and the message (RFC 6455 5.2).
         """
-        for payload in message.get("every", ())[:-1]:
-            if self.conn.state is State.OPEN:
-                self.conn.send_binary(payload)
         if "every" in message:
-            message = {"type": message["type"], "bytes": message["every"][-1]}
+            await self.writable.wait()
+            if self.disconnected:
+                raise ClientDisconnected
+            if self.conn.state is State.OPEN and not self.close_sent:
+                self.transport.write(b"".join(p for m in message["every"] for p in (header(len(m)), m)))
+            return
         await super().send(message)
         if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
             self.handshake_complete = True

@@ -5,7 +5,15 @@ from __future__ import annotations
 from math import inf
 from typing import Protocol
 
-from seerob.core.snapshot import Command, History, Snapshot, SoFar, Transport
+from seerob.core.snapshot import (
+    Command,
+    History,
+    Snapshot,
+    SoFar,
+    Transport,
+    VisitorInfo,
+    VisitorPresence,
+)
 
 
 class Audience(Protocol):
@@ -18,6 +26,9 @@ class Audience(Protocol):
             snapshot: It.
             until: Monotonic time from which on it is not the present any more [s].
         """
+
+    def recall(self, visitors: tuple[VisitorInfo, ...], presences: tuple[VisitorPresence, ...]) -> None:
+        """Show who was there when it was recorded, among those who are there now."""
 
     def tell(self, message: Transport | History | SoFar) -> None:
         """Send what changed; of each kind the newest only."""

@@ -49,6 +49,8 @@ from seerob.core.snapshot import (
     Tracked,
     Tracking,
     Transport,
+    VisitorInfo,
+    VisitorPresence,
 )
 from seerob.devices.live import headset_offers
 from seerob.devices.live.headset_offers import Offers
@@ -179,6 +181,10 @@ class Hub:
         self.company.show()
         for client in self.clients:
             client.offer_frame(snapshot.seq, payload, until)
+
+    def recall(self, visitors: tuple[VisitorInfo, ...], presences: tuple[VisitorPresence, ...]) -> None:
+        """Show who was there when it was recorded, among those who are there now."""
+        self.company.recall(visitors, presences)
 
     def tell(self, message: Transport | History | SoFar) -> None:
         """Send a change to every page."""

@@ -23,6 +23,7 @@ from seerob.app.server.serving import Server
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Command, History, Result, Scene, Snapshot, SoFar, Trace, Transport
 from seerob.core.transforms import Array
+from seerob.devices.live.camera_pictures import Cameras
 from seerob.devices.live.headset_offers import Offers
 from seerob.outputs.sink import Closing
 from seerob.recording.result_log import ResultLog
@@ -304,6 +305,7 @@ class LiveView(Shown):
         tls: Encrypts.
         clear_text: Whether others may be served unencrypted.
         ruler: By which pages measure; None where they do not.
+        cameras: Network cameras whose pictures are handed on.
 
     Raises:
         InputError: As `Server.start`.
@@ -320,6 +322,7 @@ class LiveView(Shown):
         tls: Tls | None = None,
         clear_text: bool = False,
         ruler: Ruler | None = None,
+        cameras: Cameras | None = None,
     ) -> None:
         live = Live()
         self.server = Server(
@@ -332,6 +335,7 @@ class LiveView(Shown):
             tls=tls,
             clear_text=clear_text,
             ruler=None if ruler is None else lambda: ruler,
+            cameras=cameras,
         )
         super().__init__(live, self.server.offers)
         self.url = self.server.start()

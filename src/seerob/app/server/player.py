@@ -3,19 +3,110 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
-from math import inf, nextafter
+from math import inf, nan, nextafter
+from struct import Struct
 from time import monotonic
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+import msgspec
 from msgspec.structs import replace
 
+from seerob.app.server.company import COLORS, MOST_POINTS, SHAPES, place_mistake, titled
 from seerob.app.server.feed import Audience
+from seerob.core.errors import InputError
 from seerob.core.printable import printable_record
-from seerob.core.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
+from seerob.core.snapshot import (
+    Command,
+    History,
+    Scene,
+    Snapshot,
+    SoFar,
+    Transport,
+    VisitorInfo,
+    VisitorPresence,
+)
+from seerob.recording.format import Visitor
 from seerob.recording.result_log import ResultLog
+
+_LIMB, _POINT = Struct("<7f"), Struct("<3f")
+_NOBODY = _LIMB.pack(*[nan] * 7)
+_Numbers = tuple[float, float, float, float, float, float, float]
+_Numbers3 = tuple[float, float, float]
+
+
+class _Seen(msgspec.Struct):
+    """One visitor of a message on ``/presences``."""
+
+    id: int
+    head: _Numbers | None = None
+    left: _Numbers | None = None
+    right: _Numbers | None = None
+    points: list[_Numbers3] = []
+    laser: list[_Numbers3] = []
+
+    def presence(self) -> VisitorPresence:
+        """What pages are told, with the number turned negative."""
+        limbs = (self.head, self.left, self.right)
+        return VisitorPresence(
+            id=-self.id,
+            poses=b"".join(_NOBODY if limb is None else _LIMB.pack(*limb) for limb in limbs),
+            points=b"".join(_POINT.pack(*point) for point in self.points[:MOST_POINTS]),
+            laser=b"".join(_POINT.pack(*point) for point in self.laser[:2]),
+        )
+
+
+class _AllSeen(msgspec.Struct):
+    visitors: list[_Seen]
+
+
+_decode_seen = msgspec.json.Decoder(_AllSeen).decode
+
+
+@runtime_checkable
+class RemembersVisitors(Protocol):
+    """A recording that holds who looked on."""
+
+    def visits(self) -> tuple[tuple[float, Visitor], ...]:
+        """Who came, introduced themselves and left, with run time [s], in order."""
+
+    def presences_at(self, t: float) -> bytes:
+        """What was last said before ``t`` [s] of where visitors are, JSON; empty when nothing was."""
+
+
+def there_at(visits: Iterable[tuple[float, Visitor]], t: float) -> tuple[VisitorInfo, ...]:
+    """Who was there at an instant [s], as pages are told; their numbers are negative."""
+    there: dict[int, Visitor] = {}
+    for when, visitor in visits:
+        if when > t:
+            break
+        if visitor.event == "left":
+            there.pop(visitor.id, None)
+        elif visitor.id > 0:
+            there[visitor.id] = visitor
+    return tuple(
+        VisitorInfo(
+            id=-number,
+            role=titled(one.role, one.human),
+            introduced=one.device != "",
+            name=one.name or f"visitor {number}",
+            color=COLORS[number % len(COLORS)],
+            shape=SHAPES[number % len(SHAPES)],
+            device=one.device or "program",
+            human=one.human,
+            scale=one.scale,
+            position=one.position,
+            turn=one.turn,
+            calls=False,
+            holds=(),
+            recorded=True,
+        )
+        for number, one in there.items()
+    )
+
 
 SLOWEST, FASTEST = 0.01, 100.0
 """Speeds are brought into this range."""
@@ -24,6 +115,7 @@ LONGEST_STEP = 1000
 POINTS = 4000
 """Per criterion in the history of a whole recording, at most."""
 _TELL_EVERY = 1.0
+_log = logging.getLogger(__name__)
 
 
 class Recorded(Protocol):
@@ -75,6 +167,7 @@ class Player:
         self._dirty = True
         self._shown: float | None = None
         self._wake = asyncio.Event()
+        self._visitors = recording if isinstance(recording, RemembersVisitors) else None
         self._log = ResultLog(recording.scene.criteria)
         self._beside = beside or History(traces=())
         self._history = self._so_far_history()
@@ -172,6 +265,24 @@ class Player:
         if snapshot.t != self._shown:
             self._shown = snapshot.t
             audience.show(printable_record(snapshot))
+            if self._visitors is not None:
+                audience.recall(*self._recalled(self._visitors, snapshot.t))
+
+    def _recalled(
+        self, visitors: RemembersVisitors, t: float
+    ) -> tuple[tuple[VisitorInfo, ...], tuple[VisitorPresence, ...]]:
+        """Who was there, and where, at an instant [s]; nobody where the recording is not as it should."""
+        try:
+            there = there_at(visitors.visits(), t)
+            told = visitors.presences_at(t) if there else b""
+            seen = _decode_seen(told).visitors if told else []
+            numbers = {info.id for info in there}
+            presences = tuple(one.presence() for one in seen if -one.id in numbers)
+        except (InputError, msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
+            _log.warning("who looked on is not shown: %s", error)
+            self._visitors = None
+            return (), ()
+        return there, tuple(one for one in presences if not place_mistake(one))
 
     def _stepped(self, snapshot: Snapshot, steps: int) -> Snapshot:
         if steps > 0:

@@ -29,7 +29,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
-from seerob.app.server import trust
+from seerob.app.server import camera_route, trust
 from seerob.app.server.access import Role, Tokens, Visits
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
@@ -41,6 +41,7 @@ from seerob.app.server.hub import PATIENCE, Hub
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
+from seerob.devices.live.camera_pictures import Cameras
 from seerob.devices.live.headset_offers import Offers
 from seerob.protocols.links.tcp_server import stop_accepting
 from seerob.session.measuring import Ruler
@@ -111,6 +112,7 @@ def build(
     schema: bytes,
     folder: Path,
     tls: Tls | None,
+    cameras: Cameras | None,
     lifespan: Lifespan,
 ) -> Starlette:
     """The application behind the `Door`.
@@ -121,6 +123,7 @@ def build(
         schema: JSON schema of the workstation file, for forms; empty where nobody edits.
         folder: The built page.
         tls: Whose authority visitors have to trust.
+        cameras: Whose pictures are fetched.
         lifespan: What runs while the application does.
     """
 
@@ -140,6 +143,9 @@ def build(
     async def trusted(request: Request) -> Response:
         return trust.answer(tls, request.url.path)
 
+    async def camera(request: Request) -> Response:
+        return await camera_route.answer(cameras, request)
+
     async def file(request: Request) -> Response:
         return await run_in_threadpool(answer, folder, request.path_params["path"])
 
@@ -147,6 +153,7 @@ def build(
         WebSocketRoute("/ws", hub.attend),
         Route("/mesh/{name}", mesh),
         Route("/schema.json", forms),
+        Route("/camera/{number:int}", camera),
         *(Route(path, trusted) for path in sorted(trust.PATHS)),
         Route("/{path:path}", file),
     ]
@@ -184,6 +191,7 @@ class Server:
         hosts: Names, besides addresses and ``localhost``, under which the server may be asked for.
         desk: Where pages edit the workstation; None where nobody does.
         ruler: Gives that by which pages measure in what is shown; None where they do not.
+        cameras: Network cameras whose pictures are handed on.
         origins: Origins, such as ``https://line3.example``, whose pages may connect as well.
         page: Folder of the built page.
         patience: How long a page may leave a frame waiting before it is disconnected [s].
@@ -204,6 +212,7 @@ class Server:
         origins: Iterable[str] = (),
         desk: Desk | None = None,
         ruler: Callable[[], Ruler] | None = None,
+        cameras: Cameras | None = None,
         page: Path = FOLDER,
         patience: float = PATIENCE,
     ) -> None:
@@ -226,7 +235,13 @@ class Server:
         self._meshes = dict(meshes)
         schema = b"" if desk is None else desk.schema
         app = build(
-            hub=self.hub, meshes=self._meshes, schema=schema, folder=page, tls=tls, lifespan=self._lifespan
+            hub=self.hub,
+            meshes=self._meshes,
+            schema=schema,
+            folder=page,
+            tls=tls,
+            cameras=cameras,
+            lifespan=self._lifespan,
         )
         known = (*hosts, *(() if tls is None else tls.names))
         names = {name.lower() for name in known} | ({host.lower()} if not is_address(host) else set())

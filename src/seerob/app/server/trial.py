@@ -17,7 +17,16 @@ from msgspec.structs import replace
 
 from seerob.app.server.feed import Audience, Feed
 from seerob.app.server.live import Live
-from seerob.core.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
+from seerob.core.snapshot import (
+    Command,
+    History,
+    Scene,
+    Snapshot,
+    SoFar,
+    Transport,
+    VisitorInfo,
+    VisitorPresence,
+)
 from seerob.session.measuring import Ruler
 from seerob.session.station import Station
 
@@ -237,6 +246,10 @@ class _While:
     def show(self, snapshot: Snapshot, until: float = inf) -> None:
         if self._holds():
             self._audience.show(snapshot, until)
+
+    def recall(self, visitors: tuple[VisitorInfo, ...], presences: tuple[VisitorPresence, ...]) -> None:
+        if self._holds():
+            self._audience.recall(visitors, presences)
 
     def tell(self, message: Transport | History | SoFar) -> None:
         if self._holds():

@@ -38,12 +38,19 @@ STEPS = (
     ("macOS", "Open authority.pem in Keychain Access, and set it to Always Trust."),
     (
         "Linux",
-        "Chromium: Settings, Privacy and security, Security, Manage certificates, Authorities, Import "
-        "authority.pem. Firefox: Settings, Certificates, View Certificates, Authorities, Import.",
+        "Chromium: chrome://settings/certificates, Manage certificates, Authorities, Import authority.pem; "
+        "in newer ones Local certificates, Custom, Installed by you, Trusted Certificates, Import. Firefox: "
+        "Settings, Privacy & Security, View Certificates, Authorities, Import.",
     ),
     ("curl, Python", "curl --cacert authority.pem; ssl.create_default_context(cafile='authority.pem')."),
 )
-"""Device → what to do there; from the makers' descriptions, tried here for the last alone."""
+"""Device → what to do there; tried here for the last alone.
+
+Chromium on Linux: its own docs/linux/cert_management.md, and for the newer menus warden's documentation
+(wardenenv/docs#41, October 2025), read in November 2026. iPhone: that an authority without a common name is
+not offered in Certificate Trust Settings (FiloSottile/mkcert#233); ours has one. The rest is from memory:
+unverified.
+"""
 
 
 def answer(tls: Tls | None, path: str) -> Response:
@@ -65,6 +72,6 @@ def answer(tls: Tls | None, path: str) -> Response:
         f"<p><code>{escape(tls.fingerprint)}</code></p>"
         '<p><a href="/trust/authority.pem">authority.pem</a> · '
         '<a href="/trust/authority.cer">authority.cer</a></p>'
-        f"<dl>{steps}</dl><p>Not tried on these devices: what their makers describe. Remove it when you "
+        f"<dl>{steps}</dl><p>Not tried on these devices; menus may be called otherwise. Remove it when you "
         "no longer need it.</p></html>"
     )

@@ -45,6 +45,8 @@ class Camera(Table, frozen=True, kw_only=True):
     """Where it is in the cell [m]."""
     wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     """World from camera: x to the right, y down, z ahead of it."""
+    on: str | None = None
+    """Full name of the link, tool, part or machine that carries it: its pose is in the frame of that."""
     error_px: float | None = None
     """Root mean square of what corners of boards are off in its pictures [px]."""
     error: float | None = None
@@ -61,7 +63,7 @@ class Camera(Table, frozen=True, kw_only=True):
 
     @property
     def world_from_camera(self) -> Array:
-        """Shape (4, 4)."""
+        """Shape (4, 4); of one that is carried, in the frame of what carries it."""
         return transform(rotation_from_wxyz(self.wxyz), self.position)
 
 

@@ -16,7 +16,7 @@ from seerob.core.errors import InputError, SeerobError, ended_by
 from seerob.core.printable import printable
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Presences, Scene, Snapshot
-from seerob.outputs.sink import Closing, Sink, Visited
+from seerob.outputs.sink import Closing, Pictured, Sink, Visited
 from seerob.recording.format import Visitor
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ class _Waiting(NamedTuple):
     snapshot: Snapshot | None
     visitors: tuple[Visitor, ...] = ()
     presences: Presences | None = None
+    pictures: list[tuple[str, bytes]] | tuple[()] = ()
 
 
 class RecorderWriter(Closing):
@@ -105,6 +106,7 @@ class RecorderWriter(Closing):
         self._last = (-1, -math.inf)
         self._taken = 0
         self._visited: Visited | None = None
+        self._pictured: Pictured | None = None
         self._thread = Thread(target=self._run, name="seerob recorder", daemon=True)
         try:
             self._thread.start()
@@ -115,6 +117,10 @@ class RecorderWriter(Closing):
     def watch(self, visited: Visited) -> None:
         """Record who looks on, too."""
         self._visited = visited
+
+    def look(self, pictured: Pictured) -> None:
+        """Record what cameras see, too."""
+        self._pictured = pictured
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick; returns at once unless ``lossless`` and the queue is full.
@@ -147,7 +153,8 @@ class RecorderWriter(Closing):
             presences = None
             if self._visited is not None:
                 visitors, presences = self._visited.take(), self._visited.seen()
-            self._waiting.append(_Waiting(seq, t, samples, kept, visitors, presences))
+            pictures = () if self._pictured is None or kept is None else self._pictured.taken()
+            self._waiting.append(_Waiting(seq, t, samples, kept, visitors, presences, pictures))
             self._condition.notify_all()
 
     def __exit__(
@@ -226,6 +233,8 @@ class RecorderWriter(Closing):
                 self._tape.visitors(tick.t, tick.visitors)
                 if tick.presences is not None:
                     self._tape.presences(tick.t, tick.presences)
+                for camera, jpeg in tick.pictures:
+                    self._tape.picture(tick.t, camera, jpeg)
             if oldest is not None and time.monotonic() - oldest >= FLUSH_PERIOD:
                 self._tape.flush()
                 oldest = None

@@ -41,7 +41,7 @@ POSTURES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Of places that a point reaches."""
+    """Convex hull of places that a point reaches."""
 
     points: Array
     """Places that are reached [m], shape (n, 3)."""
@@ -60,7 +60,7 @@ class Carried(NamedTuple):
     rotation: Array
     """world_from_base that the outline was made at, shape (3, 3)."""
     position: Array
-    """Likewise [m], shape (3,)."""
+    """Place of that base [m], shape (3,)."""
 
     def points(self, rotation: Array, position: Array) -> Array:
         """Its points where the base is at another pose [m], shape (n, 3)."""

@@ -41,6 +41,9 @@ AREA, VOLUME = 0.02, 0.02
 BETWEEN = 1.02
 """How much farther a surface may be from triangles between points that are an eighth of an edge apart: a
 parabola is 1/64 higher."""
+ROUGH = 1.1
+"""The same where triangles are farther than was asked, as at the poles of a ball, whose parameters tell less;
+of a ball of 75 mm at 1 mm, 10⁵ points lie 3.6 % farther than those that are looked at."""
 
 
 def read(
@@ -135,7 +138,8 @@ def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Sh
     name = row["name"]
     whole, _ = joined(pieces)
     points = np.frombuffer(row["points"], "<f8").reshape(-1, 3)
-    far = BETWEEN * _farthest(whole, points)
+    far = _farthest(whole, points)
+    far *= BETWEEN if far <= tolerance else ROUGH
     rounding = SINGLE * float(np.abs(whole.vertices).max(initial=0.0))
     deviation = (0.0 if row["flat"] else max(tolerance, far)) + rounding
 

@@ -97,8 +97,7 @@ def bounded(seed):
     return {**made, "map.csv": map_of(cell, rng)}
 
 
-# Pulled by the physics and placed.
-@pytest.mark.parametrize("seed", [1, 8, pytest.param(9, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("seed", [1, 8, 9])
 def test_no_bound_is_beaten_by_what_is_met_between_two_ticks(tmp_path, seed):
     for name, text in bounded(seed).items():
         (tmp_path / name).write_text(text)

@@ -456,6 +456,9 @@ class Contact(_Table, frozen=True, kw_only=True):
     """Two names, of groups, things or bodies."""
 
 
+Words = Annotated[str, Meta(min_length=1, max_length=1000, pattern=r"\w", description="a reason in words")]
+
+
 class Confirmed(_Table, frozen=True, kw_only=True):
     """A value that looks like a mistake and is meant: it does not keep verdicts undecided any more."""
 
@@ -465,7 +468,7 @@ class Confirmed(_Table, frozen=True, kw_only=True):
     """Name of that entry (title of a phase), so that what is put in another order confirms nothing else."""
     value: float | list[Any]
     """The value that is meant, as the file has it; another one later is not confirmed."""
-    why: Annotated[str, Meta(min_length=1, max_length=1000, pattern=r"\w", description="a reason in words")]
+    why: Words
     """Why it is right, in words; it stands in the report."""
 
 
@@ -479,7 +482,7 @@ class LeftOut(_Table, frozen=True, kw_only=True):
     """What it is called where it comes from."""
     why: Annotated[str, Meta(max_length=1000)] = ""
     """Why it is not here."""
-    accepted: Annotated[str, Meta(min_length=1, max_length=1000, pattern=r"\w")] | None = None
+    accepted: Words | None = None
     """Why it does not matter that nobody is warned of it, in words; it stands in the report."""
 
 

@@ -42,8 +42,9 @@ BETWEEN = 1.02
 """How much farther a surface may be from triangles between points that are an eighth of an edge apart: a
 parabola is 1/64 higher."""
 ROUGH = 1.1
-"""The same where triangles are farther than was asked, as at the poles of a ball, whose parameters tell less;
-of a ball of 75 mm at 1 mm, 10⁵ points lie 3.6 % farther than those that are looked at."""
+"""How much farther it may be there where triangles are farther than was asked, as at the poles of a ball,
+whose parameters tell less; of a ball of 75 mm at 1 mm, 10⁵ points lie 3.6 % farther than those that are
+looked at."""
 
 
 def read(

@@ -23,8 +23,10 @@ while True:
         break
     shown.append(video.get(cv2.CAP_PROP_POS_MSEC))
     frames.append(frame)
-png = cv2.resize(cv2.imread(picture), frames[-1].shape[1::-1])
-far = lambda a, b: float(np.abs(a.astype(float) - b).mean())
+# Edges lie half a pixel elsewhere where a clip is a pixel narrower than the room.
+coarse = lambda a: cv2.resize(a, (40, 40), interpolation=cv2.INTER_AREA).astype(float)
+far = lambda a, b: float(np.abs(coarse(a) - coarse(b)).mean())
+png = cv2.imread(picture)
 print(json.dumps(dict(count=count, size=size, shown=shown, same=far(frames[-1], png), moved=far(frames[0], frames[-1]))))
 `;
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-clip-"));
@@ -84,6 +86,6 @@ test("a clip has every picture that was drawn, in its time, and ends with what i
     `${read.shown.at(-1)} of ${lasted}`,
   );
   // Colours are coded coarsely; the arm has moved by far more than that.
-  assert.ok(read.same < 4 && read.moved > 0.3, JSON.stringify(read));
+  assert.ok(read.same < read.moved / 3, JSON.stringify(read));
   assert.deepEqual(opened.browser.complaints, []);
 });

@@ -30,6 +30,8 @@ RETRY = 0.5
 """Time between two attempts to come in [s]."""
 ACKNOWLEDGED = 4
 """Every so many snapshots."""
+PRESENCES = 30.0
+"""How often a page says where a visitor is who looks on [Hz]."""
 
 THREE = {
     "viewer": ("Head", (0.05, 0.0, 0.04)),
@@ -181,19 +183,22 @@ class Visitor(LoopEmulator):
         introduction = self._introduction
         if introduction is not None:
             await connection.send(msgspec.msgpack.encode(introduction))
+        looks_on = introduction is not None and not self.human
+        rate = min(self.rate, PRESENCES) if looks_on else self.rate
         while True:
-            k = int((time.monotonic() - begun) * self.rate) + 1
-            await asyncio.sleep(max(0.0, begun + k / self.rate - time.monotonic()))
-            while grabs and grabs[0][0] <= k / self.rate:
+            k = int((time.monotonic() - begun) * rate) + 1
+            await asyncio.sleep(max(0.0, begun + k / rate - time.monotonic()))
+            while grabs and grabs[0][0] <= k / rate:
                 await connection.send(msgspec.msgpack.encode(grabs.popleft()[1]))
-            names, poses = self._seen(k / self.rate)
-            if introduction is not None and not self.human:
+            names, poses = self._seen(k / rate)
+            if looks_on:
+                assert introduction is not None
                 world = in_world(poses[: len(THREE)], introduction)
                 said: Presence | Tracking = Presence(poses=world.astype("<f4").tobytes())
             else:
                 said = Tracking(
                     human=self.human,
-                    t=k / self.rate,
+                    t=k / rate,
                     names=names,
                     poses=poses.astype("<f4").tobytes(),
                     scale=1.0 if introduction is None else introduction.scale,

@@ -65,7 +65,7 @@ def test_a_casting_is_picked_put_onto_the_belt_rides_away_and_comes_again():
         ("round", "casting_1", "gripper", "belt_end"),
     ]
     taken, put, away, *_ = cell.events
-    assert put.t - taken.t == pytest.approx(5.9, abs=0.3)
+    assert put.t - taken.t == pytest.approx(5.7, abs=0.3)
     assert away.t - taken.t == pytest.approx(10.8, abs=0.5)
     assert cell.worst["tool speed"] == {Verdict.WITHIN}
     assert cell.worst["arm energy"] == {Verdict.UNDECIDED}, "nobody published its masses"

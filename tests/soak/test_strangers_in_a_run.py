@@ -99,6 +99,8 @@ class Relay(threading.Thread):
         self.inside.bind((HERE, 0))
         self.port = self.inside.getsockname()[1]
         self.mixed = self.muted = False
+        self.heard_from = 0.0
+        """What was sent before was heard by nobody: played again, it is news, as of a device that starts."""
         self.start()
 
     def run(self):
@@ -121,7 +123,8 @@ class Relay(threading.Thread):
 
     def mute(self, seconds):
         """Send nothing, until that is undone; then the newest that was sent live, again and again."""
-        self.muted, self._loop = True, [data for t, data in self._sent if t > self._sent[-1][0] - seconds]
+        begins = max(self._sent[-1][0] - seconds, self.heard_from)
+        self.muted, self._loop = True, [data for t, data in self._sent if t > begins]
 
 
 class Watching:
@@ -193,6 +196,8 @@ def test_nobody_is_within_by_what_strangers_send_or_by_what_is_old(run, tmp_path
     process, shown, ports, relays, robot = run
     people = tuple(ports)
     shown.until("within", ("arm", *people))
+    for relay in relays.values():
+        relay.heard_from = time.monotonic()
 
     others = [sender(kind, port).start() for kind, port in ports.items()]
     shown.until("undecided", people, "too; heard is 127.0.0.1 port")

@@ -1,0 +1,130 @@
+"""Cells of the paper at real speed: the emulator of each device is killed in the middle of a run.
+
+What depends on whom it moves is undecided within the time-out of its source, and nothing else is.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import seerob as sr
+from seerob.app.console.terminal import Exit
+from seerob.core.samples import BodySample, JointSample
+from seerob.core.snapshot import Verdict
+from seerob.devices.live.listening import LiveSource
+from seerob.recording.recording import Recording
+
+CELLS = Path(__file__).parents[2] / "workstations"
+SECONDS, KILLED_AFTER = 16.0, 7.0
+SLACK = 0.15
+"""Beside the time-out: a tick, and what a live twin runs behind [s]."""
+
+
+def emulators_of(process):
+    """Processes of the emulators, in the order of the file."""
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    known = [int(child) for child in children if "emulation.processes" in command_of(child)]
+    return sorted(known)
+
+
+def command_of(process):
+    return Path(f"/proc/{process}/cmdline").read_text().replace("\0", " ")
+
+
+def asked_of(criterion, carried):
+    """Owners that a criterion names, with who carries what it names."""
+    named = [
+        value
+        for key in criterion.__struct_fields__
+        if key != "name"
+        for value in texts(getattr(criterion, key))
+    ]
+    owners = {name.split("/")[0] for name in named}
+    return owners | {carried[name] for name in (*named, *owners) if name in carried}
+
+
+def texts(value):
+    if isinstance(value, str):
+        return [value]
+    if isinstance(value, tuple | list):
+        return [text for one in value for text in texts(one)]
+    return []
+
+
+def run_and_kill(cell, which, folder):
+    """The recording of a run, one of whose emulators was killed."""
+    environment = dict(os.environ, PYTHONPATH=str(Path(sr.__file__).parents[1]))
+    command = [sys.executable, "-m", "seerob.app.cli", "run", str(CELLS / cell), "--emulated"]
+    command += ["--port", "0", "--seconds", str(SECONDS), "-o", str(folder)]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
+        while not (folder / "run.mcap").exists():
+            assert process.poll() is None
+            time.sleep(0.1)
+        time.sleep(KILLED_AFTER)
+        os.kill(emulators_of(process.pid)[which], signal.SIGKILL)
+        assert process.wait(300) != Exit.ERROR
+    return Recording.open(folder / "run.mcap")
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+@pytest.mark.parametrize(
+    ("cell", "which", "whom"),
+    [
+        ("motor_station", 0, "iiwa"),
+        ("motor_station", 1, "operator"),
+        ("assembly_line", 0, "ur10"),
+        ("assembly_line", 1, "operator"),
+        ("empty_room", 0, "ur5"),
+        ("empty_room", 1, "visitor"),
+        ("three_robots", 0, "visitor"),
+        ("giant_niryo", 0, "niryo"),
+        ("giant_niryo", 1, "operator"),
+        ("niryo_picking", 0, "niryo"),
+        ("two_places", 0, "niryo"),
+        ("two_places", 2, "operator"),
+    ],
+)
+def test_what_depends_on_a_killed_device_is_undecided_within_its_time_out_and_nothing_else(
+    tmp_path, cell, which, whom
+):
+    station = sr.load(CELLS / cell)
+    file = station.workstation
+    (source,) = (
+        s
+        for s in file.sources
+        if isinstance(s, LiveSource) and whom in (getattr(s, "robot", ""), getattr(s, "human", ""))
+    )
+    carried = {each.name: each.on.split("/")[0] for each in (*file.tools, *file.areas) if each.on}
+    carried |= {name: carried[on] for name, on in carried.items() if on in carried}
+    recording = run_and_kill(cell, which, tmp_path / "run")
+    heard = [
+        s.t
+        for tick in recording.ticks()
+        for s in tick.samples
+        if isinstance(s, JointSample | BodySample) and s.target == whom
+    ]
+    end = max(heard) + source.timeout
+    limited = {c.name for c in (*file.safety, *file.ergonomics)}
+    before, after, late = set(), set(), {}
+    for snapshot in recording.snapshots():
+        for result in snapshot.results:
+            if result.name not in limited or result.verdict in (Verdict.UNDECIDED, None):
+                continue
+            if snapshot.t < max(heard):
+                before.add(result.name)
+            elif snapshot.t > end + SLACK:
+                after.add(result.name)
+                late[result.name] = snapshot.t
+    assert recording.duration - end > 3.0
+    assert before
+    for criterion in (*file.safety, *file.ergonomics):
+        if whom in asked_of(criterion, carried):
+            assert criterion.name not in after, (criterion.name, late[criterion.name], end)
+        elif criterion.name in before:
+            assert criterion.name in after

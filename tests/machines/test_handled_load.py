@@ -90,10 +90,16 @@ def test_from_the_least_on_scores_are_those_of_the_tables():
     assert load_codes(None, 12.0).tolist() == [False, True, True]
 
 
-def test_what_is_mounted_on_a_hand_is_held_all_the_time(tmp_path):
+@pytest.mark.parametrize(
+    ("weight", "mass", "hands"),
+    [("mass = 0.8", 0.8, {"left"}), ("density = 1000", 0.36, {"left"}), ("", None, set())],
+)
+def test_what_is_mounted_on_a_hand_is_held_all_the_time(tmp_path, weight, mass, hands):
     worn = BLANK.replace('name = "blank"', 'name = "drill"\non = "operator/left_hand"')
+    worn = worn.replace("[[workpieces]]", "[[tools]]").replace("mass = 0.8", weight)
     cell = Cell(tmp_path, PERSON + worn)
-    assert bind_handled(cell.model, "operator")(cell.state) == Handled(0.8, frozenset({"left"}))
+    found = bind_handled(cell.model, "operator")(cell.state)
+    assert found == Handled(None if mass is None else pytest.approx(mass), frozenset(hands))
 
 
 def test_two_hands_at_one_piece_carry_it_once_and_two_pieces_both(tmp_path):

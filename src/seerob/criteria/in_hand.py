@@ -16,6 +16,7 @@ from seerob.core.figures import rounded_up
 from seerob.core.snapshot import Result
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.question import Bound
+from seerob.criteria.scoring.handled import unweighed
 from seerob.criteria.scoring.phases import Phase, entered_for, phase_at
 from seerob.model.model import Model
 from seerob.twin.state import State
@@ -49,11 +50,12 @@ class InHand:
         self._bodies = {body.name: body.index for body in model.bodies}
         self._judged: list[set[int]] = []
         self._always: dict[str, dict[str, float]] = {}
-        """Person → what is mounted on a bone, by name [kg]."""
+        """Person → what is mounted on a bone, by name [kg]; infinite where nobody knows what it weighs."""
         for name, mechanism in model.mechanisms.items():
             if mechanism.role == "human":
                 carried = (model.bodies[i] for i in mechanism.carried)
                 self._always[name] = {b.owner: b.mass.value for b in carried if b.mass is not None}
+                self._always[name] |= dict.fromkeys(unweighed(model, name), math.inf)
         loads = ((i, _entered_load(model, each)) for i, each in enumerate(criteria))
         self._loads = {i: load for i, load in loads if load is not None}
         """Place of each that is told a load → that load at an instant of the run [s]."""
@@ -73,7 +75,7 @@ class InHand:
             for person in self._criteria[i].subjects():
                 things = weights.get(person, {})
                 if sum(things.values()) > load * (1 + MORE):
-                    what = ", ".join(f"{name} ({mass:g} kg)" for name, mass in things.items())
+                    what = ", ".join(f"{name} ({_weight(mass)})" for name, mass in things.items())
                     found[i] = f"{person} holds {what}, and load says {load:g} kg: give all that hands hold"
         if held:
             found |= self._nearer(state, results)
@@ -113,6 +115,10 @@ class InHand:
             away = np.linalg.norm(points - state.positions[hand], axis=1).max(initial=0.0)
             far = max(far, float(away) + body.radius + body.deviation)
         return far + float(state.largest_speeds().max(initial=0.0)) * self._model.workstation.engine.tick
+
+
+def _weight(mass: float) -> str:
+    return f"{mass:g} kg" if math.isfinite(mass) else "of a mass that nobody gave"
 
 
 def _room(result: Result) -> float:

@@ -37,16 +37,19 @@ NOTE = "of loose workpieces that are held their weight counts, not what it takes
 def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
     """Return what reads what a person holds now; of what two people hold, each has all of it.
 
-    What the workstation file mounts on the person is held all the time, as far as its mass is given. Where
-    workpieces are loose there is one instant at a time.
+    What the workstation file mounts on the person is held all the time; where nobody knows what a thing on a
+    hand weighs, nobody knows what all of it does. Where workpieces are loose there is one instant at a time.
     """
     station = model.workstation
+    # By a mass that is given, or by density; one of several shapes has it on each.
+    weighed = {body.owner: body.mass.value for body in model.bodies if body.mass is not None}
     worn = [
-        ((thing.on or "").partition("/")[2], thing.mass)
+        ((thing.on or "").partition("/")[2], weighed[thing.name])
         for thing in (*station.workpieces, *station.tools)
-        if (thing.on or "").startswith(f"{human}/") and thing.mass is not None
+        if (thing.on or "").startswith(f"{human}/") and thing.name in weighed
     ]
-    always = Handled(sum(mass for _, mass in worn), frozenset(bone.removesuffix("_hand") for bone, _ in worn))
+    weight = None if unweighed(model, human) else sum(mass for _, mass in worn)
+    always = Handled(weight, frozenset(bone.removesuffix("_hand") for bone, _ in worn))
     loose = {piece.name for piece in station.workpieces if piece.loose}
     masses: dict[str, float | None] = dict.fromkeys(loose, 0.0)
     for body in model.bodies:
@@ -69,6 +72,15 @@ def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
         return Handled(mass, hands)
 
     return read if loose else lambda twin: always
+
+
+def unweighed(model: Model, human: str) -> list[str]:
+    """What is mounted on the hands of a person, and nobody knows what it weighs, by name."""
+    hands = {f"{human}/left_hand", f"{human}/right_hand"}
+    station = model.workstation
+    mounted = {thing.name for thing in (*station.workpieces, *station.tools) if thing.on in hands}
+    weighed = {body.owner for body in model.bodies if body.mass is not None}
+    return sorted(mounted - weighed)
 
 
 def load_range(entered: float | None, handled: Handled) -> tuple[float, float]:

@@ -512,3 +512,53 @@ def test_densities_of_a_table_go_by_material_and_their_masses_are_summed(tmp_pat
         table.write_text(text)
         assert cli.main(["import", str(file), str(tmp_path / "new"), "--densities", str(table)]) == Exit.ERROR
         assert "ours.toml" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def housing(tmp_path_factory):
+    """A box of 400 mm with walls of 10 mm and a hole of 60 mm in its lid, a part inside, one beside it."""
+    scene = trimesh.Scene()
+    box = trimesh.creation.box((0.4, 0.4, 0.4)).difference(trimesh.creation.box((0.38, 0.38, 0.38)))
+    hole = trimesh.creation.cylinder(
+        0.03, 0.1, transform=trimesh.transformations.translation_matrix((0, 0, 0.2))
+    )
+    scene.add_geometry(box.difference(hole), node_name="housing", geom_name="housing")
+    ball = trimesh.creation.icosphere(5, 0.05)
+    scene.add_geometry(ball, node_name="inside", geom_name="ball")
+    moved = trimesh.transformations.translation_matrix((0, 0.6, 0))
+    scene.graph.update("beside", "world", matrix=moved, geometry="ball")
+    file = tmp_path_factory.mktemp("housing") / "h.glb"
+    scene.export(file)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("width", "left"), [("40", ["beside", "housing", "inside"]), ("100", ["beside", "housing"])]
+)
+def test_what_nothing_can_touch_is_left_out_on_request_and_told(tmp_path, housing, capsys, width, left):
+    code, table = imported(housing, tmp_path / "cell", "--unreachable", width, "--triangles", "500")
+    assert code == Exit.WITHIN
+    assert sorted(part["name"].rpartition("/")[2] for part in table["parts"]) == left
+    out = " ".join(capsys.readouterr().out.split())
+    assert ("inside: as asked: --unreachable 100; inside of others" in out) == (width == "100")
+    assert len(table.get("left_out", [])) == 3 - len(left)
+    if width == "100":
+        assert cli.main(["import", str(housing), str(tmp_path / "b"), "--unreachable", "1"]) == Exit.ERROR
+        assert "for an assembly of this size" in capsys.readouterr().err
+
+
+def test_a_budget_of_triangles_is_of_the_screen_alone_and_what_is_shown_says_how_far_it_is_off(
+    tmp_path, housing
+):
+    _, table = imported(housing, tmp_path / "cell", "--triangles", "500")
+    assert {part["triangles"] for part in table["parts"]} == {500}
+    station = load(tmp_path / "cell")
+    found = [f.text for f in station.scene().findings if "beside" in f.subject and "is shown with" in f.text]
+    assert len(found) == 1
+    off = float(re.search(r"at most ([\d.]+) mm off", found[0])[1])
+    body = next(body for body in station.model.bodies if body.name.endswith("beside"))
+    assert max(len(solid.mesh.faces) for solid in body.solids) == 20480
+    shown = next(node.mesh for node in station.scene().nodes if node.name == body.name)
+    drawn = trimesh.load(io.BytesIO(station.model.meshes[shown]), file_type="glb", force="mesh")
+    assert len(drawn.faces) <= 500
+    assert 0 < 50 - np.linalg.norm(drawn.triangles_center, axis=1).min() * 1e3 <= off + 0.1

@@ -6,6 +6,7 @@ import tomllib
 from contextlib import ExitStack
 
 import msgspec
+import numpy as np
 import pytest
 
 from seerob.app.commands.edit import serving
@@ -27,6 +28,7 @@ from seerob.core.snapshot import (
     Visitors,
 )
 from seerob.workstation.allowed import NOTHING
+from seerob.workstation.editing import changed
 from server.frames import Visitor
 
 CELL = b"""# A cell; this line and all others that nobody edits stay.
@@ -409,3 +411,36 @@ def test_what_one_holds_no_other_changes_nor_takes_back(desk):
     server.stop()
     refused = [reason for v in server.visits.take(end=True) if v.event == "left" for reason in v.refused]
     assert any(reason.startswith("hold: table, held by visitor") for reason in refused)
+
+
+def test_changes_that_are_made_at_once_make_the_file_that_they_make_one_by_one():
+    random = np.random.default_rng(7)
+    adds = [
+        Change(kind="add", path=("parts",), value={"name": f"p{k}", "shape": {"box": [1, 1, k + 1]}})
+        for k in range(4)
+    ]
+    for _ in range(40):
+        at = random.permutation(6)
+        sets = [
+            Change(kind="set", path=("parts", int(k), "color"), value=[0.1, 0.2, float(random.random())])
+            for k in at[:4]
+        ]
+        more = [Change(kind="set", path=("parts", int(at[0]), "at"), value={"position": [1, 2, 3]})]
+        gone = [Change(kind="remove", path=("parts", int(k))) for k in sorted(at[4:], reverse=True)]
+        changes = [*adds, *sets, *more, *gone]
+        raw, events = changed(CELL, changes, "x")
+        one_by_one, found = CELL, []
+        for change in changes:
+            one_by_one, event = changed(one_by_one, [change], "x")
+            found += event
+        assert raw == one_by_one
+        assert events == found
+    with pytest.raises(InputError, match=r"parts\[9\]\.color"):
+        changed(
+            CELL,
+            [
+                Change(kind="set", path=("parts", 0, "up"), value="z"),
+                Change(kind="set", path=("parts", 9, "color"), value=[1, 1, 1]),
+            ],
+            "x",
+        )

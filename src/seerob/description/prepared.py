@@ -71,7 +71,12 @@ _held = [0]
 
 
 def prepared(
-    path: Path, *, units: str | None = None, up: str | None = None, cache: Path | None = None
+    path: Path,
+    *,
+    units: str | None = None,
+    up: str | None = None,
+    triangles: int = detail.SHOWN,
+    cache: Path | None = None,
 ) -> PreparedFile:
     """A mesh file made ready.
 
@@ -79,19 +84,20 @@ def prepared(
         path: The file.
         units: Unit of its lengths, where its format does not say.
         up: Its axis that points up, likewise.
+        triangles: Most of each of its meshes on the screen.
         cache: Folder that keeps what was made from start to start.
 
     Raises:
         InputError: As `load_meshes` raises it.
     """
     content = file_content(path, MAX_BYTES)
-    words = repr((EDITION, path.suffix.lower(), path.stem, units, up)).encode()
+    words = repr((EDITION, path.suffix.lower(), path.stem, units, up, triangles)).encode()
     key = hashlib.sha256(hashlib.sha256(content).digest() + words).hexdigest()[:40]
     found = _kept.get(key)
     if found is None and cache is not None:
         found = _read(cache / f"mesh-{key}.npz", path.name, content)
     if found is None:
-        found = _made(path, units, up)
+        found = _made(path, units, up, triangles)
         # What names other files is not told by its own content.
         if cache is not None and len(found.files) == 1:
             _write(cache / f"mesh-{key}.npz", found)
@@ -105,7 +111,7 @@ def prepared(
     return found
 
 
-def _made(path: Path, units: str | None, up: str | None) -> PreparedFile:
+def _made(path: Path, units: str | None, up: str | None, triangles: int) -> PreparedFile:
     loaded = load_meshes(path, units=units, up=up)
     made = tuple(
         PreparedMesh(
@@ -113,7 +119,7 @@ def _made(path: Path, units: str | None, up: str | None) -> PreparedFile:
             named.mesh,
             detail.physics_mesh(named.mesh),
             named.drawn,
-            tuple(map(detail.display_mesh, named.drawn)),
+            tuple(detail.display_mesh(mesh, max_triangles=triangles) for mesh in named.drawn),
             is_closed(named.mesh),
         )
         for named in loaded.meshes

@@ -12,7 +12,7 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import tomlkit
@@ -34,6 +34,8 @@ _TOKEN = re.compile(
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 DEEPEST = 12
 """Levels that the value of a change may have."""
+_WRONG = (TOMLKitError, tomllib.TOMLDecodeError, LookupError, TypeError, ValueError, AttributeError)
+"""What a change raises that cannot be made."""
 
 
 class Event(NamedTuple):
@@ -78,27 +80,70 @@ def changed(raw: bytes, changes: Sequence[Change], file: str) -> tuple[bytes, li
         raise InputError.at(file, "", "has lines of two kinds of ends", "save it with one of them")
     text = text.replace("\r\n", "\n")
     events: list[Event] = []
-    for change in changes:
-        key = named(change.path)
-        try:
-            plain = loads(text)
-            _check_value(change.value)
-            event = _apply(plain, change)
-            text = _rewritten(text, change)
-            if _told(loads(text)) != _told(plain):
-                raise ValueError("is written in a form that cannot be edited here")
-        except (
-            TOMLKitError,
-            tomllib.TOMLDecodeError,
-            LookupError,
-            TypeError,
-            ValueError,
-            AttributeError,
-        ) as error:
-            what = str(error) if isinstance(error, ValueError) and str(error) else "there is no such place"
-            raise InputError.at(file, key, what, "edit the file by hand, or read it again") from error
-        events.append(event)
+    for run in _runs(changes):
+        if len(run) > 1:
+            try:
+                text, found = _made(text, run, _rewritten_at_once)
+                events += found
+                continue
+            except _WRONG:  # one by one, to say which it is
+                pass
+        for change in run:
+            try:
+                text, found = _made(text, [change], lambda text, run: _rewritten(text, run[0]))
+            except _WRONG as error:
+                what = (
+                    str(error) if isinstance(error, ValueError) and str(error) else "there is no such place"
+                )
+                remedy = "edit the file by hand, or read it again"
+                raise InputError.at(file, named(change.path), what, remedy) from error
+            events += found
     return mark + text.replace("\n", "\r\n" if ends else "\n").encode(), events
+
+
+def _runs(changes: Sequence[Change]) -> Iterator[list[Change]]:
+    """Changes that follow each other and can be written at once.
+
+    These are new entries of one list, entries of it that go, from the end, or keys of entries.
+    """
+    run: list[Change] = []
+    for change in changes:
+        if run and not (_kind(change) == _kind(run[0]) != () and _goes_on(run[-1], change)):
+            yield run
+            run = []
+        run.append(change)
+    if run:
+        yield run
+
+
+def _kind(change: Change) -> tuple[object, ...]:
+    match change.kind, len(change.path):
+        case "add", 1:
+            return "add", change.path[0]
+        case "remove", 2 if isinstance(change.path[1], int):
+            return "remove", change.path[0]
+        case (("set" | "remove"), 3) if isinstance(change.path[1], int):
+            return ("key",)
+    return ()
+
+
+def _goes_on(before: Change, change: Change) -> bool:
+    return len(change.path) != 2 or int(change.path[1]) < int(before.path[1])
+
+
+def _made(
+    text: str, run: Sequence[Change], write: Callable[[str, Sequence[Change]], str]
+) -> tuple[str, list[Event]]:
+    """The text with changes made, which is what they make of what the text says; and their events."""
+    plain = loads(text)
+    events = []
+    for change in run:
+        _check_value(change.value)
+        events.append(_apply(plain, change))
+    text = write(text, run)
+    if _told(loads(text)) != _told(plain):
+        raise ValueError("is written in a form that cannot be edited here")
+    return text, events
 
 
 def named(path: Path) -> str:
@@ -218,6 +263,49 @@ def _lists(value: Any) -> Any:
 # -- text ---------------------------------------------------------------------------------------
 
 
+def _rewritten_at_once(text: str, run: Sequence[Change]) -> str:
+    """The file with changes of one of `_runs` made."""
+    lines = re.findall(r"[^\n]*\n|[^\n]+", text)
+    pieces = list(_pieces(text, lines))
+    if run[0].kind == "add":
+        (group,) = run[0].path
+        entries = [piece for piece in pieces if len(piece.path) == 2 and piece.path[0] == group]
+        if not entries and group in loads(text):
+            raise ValueError("its list is written in another form")
+        return _inserted(lines, entries, "\n".join(_new_entry(change) for change in run))
+    by_path = {piece.path: piece for piece in pieces}
+    if len(run[0].path) == 2:
+        for change in run:
+            lines = _without_piece(lines, by_path[change.path])
+        return "".join(lines)
+    of_piece: dict[Path, list[Change]] = {}
+    for change in run:
+        of_piece.setdefault(change.path[:2], []).append(change)
+    for path, changes in of_piece.items():
+        piece = by_path[path]
+        body = "".join(lines[piece.begin : piece.end])
+        for change in changes:
+            body += "" if body.endswith("\n") else "\n"
+            inner = (path[0], 0, *change.path[2:])
+            body = _in_piece(body, Change(kind=change.kind, path=inner, value=change.value))
+        lines[piece.begin : piece.end] = [body, *[""] * (piece.end - piece.begin - 1)]
+    return "".join(lines)
+
+
+def _new_entry(change: Change) -> str:
+    body = "".join(f"{_key(key)} = {literal(value)}\n" for key, value in _table(change.value).items())
+    return f"[[{_key(str(change.path[0]))}]]\n{body}"
+
+
+def _without_piece(lines: list[str], piece: _Piece) -> list[str]:
+    before, after = lines[: piece.begin], lines[piece.end :]
+    while after and not after[0].strip():
+        after.pop(0)
+    while not after and before and not before[-1].strip():
+        before.pop()
+    return before + after
+
+
 def _rewritten(text: str, change: Change) -> str:
     """The file with one change made; only lines of the piece that it is about are others."""
     lines = re.findall(r"[^\n]*\n|[^\n]+", text)
@@ -225,18 +313,12 @@ def _rewritten(text: str, change: Change) -> str:
     path = change.path
     entries = [piece for piece in pieces if len(piece.path) == 2 and piece.path[0] == path[0]]
     if change.kind == "add" and len(path) == 1 and (entries or path[0] not in loads(text)):
-        body = "".join(f"{_key(key)} = {literal(value)}\n" for key, value in _table(change.value).items())
-        return _inserted(lines, entries, f"[[{_key(str(path[0]))}]]\n{body}")
+        return _inserted(lines, entries, _new_entry(change))
     piece = next((p for p in pieces if p.path and path[: len(p.path)] == p.path), None)
     if piece is None:
         piece = next((p for p in pieces if p.path == ()), _Piece((), 0, 0))
     if path == piece.path and change.kind == "remove":
-        before, after = lines[: piece.begin], lines[piece.end :]
-        while after and not after[0].strip():
-            after.pop(0)
-        while not after and before and not before[-1].strip():
-            before.pop()
-        return "".join(before + after)
+        return "".join(_without_piece(lines, piece))
     body = "".join(lines[piece.begin : piece.end])
     if body and not body.endswith("\n"):
         body += "\n"

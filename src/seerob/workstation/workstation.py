@@ -211,6 +211,9 @@ class Thing(_Table, frozen=True, kw_only=True):
     deviation: Annotated[float, unit("m", ge=0, le=1)] = 0.0
     """How far the real surface may lie outside the mesh [m], as of a round one that was cut into triangles;
     every distance is uncertain by it."""
+    triangles: Annotated[int, Meta(ge=100, le=20_000_000)] | None = None
+    """Most triangles of each of its meshes on the screen, 20 000 when not given; how far what is shown is off
+    then is a finding. Distances use all."""
     at: Pose = Pose()
     """Pose in the world, or in the frame it is mounted on."""
     mass: Mass | None = None
@@ -229,6 +232,8 @@ class Thing(_Table, frozen=True, kw_only=True):
             raise ValueError("give either mesh or shape")
         if self.deviation and self.mesh is None:
             raise ValueError("deviation is of a mesh: leave it out beside a shape")
+        if self.triangles is not None and self.mesh is None:
+            raise ValueError("triangles are of a mesh: leave it out beside a shape")
         if self.mass is not None and self.density is not None:
             raise ValueError("mass and density are both given: keep one")
         if self.inertia is not None and (self.mass is None or self.com is None):

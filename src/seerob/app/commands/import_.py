@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 HELP = "make a workstation folder from CAD: parts with names, places, colours and meshes"
 EXAMPLE = "seerob import line.step my_line"
 
-_KEPT = ("density", "tolerance", "units", "up", "accept", "ground", "without", "smaller")
+_KEPT = (
+    *("density", "tolerance", "units", "up", "accept", "ground"),
+    *("without", "smaller", "unreachable", "triangles"),
+)
 """Options that a new revision takes over where they are not given again."""
 _SHOWN = 20
 """Lines about what was left out."""
@@ -42,6 +45,10 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--without", action="append", default=[], metavar="PATTERN", help=text)
     text = "leave out parts that are smaller than this in every direction [mm]"
     sub.add_argument("--smaller", type=float, metavar="MM", help=text)
+    text = "leave out parts inside of others, which nothing that is thicker than this can touch [mm]"
+    sub.add_argument("--unreachable", type=float, metavar="MM", help=text)
+    text = "most triangles of each part on the screen (default: 20000); distances use all"
+    sub.add_argument("--triangles", type=int, metavar="COUNT", help=text)
     text = "propose axes that parts can move about or along, from shapes of a STEP or IGES file that fit"
     sub.add_argument("--axes", action="store_true", help=text)
     text = "make a mechanism of proposed axes, by their numbers: 1,3; implies --axes"
@@ -141,17 +148,30 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
 
 def _wanted(options: argparse.Namespace, assembly: Assembly) -> Assembly:
     """The assembly without what the user leaves out."""
-    from seerob.description.cad.assembly import without
+    from seerob.description.cad.assembly import without, without_numbers
 
-    if options.smaller is not None and not 0 < options.smaller <= 1e4:
-        what = f"{options.smaller:g} mm"
-        raise InputError.at("--smaller", "", what, "more than 0 and at most 10000 mm")
+    for key in ("smaller", "unreachable"):
+        given = getattr(options, key)
+        if given is not None and not 0 < given <= 1e4:
+            raise InputError.at(f"--{key}", "", f"{given:g} mm", "more than 0 and at most 10000 mm")
+    if options.triangles is not None and not 100 <= options.triangles <= 20_000_000:
+        what = f"{options.triangles} triangles"
+        raise InputError.at("--triangles", "", what, "at least 100 are needed to show a shape")
     try:
         smaller = None if options.smaller is None else options.smaller * 1e-3
-        return without(assembly, options.without, smaller)
+        assembly = without(assembly, options.without, smaller)
     except ValueError as error:
         names = ", ".join(assembly.names()[:5])
         raise InputError.at("--without", "", str(error), f"full names, as {names}") from None
+    if options.unreachable is None:
+        return assembly
+    from seerob.app.importing.unreachable import unreachable
+
+    try:
+        inside = unreachable(assembly, options.unreachable * 1e-3)
+    except ValueError as error:
+        raise InputError.at("--unreachable", "", f"{options.unreachable:g} mm", str(error)) from None
+    return without_numbers(assembly, inside, f"--unreachable {options.unreachable:g}; inside of others")
 
 
 def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:

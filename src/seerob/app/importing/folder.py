@@ -114,6 +114,8 @@ def files(
             "world": instance.world_from_shape,
         }
         row["written"] = part_values(row, instance.color)
+        if options.get("triangles"):
+            row["written"]["triangles"] = options["triangles"]
         if instance.inertial is not None and density is None:
             row["written"] |= _stated_mass(instance.inertial)
         del row["world"]

@@ -83,6 +83,7 @@ def _revise_group(
     at = {entry.get("name"): number for number, entry in enumerate(entries)}
     old = {row["name"]: row for row in former}
     new = {row["name"]: row for row in rows}
+    added: list[Change] = []
 
     def tell(word: str, name: str, what: str = "") -> None:
         touched = ", ".join(_touched(table, group, name))
@@ -93,7 +94,7 @@ def _revise_group(
             if name in at:
                 what = f"one of yours is called {name}, as a new one of the CAD file"
                 raise InputError.at(file, f"{group}[{at[name]}].name", what, "give yours another name")
-            changes.append(Change(kind="add", path=(group,), value=row["written"]))
+            added.append(Change(kind="add", path=(group,), value=row["written"]))
             tell("added", name)
         elif name not in at:
             tell("left out", name, ", whose table was taken out by hand")
@@ -103,6 +104,7 @@ def _revise_group(
             if how := _differs(old[name], row):
                 tell(how, name)
             told += [("kept", f"{name}: {key} as it was changed by hand") for key in kept]
+    changes += added  # kinds one after another, which are written at once
     lost = [name for name in old if name not in new]
     # From the end, so that numbers of entries stay what they are.
     for name in sorted((n for n in lost if n in at), key=lambda n: -at[n]):

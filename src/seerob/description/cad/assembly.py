@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -201,6 +201,14 @@ def without(assembly: Assembly, patterns: Sequence[str], smaller: float | None) 
     if not kept and not assembly.mechanisms:
         raise ValueError("no part would be left")
     return replace(_pruned(assembly, assembly.shapes, kept), left_out=tuple(left_out))
+
+
+def without_numbers(assembly: Assembly, numbers: Collection[int], why: str) -> Assembly:
+    """The assembly without instances, by their numbers; each is listed as left out, as asked."""
+    left_out = [(name, f"{ASKED}{why}") for k, name in enumerate(assembly.names()) if k in numbers]
+    kept = [instance for k, instance in enumerate(assembly.instances) if k not in numbers]
+    pruned = _pruned(assembly, assembly.shapes, kept)
+    return replace(pruned, left_out=(*assembly.left_out, *left_out))
 
 
 def nearest_rotation(linear: Array) -> Array:

@@ -16,6 +16,8 @@ from seerob.kernels.tree import build_tree
 
 LOSSLESS = 1e-6
 """Tolerance of the simplification for distances [m]."""
+SHOWN = 20_000
+"""Most triangles of a mesh on the screen, unless the user says otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,7 @@ def _simplified(mesh: Mesh, tolerance: float) -> Mesh | None:
     return simple if 0 < len(simple.faces) < len(mesh.faces) else None
 
 
-def display_mesh(mesh: Mesh, *, max_triangles: int = 20_000) -> DerivedMesh:
+def display_mesh(mesh: Mesh, *, max_triangles: int = SHOWN) -> DerivedMesh:
     """A mesh for the screen.
 
     Args:

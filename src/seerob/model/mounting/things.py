@@ -15,7 +15,7 @@ from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
 from seerob.description.description import Inertial, Link
-from seerob.description.prepared import PreparedMesh, prepared
+from seerob.description.prepared import PreparedFile, PreparedMesh, prepared
 from seerob.description.shapes import detail, mass_properties, shapes
 from seerob.description.shapes.detail import display_mesh
 from seerob.description.shapes.hull import hull_volume
@@ -34,6 +34,8 @@ PART_COLOR: Color = (0.55, 0.58, 0.62, 1.0)
 AREA_COLOR: Color = (0.99, 0.92, 0.57, 0.25)
 
 CYLINDER_SIDES = 96
+VISIBLE = 1e-4
+"""How far what is shown may be off without a finding [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,13 +98,15 @@ def load_thing(
     files: dict[str, bytes] = {}
     if thing.mesh is not None:
         path = folder / thing.mesh
-        loaded = prepared(path, units=thing.units, up=thing.up, cache=cache)
+        most = thing.triangles or detail.SHOWN
+        loaded = prepared(path, units=thing.units, up=thing.up, triangles=most, cache=cache)
         findings = tuple(replace_subject(f, thing.name) for f in loaded.findings)
+        findings += _shown_coarsely(thing.name, loaded)
         files = loaded.files
         single = len(loaded.meshes) == 1
         own_color = thing.color is not None
         pieces = tuple(
-            _piece("" if single else m.name, m, thing.deviation, color if own_color else None)
+            _piece("" if single else m.name, m, thing.deviation, color if own_color else None, most)
             for m in loaded.meshes
         )
         source = f"shape of {thing.mesh}"
@@ -143,11 +147,27 @@ def replace_subject(finding: Finding, subject: str) -> Finding:
     return structs.replace(finding, subject=subject)
 
 
-def _piece(name: str, made: PreparedMesh, deviation: float, color: Color | None) -> Piece:
+def _shown_coarsely(name: str, loaded: PreparedFile) -> tuple[Finding, ...]:
+    """How far what is shown is from the mesh, where triangles were left out for the screen."""
+    off = [
+        (shown.deviation, len(shown.faces), len(drawn.faces))
+        for each in loaded.meshes
+        for shown, drawn in zip(each.shown, each.drawn, strict=True)
+        if shown.deviation > VISIBLE
+    ]
+    if not off:
+        return ()
+    deviation, _, _ = max(off)
+    count, of = sum(n for _, n, _ in off), sum(n for _, _, n in off)
+    text = f"is shown with {count} of {of} triangles, at most {deviation * 1e3:.2g} mm off; distances use all"
+    return (Finding(level="note", subject=name, text=text),)
+
+
+def _piece(name: str, made: PreparedMesh, deviation: float, color: Color | None, most: int) -> Piece:
     solid = Solid(mesh=made.exact, name=name, deviation=deviation)
     if color is None:
         return Piece(name, made.shown, (solid,))
-    one = made.shown[0] if len(made.shown) == 1 else detail.display_mesh(made.mesh)
+    one = made.shown[0] if len(made.shown) == 1 else detail.display_mesh(made.mesh, max_triangles=most)
     return Piece(name, (replace(one, color=color),), (solid,))
 
 

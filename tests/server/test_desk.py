@@ -1,5 +1,7 @@
 """Editing a workstation file over real sockets: what changes, what stays, what two pages do together."""
 
+import http.client
+import json
 import os
 import stat
 import tomllib
@@ -9,9 +11,11 @@ import msgspec
 import numpy as np
 import pytest
 
+from model_io import made_mechanisms
 from seerob.app.commands.edit import serving
 from seerob.app.console.loading import compiled
 from seerob.app.console.visiting import Visiting
+from seerob.app.server import cad_route
 from seerob.app.server.access import Role, Tokens
 from seerob.core.errors import InputError
 from seerob.core.snapshot import (
@@ -444,3 +448,66 @@ def test_changes_that_are_made_at_once_make_the_file_that_they_make_one_by_one()
             ],
             "x",
         )
+
+
+def brought(server, name, content, query="", origin=None):
+    """What the server answers to a CAD file, line by line; or the status of a refusal."""
+    host = f"127.0.0.1:{server.port}"
+    asked = http.client.HTTPConnection(host, timeout=120)
+    headers = {"Origin": origin or f"http://{host}", "Content-Type": "application/octet-stream"}
+    asked.request("POST", f"/cad/{name}{query}", content, headers)
+    answer = asked.getresponse()
+    text = answer.read().decode()
+    asked.close()
+    return [json.loads(line) for line in text.splitlines()] if answer.status == 200 else answer.status
+
+
+def test_a_cad_file_that_a_page_brings_becomes_parts_and_accepted_axes_a_robot(desk, file):
+    server, _ = desk
+    made_mechanisms.write(file.with_name("door.step"), made_mechanisms.door()[0])
+    door = file.with_name("door.step").read_bytes()
+    with Page(server) as page:
+        page.of(Draft)
+        *said, found = brought(server, "door.step", door)
+        assert any("cutting" in line["say"] for line in said)
+        assert found["parts"] == 2
+        hinge = next(k for k, a in enumerate(found["axes"], 1) if a["kind"] == "revolute")
+        assert abs(found["axes"][hinge - 1]["axis"][2]) == pytest.approx(1)
+        assert "on one axis" in found["axes"][hinge - 1]["reason"]
+        assert file.read_bytes() == CELL
+        page._id += 1
+        edit = Edit(id=page._id, action="change", revision=page.draft.revision, brought=found["brought"])
+        page.socket.send(msgspec.msgpack.encode(edit))
+        assert page.until(lambda m: isinstance(m, Edited) and m.id == edit.id).accepted
+        while len(page.draft.tables["parts"]) < 4:
+            page.read()
+        assert {p["name"] for p in page.draft.tables["parts"][2:]} == {"door/frame", "door/leaf"}
+        # With an axis, what moves is a robot and no part any more.
+        *_, found = brought(server, "door.step", b"", f"?again=1&accept={hinge}")
+        assert found["robots"] == 1
+        page._id += 1
+        edit = Edit(id=page._id, action="change", revision=page.draft.revision, brought=found["brought"])
+        page.socket.send(msgspec.msgpack.encode(edit))
+        assert page.until(lambda m: isinstance(m, Edited) and m.id == edit.id).accepted
+        while "robots" not in page.draft.tables:
+            page.read()
+        assert [p["name"] for p in page.draft.tables["parts"][2:]] == ["door/frame"]
+        assert page.edit(action="undo").accepted
+        assert len(page.draft.tables["parts"]) == 4
+    assert file.read_bytes() == CELL
+
+
+def test_what_is_brought_is_bounded_and_of_who_may_edit_alone(desk, file, monkeypatch):
+    server, _ = desk
+    assert brought(server, "a.step", b"x", origin="http://elsewhere.example") == 403
+    for name in ("..%2Fa.step", ".a.step", "a", "a%2Fb.step", "a..step"):
+        assert brought(server, name, b"x") in (400, 404, 405)
+    assert brought(server, "a.step", b"x", "?tolerance=1") == 400
+    assert brought(server, "a.step", b"") == 400
+    assert brought(server, "never.step", b"", "?again=1") == 404
+    monkeypatch.setattr(cad_route, "MOST_BYTES", 1000)
+    assert brought(server, "a.step", bytes(1001)) == 413
+    assert brought(server, "a.step", iter([bytes(600), bytes(600)])) == 413
+    *_, answer = brought(server, "a.step", b"ISO-10303-21;")
+    assert "problems" in answer
+    assert not [p for p in file.parent.rglob("*") if p.name.endswith((".coming", ".glb"))]

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "056ffab44be2d069";
+export const SCHEMA = "efdfa504f9da2538";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -787,6 +787,8 @@ export interface Edit {
   /** `Draft.revision` that the page saw. */
   revision: number;
   changes?: Change[];
+  /** Of a `change`, instead of its own: the number of those that a CAD file makes, which the page brought. */
+  brought?: number;
 }
 
 /** What a page that may control asks of the twin: how far two things are from one another. */

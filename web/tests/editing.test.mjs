@@ -8,6 +8,7 @@ import path from "node:path";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
 import { edited, showEdited } from "./edited.mjs";
+import { python } from "./python.mjs";
 
 const AXE = fs.readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const CELL = `# A cell; what nobody edits stays as it is, this line too.
@@ -33,6 +34,9 @@ name = "beside the table"
 between = ["table", "operator"]
 limit = 0.5               # [m]
 `;
+const MAKE_DOOR = `import sys; from pathlib import Path; sys.path.insert(0, "../tests/model_io")
+import made_mechanisms as made
+made.write(Path(sys.argv[1]), made.door()[0])`;
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-edit-"));
 const file = path.join(folder, "workstation.toml");
 let server;
@@ -288,6 +292,36 @@ test("a section takes away what lies beyond it, also for clicks; panels fold and
   assert.ok(Math.hypot(...(await pixel()).map((x, k) => x - at[k])) < 3, `${await pixel()}, was ${at}`);
   await panel.getByRole("button", { name: "Forget" }).click();
   await page.keyboard.press("Escape");
+});
+
+test("a CAD file that is dropped becomes parts, an axis that is accepted a mechanism", async () => {
+  const begun = saved();
+  const made = python("-c", MAKE_DOOR, path.join(folder, "door.step"));
+  made.stdout.resume();
+  await new Promise((resolve) => made.once("exit", resolve));
+  const step = fs.readFileSync(path.join(folder, "door.step"), "utf8");
+  const dropped = await page.evaluateHandle((text) => {
+    const data = new DataTransfer();
+    data.items.add(new File([text], "a door.STEP"));
+    return data;
+  }, step);
+  await page.dispatchEvent(".room", "drop", { dataTransfer: dropped });
+  const told = page.locator(".bringing");
+  await told.getByText("a_door.step: 2 parts, in the draft").waitFor();
+  await page.waitForFunction(() => window.seerob.pose("door/leaf") !== null);
+  const hinge = told.locator(".axes label", { hasText: "on one axis" }).first();
+  await hinge.getByRole("checkbox").check();
+  assert.match(await hinge.innerText(), /door\/leaf → door\/frame|door\/frame → door\/leaf/);
+  await told.getByRole("button", { name: "Accept what is marked" }).click();
+  await told.getByText("a_door.step: 1 parts and 1 mechanisms, in the draft").waitFor();
+  await page.waitForFunction(() => window.seerob.pose("door/frame") !== null);
+  assert.equal(saved(), begun);
+  await review("Save");
+  assert.match(saved(), /\[\[robots\]\]\nname = "a_door"\nmodel = "imported\/a_door\/robots\//);
+  for (let k = 0; k < 2; k += 1) await page.getByRole("button", { name: "Undo" }).click();
+  await page.waitForFunction(() => window.seerob.pose("door/frame") === null);
+  await review("Save");
+  assert.equal(saved(), begun);
 });
 
 test("a picture, and the figures of the instant, are what is shown", async () => {

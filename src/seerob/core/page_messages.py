@@ -206,6 +206,8 @@ class Edit(Struct, frozen=True, kw_only=True, tag="edit"):
     revision: int
     """`Draft.revision` that the page saw."""
     changes: tuple[Change, ...] = ()
+    brought: int = 0
+    """Instead of ``changes``, the number of those that a CAD file makes that a page brought; 0 for none."""
 
 
 class Measure(Struct, frozen=True, kw_only=True, tag="measure"):

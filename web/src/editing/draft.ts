@@ -123,17 +123,29 @@ export function ask(action: string, changes: Change[] = []): Promise<boolean> {
 }
 
 async function askNow(action: string, changes: Change[]): Promise<boolean> {
+  const answer = await answered({ action, changes });
+  refused.value = answer.accepted ? null : { changes, mistakes: answer.mistakes };
+  return answer.accepted;
+}
+
+/** Ask for the changes that a CAD file makes, which the server keeps under a number. */
+export function askBrought(brought: number): Promise<Edited> {
+  const next = queue.then(() => answered({ action: "change", changes: [], brought }));
+  queue = next;
+  return next;
+}
+
+async function answered(asked: Pick<Edit, "action" | "changes" | "brought">): Promise<Edited> {
   last += 1;
   const id = last;
   asking.value = true;
   const answer = await new Promise<Edited>((resolve) => {
     waiting.set(id, resolve);
-    send({ type: "edit", id, action, revision: draft.value?.revision ?? 0, changes });
+    send({ type: "edit", id, revision: draft.value?.revision ?? 0, ...asked });
   });
   waiting.delete(id);
   asking.value = waiting.size > 0;
-  refused.value = answer.accepted ? null : { changes, mistakes: answer.mistakes };
-  return answer.accepted;
+  return answer;
 }
 
 export const change = (...changes: Change[]): Promise<boolean> => ask("change", changes);

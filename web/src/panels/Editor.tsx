@@ -26,6 +26,7 @@ import { entrySchema, fetchSchema, kinds, schema } from "../editing/schema";
 import { select } from "../page_state";
 import type { Change } from "../wire";
 import { said, word } from "../words";
+import { Bringing } from "./Bringing";
 import { Choice } from "./Choice";
 import { MistakeList } from "./MistakeList";
 import { Review } from "./Review";
@@ -160,6 +161,7 @@ export function Editor() {
       ) : (
         <p class="empty">{said("Select something in the room, the tree or above, or add something.")}</p>
       )}
+      <Bringing />
       <Review
         open={reviewing.value}
         close={() => {

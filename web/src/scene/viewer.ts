@@ -5,6 +5,7 @@ import { Quaternion, type Raycaster, Vector3 } from "three";
 import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
+import { axisMarker, pointedAt } from "../editing/bringing";
 import { Glide } from "../glide";
 import { MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
@@ -217,7 +218,7 @@ export class Viewer {
   private draw(): void {
     const chosen = selection.peek();
     const measured = measuring.peek()?.result;
-    const asked = [measured, reaching.peek()?.result].filter((result) => result != null);
+    const asked = [measured, reaching.peek()?.result, axisMarker()].filter((result) => result != null);
     const results = this.frame?.results ?? [];
     this.markers.update(
       [...asked, ...results],
@@ -314,6 +315,7 @@ export class Viewer {
     effect(() => {
       // Read to be told of changes.
       void [mutedCriteria.value, selection.value, showCaptions.value, measuring.value, reaching.value];
+      void pointedAt.value;
       this.draw();
     });
     effect(() => {

@@ -143,6 +143,8 @@ def serving(
     """
     from seerob.app.commands.schema import schema
     from seerob.app.emulation.ports import at_ports
+    from seerob.app.importing import dropped
+    from seerob.app.server.cad_route import Bringing
     from seerob.app.server.desk import Desk
     from seerob.app.server.serving import Server
     from seerob.app.server.trial import Begun, Trial
@@ -175,6 +177,7 @@ def serving(
         meshes=station.model.meshes,
         feed=trial,
         desk=desk,
+        bringing=Bringing(desk, dropped.read_apart, dropped.changes),
         ruler=lambda: trial.ruler,
         host=host,
         port=port,

@@ -49,20 +49,49 @@ def revised(
     Raises:
         InputError: It cannot be read or edited, or something new has the name of one of the user's.
     """
-    try:
-        table = tomllib.loads(raw.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError.at(file, "", f"cannot be read: {error}", "mend it first") from error
-    changes: list[Change] = []
-    told: list[tuple[str, str]] = []
-    for group, of_group in rows.items():
-        _revise_group(group, table, before.get(group, ()), of_group, file, changes, told)
+    changes, told = changes_of(read_tables(raw, file), before, rows, file)
     text, _ = changed(raw, changes, file)
     named = {entry.get("mesh") for entry in _tables(tomllib.loads(text.decode("utf-8-sig")))}
     now = {name for of_group in rows.values() for row in of_group for name in _files(row)}
     made = {name for group in rows for row in before.get(group, ()) for name in _files(row)}
     unused = sorted(name for name in made - named - now if _MESH.fullmatch(name))
     return Revision(text, tuple(told), tuple(unused))
+
+
+def read_tables(raw: bytes, file: str) -> dict[str, Any]:
+    """What a workstation file says.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    try:
+        return tomllib.loads(raw.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError.at(file, "", f"cannot be read: {error}", "mend it first") from error
+
+
+def changes_of(
+    table: Mapping[str, Any],
+    before: Mapping[str, Any],
+    rows: Mapping[str, tuple[dict[str, Any], ...]],
+    file: str,
+) -> tuple[list[Change], list[tuple[str, str]]]:
+    """What of a workstation file changes with a new revision, and what is told of it.
+
+    Args:
+        table: What the file says.
+        before: As of `revised`, as the others.
+        rows: Likewise.
+        file: Likewise.
+
+    Raises:
+        InputError: Something new has the name of one of the user's.
+    """
+    changes: list[Change] = []
+    told: list[tuple[str, str]] = []
+    for group, of_group in rows.items():
+        _revise_group(group, table, before.get(group, ()), of_group, file, changes, told)
+    return changes, told
 
 
 def _files(row: Mapping[str, Any]) -> list[str]:

@@ -36,6 +36,8 @@ from seerob.workstation.editing import Event, Overlap, exchanged, undone
 
 _log = logging.getLogger(__name__)
 _encode = msgspec.msgpack.Encoder().encode
+MOST_BROUGHT = 8
+"""CAD files whose changes wait for a page to ask for them."""
 MOST_STEPS = 1000
 """That can be taken back, and revisions that an edit may be behind."""
 
@@ -126,6 +128,31 @@ class Desk:
         self._diff = ""
         self._lock = asyncio.Lock()
         self._held: Held = lambda _: ""
+        self._brought: dict[int, tuple[tuple[Change, ...], int]] = {}
+        self._last_brought = 0
+
+    @property
+    def file(self) -> Path:
+        """The workstation file."""
+        return self._file
+
+    @property
+    def newest(self) -> tuple[bytes, int]:
+        """The draft, and which revision it is."""
+        return self._raw, self._revision
+
+    def keep(self, changes: tuple[Change, ...], revision: int) -> int:
+        """Keep changes that are too many for a message, until a page asks for them by the number given.
+
+        Args:
+            changes: What a CAD file makes of a draft.
+            revision: Of that draft.
+        """
+        self._last_brought += 1
+        self._brought[self._last_brought] = changes, revision
+        while len(self._brought) > MOST_BROUGHT:
+            del self._brought[next(iter(self._brought))]
+        return self._last_brought
 
     @property
     def unsaved(self) -> bool:
@@ -165,6 +192,12 @@ class Desk:
 
     async def _take(self, page: Client, edit: Edit) -> None:
         match edit.action:
+            case "change" if edit.brought:
+                if edit.changes or edit.brought not in self._brought:
+                    raise self._refusal("what was brought is not kept here any more", "bring the file again")
+                await self._change(page, *self._brought[edit.brought])
+                del self._brought[edit.brought]
+                self._redo.get(page, []).clear()
             case "change":
                 await self._change(page, edit.changes, edit.revision)
                 self._redo.get(page, []).clear()

@@ -2,8 +2,8 @@
 
 A page of another site that the same browser has open can reach this server: by its address, and
 by a name that it makes point here (DNS rebinding). Hence: the host asked for must be an address or
-a known name, a WebSocket must come from the page's own origin, and whoever listens on more than
-this machine asks for a token. Requests that come faster than a page makes them wait.
+a known name, a WebSocket or what brings something must come from the page's own origin, and whoever
+listens on more than this machine asks for a token. Requests that come faster than a page makes them wait.
 """
 
 from __future__ import annotations
@@ -124,7 +124,8 @@ class Door:
         name = (match[1] or match[2]).lower() if match else ""
         if not (is_address(name) or name == "localhost" or name in self._hosts):
             return PlainTextResponse("not served under this host name\n", 403)
-        if scope["type"] == "websocket":
+        changes = scope["type"] == "http" and scope["method"] not in ("GET", "HEAD")
+        if scope["type"] == "websocket" or changes:
             origin = headers.get("origin")
             own = (f"https://{host}",) if self._encrypted else (f"http://{host}", f"https://{host}")
             if origin is not None and origin not in own and origin not in self._origins:

@@ -31,6 +31,7 @@ from starlette.routing import Route, WebSocketRoute
 
 from seerob.app.server import camera_route, trust
 from seerob.app.server.access import Role, Tokens, Visits
+from seerob.app.server.cad_route import Bringing
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
 from seerob.app.server.connection import Doorstep, PromptLoop, PromptRequests, WholeBinaryFrames
@@ -113,6 +114,7 @@ def build(
     folder: Path,
     tls: Tls | None,
     cameras: Cameras | None,
+    bringing: Bringing | None,
     lifespan: Lifespan,
 ) -> Starlette:
     """The application behind the `Door`.
@@ -124,6 +126,7 @@ def build(
         folder: The built page.
         tls: Whose authority visitors have to trust.
         cameras: Whose pictures are fetched.
+        bringing: Takes CAD files of pages that edit.
         lifespan: What runs while the application does.
     """
 
@@ -146,6 +149,11 @@ def build(
     async def camera(request: Request) -> Response:
         return await camera_route.answer(cameras, request)
 
+    async def cad(request: Request) -> Response:
+        if bringing is None:
+            return PlainTextResponse("nobody edits here\n", 404)
+        return await bringing.answer(request)
+
     async def file(request: Request) -> Response:
         return await run_in_threadpool(answer, folder, request.path_params["path"])
 
@@ -154,6 +162,7 @@ def build(
         Route("/mesh/{name}", mesh),
         Route("/schema.json", forms),
         Route("/camera/{number:int}", camera),
+        Route("/cad/{name}", cad, methods=["POST"]),
         *(Route(path, trusted) for path in sorted(trust.PATHS)),
         Route("/{path:path}", file),
     ]
@@ -190,6 +199,7 @@ class Server:
         clear_text: Whether others may be served unencrypted, so that anyone on the way reads and changes it.
         hosts: Names, besides addresses and ``localhost``, under which the server may be asked for.
         desk: Where pages edit the workstation; None where nobody does.
+        bringing: Takes CAD files that pages bring; None where none does.
         ruler: Gives that by which pages measure in what is shown; None where they do not.
         cameras: Network cameras whose pictures are handed on.
         origins: Origins, such as ``https://line3.example``, whose pages may connect as well.
@@ -211,6 +221,7 @@ class Server:
         hosts: Iterable[str] = (),
         origins: Iterable[str] = (),
         desk: Desk | None = None,
+        bringing: Bringing | None = None,
         ruler: Callable[[], Ruler] | None = None,
         cameras: Cameras | None = None,
         page: Path = FOLDER,
@@ -241,6 +252,7 @@ class Server:
             folder=page,
             tls=tls,
             cameras=cameras,
+            bringing=bringing,
             lifespan=self._lifespan,
         )
         known = (*hosts, *(() if tls is None else tls.names))

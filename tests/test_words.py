@@ -9,7 +9,7 @@ import pytest
 
 from seerob.core.snapshot import Verdict
 from seerob.outputs.palette import WORD
-from seerob.outputs.words import LANGUAGES, catalogue, said, speaking, spoken
+from seerob.outputs.words import LANGUAGES, catalogue, said, speaking, spoken, told
 
 ROOT = Path(__file__).parents[1]
 LOADER = SourceFileLoader("missing_words", str(ROOT / "scripts/missing-words"))
@@ -40,6 +40,29 @@ def test_what_is_spoken_ends_with_it_and_what_is_not_known_stays_english():
         assert said("no such text, {n}", n=3) == "no such text, 3"
     assert spoken() == "en"
     assert said("{low} and {high}", low=1, high=2) == "1 and 2"
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_each_sentence_of_the_engine_is_told_with_its_values_and_its_reason(language):
+    sentences = [(text, out) for text, out in catalogue(language).items() if re.search(r"\{\d\}", text)]
+    assert len(sentences) > 120
+    values = [f"N{k}" for k in range(9)]
+    with speaking(language):
+        wrong = [text for text, out in sentences if told(text.format(*values)) != out.format(*values)]
+        assert wrong == []
+        late = "not heard for {0} s (time-out {1} s)"
+        joined = f"ur10: {late.format('0.31', '0.2')}; no part moves; what a plug-in says"
+        late = catalogue(language)[late].format("0.31", "0.2")
+        assert told(joined) == f"ur10: {late}; {catalogue(language)['no part moves']}; what a plug-in says"
+        inside = told("the map is undecided here: nothing heard yet")
+        assert inside.endswith(catalogue(language)["nothing heard yet"])
+    assert told(joined) == joined
+
+
+def test_what_the_engine_says_as_it_stands_is_asked_of_every_catalogue():
+    assert len(missing.engine()[1]) > 40
+    assert "{0} may be elsewhere: {1}" in missing.engine()[1]
+    assert not missing.in_source("{0} may be elsewhere, {1}")
 
 
 def test_a_text_that_lacks_a_value_is_found(monkeypatch):

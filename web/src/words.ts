@@ -1,4 +1,5 @@
-// Words in the language that was chosen. What criteria, findings and refusals say comes from the engine, in English.
+// Words in the language that was chosen. The engine speaks English; what it says is translated where it is shown, by
+// the sentence of its source that it was made from, as in `seerob.outputs.words`.
 
 import de from "../../src/seerob/outputs/words/de.json";
 import es from "../../src/seerob/outputs/words/es.json";
@@ -30,6 +31,80 @@ export function said(text: string, values: Readonly<Record<string, string | numb
   const chosen = language.value;
   const found = chosen === "en" ? text : (CATALOGUES[chosen][text] ?? text);
   return found.replace(/\{(\w+)\}/g, (all, name: string) => String(values[name] ?? all));
+}
+
+interface Sentence {
+  /** Its longest words without a value. */
+  words: string;
+  pattern: RegExp;
+  translation: string;
+}
+
+const MOST_KEPT = 4000;
+const sentences = new Map<string, readonly Sentence[]>();
+const kept = new Map<string, string>();
+
+/** What the engine says, in the chosen language; as it is where no catalogue has it. */
+export function told(text: string): string {
+  const chosen = language.value;
+  return chosen === "en" ? text : toldIn(text, chosen);
+}
+
+function toldIn(text: string, chosen: Exclude<Language, "en">): string {
+  const key = `${chosen} ${text}`;
+  let found = kept.get(key);
+  if (found === undefined) {
+    if (kept.size >= MOST_KEPT) kept.clear();
+    found = translated(text, chosen);
+    kept.set(key, found);
+  }
+  return found;
+}
+
+function translated(text: string, chosen: Exclude<Language, "en">): string {
+  const whole = CATALOGUES[chosen][text];
+  if (whole !== undefined) return whole;
+  for (const { words, pattern, translation } of sentencesOf(chosen)) {
+    const match = text.includes(words) && pattern.exec(text);
+    if (!match) continue;
+    // A value may be a sentence itself; a name or a figure stays.
+    const values = match.slice(1).map((value) => (value.includes(" ") ? toldIn(value, chosen) : value));
+    return translation.replace(/\{(\d+)\}/g, (_, place: string) => values[Number(place)]!);
+  }
+  if (text.includes("; "))
+    return text
+      .split("; ")
+      .map((each) => toldIn(each, chosen))
+      .join("; ");
+  if (text.includes(", ")) {
+    const parts = text.split(", ");
+    const found = parts.map((each) => toldIn(each, chosen));
+    // A list of words or names; of a sentence that no catalogue has no half is translated.
+    if (parts.every((each, i) => each !== found[i] || !each.includes(" "))) return found.join(", ");
+  }
+  const colon = text.indexOf(": ");
+  if (colon >= 0 && !text.slice(0, colon).includes("("))
+    return `${toldIn(text.slice(0, colon), chosen)}: ${toldIn(text.slice(colon + 2), chosen)}`;
+  const inside = /^(.+) \(([^()]+)\)$/.exec(text);
+  if (inside) return `${toldIn(inside[1]!, chosen)} (${toldIn(inside[2]!, chosen)})`;
+  const figure = /^(\D*[^\d\s−-]) ([−-]?\d\S*)$/.exec(text);
+  return figure ? `${toldIn(figure[1]!, chosen)} ${figure[2]}` : text;
+}
+
+function sentencesOf(chosen: Exclude<Language, "en">): readonly Sentence[] {
+  const made = sentences.get(chosen);
+  if (made) return made;
+  const found: Sentence[] = [];
+  for (const [text, translation] of Object.entries(CATALOGUES[chosen])) {
+    const words = text.split(/\{\d+\}/);
+    if (words.length < 2) continue;
+    const escaped = words.map((each) => each.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"));
+    const longest = words.reduce((a, b) => (b.length > a.length ? b : a));
+    found.push({ words: longest, pattern: new RegExp(`^${escaped.join("([^;]+?)")}$`), translation });
+  }
+  found.sort((a, b) => b.pattern.source.length - a.pattern.source.length);
+  sentences.set(chosen, found);
+  return found;
 }
 
 /** Marks a text that `said` is given later, so that catalogues are known to need it. */

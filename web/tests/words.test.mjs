@@ -82,7 +82,8 @@ function contrast(a, b) {
   return (high + 0.05) / (low + 0.05);
 }
 
-const { language, said } = await load("words");
+const { language, said, told } = await load("words");
+const { angleUnit, lengthUnit, spoken } = await load("units");
 
 test("a text is said in the chosen language, with its values, and in English where nobody translated it", () => {
   assert.equal(said("at {time}", { time: "1:02" }), "at 1:02");
@@ -90,4 +91,40 @@ test("a text is said in the chosen language, with its values, and in English whe
   assert.equal(said("at {time}", { time: "1:02" }), "bei 1:02");
   assert.equal(said("of no catalogue"), "of no catalogue");
   language.value = "en";
+});
+
+test("what the engine says is told by the same catalogues as in the report, with its values and its reason", () => {
+  for (const code of ["de", "fr", "es", "it"]) {
+    const file = new URL(`../../src/seerob/outputs/words/${code}.json`, import.meta.url);
+    const catalogue = JSON.parse(fs.readFileSync(file, "utf8"));
+    const filled = (text) => text.replace(/\{(\d+)\}/g, (_, n) => `N${n}`);
+    const sentences = Object.entries(catalogue).filter(([text]) => /\{\d\}/.test(text));
+    assert.ok(sentences.length > 120);
+    language.value = code;
+    for (const [text, translation] of sentences) assert.equal(told(filled(text)), filled(translation));
+    assert.equal(
+      told("ur10: no part moves; nothing touches; what a plug-in says"),
+      `ur10: ${catalogue["no part moves"]}; ${catalogue["nothing touches"]}; what a plug-in says`,
+    );
+    assert.equal(
+      told("neck flexion −3°, elbow flexion 11°").split(", ")[1],
+      `${catalogue["elbow flexion"]} 11°`,
+    );
+  }
+  language.value = "en";
+});
+
+test("figures in sentences are in the chosen units, lengths without rounding", () => {
+  const text = "0.3 to 0.50 m, at 1.6 m/s, of 0.02 m² and 0.05 rad or m; −0.1501 m; 12 kg; 1e-05 m; 35° away";
+  assert.equal(spoken(text), text);
+  lengthUnit.value = "mm";
+  angleUnit.value = "rad";
+  assert.equal(
+    spoken(text),
+    "300 to 500 mm, at 1600 mm/s, of 0.02 m² and 0.05 rad or m; −150.1 mm; 12 kg; 1e-05 m; 0.611 rad away",
+  );
+  lengthUnit.value = "m";
+  angleUnit.value = "°";
+  assert.equal(spoken("off by 0.5 rad, more than 0.1 rad/s"), "off by 28.6°, more than 5.73°/s");
+  angleUnit.value = "as given";
 });

@@ -11,6 +11,7 @@ import {
   Vector3,
 } from "three";
 import { shortened } from "../format";
+import { spoken } from "../units";
 import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
 import type { Verdict } from "../wire";
 import type { View } from "./view";
@@ -65,7 +66,8 @@ export class Caption {
   }
 
   update(text: string, verdict: Verdict | null): void {
-    const short = shortened(text, LONGEST);
+    // A name stays one, whatever it looks like.
+    const short = shortened(this.aside ? spoken(text) : text, LONGEST);
     const key = `${verdict} ${short}`;
     if (key === this.shown) return;
     this.shown = key;

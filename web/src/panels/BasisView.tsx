@@ -1,15 +1,27 @@
 // Why a number is what it is: enough to defend it line by line.
 
 import { formatNumber } from "../format";
+import { spoken } from "../units";
 import type { Basis, Input } from "../wire";
-import { said } from "../words";
+import { said, word } from "../words";
+
+const ORIGINS: Record<string, string> = {
+  measured: word("measured"),
+  stated: word("stated"),
+  given: word("given"),
+  computed: word("computed"),
+  estimated: word("estimated"),
+  choice: word("choice"),
+  assumed: word("assumed"),
+  missing: word("missing"),
+};
 
 export function BasisView({ basis }: { basis: Basis }) {
   return (
     <div class="basis">
       <h3>{said("Basis")}</h3>
       <p class="formula">{basis.formula}</p>
-      <p class="cited">{basis.source}</p>
+      <p class="cited">{spoken(basis.source)}</p>
       {basis.inputs.length > 0 && (
         <table class="inputs">
           <caption>{said("Inputs")}</caption>
@@ -25,7 +37,7 @@ export function BasisView({ basis }: { basis: Basis }) {
           <h3>{said("Not modelled")}</h3>
           <ul class="not-modelled">
             {basis.not_modelled.map((text) => (
-              <li key={text}>{text}</li>
+              <li key={text}>{spoken(text)}</li>
             ))}
           </ul>
         </>
@@ -38,13 +50,13 @@ function InputRow({ input }: { input: Input }) {
   const value = typeof input.value === "number" ? formatNumber(input.value) : (input.value ?? "–");
   return (
     <tr>
-      <th scope="row">{input.name}</th>
+      <th scope="row">{spoken(input.name)}</th>
       <td class="number">
         {value} <span class="unit">{input.unit}</span>
       </td>
       <td>
-        <span class={`origin origin-${input.origin}`}>{input.origin}</span>
-        {input.source !== "" && <span class="reason">{input.source}</span>}
+        <span class={`origin origin-${input.origin}`}>{said(ORIGINS[input.origin] ?? input.origin)}</span>
+        {input.source !== "" && <span class="reason">{spoken(input.source)}</span>}
       </td>
     </tr>
   );

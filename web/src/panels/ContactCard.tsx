@@ -4,6 +4,7 @@ import { type Aspect, inputsOf, LOOK_WORDS, lookOf, shareOf, type Told } from ".
 import type { Spot } from "../body_map/figure";
 import { against, atLeast, figure, percent, withUnit } from "../figures";
 import { formatNumber } from "../format";
+import { spoken } from "../units";
 import type { Input, Scene } from "../wire";
 import { said } from "../words";
 import { StateBadge } from "./StateBadge";
@@ -43,7 +44,7 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
         )}
         {share !== null && <span>{percent(share, "up")}</span>}
       </p>
-      <p class="reason">{row.reason}</p>
+      <p class="reason">{spoken(row.reason)}</p>
     </div>
   );
 }
@@ -97,7 +98,7 @@ function LimitRow({ input, group }: { input: Input; group: string }) {
       </td>
       <td>
         <span class={`origin origin-${input.origin}`}>{input.origin}</span>
-        <span class="reason">{input.source}</span>
+        <span class="reason">{spoken(input.source)}</span>
       </td>
     </tr>
   );

@@ -7,7 +7,7 @@ import { formatTime } from "../format";
 import { mutedCriteria, type Row, scene, select, selection, soFar, stale, toggleMuted } from "../page_state";
 import { worstOf } from "../posture/instants";
 import { aim, orderedRows } from "../row_order";
-import { shownIn } from "../units";
+import { shownIn, spoken } from "../units";
 import { margin, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo, Result } from "../wire";
 import { said, word } from "../words";
@@ -141,7 +141,7 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
       {reason !== "" && (
         <tr class={`row explanation ${look}`}>
           <td colSpan={COLUMNS}>
-            <span class="reason">{reason}</span>
+            <span class="reason">{spoken(reason)}</span>
           </td>
         </tr>
       )}
@@ -205,7 +205,7 @@ function RunSoFar({ info }: { info: CriterionInfo }) {
       {said(soFar.value?.whole ? word("Run") : word("Run so far"))}:{" "}
       {said(told.verdict ? STATE_WORDS[told.verdict] : word("no verdict"))};{" "}
       {said("{shares} of the time", { shares: parts.join(", ") })}
-      {told.reason !== "" && `; ${told.reason}`}
+      {told.reason !== "" && `; ${spoken(told.reason)}`}
     </p>
   );
 }

@@ -4,13 +4,14 @@ import { Fragment } from "preact";
 import { formatNumber } from "../format";
 import { frame, link, scene, select, stale } from "../page_state";
 import { unseen } from "../scene/viewer";
+import { spoken } from "../units";
 import type { Finding, SourceLine } from "../wire";
-import { said } from "../words";
+import { said, word } from "../words";
 
 const LOOKS: Record<string, { icon: string; word: string; rank: number }> = {
-  warning: { icon: "!", word: "warning", rank: 0 },
-  assumed: { icon: "≈", word: "assumed", rank: 1 },
-  note: { icon: "i", word: "note", rank: 2 },
+  warning: { icon: "!", word: word("warning"), rank: 0 },
+  assumed: { icon: "≈", word: word("assumed"), rank: 1 },
+  note: { icon: "i", word: word("note"), rank: 2 },
 };
 
 export function allFindings(): Finding[] {
@@ -29,7 +30,9 @@ export function Findings() {
   return (
     <section class="findings scroll" aria-label={said("Findings")}>
       <p class="lead">
-        What was noticed, repaired or assumed while the model was built. Each of these bears on the results.
+        {said(
+          "What was noticed, repaired or assumed while the model was built. Each of these bears on the results.",
+        )}
       </p>
       {findings.length === 0 ? (
         <p class="empty">{said("Nothing was found.")}</p>
@@ -44,7 +47,7 @@ export function Findings() {
           <dt>seerob</dt>
           <dd>{scene.value.version}</dd>
           <dt>{said("Connection")}</dt>
-          <dd>{link.value.reason || link.value.state}</dd>
+          <dd>{spoken(link.value.reason || link.value.state)}</dd>
         </dl>
       )}
     </section>
@@ -72,16 +75,17 @@ export function Sources() {
 
 export function sourceLine(line: SourceLine): string {
   const ms = (seconds: number) => `${formatNumber(1e3 * seconds)} ms`;
-  const words = [line.heard ? "heard" : "not heard"];
+  const words = [said(line.heard ? word("heard") : word("not heard"))];
   if (line.rate !== null && line.jitter !== null) {
-    words.push(`${formatNumber(line.rate)}/s, jitter ${ms(line.jitter)}`);
+    words.push(said("{rate}/s, jitter {jitter}", { rate: formatNumber(line.rate), jitter: ms(line.jitter) }));
   }
   if (line.latency !== null && line.bound !== null) {
-    words.push(`latency ${ms(line.latency)} (${ms(line.bound)} may be)`);
+    words.push(said("latency {late} ({bound} may be)", { late: ms(line.latency), bound: ms(line.bound) }));
   }
-  words.push(`${line.received} received, ${line.lost} lost, lost ${line.losses} times`);
-  if (line.sent > 0) words.push(`${line.sent} sent`);
-  if (line.word !== "") words.push(`last word: ${line.word}`);
+  const { received, lost, losses } = line;
+  words.push(said("{received} received, {lost} lost, lost {losses} times", { received, lost, losses }));
+  if (line.sent > 0) words.push(said("{sent} sent", { sent: line.sent }));
+  if (line.word !== "") words.push(said("last word: {word}", { word: spoken(line.word) }));
   return words.join("; ");
 }
 
@@ -93,12 +97,12 @@ export function FindingList({ findings }: { findings: readonly Finding[] }) {
         return (
           <li key={i} class={`finding finding-${look.word}`}>
             <span class="finding-level">
-              <span aria-hidden="true">{look.icon}</span> {look.word}
+              <span aria-hidden="true">{look.icon}</span> {said(look.word)}
             </span>
             <button type="button" class="link" onClick={() => choose(finding.subject)}>
               {finding.subject}
             </button>
-            <span>{finding.text}</span>
+            <span>{spoken(finding.text)}</span>
           </li>
         );
       })}

@@ -1,6 +1,7 @@
 // What a result says of each of its parts: a link, a body area, a side.
 
 import { against, withUnit } from "../figures";
+import { spoken } from "../units";
 import type { Result } from "../wire";
 import { said } from "../words";
 import { StateBadge } from "./StateBadge";
@@ -23,8 +24,8 @@ function Part({ part }: { part: Result }) {
   return (
     <tr>
       <th scope="row">
-        {part.name}
-        {part.reason !== "" && <span class="reason">{part.reason}</span>}
+        {spoken(part.name)}
+        {part.reason !== "" && <span class="reason">{spoken(part.reason)}</span>}
       </th>
       <td class="number">{withUnit(value, part.unit)}</td>
       <td class="number">{part.limit !== null && withUnit(limit, part.unit)}</td>

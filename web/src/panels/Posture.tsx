@@ -5,6 +5,7 @@ import { frame, scene, stale } from "../page_state";
 import { chooseScore, shownScore } from "../posture/coloring";
 import { worstScores } from "../posture/instants";
 import { components, scored } from "../posture/scores";
+import { spoken } from "../units";
 import type { Result } from "../wire";
 import { said } from "../words";
 import { Instants } from "./Instants";
@@ -77,7 +78,7 @@ function Score({ result }: { result: Result }) {
         {result.verdict && <StateBadge state={result.verdict} />}
         {result.interval && <span class="unit">between {between(result.interval, result.unit)}</span>}
       </p>
-      {result.reason !== "" && <p class="reason">{result.reason}</p>}
+      {result.reason !== "" && <p class="reason">{spoken(result.reason)}</p>}
       {parts.length > 0 ? (
         <ScoreTable parts={parts} />
       ) : (

@@ -4,6 +4,7 @@ import { useComputed, useSignal } from "@preact/signals";
 import { doubtAmong, doubts } from "../doubts";
 import { shortName } from "../format";
 import { hidden, scene, select, selectedNodes, selection, toggleHidden } from "../page_state";
+import { spoken } from "../units";
 import type { Node } from "../wire";
 import { said, word } from "../words";
 import { Icon } from "./Icon";
@@ -144,8 +145,8 @@ function DoubtSign({ nodes }: { nodes: readonly Node[] }) {
     <span
       class="doubt"
       role="img"
-      aria-label={said("may be elsewhere: {reason}", { reason })}
-      title={said("may be elsewhere: {reason}", { reason })}
+      aria-label={said("may be elsewhere: {reason}", { reason: spoken(reason) })}
+      title={said("may be elsewhere: {reason}", { reason: spoken(reason) })}
     >
       ?
     </span>

@@ -4,6 +4,7 @@ import { figure } from "../figures";
 import { formatFixed } from "../format";
 import { palette } from "../posture/coloring";
 import { type Component, cssColor, scaleColor, shareOfScale, TOTAL } from "../posture/scores";
+import { spoken } from "../units";
 import type { Aspect, Row } from "../wire";
 import { said } from "../words";
 
@@ -43,13 +44,13 @@ function ScoreCell({ row, span = 1 }: { row: Row | null; span?: number }) {
   const [best, worst] = row.scale ?? [null, null];
   const scale = best === null ? "" : `, from ${best} to ${worst}`;
   return (
-    <td colSpan={span} title={`${row.reason}${scale}`}>
+    <td colSpan={span} title={`${spoken(row.reason)}${scale}`}>
       <span class={share === null ? "chip chip-unknown" : "chip"} style={{ background: color }}>
         {share === null ? "?" : figure(row.value, "")}
         {worst !== null && share !== null && <small>/{worst}</small>}
       </span>
       <span class="angles">
-        {share === null && <em>{row.reason || "not assessed"} </em>}
+        {share === null && <em>{spoken(row.reason || "not assessed")} </em>}
         {row.aspects.map((aspect) => (
           <Angle key={aspect.name} aspect={aspect} />
         ))}

@@ -3,6 +3,7 @@
 import { Box3, Group } from "three";
 import type { Doubts } from "../doubts";
 import { Caption } from "../markers/caption";
+import { spoken } from "../units";
 import type { Scene } from "../wire";
 import type { Bodies } from "./bodies";
 
@@ -26,7 +27,7 @@ export class DoubtCaptions {
       const caption = this.captionAt(used);
       this.box.getCenter(caption.object.position).z = this.box.max.z;
       caption.object.visible = true;
-      caption.update(shortened(name, reason), "undecided");
+      caption.update(shortened(name, spoken(reason)), "undecided");
       used += 1;
     }
     for (const caption of this.captions.slice(used)) caption.object.visible = false;

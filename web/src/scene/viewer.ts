@@ -21,12 +21,14 @@ import {
   stale,
 } from "../page_state";
 import { manikinTints } from "../posture/coloring";
+import { angleUnit, lengthUnit } from "../units";
 import { camera, cameraShown, device } from "../view/camera";
 import { measuring, type Normal, withFace } from "../view/measure";
 import { followProbe, probeAt, probing } from "../view/probe";
 import { reaching } from "../view/reach";
 import { sectionPlanes } from "../view/section";
 import type { CameraInfo, Scene } from "../wire";
+import { language } from "../words";
 import { Bodies } from "./bodies";
 import { CameraView } from "./camera_view";
 import { Companions } from "./companions";
@@ -316,6 +318,7 @@ export class Viewer {
       // Read to be told of changes.
       void [mutedCriteria.value, selection.value, showCaptions.value, measuring.value, reaching.value];
       void pointedAt.value;
+      void [language.value, lengthUnit.value, angleUnit.value];
       this.draw();
     });
     effect(() => {

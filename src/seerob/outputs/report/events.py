@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from seerob.core.snapshot import Event
 from seerob.outputs.html import Html, joined, table, tag, whole
+from seerob.outputs.words import said, told, word
 from seerob.recording.result_log import MOST_EVENTS, ResultLog
 
 WORDS = {
-    "taken": "taken",
-    "handed": "handed over",
-    "torn": "torn out of the hand",
-    "placed": "placed",
-    "dropped": "dropped",
-    "refused": "not taken",
-    "round": "round ended",
+    "taken": word("taken"),
+    "handed": word("handed over"),
+    "torn": word("torn out"),
+    "placed": word("placed"),
+    "dropped": word("dropped"),
+    "refused": word("not taken"),
+    "round": word("round ended"),
 }
 
 
@@ -25,15 +26,21 @@ def events_section(log: ResultLog) -> Html | None:
     parts = []
     if rounds:
         mean, least, most = sum(rounds) / len(rounds), min(rounds), max(rounds)
-        text = f"{len(rounds)} rounds: {mean:.2f} s each on average, {least:.2f} to {most:.2f} s."
+        text = said(
+            "{n} rounds: {mean} s each on average, {least} to {most} s.",
+            n=len(rounds), mean=f"{mean:.2f}", least=f"{least:.2f}", most=f"{most:.2f}",
+        )  # fmt: skip
         parts.append(tag("p", text))
     if len(log.events) == MOST_EVENTS:
-        parts.append(tag("p", f"The first {MOST_EVENTS} events; later ones are in the recording."))
-    head = ["at", "what", "workpiece", "hand", "place", "took"]
+        parts.append(tag("p", said("The first {n} events; later ones are in the recording.", n=MOST_EVENTS)))
+    head = [
+        said(one)
+        for one in ("at", word("what"), word("workpiece"), word("hand"), word("place"), word("took"))
+    ]
     return joined([*parts, table(head, [_row(event) for event in log.events], class_="instants")])
 
 
 def _row(event: Event) -> list[str | Html]:
     took = "–" if event.took is None else f"{event.took:.2f} s"
-    what = WORDS.get(event.what, event.what) + (f": {event.reason}" if event.reason else "")
+    what = said(WORDS.get(event.what, event.what)) + (f": {told(event.reason)}" if event.reason else "")
     return [whole(f"{event.t:.2f} s"), what, event.piece, event.by or "–", event.where or "–", took]

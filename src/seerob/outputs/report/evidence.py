@@ -11,7 +11,7 @@ from seerob.description.humans.skeleton import BONES
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.report.report import UNKNOWN, WHO, Report, Setup
 from seerob.outputs.sentences import grouped, number
-from seerob.outputs.words import said
+from seerob.outputs.words import said, told
 from seerob.recording.bone_errors import BoneErrors
 
 
@@ -19,8 +19,11 @@ def assumed(report: Report) -> Html:
     """What was found while the model was built."""
     if not report.findings:
         return tag("p", said("Nothing was assumed, repaired or found odd."))
-    marks = {"note": "note", "assumed": "! assumed", "warning": "! warning"}
-    rows = [[f.subject, whole(marks.get(f.level, f.level)), f.text] for f in grouped(report.findings)]
+    marks = {"note": "", "assumed": "! ", "warning": "! "}
+    rows = [
+        [f.subject, whole(marks.get(f.level, "") + said(f.level)), told(f.text)]
+        for f in grouped(report.findings)
+    ]
     return table([said("about"), said("kind"), said("what was found while the model was built")], rows)
 
 
@@ -54,7 +57,7 @@ def not_covered(report: Report) -> Html:
             else None,
             table(
                 [said("criterion"), said("leaves out")],
-                [[names, "; ".join(items)] for names, items in left_out.items()],
+                [[names, "; ".join(map(told, items))] for names, items in left_out.items()],
             )
             if left_out
             else None,

@@ -18,7 +18,7 @@ from seerob.outputs.report.posture_safety import posture_safety_section
 from seerob.outputs.report.report import DOUBTFUL, Report, ReportSection, ReportTable, badge, grouped_inputs
 from seerob.outputs.report.time_shares import spread_over_time
 from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
-from seerob.outputs.words import said, speaking, spoken, word
+from seerob.outputs.words import said, speaking, spoken, told, word
 from seerob.recording.series import Series
 
 STYLE = f"""
@@ -282,7 +282,7 @@ def to_do(report: Report) -> list[str]:
                 "it was not decided all the time"
             )
             undecided.append(
-                said("Give what is not known: {name}: {reason}.", name=series.name, reason=reason)
+                said("Give what is not known: {name}: {reason}.", name=series.name, reason=told(reason))
             )
     texts = []
     for each in (exceeded, undecided):
@@ -360,7 +360,7 @@ def _verdicts(report: Report) -> Html:
                 "–" if series.verdict is None else percent(times.decided),
                 percent(times.exceeded),
                 percent(times.undecided + times.open),
-                worst.reason or worst.part,
+                told(worst.reason) or worst.part,
             ]
         )
     head = [
@@ -452,7 +452,7 @@ def _parts(series: Series) -> Html | None:
         worst, shares = part.worst(), part.shares()
         rows.append(
             [
-                part.name,
+                told(part.name),
                 badge(part.verdict),
                 whole(extremum(worst, part)),
                 whole(bound(worst, part)),
@@ -473,7 +473,7 @@ def _parts(series: Series) -> Html | None:
 def _formula(basis: Basis | None) -> Html:
     if basis is None:
         return tag("p", said("The criterion did not say what its figure rests on."), class_="doubt")
-    return joined([tag("p", basis.formula, class_="formula"), tag("p", basis.source, class_="lead")])
+    return joined([tag("p", basis.formula, class_="formula"), tag("p", told(basis.source), class_="lead")])
 
 
 def _origins(report: Report) -> Html:

@@ -21,7 +21,7 @@ from seerob.core.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
 from seerob.outputs.html import Html, tag
 from seerob.outputs.palette import MARK, WORD
 from seerob.outputs.sentences import number
-from seerob.outputs.words import said, word
+from seerob.outputs.words import said, told, word
 from seerob.recording.result_log import ResultLog
 from seerob.workstation.source import Source
 from seerob.workstation.workstation import Engine, ReportCover
@@ -97,7 +97,8 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
     rows: dict[tuple[Origin, str], dict[str, dict[str, None]]] = {}
     for name, item in items:
         value = item.value if isinstance(item.value, str) else number(item.value, item.unit)
-        text = item.name if value in ("", "–") else f"{item.name}: {value}"
+        what = told(item.name)
+        text = what if value in ("", "–") else f"{what}: {value}"
         rows.setdefault((item.origin, item.source), {}).setdefault(text, {})[name] = None
     found: list[list[str | Html]] = []
     for (origin, source), texts in rows.items():
@@ -106,7 +107,7 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
             by.setdefault(", ".join(names), []).append(text)
         whose = said(WHO[origin])
         who = tag("span", f"! {whose}", class_="doubt") if origin in DOUBTFUL else whose
-        found += [["; ".join(each), criteria, who, source or "–"] for criteria, each in by.items()]
+        found += [["; ".join(each), criteria, who, told(source) or "–"] for criteria, each in by.items()]
     return found
 
 

@@ -1,15 +1,17 @@
 """Words of page and report in five languages: English in the source, the others in one catalogue each.
 
-What criteria, findings and refusals say comes from the engine, in English, and so do names of the file,
-formulas and sources. `web/src/words.ts` reads the same catalogues.
+The engine speaks English: what it says is compared, recorded and replayed. Page and report translate that
+where it is shown (`told`), by the sentence of the source it was made from. Names of the file, formulas and
+sources stay as they are. `web/src/words.ts` reads the same catalogues and does the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 
 import msgspec
@@ -52,3 +54,68 @@ def said(text: str, **values: object) -> str:
 def word(text: str) -> str:
     """Mark a text that `said` is given later, so that catalogues are known to need it."""
     return text
+
+
+_PLACE = re.compile(r"\{(\d+)\}")
+
+
+@cache
+def _sentences(language: str) -> tuple[tuple[str, re.Pattern[str], str], ...]:
+    """What the engine says with values in it, the most words first: longest words, pattern, translation."""
+    found = []
+    for text, translation in catalogue(language).items():
+        words = _PLACE.split(text)[::2]
+        if len(words) > 1:
+            pattern = re.compile("([^;]+?)".join(map(re.escape, words)))
+            found.append((max(words, key=len), pattern, translation))
+    return tuple(sorted(found, key=lambda each: -len(each[1].pattern)))
+
+
+def told(text: str) -> str:
+    """What the engine says, in the language that is spoken; as it is where no catalogue has it.
+
+    Sentences that are joined, in place of a value, in parentheses or about a name (``ur10: …``) are looked up
+    each by itself, and so is what stands before a figure.
+    """
+    language = _language.get()
+    return text if language == "en" else _told(text, language)
+
+
+_IN_PARENTHESES = re.compile(r"(.+) \(([^()]+)\)")
+_OF_A_FIGURE = re.compile(r"([^\d]*[^\d\s−-]) ([−-]?\d\S*)")
+
+
+@lru_cache(maxsize=4096)
+def _told(text: str, language: str) -> str:
+    found = catalogue(language).get(text)
+    if found is not None:
+        return found
+    for words, pattern, translation in _sentences(language):
+        if words in text and (match := pattern.fullmatch(text)):
+            return _filled(translation, [_value(value, language) for value in match.groups()])
+    if "; " in text:
+        return "; ".join(_told(each, language) for each in text.split("; "))
+    if ", " in text:
+        parts = text.split(", ")
+        parts_told = [_told(each, language) for each in parts]
+        # A list of words or names; of a sentence that no catalogue has no half is translated.
+        known = all(a != b or " " not in a for a, b in zip(parts, parts_told, strict=True))
+        if known:
+            return ", ".join(parts_told)
+    about, colon, rest = text.partition(": ")
+    if colon and "(" not in about:
+        return f"{_told(about, language)}: {_told(rest, language)}"
+    if match := _IN_PARENTHESES.fullmatch(text):
+        return f"{_told(match[1], language)} ({_told(match[2], language)})"
+    if match := _OF_A_FIGURE.fullmatch(text):
+        return f"{_told(match[1], language)} {match[2]}"
+    return text
+
+
+def _filled(translation: str, values: Sequence[str]) -> str:
+    return _PLACE.sub(lambda place: values[int(place[1])], translation)
+
+
+def _value(text: str, language: str) -> str:
+    """A value in a sentence: a sentence itself, or a name or a figure, which stays."""
+    return _told(text, language) if " " in text else text

@@ -28,6 +28,7 @@ from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.in_place import implausible_motion
 from seerob.model.variables import uses
+from seerob.session.steps import problems_of
 from seerob.twin.controller_check import compared, controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.plausibility.ranges import Quantity
@@ -94,6 +95,9 @@ def _unpublished(model: Model, opened: Sequence[tuple[Source, Opened]], file: st
             mover = model.carrier(frame).name
         except UnknownName as error:
             yield Problem(file, key, str(error))
+            continue
+        if table.steps:
+            yield from problems_of(model, table, file, f"targets[{i}]")
             continue
         said: list[str] = []
         for source, one in opened:

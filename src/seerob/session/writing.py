@@ -7,7 +7,8 @@ What triggers write are edges: a verdict that came or went since the run began; 
 is one line of the log. What a source says of where a tool is to be is published, over rosbridge or ROS-TCP,
 when the twin gets there, in the frame that the controller wants; of what waits, only the newest is sent.
 Nothing that its source does not call good is sent, and nothing is repeated: a controller that must stop when
-targets cease has to see to that itself.
+targets cease has to see to that itself. Where steps say where to (`seerob.session.steps`), it is said again
+and again until the robot is heard to be there.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ from seerob.protocols.links.websocket_link import Link, linked
 from seerob.protocols.ros import ros_tcp, rosbridge
 from seerob.protocols.ros.ros_messages import Edition, ros1_name, store
 from seerob.protocols.ros.rosbridge import Status
-from seerob.session.opening import target
+from seerob.session.opening import signal_timeouts, target
+from seerob.session.steps import Steps
 from seerob.workstation.tables.writing import CartesianTarget, TargetMessage, TargetWire, Trigger
 from seerob.workstation.variables import Variable
 
@@ -386,6 +388,7 @@ class _Way:
         self._said_from_at: dict[str, Array | None] = {}
         """By what a source says poses of; None of what does not move with the tool."""
         self._frame_from_world = frame_from_world
+        self.steps = Steps(model, table, signal_timeouts(model)[0]) if table.steps else None
         self._ahead = deque[PoseSample](maxlen=AHEAD)
         self._newest = deque[PoseSample](maxlen=1)
 
@@ -394,6 +397,13 @@ class _Way:
         self._ahead.extend(s for s in samples if isinstance(s, PoseSample) and self._moved_by(s) is not None)
         while self._ahead and self._ahead[0].t <= now:
             self._newest.append(self._ahead.popleft())
+            self.heard += 1
+
+    def step(self, steps: Steps, snapshot: Snapshot, samples: Sequence[Sample]) -> None:
+        """Take where steps say that the tool is to be at a tick."""
+        self._newest.clear()
+        if (pose := steps.next(snapshot, samples)) is not None:
+            self._newest.append(pose)
             self.heard += 1
 
     def _moved_by(self, sample: PoseSample) -> Array | None:
@@ -405,9 +415,10 @@ class _Way:
 
     def take(self) -> dict[str, Any] | None:
         """The message that is to be published; None when there is nothing new."""
-        if not self._newest:
+        try:
+            sample = self._newest.pop()
+        except IndexError:
             return None
-        sample = self._newest.pop()
         values = np.array([*sample.position, *sample.wxyz])
         if sample.quality is not Quality.GOOD or not np.isfinite(values).all() or not values[3:].any():
             self.refused += 1
@@ -426,7 +437,8 @@ class _Way:
 
     def line(self) -> SourceLine:
         """How many were sent, and why it is none now."""
-        return SourceLine(heard=not self.reason, sent=self.published, received=self.heard, word=self.reason)
+        word = self.reason or (self.steps.word if self.steps is not None else "")
+        return SourceLine(heard=not self.reason, sent=self.published, received=self.heard, word=word)
 
     def __str__(self) -> str:
         """How many were sent, in a line, and why none were."""
@@ -435,7 +447,7 @@ class _Way:
             within = f" in {table.frame_id}" if table.message is not TargetMessage.POSE else ""
             last = f"{self.published} poses of {table.at} sent, the last at {self.last} m{within}"
             return f"{table.topic}: {last}{f'; {self.reason}' if self.reason else ''}"
-        why = self.reason or "no pose of it was heard"
+        why = self.reason or (self.steps.word if self.steps is not None else "no pose of it was heard")
         if not self.reason and self.heard:
             why = f"{self.heard} poses were heard, {self.refused} that nobody may rely on"
         return f"{table.topic}: nothing was sent of {table.at}: {why}"
@@ -499,7 +511,10 @@ class CartesianTargets(Closing):
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Note what is due; returns at once."""
         for way in self.ways:
-            way.note(snapshot.t, samples)
+            if way.steps is not None:
+                way.step(way.steps, snapshot, samples)
+            else:
+                way.note(snapshot.t, samples)
 
     def lines(self, known: Mapping[str, SourceLine]) -> dict[str, SourceLine]:
         """How sources are heard, and how many poses went to each topic."""

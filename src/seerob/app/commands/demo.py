@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import sys
 import tomllib
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 from seerob.app.commands import run as live
 from seerob.app.console.terminal import Exit, line
@@ -34,6 +40,9 @@ SHIPPED = {
     "plc_cell": "live: a UR10 and a PLC with a belt, a light curtain and a door, both emulated",
 }
 """What each shows; the first is run when none is named."""
+PICTURE = "picture.png"
+"""File in the folder of each cell of the paper, which shows it (`scripts/make-cell-pictures`)."""
+ADDRESSES = ("host", "bind", "url", "port")
 
 
 def add(sub: argparse.ArgumentParser) -> None:
@@ -46,7 +55,11 @@ def add(sub: argparse.ArgumentParser) -> None:
     text = "its devices are there: start no emulators, and say where the addresses stand"
     sub.add_argument("--real", action="store_true", help=text)
     live.add_live(sub)
-    sub.set_defaults(allow_plugins=False, allow_outside=False, allow_writing=False, replay=None, edit=False)
+    text = (
+        "let it write to its devices, where its file allows it too: niryo_picking tells the robot its targets"
+    )
+    sub.add_argument("--allow-writing", action="store_true", help=text)
+    sub.set_defaults(allow_plugins=False, allow_outside=False, replay=None, edit=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -62,6 +75,9 @@ def run(options: argparse.Namespace) -> int:
         width = max(map(len, SHIPPED))
         for name, text in SHIPPED.items():
             line("demo", f"{name:<{width}}  {text}")
+            picture = _home() / name / PICTURE
+            if picture.is_file():
+                shown(picture.read_bytes(), str(picture))
     if options.list:
         return Exit.WITHIN
     name = options.name or next(iter(SHIPPED))
@@ -72,14 +88,64 @@ def run(options: argparse.Namespace) -> int:
         copy(name, folder)
         line("wrote", f"{folder}: yours to change; seerob run {folder} runs it again")
     options.workstation = folder
-    named = "emulators" in tomllib.loads((folder / "workstation.toml").read_text("utf-8"))
+    file = folder / "workstation.toml"
+    tables = tomllib.loads(file.read_text("utf-8"))
+    named = "emulators" in tables
     options.emulated = named and not options.real
     if named and options.real:
-        line(
-            "real",
-            f"the addresses below stand in {folder / 'workstation.toml'}: put those of your devices there",
-        )
+        line("real", f"put the addresses of your devices into {file}:")
+        for text in addresses(tables):
+            line("", text)
     return live.run(options)
+
+
+def addresses(tables: dict[str, Any]) -> Iterator[str]:
+    """What of a workstation file is different where devices are real, a line for each key.
+
+    Args:
+        tables: The file.
+    """
+    for table in ("sources", "targets"):
+        for i, entry in enumerate(tables.get(table, ())):
+            whose = (
+                f"{entry.get('kind', table[:-1])} {entry.get('name') or entry.get('robot') or ''}".rstrip()
+            )
+            for key in ADDRESSES:
+                if key in entry:
+                    yield f"{table}[{i}].{key} = {json.dumps(entry[key])}  {whose}"
+            if "origin" in entry:
+                yield f"{table}[{i}].origin: leave it out for a real robot  {whose}"
+            if entry.get("kind") == "headset":
+                yield f"{table}[{i}]: no address; open the page in the headset's browser  {whose}"
+
+
+def shown(png: bytes, path: str) -> None:
+    """Draw a picture where the terminal can, and say where it lies where it cannot."""
+    if not (sys.stdout.isatty() and (said := inline(png, os.environ))):
+        line("", path)
+        return
+    sys.stdout.write(f"{said}\n")
+    sys.stdout.flush()
+
+
+def inline(png: bytes, environment: Mapping[str, str]) -> str:
+    """Draw a picture in the text of a terminal, 36 columns wide; empty where the terminal has no way to.
+
+    iTerm2's sequence, which WezTerm knows, and the graphics protocol of kitty, which Ghostty knows.
+
+    Args:
+        png: The picture.
+        environment: Of the process, which names the terminal.
+    """
+    coded, program = b64encode(png).decode(), environment.get("TERM_PROGRAM", "")
+    if program in ("iTerm.app", "WezTerm"):
+        return f"\033]1337;File=inline=1;width=36;size={len(png)}:{coded}\a"
+    if program != "ghostty" and environment.get("TERM") != "xterm-kitty":
+        return ""
+    parts = [coded[i : i + 4096] for i in range(0, len(coded), 4096)]
+    heads = ["a=T,f=100,c=36,", *[""] * (len(parts) - 1)]
+    more = [f"{head}m={int(i < len(parts) - 1)}" for i, head in enumerate(heads)]
+    return "".join(f"\033_G{head};{part}\033\\" for head, part in zip(more, parts, strict=True))
 
 
 def copy(name: str, folder: Path) -> None:
@@ -91,7 +157,12 @@ def copy(name: str, folder: Path) -> None:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError.at(folder, "", "exists already", "give the name of a new folder")
     with whole_folder(folder) as working:
-        _copied(_home() / name, working)
+        copied(name, working)
+
+
+def copied(name: str, folder: Path) -> None:
+    """Copy a workstation that comes with seerob into a folder."""
+    _copied(_home() / name, folder)
 
 
 def _home() -> Traversable:

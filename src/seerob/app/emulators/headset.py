@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.mvn_person import Person
-from seerob.app.emulation.options import COMMAND, PersonOptions, Ready, option, port
+from seerob.app.emulation.options import COMMAND, IN_STEP, PersonOptions, Ready, option, port
 from seerob.core.errors import InputError
 from seerob.core.page_messages import Command, Grab, Introduction, Presence, Tracking
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
@@ -119,6 +119,7 @@ class Visitor(LoopEmulator):
         rate: Pictures per second [Hz].
         body: Whether joints of the whole body are seen.
         grabs: What hands hold from when on [s]; time begins with the first picture of the run.
+        in_step: Instead at the next whole multiple of this period of the machine's clock [s].
         introduction: How they introduce themselves; None for not at all. Who is no person of the twin says
             where head and hands are in the world.
     """
@@ -133,9 +134,11 @@ class Visitor(LoopEmulator):
         rate: float,
         body: bool,
         grabs: Sequence[tuple[float, Grab]] = (),
+        in_step: float | None = None,
         introduction: Introduction | None = None,
     ) -> None:
         super().__init__()
+        self._in_step = in_step
         self._introduction = introduction
         self.human, self.rate, self.to = human, rate, (host, port)
         self.sent = 0
@@ -185,12 +188,13 @@ class Visitor(LoopEmulator):
             await connection.send(msgspec.msgpack.encode(introduction))
         looks_on = introduction is not None and not self.human
         rate = min(self.rate, PRESENCES) if looks_on else self.rate
+        waits = 0.0 if self._in_step is None else -time.time() % self._in_step
         while True:
             k = int((time.monotonic() - begun) * rate) + 1
             await asyncio.sleep(max(0.0, begun + k / rate - time.monotonic()))
-            while grabs and grabs[0][0] <= k / rate:
+            while grabs and grabs[0][0] <= k / rate - waits:
                 await connection.send(msgspec.msgpack.encode(grabs.popleft()[1]))
-            names, poses = self._seen(k / rate)
+            names, poses = self._seen(max(k / rate - waits, 0.0))
             if looks_on:
                 assert introduction is not None
                 world = in_world(poses[: len(THREE)], introduction)
@@ -237,6 +241,7 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
     port: Annotated[int, port("port of the page; `seerob run --emulated` tells its own")] = 8080
     rate: Annotated[float, option("pictures per second", "Hz", ge=30, le=144)] = 72.0
     body: Annotated[bool, option("joints of the whole body are seen; else head and hands")] = False
+    in_step: Annotated[float, option(IN_STEP, "s", gt=0)] | None = None
     grabs: Annotated[
         str,
         option("what hands take and let go: '4.5 right_hand blank_1, 8 right_hand', at seconds of the run"),
@@ -263,6 +268,7 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
             rate=self.rate,
             body=self.body,
             grabs=tuple(self._grabs()),
+            in_step=self.in_step,
             introduction=self._introduction() if self.name else None,
         )
         hear = ("seerob run CELL --port {port}",)

@@ -1,6 +1,6 @@
 """A rosbridge server with the joint states of one robot, as the server of ROS 1 or of ROS 2 has them.
 
-It speaks for a robot that does what a motion says. What clients publish it keeps, and moves nothing.
+It speaks for a robot that does what a motion says or, with a `Follower`, goes where clients say by poses.
 """
 
 from __future__ import annotations
@@ -12,19 +12,23 @@ import logging
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
+from seerob.app.emulation.follower import Follower
 from seerob.app.emulation.motions import Motion
-from seerob.app.emulation.options import Ready, port
+from seerob.app.emulation.options import CALM, Ready, option, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.core.extras import need
+from seerob.files.waypoints.arm import Arm
 from seerob.protocols.links.tcp_server import stop_accepting
 from seerob.protocols.ros.ros_messages import Edition, Joints, Plan, RosMessage, Transform, encode, ros1_name
 from seerob.protocols.ros.rosbridge import MAX_MESSAGE, Compression
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
+
+    from seerob.workstation.source import Target
 
 _log = logging.getLogger(__name__)
 
@@ -37,6 +41,7 @@ class RosbridgeServer(RosRobot):
     def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
         """Take the arguments of `RosRobot`."""
         super().__init__(motion, names, **more)
+        self._follower = motion if isinstance(motion, Follower) else None
         self.received: deque[dict[str, Any]] = deque(maxlen=1000)
         """What clients advertised and published, oldest first."""
 
@@ -77,6 +82,8 @@ class RosbridgeServer(RosRobot):
                     _end(sending.pop(topic, None))
                 elif op in ("advertise", "publish", "unadvertise"):
                     self.received.append(asked)
+                    if op == "publish" and self._follower is not None and topic == self._follower.topic:
+                        self._follower.hear(asked.get("msg"))
                 elif op == "call_service":
                     await connection.send(self._answer(asked))
         except ConnectionClosed:
@@ -221,6 +228,25 @@ class Rosbridge(RosOptions, frozen=True, kw_only=True):
     """A rosbridge server (ROS 1 or 2) with the joint states of a robot."""
 
     port: Annotated[int, port()] = 9090
+    follows: Annotated[str, option("topic of poses of its tool that it goes to, from the first one on")] = ""
+    joint_speed: Annotated[float, option("on the way there", "rad/s", gt=0, le=10)] = CALM["joint_speed"]
+    joint_acceleration: Annotated[float, option("on the way there", "rad/s²", gt=0, le=50)] = CALM[
+        "joint_acceleration"
+    ]
+
+    def motion(self, target: Target, home: Sequence[float] | None = None) -> tuple[Motion, str]:
+        """What it plays, until it is told where to go when it follows; and that in words.
+
+        Raises:
+            InputError: The file is missing or wrong, or the robot cannot do what it says.
+        """
+        motion, what = super().motion(target, home)
+        if not self.follows:
+            return motion, what
+        arm = Arm(target.description) if target.description is not None else None
+        assert arm is not None  # of the library
+        limits = {"speed": self.joint_speed, "acceleration": self.joint_acceleration}
+        return Follower(motion, arm, self.follows, **limits), f"{what}, until {self.follows} says where to go"
 
     def ready(self) -> Ready:
         """The server."""

@@ -8,7 +8,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.core.host_name import check_host
-from seerob.core.quantities import PathName, Table, unit
+from seerob.core.quantities import Metres3, PathName, Pose, Table, unit
 from seerob.core.verdict import Verdict
 
 Topic = Annotated[
@@ -37,11 +37,41 @@ class TargetWire(StrEnum):
     """Unity's ROS-TCP-Endpoint."""
 
 
+class Step(Table, frozen=True, kw_only=True):
+    """Where the tool is to be next, and what is waited for there."""
+
+    name: str = ""
+    """For the log."""
+    to: Pose
+    """Pose of ``at`` in the world; with ``of`` its position counts from that workpiece, along world axes."""
+    of: str = ""
+    """Loose workpiece, or several (``casting_*``): the one that is nearest to ``near`` as the step begins."""
+    near: Metres3 | None = None
+    """Where it is looked for in the world; there must be one before the tool goes anywhere."""
+    within: Annotated[float, unit("m", gt=0, le=1)] = 0.05
+    """How far from there it may be [m]."""
+    variable: str = ""
+    """Variable of the dictionary that the tool waits for once it is there."""
+    above: float | None = None
+    """It is to be more than that, in SI; a bool counts as 0 or 1."""
+    below: float | None = None
+    """It is to be less than that."""
+    pause: Annotated[float, unit("s", ge=0, le=600)] = 0.0
+    """How long all of it is to hold [s]."""
+
+    def __post_init__(self) -> None:
+        if bool(self.of) != (self.near is not None):
+            raise ValueError("of and near go together: which workpiece, and where it is looked for")
+        if bool(self.variable) == (self.above is None and self.below is None):
+            raise ValueError("a variable is waited for with above, below, or both")
+
+
 class CartesianTarget(Table, frozen=True, kw_only=True):
     """Where a tool of the twin is to go, published to ROS for a controller that listens to that."""
 
     at: PathName
-    """Full name of the link or tool that a source moves by poses (``ur10/tool0``), or the robot's."""
+    """Full name of the link or tool that goes there (``ur10/tool0``), or the robot's: a source moves it by
+    poses, or ``steps`` say where to."""
     host: str
     """Name or address of the computer with the rosbridge server or ROS-TCP endpoint."""
     wire: TargetWire = TargetWire.ROSBRIDGE
@@ -62,6 +92,9 @@ class CartesianTarget(Table, frozen=True, kw_only=True):
     """Full name of the link of the twin that stands where ``frame_id`` is; the world when not given."""
     every: Annotated[float, unit("s", ge=0.01, le=60)] = 0.1
     """Least time between two targets [s]; of what comes faster, the newest is published."""
+    steps: tuple[Step, ...] = ()
+    """Where to, one after the other and round and round, instead of a source: the next is published once the
+    twin, which hears the robot, is where the one before said."""
 
     def __post_init__(self) -> None:
         check_host("host", self.host)

@@ -149,7 +149,9 @@ class Description:
 
 
 def base_from_links(description: Description, q: Mapping[str, float]) -> dict[str, Array]:
-    """Pose of every link (4, 4) in the root's frame; joints that ``q`` does not name are at 0.
+    """Pose of every link (4, 4) in the root's frame.
+
+    Joints that ``q`` does not name are at 0, or where the one is that they mimic.
 
     Args:
         description: The robot.
@@ -159,9 +161,16 @@ def base_from_links(description: Description, q: Mapping[str, float]) -> dict[st
     for link in description.links:
         pose = link.parent_from_link if link.parent is None else poses[link.parent] @ link.parent_from_link
         for joint in link.joints:
-            pose = pose @ displacement(joint, q.get(joint.name, 0.0))
+            pose = pose @ displacement(joint, _position(joint, q))
         poses[link.name] = pose
     return poses
+
+
+def _position(joint: Joint, q: Mapping[str, float]) -> float:
+    """Where a joint is [rad or m]."""
+    if joint.mimic is None or joint.name in q:
+        return q.get(joint.name, 0.0)
+    return joint.mimic.multiplier * q.get(joint.mimic.joint, 0.0) + joint.mimic.offset
 
 
 def displacement(joint: Joint, q: float) -> Array:

@@ -227,8 +227,16 @@ class Thing(_Table, frozen=True, kw_only=True):
     color: tuple[Share, Share, Share] | None = None
     """Red, green, blue in 0…1."""
 
+    @property
+    def library(self) -> str | None:
+        """Name in the library of tools, where its shape is that."""
+        return None
+
     def __post_init__(self) -> None:
-        if (self.mesh is None) == (self.shape is None):
+        if self.library is not None:
+            if self.mesh is not None or self.shape is not None:
+                raise ValueError("model has a shape: leave out mesh and shape")
+        elif (self.mesh is None) == (self.shape is None):
             raise ValueError("give either mesh or shape")
         if self.deviation and self.mesh is None:
             raise ValueError("deviation is of a mesh: leave it out beside a shape")
@@ -266,8 +274,16 @@ class Mounted(Thing, frozen=True, kw_only=True):
 class Tool(Mounted, frozen=True, kw_only=True):
     """Something mounted on a robot, real or virtual: it changes the twin's masses and torques."""
 
+    model: Annotated[str, Meta(pattern=r"^library:[a-z0-9_]+$")] | None = None
+    """A tool of the library, as ``library:robotiq_2f_85``, instead of a mesh or a shape: its envelope, mass
+    and working point, unless they are given here."""
     tcp: Pose | None = None
     """Its working point in its own frame; the robot's point of interest from then on."""
+
+    @property
+    def library(self) -> str | None:
+        """Name in the library of tools, where its shape is that."""
+        return None if self.model is None else self.model.removeprefix("library:")
 
 
 class Workpiece(Mounted, frozen=True, kw_only=True):

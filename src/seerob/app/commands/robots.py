@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from seerob.description.description import Description
     from seerob.description.robots.library import Entry
 
-HELP = "list robots that can be named, with what is known of each; fetch a published description"
+HELP = "list robots and tools that can be named, with what is known of each; fetch a published description"
 EXAMPLE = "seerob robots"
 
 MISSING = (
@@ -60,6 +60,7 @@ def run(options: argparse.Namespace) -> int:
     if options.action == "identify":
         return _identify(options)
     _library()
+    _tools()
     _descriptions(options.all)
     _packages()
     OUT.print("missing: what is UNDECIDED without it, unless the workstation file gives it", style="bold")
@@ -107,6 +108,21 @@ def _library() -> None:
         OUT.print(
             f"  {f'library:{name}':<28} {entry.maker[:18]:<18} {len(robot.joints()):>4} "
             f"{_figures(entry, robot)}  {', '.join(lacks) or 'nothing'}",
+            markup=False,
+        )
+
+
+def _tools() -> None:
+    from seerob.description.tools import library
+
+    OUT.print("tools", style="bold")
+    for name in library.names():
+        tool = library.load(name)
+        high = max(float(s.mesh.vertices[:, 2].max()) for s in tool.solids if s.mesh is not None)
+        mass = "?" if tool.inertial is None else f"{tool.inertial.mass:.3g} kg"
+        tip = "?" if tool.tcp is None else f"{tool.tcp[2, 3]:.3g} m"
+        OUT.print(
+            f"  {f'library:{name}':<30} {tool.maker[:16]:<16} {high:>6.3g} m long {mass:>8}  tip {tip}",
             markup=False,
         )
 

@@ -24,6 +24,7 @@ from seerob.description.humans import posture
 from seerob.description.loader import load_robot
 from seerob.description.robots.calibration import calibrated_by
 from seerob.description.robots.scaled import scaled
+from seerob.description.tools import library
 from seerob.distance.least import Shapes
 from seerob.model.model import Body, Frame, Mechanism, Model
 from seerob.model.mounting import loose as loose_mounting
@@ -447,8 +448,11 @@ class _Compiler:
         if isinstance(thing, Tool):
             carrier = self.carriers[on]
             wanted = next((r.tool for r in self.station.robots if r.name == carrier), None)
-            if thing.tcp is not None and wanted in (None, thing.name):
-                self.chains[carrier].tip = Frame(thing.name, -1, pose_matrix(thing.tcp))
+            tip = None if thing.tcp is None else pose_matrix(thing.tcp)
+            if tip is None and thing.library is not None:
+                tip = library.load(thing.library).tcp
+            if tip is not None and wanted in (None, thing.name):
+                self.chains[carrier].tip = Frame(thing.name, -1, tip)
 
     def _thing(
         self,

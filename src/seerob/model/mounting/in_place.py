@@ -152,7 +152,7 @@ def _sizes(model: Model) -> Iterator[Quantity]:
                 figures.append(("tcp_outside", "m", _outside(np.array(at), low, high), said))
             mass = next((body.mass.value for body in bodies if body.mass is not None), None)
             volume = float((high - low).prod())
-            if mass is not None and thing.mass is None:
+            if mass is not None and thing.mass is None and thing.density is not None:
                 figures.append(("mass", "kg", mass, f"of its shape at {thing.density:g} kg/m³{read}"))
             elif mass is not None and volume > 0:
                 said = f"{mass:g} kg in a box of {volume:.3g} m³{read}"

@@ -22,6 +22,7 @@ from seerob.description.shapes.hull import hull_volume
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.mesh_mending import enclosing
 from seerob.description.shapes.moments import signed_volume
+from seerob.description.tools import library
 from seerob.model.mounting.specification import Mounting, pose_matrix
 from seerob.workstation.tables.sensors import Sensor
 from seerob.workstation.workstation import Area, Shape, Thing
@@ -96,6 +97,7 @@ def load_thing(
         color = (*thing.color, 1.0)
     findings: tuple[Finding, ...] = ()
     files: dict[str, bytes] = {}
+    known = None if thing.library is None else library.load(thing.library)
     if thing.mesh is not None:
         path = folder / thing.mesh
         most = thing.triangles or detail.SHOWN
@@ -119,6 +121,12 @@ def load_thing(
                 # Split by colour or by name, none of the pieces has an inside; all of them together do.
                 inside = Solid(mesh=detail.physics_mesh(around), deviation=thing.deviation)
                 pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
+    elif known is not None:
+        visual = known.visual if thing.color is None else tuple(replace(m, color=color) for m in known.visual)
+        pieces, source = (Piece("", visual, known.solids),), f"envelope of library:{thing.library}"
+        whole = [solid.mesh for solid in known.solids if solid.mesh is not None]
+        findings = tuple(replace_subject(f, thing.name) for f in known.findings)
+        files = {f"library/{thing.library}.toml": known.content}
     else:
         assert thing.shape is not None
         piece, whole = _simple(thing.shape, color)
@@ -129,6 +137,8 @@ def load_thing(
     more: tuple[Finding, ...] = ()
     if needs_mass and (thing.mass is not None or thing.density is not None):
         inertial, more = _inertial(thing, whole, source)
+    elif needs_mass and known is not None:
+        inertial = known.inertial
     elif thing.mass is not None and thing.com is not None:
         # It stands still, so only what the user wrote is looked at.
         inertial = given_inertial(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)

@@ -1,0 +1,1 @@
+"""Grippers and other tools of the library."""

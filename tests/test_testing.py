@@ -58,6 +58,7 @@ SAFETY = {
     "light_curtain": 'sensor = "curtain"\nof = ["arm", "op"]\n',
     "manipulability": 'at = "arm"\n',
     "minimum_distance": 'between = ["arm", "op"]\nlimit = 0.01\n',
+    "point_energy": 'at = "arm"\nlimit = 100\n',
     "power_and_force": 'robot = "arm"\nhuman = "op"\n',
     "pressure_mat": 'sensor = "mat"\nof = "op"\n',
     "safety_area": 'area = "zone"\nof = ["arm", "op"]\n',

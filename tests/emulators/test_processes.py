@@ -150,6 +150,9 @@ def test_cells_of_the_paper_run_without_their_devices(tmp_path, cell, sources, e
     said = [f for f in recording.scene.findings if f.subject.startswith("emulators[")]
     assert len(said) == emulators
     assert all("no device, an emulator" in finding.text for finding in said)
+    if cell == "two_places":
+        # What devices see at B is in the result that every page is told, A's too.
+        assert "RULA at B" in {result.name for s in recording.snapshots() for result in s.results}
 
 
 def emulated_run(cell: str, folder: Path) -> list[str]:

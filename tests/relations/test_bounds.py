@@ -196,6 +196,7 @@ def masses_of(seed):
         f"limit = 1e4\noffset = {rng.normal(0, 0.1, 3).tolist()}\n"
         for along in ("motion", "worst")
     )
+    more += '[[safety]]\nkind = "point_energy"\nname = "at a point"\nat = "arm"\nlimit = 1e4\n'
     return files(
         replace(
             cell, physics=bool(seed % 2), more=more, machine=None, mass_tolerance=0.0,
@@ -209,8 +210,9 @@ def test_no_effective_mass_between_two_ticks_is_above_its_bound(tmp_path, seed):
     for name, text in masses_of(seed).items():
         (tmp_path / name).write_text(text)
     room = worst_found(load(tmp_path), looks=3)
-    assert set(room) <= {"motion", "worst"}
-    assert "motion" in room
+    assert set(room) <= {"motion", "worst", "at a point"}
+    assert {"motion", "at a point"} <= set(room)
+    assert np.isfinite(room["at a point"]).mean() > 0.3
     for name, found in room.items():
         assert min(found) >= -1e-9, name
     assert np.isfinite(room["motion"]).mean() > 0.3

@@ -7,6 +7,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, basis_in, made, results_at, two_r
 from seerob.core.errors import InputError, UnknownName
+from seerob.core.snapshot import Verdict
 from seerob.criteria.safety.effective_mass import (
     felt_toward,
     inverse_effective_mass,
@@ -15,6 +16,7 @@ from seerob.criteria.safety.effective_mass import (
 )
 from seerob.criteria.safety.kinetic_energy import kinetic_energy
 from seerob.criteria.safety.manipulability import singular_values
+from seerob.criteria.safety.point_energy import point_energy
 from seerob.criteria.safety.velocity import point_velocity
 from seerob.kernels.axes import mass_along
 
@@ -38,6 +40,29 @@ def test_matrices_in_closed_form():
     assert principal_masses(inverse)[0] == pytest.approx([1, 2, np.inf])
     assert singular_values(J)[0] == pytest.approx([1.618034, 0.618034, 0], abs=1e-6)
     assert kinetic_energy(M, np.array([1.0, -2.0])) == 1.5
+    # The tip moves by (1, 1) m/s, where it feels as 4/3 kg.
+    assert point_energy(inverse, J @ [1.0, -2.0]) == pytest.approx(4 / 3)
+    assert point_energy(inverse, np.zeros((2, 3))).tolist() == [0.0, 0.0]
+
+
+def test_energy_at_a_point_is_the_least_that_moves_it_so(tmp_path):
+    rng = np.random.default_rng(3)
+    Js, root, qds = rng.normal(size=(50, 3, 5)), rng.normal(size=(50, 5, 5)), rng.normal(size=(50, 5))
+    Ms = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(5)
+    v = np.matvec(Js, qds)
+    found = point_energy(inverse_effective_mass(Js, Ms), v)
+    assert (found <= kinetic_energy(Ms, qds) * (1 + 1e-12)).all()
+    # Of all joint speeds that move it as fast along u, M⁻¹ Jᵀ u has the least energy.
+    u = v / np.linalg.norm(v, axis=-1, keepdims=True)
+    least = np.linalg.solve(Ms, np.swapaxes(Js, 1, 2) @ u[..., None])[..., 0]
+    least *= (np.linalg.norm(v, axis=-1) / np.vecdot(u, np.matvec(Js, least)))[:, None]
+    np.testing.assert_allclose(found, kinetic_energy(Ms, least), rtol=1e-9)
+    point, whole = judged(
+        tmp_path,
+        ['kind = "point_energy"\nat = "arm"\nlimit = 1.3', 'kind = "kinetic_energy"\nrobot = "arm"'],
+    )
+    assert point.value == pytest.approx(4 / 3)
+    assert (point.verdict, whole.value) == (Verdict.EXCEEDED, pytest.approx(1.5))
 
 
 def test_functions_take_batches():

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
+from live_story import wait_for
 from seerob.app.server.access import Role, Tokens
 from seerob.app.server.company import COLORS, FARTHEST, LONGEST_NAME, MOST_POINTS, SHAPES, place_mistake
 from seerob.app.server.desk import changed_entries
@@ -21,7 +23,9 @@ from seerob.app.server.hub import LARGEST
 from seerob.app.server.live import Live
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
+from seerob.core.plugin import kind_of
 from seerob.core.snapshot import Hello, Hold, Introduction, Presence, Presences, Snapshot, Visitors
+from seerob.session.reading import read
 from server.frames import MESHES, Remembered, Visitor, scene, snapshot
 
 TOKENS = Tokens.made()
@@ -95,6 +99,32 @@ def test_who_comes_later_sees_who_is_there_and_where(server):
             assert other.color in COLORS
             assert other.shape in SHAPES
         assert set(first.others(lambda every: len(every) == 1)) == {first.hello.visitor}
+
+
+def test_a_third_sees_the_visitors_of_both_places_and_each_of_them_is_told_of_the_other():
+    """The headsets that the cell of two places asks for, beside a page that somebody opens."""
+    cell = read(Path(__file__).parents[2] / "workstations/two_places")
+    headsets = [each for each in cell.emulators if kind_of("emulators", each) == "headset"]
+    feed = Player(Remembered([snapshot(k) for k in range(100)]))
+    with Server(scene=scene(), meshes=MESHES, feed=feed, port=0) as server, ExitStack() as until_the_end:
+        heard = []
+        for each in headsets:
+            visitor = until_the_end.enter_context(
+                replace(each, port=server.port, file="library:reach").ready().server
+            )
+            heard.append(visitor)
+        with Guest(server, name="C") as third:
+            known = third.others(lambda every: {"A", "B", "C"} <= {v.name for v in every.values()})
+            by_name = {v.name: v for v in known.values()}
+            assert (by_name["A"].device, by_name["A"].scale) == ("ar", 1.0)
+            assert (by_name["B"].device, by_name["B"].scale) == ("vr", 0.1)
+            ids = {by_name[name].id for name in "AB"}
+            seen = third.sees(lambda every: ids <= every.keys())
+            # Heads are above the floor of each room, as large as each is: 1.7 m, and a tenth of that.
+            tall = {name: head(seen[by_name[name].id])[2] - by_name[name].position[2] for name in "AB"}
+            assert 1.4 < tall["A"] < 1.9
+            assert tall["B"] == pytest.approx(0.1 * tall["A"], rel=0.1)
+            wait_for(lambda: all({"A", "B", "C"} <= set(visitor.others) for visitor in heard))
 
 
 def test_numbers_are_given_once_and_presence_goes_with_whoever_leaves(server):

@@ -41,7 +41,7 @@ SHIPPED = {
 }
 """What each shows; the first is run when none is named."""
 PICTURE = "picture.png"
-"""File in the folder of each cell of the paper, which shows it (`scripts/make-cell-pictures`)."""
+"""File in the folder of each cell of the paper, which shows it (`scripts/make-cells`)."""
 ADDRESSES = ("host", "bind", "url", "port")
 
 

@@ -102,10 +102,11 @@ def in_world(poses: Array, introduction: Introduction) -> Array:
 
 
 class _Received(Struct):
-    """Kind and number of a message of the server: snapshots are acknowledged."""
+    """What matters of a message of the server: snapshots are acknowledged, others are known."""
 
     type: str = ""
     seq: int | None = None
+    visitors: tuple[dict[str, object], ...] = ()
 
 
 class Visitor(LoopEmulator):
@@ -143,6 +144,8 @@ class Visitor(LoopEmulator):
         self.human, self.rate, self.to = human, rate, (host, port)
         self.sent = 0
         """Messages so far."""
+        self.others: tuple[str, ...] = ()
+        """Names of all visitors, as the page told last."""
         self._seen = seen(person, body=body)
         self._grabs = sorted(grabs, key=lambda grab: grab[0])
 
@@ -215,6 +218,8 @@ class Visitor(LoopEmulator):
         unanswered = 0
         async for message in connection:
             received = decoder.decode(message)  # type: ignore[arg-type]
+            if received.type == "visitors":
+                self.others = tuple(str(visitor.get("name", "")) for visitor in received.visitors)
             if received.type == "snapshot" and received.seq is not None:
                 runs.set()
                 unanswered += 1

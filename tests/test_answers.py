@@ -285,6 +285,7 @@ def test_many_instants_contradict_themselves_where_one_does(n, at_most):
         interval, nothing = (ends if turn % 2 else None), (rng.random(n) < 0.3 if turn % 3 else None)
         verdict = rng.choice(codes, n).astype(np.uint8)
         found = Answers(value, limit, verdict, interval, nothing).contradictions(at_most=at_most)
+        found = [""] * n if found is None else found
         for k in range(n):
             result = Result(
                 name="x",

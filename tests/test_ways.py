@@ -130,6 +130,10 @@ def test_ways_share_their_ends():
     assert Ways(t, q, q, np.array([0, 2, 4])).knots_inside().tolist() == [1, 3]
     with pytest.raises(ValueError, match="without a step"):
         ways[::2]
+    on, when = np.array([2, 0, 1, 0, 2]), np.array([4.3, 1.0, 3.7, 2.6, 6.0])
+    each = [ways[way].at(instant) for way, instant in zip(on.tolist(), when.tolist(), strict=True)]
+    for found, alone in zip(ways.at(on, when), zip(*each, strict=True), strict=True):
+        assert found.tolist() == np.array(alone).tolist()
 
 
 def test_points_are_as_fast_as_all_joints_before_them_with_the_segments_between(model):

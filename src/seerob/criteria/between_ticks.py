@@ -220,6 +220,8 @@ class BetweenTicks:
         """Which of MuJoCo's bodies moved each body at the last tick."""
         self._speeds: Array | None = None
         self._shadow: State | None = None
+        self._shadow_of: State | None = None
+        """Of whom that is the twin between two ticks."""
         self._whole: Span | None = None
         """Of the way from tick to tick, which all criteria ask for."""
         self._simple = AllFalls(watch.falls for watch in watches if watch is not None)
@@ -260,7 +262,6 @@ class BetweenTicks:
         speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
         if path is None or self._ids is None:
             path, self._before, self._followed, self._past = None, [None] * len(found), {}, []
-            self._shadow = None  # it hears what the twin of this run does
         self._way, self._asking, self._whole, self._falls = path, asking, None, None
         if path is not None:
             self._begins, self._ends = float(path.t[0]), float(path.t[-1])
@@ -698,13 +699,13 @@ class BetweenTicks:
 
     def placed(self, path: Path, t: float, state: State) -> State:
         """The twin at an instant between two ticks."""
-        if self._shadow is None:
-            data = mujoco.MjData(state.model.mj)
-            self._shadow = State(state.model, data, state.hearings, state.signals)
-            self._shadow.attachments = state.attachments
-            self._shadow.between = True
         shadow = self._shadow
-        shadow.columns, shadow.foresee, shadow.knots = state.columns, state.foresee, state.knots
+        if shadow is None or self._shadow_of is not state:  # it hears what the twin of this run does
+            data = mujoco.MjData(state.model.mj)
+            shadow = self._shadow = State(state.model, data, state.hearings, state.signals)
+            shadow.between, self._shadow_of = True, state
+        shadow.attachments, shadow.columns = state.attachments, state.columns
+        shadow.foresee, shadow.knots = state.foresee, state.knots
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.captured_between = path.captured_at(t)
         shadow.refresh(t)

@@ -23,7 +23,7 @@ from seerob.core.markers import Marker, drawn
 from seerob.core.snapshot import Result, Row
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, Verdict, judge_interval, keeps, worst
-from seerob.kernels.verdicts import Codes, judged, judged_many
+from seerob.kernels.verdicts import Codes, answered, judged, judged_many
 from seerob.recording.answers import Answers, Flags
 from seerob.recording.series import CODES
 
@@ -293,12 +293,13 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
 
     if figure.parts is not None:
         return _answers_of_parts(figure.parts, at_most=at_most)
+    if figure.interval is None:
+        return _answers_of_values(figure, n, at_most=at_most)
     limit = None if figure.limit is None else each(figure.limit)
     found = Answers.against(each(figure.value), limit, at_most=at_most, exact=figure.exact)
-    if figure.interval is not None:
-        low, high = map(each, figure.interval)
-        if not ((low == high) & (low == found.value)).all():  # also where one is not a number
-            found = found.between(low, high, at_most=at_most)
+    low, high = map(each, figure.interval)
+    if not ((low == high) & (low == found.value)).all():  # also where one is not a number
+        found = found.between(low, high, at_most=at_most)
     unknown, silent = np.isnan(found.value), np.zeros(n, bool)
     verdict = np.where(unknown & (found.verdict != CODES[_EXCEEDED]), CODES[_UNDECIDED], found.verdict)
     if limit is None and found.interval is not None:  # it informs of where the value lies
@@ -318,6 +319,22 @@ def answers_of(figure: Figure, n: int, *, at_most: bool) -> Answers:
     open_ = figure.open if limit is None else figure.open | np.isinf(limit)
     found = found.finite().open(open_) if np.any(open_) else found.finite()
     return found.without_verdict(np.broadcast_to(figure.nothing, (n,))) if np.any(figure.nothing) else found
+
+
+def _answers_of_values(figure: Figure, n: int, *, at_most: bool) -> Answers:
+    """Judge figures of N instants of which no interval is known."""
+    value, limit = (np.full(n, np.nan if given is None else given) for given in (figure.value, figure.limit))
+    open_, nothing = (np.full(n, given, np.bool_) for given in (figure.open, figure.nothing))
+    verdicts, shown, idle = np.empty(n, np.uint8), np.empty(n), np.empty(n, np.bool_)
+    limited = figure.limit is not None
+    answered(
+        value.astype(float, copy=False), limit.astype(float, copy=False), limited, ROUNDING, at_most,
+        figure.exact, open_, nothing, verdicts, shown, idle,
+    )  # fmt: skip
+    for given, verdict in ((figure.exceeded, _EXCEEDED), (figure.undecided, _UNDECIDED)):
+        if limited and np.any(given):
+            verdicts[given & ~nothing] = CODES[verdict]
+    return Answers(shown, limit, verdicts, None, idle, figure.exact)
 
 
 def _answers_of_parts(parts: Parts, *, at_most: bool) -> Answers:

@@ -79,14 +79,14 @@ def mobility(J: Array, M: Array, found: Array) -> bool:
     r"""Write :math:`J M^{-1} J^T` of many points, by :math:`M = U D U^T` from the last joint inward.
 
     Args:
-        J: Shape (N, r, n).
+        J: Shape (N, r, n) or with more rows, of which the first r count.
         M: Symmetric, shape (N, n, n).
         found: Shape (N, r, r).
 
     Returns:
         Whether every M is positive definite; where not, nothing of use is written.
     """
-    r, n = J.shape[1:]
+    r, n = found.shape[1], J.shape[2]
     U = np.zeros((n, n))
     D = np.empty(n)
     W = np.empty((r, n))

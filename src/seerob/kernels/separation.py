@@ -45,6 +45,35 @@ def separation(
         found[i] = least
 
 
+@njit(
+    f"void(f8, {_ROW}, {_ROW}, f8, {_ROW}, {_ROW}, f8, {_ROW})", cache=True, nogil=True, error_model="numpy"
+)
+def rise(
+    S_h: float,
+    S_r: Array,
+    S_s: Array,
+    S_h_then: float,
+    S_r_then: Array,
+    S_s_then: Array,
+    more: float,
+    found: Array,
+) -> None:
+    """Find by how much S_p of each part is longer after another course; writes the last argument.
+
+    Args:
+        S_h: Way of the person [m].
+        S_r: Ways while the robot reacts [m], shape (n,).
+        S_s: Ways while it brakes [m], shape (n,).
+        S_h_then: After the other course, with the next two.
+        S_r_then: Likewise.
+        S_s_then: Likewise.
+        more: What is added [m].
+        found: [m], shape (n,).
+    """
+    for i in range(len(S_r)):
+        found[i] = ((S_h_then + S_r_then[i] + S_s_then[i]) - (S_h + S_r[i] + S_s[i])) + more
+
+
 @njit(f"void({_ROW}, f8, f8, f8, f8, f8, {_ROW})", cache=True, nogil=True, error_model="numpy")
 def approach_speeds(
     distance: Array, v_h: float, seen: float, reaching: float, walking: float, arm: float, found: Array

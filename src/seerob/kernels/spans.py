@@ -177,6 +177,39 @@ def joints_at(t: Array, q: Array, v: Array, when: float, position: Array, veloci
         velocity[i] = (c1 + x * (2 * c2 + x * 3 * c3)) / T
 
 
+@njit(
+    f"void({_ROW}, {_ROWS}, {_ROWS}, i8[::1], i8[::1], {_ROW}, {_ROWS}, {_ROWS})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def joints_on_ways(
+    t: Array,
+    q: Array,
+    v: Array,
+    first: Indices,
+    ways: Indices,
+    when: Array,
+    positions: Array,
+    velocities: Array,
+) -> None:
+    """Where joints are at m instants, each on one of many ways (`joints_at`); writes the last two arguments.
+
+    Args:
+        t: Knots of all ways, increasing [s], shape (k,).
+        q: Positions there [rad or m], shape (k, n).
+        v: Velocities there, shape (k, n).
+        first: At which knot each way begins and the one before ends, shape (w + 1,).
+        ways: On which each instant is, shape (m,).
+        when: [s], shape (m,).
+        positions: Shape (m, n).
+        velocities: Shape (m, n).
+    """
+    for i in range(len(when)):
+        begin, end = first[ways[i]], first[ways[i] + 1] + 1
+        joints_at(t[begin:end], q[begin:end], v[begin:end], when[i], positions[i], velocities[i])
+
+
 @njit(f"void({_ROW}, {_ROW}, f8, {', '.join([_ROW] * 5)})", cache=True, nogil=True, error_model="numpy")
 def slowest_and_fastest(
     before: Array,

@@ -14,6 +14,7 @@ Codes = NDArray[np.uint8]
 
 WITHIN, EXCEEDED, UNDECIDED = 0, 1, 2
 """Verdicts, as in `seerob.recording.series.CODES`."""
+NO_VERDICT = 255
 
 _ROWS = "f8[:,::1]"
 
@@ -87,3 +88,98 @@ def judged_many(
     """Judge parts at N instants by `judged`: shapes (N, n), ``open_`` (N,); writes the last two arguments."""
     for k in range(len(value)):
         governs[k] = judged(value[k], low[k], high[k], limit[k], rounding, at_most, open_[k], verdicts[k])
+
+
+@njit(
+    "void(f8[::1], f8[::1], b1, f8, b1, b1, b1[:], b1[:], u1[::1], f8[::1], b1[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def answered(
+    value: Array,
+    limit: Array,
+    limited: bool,
+    rounding: float,
+    at_most: bool,
+    exact: bool,
+    open_: NDArray[np.bool_],
+    nothing: NDArray[np.bool_],
+    verdicts: Codes,
+    shown: Array,
+    idle: NDArray[np.bool_],
+) -> None:
+    """Judge one figure of N instants, of which no interval is known; writes the last three arguments.
+
+    Args:
+        value: Shape (N,); NaN where there is none.
+        limit: Shape (N,).
+        limited: Whether there is one.
+        rounding: As of `judged`.
+        at_most: Whether it bounds from above.
+        exact: Whether values are whole numbers, which keep the limit that they are on.
+        open_: Where more may be than what is known, shape (N,): nothing is within there.
+        nothing: Where there is nothing to judge, shape (N,).
+        verdicts: Shape (N,).
+        shown: The values, NaN where they are infinite, shape (N,).
+        idle: Where there is no verdict because there is nothing to judge, shape (N,).
+    """
+    for k in range(len(value)):
+        v, last = value[k], limit[k]
+        endless = math.isinf(last)
+        if not (endless or exact):
+            room = rounding * max(1.0, abs(last))
+            last = last - room if at_most else last + room
+        if math.isnan(v):
+            verdicts[k] = UNDECIDED
+        elif not limited:
+            verdicts[k] = NO_VERDICT
+        elif not (v <= last if at_most else v >= last):
+            verdicts[k] = EXCEEDED
+        else:
+            verdicts[k] = UNDECIDED if open_[k] or endless else WITHIN
+        shown[k] = np.nan if math.isinf(v) else v
+        idle[k] = nothing[k] or (math.isinf(v) and not limited)
+        if nothing[k]:
+            verdicts[k] = NO_VERDICT
+
+
+@njit("b1(f8[:], f8[:], f8[:], f8[:], u1[:], b1[:], f8, b1, b1)", cache=True, nogil=True, error_model="numpy")
+def contradicted(
+    value: Array,
+    limit: Array,
+    low: Array,
+    high: Array,
+    verdicts: Codes,
+    nothing: NDArray[np.bool_],
+    rounding: float,
+    at_most: bool,
+    exact: bool,
+) -> bool:
+    """Whether any of N instants cannot be what it says, or says nothing.
+
+    Args:
+        value: Shape (N,), as all arrays.
+        limit: NaN where there is none.
+        low: Least that each may be.
+        high: Largest, likewise.
+        verdicts: What is said.
+        nothing: Where there is nothing to judge.
+        rounding: As of `judged`.
+        at_most: As of `answered`.
+        exact: As of `answered`.
+    """
+    for k in range(len(value)):
+        v, last = value[k], limit[k]
+        if verdicts[k] == NO_VERDICT:
+            if not nothing[k] and (math.isnan(v) or not math.isnan(last)):
+                return True
+        elif verdicts[k] == WITHIN:
+            if nothing[k] or not math.isfinite(v) or math.isinf(last):
+                return True
+            room = 0.0 if exact else rounding * max(1.0, abs(last))
+            last = last - room if at_most else last + room
+            for end in (v, low[k], high[k]):
+                if not (end <= last if at_most else end >= last):
+                    return True
+    return False

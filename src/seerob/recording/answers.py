@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from seerob.core.snapshot import Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING
+from seerob.kernels.verdicts import contradicted
 from seerob.recording.series import CODES, NO_VERDICT
 
 Codes = NDArray[np.uint8]
@@ -72,21 +73,24 @@ class Answers:
         verdict = np.where((self.verdict == WITHIN) & where, UNDECIDED, self.verdict)
         return replace(self, verdict=verdict.astype(np.uint8))
 
-    def contradictions(self, *, at_most: bool) -> NDArray[np.object_]:
-        """Why each instant cannot be what it says, or says nothing, shape (N,); empty where it can."""
+    def contradictions(self, *, at_most: bool) -> NDArray[np.object_] | None:
+        """Why each instant cannot be what it says, or says nothing, shape (N,); empty where it can.
+
+        None where all of them can.
+        """
         nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
-        within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
-        wordless = (silent & (np.isnan(self.value) | ~np.isnan(self.limit))).any()
-        if not (wordless or within.any()):
-            return np.full(len(self.value), "", object)
         low, high = (self.value, self.value) if self.interval is None else self.interval
+        if not contradicted(
+            *(np.array(each, float) for each in (self.value, self.limit, low, high)),
+            np.array(self.verdict, np.uint8), np.array(nothing, np.bool_), ROUNDING, at_most, self.exact,
+        ):  # fmt: skip
+            return None
+        within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
         ends = np.array([self.value, low, high], float)
         kept = keep_many(ends, self.limit, at_most=at_most, exact=self.exact).all(axis=0) & np.isfinite(
             self.value
         )
         kept &= ~np.isinf(self.limit)
-        if not (wordless or (within & (nothing | ~kept)).any()):
-            return np.full(len(self.value), "", object)
         reason = np.where(
             np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
         )

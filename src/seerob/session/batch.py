@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 from msgspec.structs import replace as changed
+from numpy.typing import NDArray
 
 from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
@@ -34,7 +35,7 @@ from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, INFORMS, ONE_INSTANT, STILL
 from seerob.session.recorded_motion import hear, hearings_of
 from seerob.session.run import Bound, settled
-from seerob.twin.spans import Ways
+from seerob.twin.spans import Path, Ways
 from seerob.twin.state import State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
 from seerob.twin.validity.hearing import SLACK, STANDS
@@ -51,6 +52,8 @@ SHARES = 8
 """Parts that a motion has between the two, so that threads end together."""
 ASKED_AGAIN = 8
 """Instants of which what one's own says of many is compared with what it says of one, at least."""
+_KNOWN = np.isin(np.arange(256), [*CODES.values()])
+"""By number, whether it is the code of a verdict."""
 TOGETHER = 32
 """Ways from one instant to the next that are bounded together, at most."""
 
@@ -202,20 +205,22 @@ def judged(
     asked, notes = _able(model, bound, (*findings, *motion.implausible))
     length = min(max(STRETCH, -(-n // SHARES)), LONGEST)
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, length), n]) if begin < end]
-    questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
     left: dict[str, list[Flags]] = {name: [] for name in asked}
-    speeds: list[Array] = []
+    speeds: list[tuple[int, Array]] = []
     alone: dict[str, str] = {}
     if asked and parts:
         # Learns what distances are asked, so that every stretch asks for all of them together.
-        _stretch(Bench(model, questions), asked, parts[0].part(0, 1))
+        bench = Bench(model, Questions(model))
+        _stretch(bench, asked, parts[0].part(0, 1))
         with ThreadPoolExecutor(max(1, threads), "seerob batch") as pool:
             shares = [parts[k::threads] for k in range(max(1, threads))]
-            made = list(pool.map(lambda share: _share(model, questions, asked, share), shares))
+            benches = [bench, *(bench.another() for _ in shares[1:])]
+            made = list(pool.map(lambda at, share: _share(at, asked, share), benches, shares))
         for k in range(len(parts)):
             stretch, fast, rested = made[k % len(shares)][k // len(shares)]
-            speeds.append(fast)
+            if fast is not None:
+                speeds.append((k * length, fast))
             alone |= rested
             for name, (answers, reasons, open_) in stretch.items():
                 found[name].append((answers, reasons))
@@ -233,7 +238,10 @@ def judged(
             walked[name] = _confirmed(model, one, motion, findings, walked[name])
     again = {name: np.concatenate([np.zeros(0, bool), *left[name]]) for name in asked}
     if motion.ways and asked:
-        _mark_uncleared(model, bound, again, motion, walked, np.concatenate(speeds))
+        every = np.full((n if speeds else 0, len(model.bodies)), np.nan)
+        for begin, fast in speeds:
+            every[begin : begin + len(fast)] = fast
+        _mark_uncleared(model, bound, again, motion, walked, every)
     for one in bound:
         name = one.criterion.name
         if name in asked and (spans := again[name]).any():
@@ -291,7 +299,7 @@ def _mark_uncleared(
         again: By name, instants that are asked again anyway; written.
         motion: Where everybody is.
         said: What was found of each instant.
-        speeds: Of all bodies [m/s], shape (N, n).
+        speeds: Of all bodies [m/s], shape (N, n); NaN, or none at all, where nothing is within.
     """
     ways = motion.ways
     assert ways is not None
@@ -403,26 +411,28 @@ Part = dict[str, tuple[Answers, Reasons, Flags]]
 
 
 def _share(
-    model: Model,
-    questions: Questions,
-    asked: dict[str, _Able],
-    parts: Sequence[Motion],
-) -> list[tuple[Part, Array, dict[str, str]]]:
+    bench: Bench, asked: dict[str, _Able], parts: Sequence[Motion]
+) -> list[tuple[Part, Array | None, dict[str, str]]]:
     """The work of one thread."""
-    bench = Bench(model, questions)
     return [_stretch(bench, asked, part) for part in parts]
 
 
-def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Part, Array, dict[str, str]]:
-    """What criteria say, speeds of all bodies, and why some are to be asked instant by instant."""
+def _stretch(
+    bench: Bench, asked: dict[str, _Able], motion: Motion
+) -> tuple[Part, Array | None, dict[str, str]]:
+    """What criteria say, speeds of all bodies, and why some are to be asked instant by instant.
+
+    Speeds [m/s], shape (N, n), are None where nothing can be lost on the way from one instant to the next.
+    """
     states = bench.place(motion)
     found: Part = {}
     alone: dict[str, str] = {}
+    doubted = {who for who, every in motion.invalid_reasons.items() if every.any()}
     for name, one in asked.items():
         states.asked.clear()
         states.speeds_asked.clear()
         states.alone = np.zeros(len(states), bool)
-        answers, reasons = _said(one, states)
+        answers, reasons, said = _said(one, states)
         if one.question.turns is not None:
             states.alone |= _passed_over(one.question.turns, motion)
         with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
@@ -437,10 +447,11 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
         asked_of = states.asked | {above for who in states.asked for above in bench.model.carriers_of(who)}
         if some := sorted(motion.seen.keys() & asked_of):
             alone[name] = f"more is known of {some[0]} than where it is"
-        for who in sorted(states.asked):
-            if motion.invalid_reasons[who].any():
-                reasons = np.where(motion.invalid_reasons[who] != "", motion.invalid_reasons[who], reasons)
-        answers = _undecided_where(answers, one.criterion, reasons)
+        for who in sorted(states.asked & doubted):
+            reasons = np.where(motion.invalid_reasons[who] != "", motion.invalid_reasons[who], reasons)
+            said = True
+        if said:
+            answers = _undecided_where(answers, one.criterion, reasons)
         for reason in (*one.question.undecided_reasons(states), one.question.held_for(states.asked)):
             there = np.asarray(reason, object) != ""
             if there.any():
@@ -451,7 +462,7 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Par
     kept = any((answers.verdict == WITHIN).any() for answers, _, _ in found.values())
     if motion.ways is not None and kept:
         return found, states.largest_speeds(), alone
-    return found, np.full((len(states), len(bench.ids)), np.nan), alone
+    return found, None, alone
 
 
 def _passed_over(turns: Callable[[float, float], Sequence[float]], motion: Motion) -> Flags:
@@ -462,8 +473,11 @@ def _passed_over(turns: Callable[[float, float], Sequence[float]], motion: Motio
     return np.array([False, *found][-len(motion.t) :], bool)
 
 
-def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
-    """What a criterion says, as far as it may be green, and why it is not: by the rules of `Judge`."""
+def _said(one: _Able, states: States) -> tuple[Answers, Reasons, bool]:
+    """What a criterion says, as far as it may be green, why it is not, and whether it is not anywhere.
+
+    By the rules of `Judge`.
+    """
     criterion, n = one.criterion, len(states)
     states.require(*one.needs)
     reasons = np.full(n, "", object)
@@ -481,13 +495,13 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
         why = f"{criterion.name} failed: {worded(error)}"
     if why:
         reasons[:] = why
-        return _nothing(criterion, n), reasons
+        return _nothing(criterion, n), reasons, True
     found = answers.contradictions(at_most=criterion.at_most)
-    if not found.any():
-        return replace(answers, verdict=answers.verdict.astype(np.uint8)), reasons
+    if found is None or not found.any():
+        return replace(answers, verdict=answers.verdict.astype(np.uint8)), reasons, False
     reasons = np.where(found == "", reasons, f"{criterion.name}: " + found)
     verdict = np.where(found == "", answers.verdict, UNDECIDED).astype(np.uint8)
-    return replace(answers, verdict=verdict), reasons
+    return replace(answers, verdict=verdict), reasons, True
 
 
 def _misshapen(answers: Answers, n: int) -> str:
@@ -498,15 +512,15 @@ def _misshapen(answers: Answers, n: int) -> str:
     shapes = {np.shape(column) for column in (answers.value, answers.limit, answers.verdict, *ends)}
     if shapes != {(n,)}:
         return f"it returns shapes {sorted(shapes)} of {n} instants, not ({n},) each"
-    if unknown := set(answers.verdict.tolist()) - set(CODES.values()):
+    codes = answers.verdict
+    quick = codes.dtype == np.uint8 and _KNOWN[codes].all()
+    if not quick and (unknown := set(codes.tolist()) - set(CODES.values())):
         return f"its verdicts {sorted(unknown)} are none of seerob.recording.series.CODES"
     return ""
 
 
 def _undecided_where(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
     """Make answers undecided, without a figure, at the instants that are in doubt."""
-    if not reasons.any():
-        return answers
     invalid = reasons != ""
     nothing = _nothing(criterion, len(reasons))
     return Answers(
@@ -607,13 +621,21 @@ def _foresee(
     q, qd = motion.q[rows][:, columns.own_q], motion.v[rows][:, columns.own_v]
     if motion.ways is not None:
         between = (rows > 0) & (motion.t[rows - 1] + SLACK < t) & (t < motion.t[rows] - SLACK)
-        for i in np.flatnonzero(between).tolist():
-            every = motion.ways[rows[i] - 1].at(float(t[i]))
-            q[i], qd[i] = every[0][columns.own_q], every[1][columns.own_v]
+        if between.any():
+            q_there, v_there = _on_ways(motion.ways, rows[between] - 1, t[between])
+            q[between], qd[between] = q_there[:, columns.own_q], v_there[:, columns.own_v]
     why = next(filter(None, motion.invalid_reasons[name][rows].tolist()), "")
     if beyond and np.abs(motion.v[-1][columns.own_v]).max(initial=0.0) > STANDS:
         why = why or "the motion ends, and what it does after is not known"
     return q, qd, why
+
+
+def _on_ways(ways: Sequence[Path], k: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    """``qpos`` (m, nq) and ``qvel`` (m, nv) at instants [s], shape (m,), each on one way, shape (m,)."""
+    if isinstance(ways, Ways):
+        return ways.at(k, t)
+    every = [ways[way].at(instant) for way, instant in zip(k.tolist(), t.tolist(), strict=True)]
+    return np.array([q for q, _ in every]), np.array([v for _, v in every])
 
 
 def _knots(motion: Motion, name: str, begin: float, end: float) -> Sequence[float] | Array:

@@ -30,6 +30,7 @@ from seerob.kernels.spans import (
     greatest,
     joint_bounds,
     joints_at,
+    joints_on_ways,
     point_bounds,
     slowest_and_fastest,
 )
@@ -199,6 +200,12 @@ class Ways(Sequence[Path]):
             return Ways(self.t, self.q, self.v, self.first[begin : max(begin, end) + 1])
         k = range(len(self))[k]
         return self.joined(k, k + 1)
+
+    def at(self, k: Indices, t: Array) -> tuple[Array, Array]:
+        """``qpos`` (m, nq) and ``qvel`` (m, nv) at instants [s], shape (m,), each on one path, shape (m,)."""
+        q, v = np.empty((len(t), self.q.shape[1])), np.empty((len(t), self.v.shape[1]))
+        joints_on_ways(self.t, self.q, self.v, self.first, k, t, q, v)
+        return q, v
 
     def knots_inside(self) -> Array:
         """Knots of all paths that are none of the instants [s], shape (m,)."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, cast
@@ -142,10 +143,30 @@ class Bench:
         self.data = mujoco.MjData(mj)
         self.ids = np.array([body.mj for body in model.bodies], np.int64)
         self.roots = mj.body_rootid[self.ids].astype(np.int64)
-        self.corners = by_coordinate([body.corners for body in model.bodies])
-        self.reach = np.array([body.radius + body.deviation for body in model.bodies])
-        self.columns = {m.name: Columns.of(m, mj) for m in model.mechanisms.values()}
+        self._columns: dict[str, Columns] = {}
         self._trees: dict[int, Tree | None] = {}
+
+    @cached_property
+    def corners(self) -> tuple[Array, NDArray[np.int64]]:
+        """Corners of all bodies, and where those of each start (`seerob.kernels.speed.by_coordinate`)."""
+        return by_coordinate([body.corners for body in self.model.bodies])
+
+    @cached_property
+    def reach(self) -> Array:
+        """How far each body lies outside these [m], shape (n,)."""
+        return np.array([body.radius + body.deviation for body in self.model.bodies])
+
+    def columns(self, mechanism: Mechanism) -> Columns:
+        """Where the joints of a mechanism are."""
+        if mechanism.name not in self._columns:
+            self._columns[mechanism.name] = Columns.of(mechanism, self.mj)
+        return self._columns[mechanism.name]
+
+    def another(self) -> Bench:
+        """Return a place of its own for another thread, which shares all that is the same."""
+        found = copy(self)
+        found.data = mujoco.MjData(self.mj)
+        return found
 
     def tree(self, body: int) -> Tree | None:
         """The tree of one of MuJoCo's bodies; None where only MuJoCo follows it."""
@@ -179,7 +200,7 @@ class Bench:
 
     def masses(self, motion: Motion, mechanism: Mechanism) -> Array:
         """Joint-space mass matrices as MuJoCo has them, shape (N, n, n)."""
-        mj, data, columns = self.mj, self.data, self.columns[mechanism.name]
+        mj, data, columns = self.mj, self.data, self.columns(mechanism)
         M, found = data.M, np.empty((len(motion.t), len(mechanism.own), len(mechanism.own)))
         for k in range(len(found)):
             data.qpos[:] = motion.q[k]
@@ -315,7 +336,7 @@ class States:
         """Joint velocities [rad/s or m/s], shape (N, n)."""
         self.require(mechanism.name)
         self.speeds_asked.add(mechanism.name)
-        return self._motion.v[:, self._bench.columns[mechanism.name].own_v]
+        return self._motion.v[:, self._bench.columns(mechanism).own_v]
 
     def mass_matrix(self, mechanism: Mechanism) -> Array:
         """Joint-space mass matrices [kg·m², kg·m or kg], shape (N, n, n).
@@ -328,7 +349,7 @@ class States:
             raise Undecided(f"{mechanism.name}: {why}")
         key = "M", mechanism.name
         if key not in self._cache:
-            columns = self._bench.columns[mechanism.name]
+            columns = self._bench.columns(mechanism)
             tree = self._followed(int(columns.bodies[0])) if len(columns.bodies) else None
             if tree is None:
                 self._cache[key] = self._bench.masses(self._motion, mechanism)
@@ -345,7 +366,7 @@ class States:
             Undecided: A mass that nobody gave.
         """
         self._weigh(mechanism)
-        columns, moved = self._bench.columns[mechanism.name], self._moved
+        columns, moved = self._bench.columns(mechanism), self._moved
         found = np.empty((len(self), len(columns.joints)))
         held_many(
             moved["subtree_com"], moved["xanchor"], moved["xaxis"], columns.bodies, columns.joints,
@@ -368,7 +389,7 @@ class States:
         self.require(mechanism.name)
         key = id(frame), mechanism.name, None if offset is None else offset.tobytes()
         if key not in self._cache:
-            bench, columns = self._bench, self._bench.columns[mechanism.name]
+            bench, columns = self._bench, self._bench.columns(mechanism)
             at = frame.body_from_frame[:3, 3]
             if offset is not None:
                 at = at + frame.body_from_frame[:3, :3] @ offset
@@ -410,7 +431,7 @@ class States:
         self, frame: Frame, mechanism: Mechanism, offset: Array | None = None
     ) -> Array:
         """Inverses of the effective mass matrix of a point [1/kg], shape (N, 3, 3)."""
-        J, M = self.jacobian(frame, mechanism, offset)[:, :3], self.mass_matrix(mechanism)
+        J, M = self.jacobian(frame, mechanism, offset), self.mass_matrix(mechanism)
         found = np.empty((len(self), 3, 3))
         if not mobility(np.ascontiguousarray(J), np.ascontiguousarray(M), found):
             raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
@@ -440,7 +461,7 @@ class States:
                 moved["cdof"][k], moved["subtree_com"][k], bench.roots[rows], moves,
                 np.ascontiguousarray(points[k]), np.ascontiguousarray(directions[k]), every[k],
             )  # fmt: skip
-        return np.asarray(bench.columns[mechanism.name].of_rows(every))
+        return np.asarray(bench.columns(mechanism).of_rows(every))
 
     def fastest_points(self, bodies: Sequence[int]) -> tuple[Array, Array, Array]:
         """Bounds on the speeds of any points of bodies, corners and their velocities; see `State`.

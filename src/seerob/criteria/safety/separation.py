@@ -39,10 +39,10 @@ from seerob.criteria.stopping.required import (
     tolerances,
 )
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
-from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
+from seerob.criteria.stopping.terms import At, Course, way_of_person
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
 from seerob.distance.least import Closests
-from seerob.kernels.separation import approach_speeds, separation, separations
+from seerob.kernels.separation import approach_speeds, rise, separation, separations
 from seerob.kernels.spans import greatest
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
@@ -701,10 +701,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
             seen: Speed of people with the former [m/s].
             fastest: With the latter [m/s].
         """
-        T_r, v_h = self.stop.reaction, max(self.human_speed or REACHING, fastest)
-        longer = separation_distance(high, v_h, T_r, 0.0) - separation_distance(low, v_h, T_r, 0.0)
+        v_h, found = max(self.human_speed or REACHING, fastest), np.empty(len(high.S_r))
         faster = max(fastest - max(self.human_speed or WALKING, seen), 0.0)
-        return np.asarray(longer + faster * (T_r + high.T_s))
+        before, then = self._time(low), self._time(high)
+        rise(v_h * before, low.S_r, low.S_s, v_h * then, high.S_r, high.S_s, faster * then, found)
+        return found
 
     def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array, seen: float) -> Array:
         return self._distance(by_speed(v), K, seen)

@@ -56,7 +56,8 @@ class MassTolerances:
         found: list[_Off] = []
         for table in station.robots:
             if table.name == robot.name:
-                links = [i for i, name in names.items() if name in robot.links]
+                own = robot.links
+                links = [i for i, name in names.items() if name in own]
                 found += _offs(table.name, links, mass=table.mass_tolerance, com=table.com_tolerance)
                 if share := table.rotor_tolerance:
                     tolerance = Tolerance(f"rotor_tolerance of {table.name}", 100 * share, "%")

@@ -82,6 +82,20 @@ def kinds(package: str) -> tuple[str, ...]:
 
 def offered(package: str) -> dict[str, EntryPoint]:
     """Kinds that installed packages offer, by name; nothing of them is imported."""
+    return dict(_offered(package, tuple((path, _changed(path)) for path in sys.path)))
+
+
+def _changed(path: str) -> int:
+    """When something was last installed in a folder, or taken away [ns]; -1 where there is none."""
+    try:
+        return os.stat(path or ".").st_mtime_ns
+    except OSError:
+        return -1
+
+
+@cache
+def _offered(package: str, _paths: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
+    """`offered`, of folders that are as they were: every package that is installed has a file to be read."""
     found = entry_points(group=f"seerob.{package}")
     return {point.name: point for point in sorted(found) if "." in point.name}
 

@@ -50,13 +50,13 @@ SIGHT = 50.0
 def implausible(model: Model) -> tuple[Finding, ...]:
     """Everything that is implausible of a workstation, and what its file confirms of that."""
     station = model.workstation
-    every = [*listed(entries_of(station), station.engine), *_variables(model), *_following(model)]
-    return (*findings(every, station.confirmed), *_without_floor(model))
-
-
-def _without_floor(model: Model) -> Iterator[Finding]:
-    """Of whom nobody looks at what they stand on, where that is below z = 0 and nothing stands there."""
     place = _Home(model)
+    every = [*listed(entries_of(station), station.engine), *_variables(model), *_following(model, place)]
+    return (*findings(every, station.confirmed), *_without_floor(model, place))
+
+
+def _without_floor(model: Model, place: _Home) -> Iterator[Finding]:
+    """Of whom nobody looks at what they stand on, where that is below z = 0 and nothing stands there."""
     if _drawn(model, place):
         return
     for human in model.workstation.humans:
@@ -76,14 +76,13 @@ def _variables(model: Model) -> Iterator[Quantity]:
         yield from quantities(variable, key=f"variables.{name}", kind="variables", about=about)
 
 
-def _following(model: Model) -> Iterator[Quantity]:
+def _following(model: Model, place: _Home) -> Iterator[Quantity]:
     yield from _sizes(model)
     yield from _links(model)
     yield from _payloads(model)
     yield from _published(model)
     yield from _left_out(model)
     yield from _people(model)
-    place = _Home(model)
     yield from _feet(model, place, place.still)
     yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
     yield from _parts(model, place)

@@ -330,7 +330,7 @@ def test_who_is_seen_for_the_first_time_during_a_run_is_put_there():
 
 
 def test_who_turns_back_while_nothing_is_heard_is_no_farther_from_the_twin_than_is_said():
-    """The twin of a live person goes on at its speed until the time-out; the person need not."""
+    """The twin of a live person goes on at its speed for a while, and then stays; the person need not."""
     station = Station(workstation(source(captured(frames_of(*walking(1.2))))))
     said = [sample for _, opened in station.sources for sample in opened.samples]
     turns = next(k for k, sample in enumerate(said) if sample.t > 0.6)
@@ -358,3 +358,9 @@ def test_who_turns_back_while_nothing_is_heard_is_no_farther_from_the_twin_than_
     assert (apart <= known + 0.005).all(), (apart - known).max()
     assert apart[-1].max() > 0.2
     assert not any(waits)  # who is heard in time is held nowhere
+    silent = 1.0 - 0.6
+    assert np.linalg.norm(places[1][-1] - places[1][-5], axis=1).max() < 0.01
+    assert min(state.hearing("operator").slack(state.t).values()) > 2 * silent
+    # It stands, and nobody says that the person does.
+    assert np.abs(state.qd(station.model.mechanisms["operator"])[:3]).max() < 0.05
+    assert not state.moved("operator")

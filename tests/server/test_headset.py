@@ -184,6 +184,7 @@ def test_one_page_per_person_until_it_leaves(server, samples):
         {"scale": 0.0},
         {"scale": float("nan")},
         {"scale": 1e3},
+        {"stands": "handstand"},
     ],
 )
 def test_an_offer_that_contradicts_itself_is_turned_away(server, wrong):
@@ -257,3 +258,57 @@ def test_ten_thousand_offers_a_second_are_not_ten_thousand_samples(server, sampl
         passed = time.monotonic() - begun
     taken = [s for s in samples if s.t_device >= 1 + 9000 / 72]  # not what was on its way before
     assert len(taken) <= passed / SHORTEST + 1
+
+
+TPOSE = np.array([[0.0, 1.638, -0.0875], [-0.895, 1.4315, 0.0], [0.895, 1.4315, 0.0]])
+"""Where a person of 1.75 m has eyes and controllers, arms to the sides."""
+
+
+def fitted(page, samples, places, sway=0.0):
+    """What the page is told after its wearer stood so, and the sample of a picture after that."""
+    for k in range(12):
+        page.see(1000 + k, places=places + sway * (-1) ** k + 3e-7 * (k % 3), stands="tpose")
+        time.sleep(2 * SHORTEST)
+    end, k, answer, fewer = time.monotonic() + PATIENCE, 2000, None, len(samples)
+    while (answer is None or answer.fits is None or len(samples) == fewer) and time.monotonic() < end:
+        page.see(k, places=places + 3e-7 * (k % 3))
+        k += 1
+        try:
+            answer = page.answer(timeout=0.02)
+        except TimeoutError:
+            fewer = len(samples) if answer is None else fewer
+    return answer, samples[-1]
+
+
+def test_who_stands_with_arms_to_the_sides_is_fitted(server, samples):
+    """How controllers lie in the hands, and who is of another stature than the file says."""
+    held = TPOSE + np.array([[0, 0, 0], [-0.03, 0, 0], [0.03, 0, 0]])
+    with Page(server) as page:
+        before = seen(page, samples)
+        assert page.answer().fits is None
+        answer, after = fitted(page, samples, held)
+        assert answer.fits
+        assert answer.taller == pytest.approx(1.0, abs=1e-3)
+        at = {point.name: np.array(point.at) for point in after.points}
+        old = {point.name: np.array(point.at) for point in before.points}
+        assert np.linalg.norm(at["left-grip"] - old["left-grip"]) == pytest.approx(0.03, abs=1e-3)
+        assert after.placing is None
+    # Whoever puts it on next has not done that.
+    with Page(server) as page:
+        anew = seen(page, samples, len(samples) + 1)
+        assert {point.name: point.at for point in anew.points} == {p.name: p.at for p in before.points}
+        answer, after = fitted(page, samples, TPOSE * 0.94)
+        assert answer.fits
+        assert answer.taller == pytest.approx(0.94, abs=2e-3)
+        assert "6 % smaller" in answer.found
+        assert answer.found == after.placing.reason
+
+
+def test_who_does_not_stand_still_is_not_fitted(server, samples):
+    with Page(server) as page:
+        seen(page, samples)
+        page.answer()
+        answer, after = fitted(page, samples, TPOSE, sway=0.05)
+        assert answer.fits is False
+        assert "stand still" in answer.found
+        assert after.placing is None

@@ -129,7 +129,8 @@ function begin(element: HTMLElement): void {
     button: (label) => visit?.button(label) ?? null,
     inRoom: (point) => visit?.inRoom(point) ?? null,
     get asked() {
-      return visit?.registering?.active ? visit.registering.lines : [];
+      if (visit?.registering?.active) return visit.registering.lines;
+      return visit?.fitting?.mesh.visible ? visit.fitting.lines : [];
     },
   };
 }

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "efdfa504f9da2538";
+export const SCHEMA = "d9ba5c03e0a77381";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -687,6 +687,11 @@ export interface Tracking {
    * scale than 1 is judged by postures alone.
    */
   scale?: number;
+  /**
+   * `tpose` (arms to the sides, palms down) or `npose` (arms hanging) while the wearer says that they
+   * stand still in that pose: once they say so no more, what was seen meanwhile calibrates the person.
+   */
+  stands?: string;
 }
 
 /** One step of finding out where the room of a page's headset lies in the cell. */
@@ -753,6 +758,15 @@ export interface Tracked {
   accepted: boolean;
   /** Why not. */
   reason: string;
+  /** Whether the newest calibration that the page asked for (`Tracking.stands`) holds; None before one. */
+  fits: boolean | null;
+  /** What it found, or why it was refused. */
+  found: string;
+  /**
+   * How many times as tall as the person of the workstation file the wearer is, by the height of the eyes;
+   * null when that was not found.
+   */
+  taller: number | null;
 }
 
 /** What a page asks of the server. */
@@ -787,7 +801,7 @@ export interface Edit {
   /** `Draft.revision` that the page saw. */
   revision: number;
   changes?: Change[];
-  /** Of a `change`, instead of its own: the number of those that a CAD file makes, which the page brought. */
+  /** Instead of `changes`, the number of those that a CAD file makes that a page brought; 0 for none. */
   brought?: number;
 }
 

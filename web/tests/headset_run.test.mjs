@@ -7,7 +7,7 @@ import path from "node:path";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { HEADSET, pictures, pressInRoom, put, trigger } from "./emulated_headset.mjs";
 import { python } from "./python.mjs";
 
 /** How far the person may be from what the headset did [m]. */
@@ -124,5 +124,36 @@ test("head and hand of the person go where those of the visitor go", { timeout: 
     const off = length(minus(inWorld(later[k], held[k]), expected[k]));
     assert.ok(off < FOLLOWS, `${bone}: ${off} m off`);
   }
+  assert.deepEqual([browser.complaints, browser.outside], [[], []]);
+});
+
+test("the person is fitted to the visitor: floor, arms to the sides, stature", {
+  timeout: 300_000,
+}, async () => {
+  const place = (i, at) => page.evaluate(([k, p]) => window.put(k, p), [i, at]);
+  const asked = (words) =>
+    page.waitForFunction((w) => window.seerob.asked.some((line) => line.includes(w)), words, {
+      timeout: 60_000,
+    });
+  await put(page, [0, 1.6, 0], [0.25, 1.1, -0.3]);
+  await pressInRoom(page, "fit me");
+  await asked("Where is your floor");
+  // The device has its floor 20 mm too high: what lies on it is lower, and so are the eyes.
+  const [low, eyes, hands] = [-0.02, 0.936 * 1.75, 0.818 * 1.75];
+  await place(1, [-0.2, low + 0.03, -0.4]);
+  await pictures(page, 2);
+  await trigger(page, 1);
+  await trigger(page, 0);
+  await asked("Arms to the sides");
+  await place(0, [0, low + eyes, -0.0875]);
+  await place(1, [-0.895, low + hands, 0]);
+  await place(2, [0.895, low + hands, 0]);
+  await asked("It fits");
+  const lines = (await page.evaluate(() => window.seerob.asked)).join(" ");
+  const [, share] = lines.match(/You are (\d+) % as tall as operator/);
+  assert.ok(Math.abs(Number(share) - 100) <= 1, lines);
+  // The floor of the room goes along: the eyes are where those of somebody of 1.75 m are.
+  const [, height] = await page.evaluate((p) => window.seerob.visited(p), [0, low + eyes, 0]);
+  assert.ok(Math.abs(height - eyes) < 5e-3, `${height}`);
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });

@@ -113,6 +113,9 @@ class Tracking(Struct, frozen=True, kw_only=True, tag="tracking"):
     scale: float = 1.0
     """Metres of the world in a metre of theirs, as they see it. Poses are in theirs: whoever works at another
     scale than 1 is judged by postures alone."""
+    stands: str = ""
+    """``tpose`` (arms to the sides, palms down) or ``npose`` (arms hanging) while the wearer says that they
+    stand still in that pose: once they say so no more, what was seen meanwhile calibrates the person."""
 
 
 class Register(Struct, frozen=True, kw_only=True, tag="register"):
@@ -173,6 +176,13 @@ class Tracked(Struct, frozen=True, kw_only=True, tag="tracked"):
     accepted: bool
     reason: str = ""
     """Why not."""
+    fits: bool | None = None
+    """Whether the newest calibration that the page asked for (`Tracking.stands`) holds; None before one."""
+    found: str = ""
+    """What it found, or why it was refused."""
+    taller: float | None = None
+    """How many times as tall as the person of the workstation file the wearer is, by the height of the eyes;
+    null when that was not found."""
 
 
 class Command(Struct, frozen=True, kw_only=True, tag="command"):

@@ -208,8 +208,8 @@ def warm_up(model: Model) -> None:
     Engine(model).tick()
 
 
-def engine_of(model: Model, state: type[State] = State) -> Engine:
-    """The twin as the workstation's sources drive it; ``state`` as of `Engine`."""
+def engine_of(model: Model, state: type[State] = State, *, contacts: bool = True) -> Engine:
+    """The twin as the workstation's sources drive it; ``state`` and ``contacts`` as of `Engine`."""
     # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
     delay = delay_of(model.workstation.sources)
     driven: dict[str, float] = {}
@@ -230,6 +230,7 @@ def engine_of(model: Model, state: type[State] = State) -> Engine:
         untimed=untimed(model),
         gappy=gappy(model),
         coarse=coarse(model),
+        contacts=contacts,
         state=state,
     )
 

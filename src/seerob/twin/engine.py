@@ -34,7 +34,7 @@ from seerob.core.samples import (
     SignalSample,
 )
 from seerob.core.transforms import Array, rotation_from_wxyz
-from seerob.description.capture.following import Following
+from seerob.description.capture.following import COASTS, Following
 from seerob.devices.live.differentiation import PositionNoise
 from seerob.files.trajectories.trajectory import QUIET
 from seerob.kernels import pull as kernel
@@ -128,7 +128,7 @@ class Engine:
             model: The compiled workstation.
             driven: Time-out [s] of the source of each robot and human that a source drives.
             live: Those of them whose source is live; when a sample is late they coast, until the time-out;
-                machines do not.
+                machines do not, and people for `COASTS` at most.
             complete: Those of them of whom each change is heard: no sample is missing between two.
             signals: Time-out [s] of each variable, or source of variables.
             untimed: Why nobody knows how late a variable is heard, by name.
@@ -174,8 +174,13 @@ class Engine:
         """Mechanisms that follow variables → until when their last jump counts [s], and what is said of it.
         """
         self._unread = coasting  # what a file says was looked at when it was read
+        coasts = {name: min(driven[name], COASTS if name in self._people else math.inf) for name in coasting}
+        self._coasting = {
+            name: coasts[name] for name in self._people if name in coasts and name not in complete
+        }
+        """People → how long they go on [s]: after that nobody says how fast they are."""
         self._references = {
-            m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
+            m.name: Reference(m.home, largest_speed(m), coast=coasts.get(m.name, 0.0))
             for m in self._mechanisms
         }
         self._hearings = {
@@ -553,6 +558,10 @@ class Engine:
             gaps = tuple(gap for each in every for gap in each.ended(t + kernel.SLACK))
             self.state.path = replace(self.state.path, gaps=gaps)
         self.state.attachments.unknown |= self._loose.lost()
+        for name, coasts in self._coasting.items():
+            reference = self._references[name]
+            silent = not reference.waits and t - reference.until > coasts + kernel.SLACK
+            self._hearings[name].once = silent or reference.once
         self.state.heard()
         return self.state
 

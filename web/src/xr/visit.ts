@@ -30,6 +30,7 @@ import { Board } from "./board";
 import { BodyBoard } from "./body_board";
 import { isOn, leftHanded, seated, smooth, sound, tone, turnOver, vignette } from "./comfort";
 import { Designing } from "./designing";
+import { Fitting } from "./fitting";
 import { Hands } from "./hands";
 import { Ghost, Ruler, Section, Vignette } from "./instruments";
 import { type Item, Menu } from "./menu";
@@ -108,7 +109,7 @@ export class Visit implements Sighted {
   private readonly bodyMap = new BodyBoard();
   private readonly review = new ReviewPanel();
   /** Panels that are shown when asked for. */
-  private readonly aside = [this.plot, this.bodyMap, this.review] as const;
+  private readonly aside: readonly Panel[];
   private readonly designing: Designing;
   private readonly ruler = new Ruler();
   private readonly section: Section;
@@ -123,6 +124,8 @@ export class Visit implements Sighted {
   private readonly ray = new Raycaster();
   /** Finds out where the room lies; null where nothing has to be found. */
   readonly registering: Registering | null = null;
+  /** Fits the person of the twin to the visitor; null for one who looks. */
+  readonly fitting: Fitting | null;
   private readonly before: () => void;
   private readonly forget: () => void;
   private exceeded: ReadonlySet<string> = new Set();
@@ -149,6 +152,8 @@ export class Visit implements Sighted {
     this.section = new Section(stage);
     this.ghost = new Ghost(stage, viewer.bodies);
     this.designing = new Designing(viewer);
+    this.fitting = human === null ? null : new Fitting(human, () => this.stand());
+    this.aside = [this.plot, this.bodyMap, this.review, ...(this.fitting ? [this.fitting] : [])];
     this.menu = new Menu([...this.items(), ...(mayEdit.peek() ? this.edits() : [])]);
     for (const { mesh } of this.aside) mesh.visible = false;
     this.things.add(this.board.mesh, this.landing, this.menu.mesh, this.vignette.mesh);
@@ -210,11 +215,14 @@ export class Visit implements Sighted {
     registering?.tick(time, frame, space);
     if (registering && registered.peek()?.at.length) this.stand();
     if (this.human !== null) {
-      const { space: name = "", roomFromFloor = null } = registering ?? {};
       const sources = this.session.inputSources;
+      this.fitting!.tick(time, frame, space, sources);
+      const name = registering?.space ?? "";
+      const { roomFromFloor } = registering ?? this.fitting!;
       const seen = sight(frame, space, sources, this.human, time, name, roomFromFloor);
       if (seen) {
         seen.scale = this.rig.scale.x;
+        seen.stands = this.fitting!.stands;
         this.send(seen);
       }
     }
@@ -280,6 +288,7 @@ export class Visit implements Sighted {
       rig.matrix.compose(this.at.set(x, y, z), this.turn, new Vector3(1, 1, 1));
       viewer.stage.world.updateMatrix();
       rig.matrix.premultiply(viewer.stage.world.matrix).multiply(AHEAD);
+      if (this.fitting && !this.registering) rig.matrix.multiply(this.fitting.roomFromFloor);
       rig.matrix.decompose(rig.position, rig.quaternion, rig.scale);
       rig.scale.setScalar(ownScale.peek());
       return;
@@ -454,12 +463,33 @@ export class Visit implements Sighted {
           this.shines = !this.shines;
         },
       },
+      ...this.fits(),
       choice("sound", sound),
       choice("smooth", smooth),
       choice("vignette", vignette),
       choice("seated", seated),
       choice("left hand", leftHanded),
       { label: () => "leave", press: () => void this.session.end() },
+    ];
+  }
+
+  /** What else is at the wrist of whoever is a person of the twin. */
+  private fits(): Item[] {
+    const { fitting } = this;
+    if (!fitting) return [];
+    return [
+      {
+        label: () => "fit me",
+        on: () => fitting.active,
+        press: () => fitting.begin(),
+      },
+      {
+        label: () => (fitting.stature() === null ? "hide" : "my stature"),
+        press: () => {
+          fitting.keepStature();
+          fitting.mesh.visible = false;
+        },
+      },
     ];
   }
 
@@ -581,6 +611,10 @@ export class Visit implements Sighted {
     this.ray.set(from, along);
     if (type === "selectstart" && side !== this.wrist && this.menu.press(this.ray)) {
       pulse(inputSource, TAKEN);
+      return;
+    }
+    if (this.fitting?.active) {
+      if (type === "selectstart") this.fitting.press(inputSource, this.session.inputSources);
       return;
     }
     if (type === "selectstart" && this.measures) {

@@ -384,7 +384,11 @@ class Hub:
             refusal = self._offers.offer(tracking.human, client, offer)
         else:
             refusal = "this page may not: open the address for tracking that seerob printed"
-        answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
+        fit = self._offers.fit_of(tracking.human, client)
+        fits, found, taller = fit or (None, "", None)
+        answer = Tracked(
+            human=tracking.human, accepted=not refusal, reason=refusal, fits=fits, found=found, taller=taller
+        )
         if refusal:
             visit.refuse(f"tracking: {refusal}")
         if answer != last_answer:

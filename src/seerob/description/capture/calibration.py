@@ -86,6 +86,9 @@ class Calibrated:
     findings: tuple[Finding, ...]
     places: dict[str, Array]
     """Name of what devices place as they like → where it is in the bone's frame [m], (3,)."""
+    taller: float | None = None
+    """How many times as high as that of the person of the file the head was over z = 0 of the device's world;
+    None when it was not seen."""
 
 
 def calibrate(
@@ -146,7 +149,9 @@ def calibrate(
         off = float(np.linalg.norm(away))
         residuals.append(Residual(row.name, row.bone, moved, swayed, off, angle, axis))
     findings = (*assumptions, *_tell(residuals, pose, heading, subject))
-    return Calibrated(mounts, tuple(residuals), heading, findings, places)
+    heads = [k for k, row in enumerate(observer.rows) if row.bone == "head" and np.isfinite(found[k]).all()]
+    taller = float(found[heads[0], 2] / expected[heads[0], 2]) if heads else None
+    return Calibrated(mounts, tuple(residuals), heading, findings, places, taller)
 
 
 def _mean(points: Array) -> Array:

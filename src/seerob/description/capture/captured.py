@@ -117,9 +117,13 @@ class CaptureFrame:
     subject: str = ""
     """The person, as the device names it: an id that may change when it loses somebody."""
     pose: str = ""
-    """``tpose`` or ``npose`` when this is no motion but a calibration pose that the file contains."""
+    """``tpose`` or ``npose`` when this is a calibration pose: of a file it is no motion, live the person says
+    so."""
     placing: Placing | None = None
     """How well it is known where the device's world lies in the cell; None where the file says where."""
+    wearer: int = 0
+    """Another number for whoever else wears the device: what a calibration found of the one before holds no
+    more."""
 
 
 @dataclass(frozen=True, eq=False)

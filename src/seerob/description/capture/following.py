@@ -64,6 +64,9 @@ HELD_SPEED = 2.0
 SWUNG_SPEED = 5.0
 """Legs that are not seen may have moved so fast meanwhile [m/s]: the foot of somebody who walks swings at up
 to 4 to 5 m/s (M)."""
+COASTS = 0.25
+"""So long the twin of a person goes on at its speed when nothing more is heard live [s]; our choice: what is
+lost on the way from a headset mostly lasts no longer, and who walks at 1.6 m/s goes 0.4 m meanwhile."""
 LEGS = ("thigh", "shank", "foot", "toes")
 STARTS = 20.0
 """No waist gets faster or slower with more [m/s²]: sprinters start with some 10 m/s² (M), falls have 9.8."""

@@ -220,11 +220,21 @@ def calibrated(
     layout: Layout,
     bound: Observer,
     description: Description,
+    *,
+    pose: CalibrationPose | None = None,
 ) -> tuple[Observer, Calibrated]:
-    """Calibrate an observer: returns it with the mounting that the frames show, and what was found."""
-    found = calibrate(
-        list(frames), bound, description, options.calibration.pose, seen=layout.seen, subject=options.human
-    )
+    """Calibrate an observer: returns it with the mounting that the frames show, and what was found.
+
+    Args:
+        options: Of the source.
+        frames: Of the window.
+        layout: The device's names.
+        bound: From `observer`.
+        description: The person.
+        pose: How the person stood; what the options say when not given.
+    """
+    pose = pose or options.calibration.pose
+    found = calibrate(list(frames), bound, description, pose, seen=layout.seen, subject=options.human)
     placed = with_places(with_mounts(bound, found.mounts), found.places)
     return placed, found
 

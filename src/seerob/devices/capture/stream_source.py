@@ -13,8 +13,9 @@ import numpy as np
 from msgspec import field
 from msgspec.structs import replace
 
+from seerob.core.errors import InputError
 from seerob.core.quantities import Pose, Seconds
-from seerob.core.samples import BodyPoint, BodySample, Quality, Sample, SignalSample
+from seerob.core.samples import BodyPoint, BodySample, Placing, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.description.capture.calibration import Calibrated, CalibrationPose
 from seerob.description.capture.captured import CaptureFrame, Layout
@@ -42,6 +43,11 @@ from seerob.workstation.source import Opened, PostureError, Target
 _log = logging.getLogger(__name__)
 
 MOST_CALIBRATION_FRAMES = 20_000
+FEWEST_STANDING = 5
+"""Frames of a person who says that they stand in a pose."""
+MOST_UNLIKE = 0.03
+"""Share of the stature in the workstation file by which a person may be taller or smaller; our choice: shoes,
+and how one stands, are as much."""
 SAME_PERSON = 0.5
 """A person of another name who appears no farther away [m] from where one was lost is the same one."""
 
@@ -111,6 +117,15 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
         """
         raise NotImplementedError
 
+    def fitted(self, said: str, taller: float | None, *, accepted: bool) -> None:
+        """Tell what a calibration found that the person asked for.
+
+        Args:
+            said: In words, or why it was refused.
+            taller: How many times as tall as the person of the file; None where that was not seen.
+            accepted: Whether it holds from now on.
+        """
+
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Pulls on the bones of the person, as they arrive."""
         description = _anybody() if target is None else person(target, self.human, self.name)
@@ -135,6 +150,11 @@ class _Hearing:
         self._begun: float | None = None
         self._window: list[CaptureFrame] = []
         self._calibrated = source.calibration.pose is CalibrationPose.NONE
+        self._standing: list[CaptureFrame] = []
+        """While the person says that they stand in a pose."""
+        self._wearer: int | None = None
+        self._unlike = ""
+        """Why nothing rests on where this person is: they are not as tall as that of the file."""
 
     def take(self, layout: Layout, frame: CaptureFrame, now: float) -> BodySample | SignalSample | None:
         """The sample of a frame that arrived at ``now`` [s]; None while there is nothing to say."""
@@ -144,8 +164,16 @@ class _Hearing:
         followed, changed = self._follows(frame, now)
         if not followed:
             return None
+        if frame.wearer != self._wearer:
+            if self._wearer is not None and self._calibrated:
+                bound = self._begin(layout)
+            self._wearer, self._unlike, self._standing = frame.wearer, "", []
+        if frame.pose and len(self._standing) < MOST_CALIBRATION_FRAMES:
+            self._standing.append(frame)
+        elif self._standing:
+            return self._fit(layout, now)
         if not self._calibrated:
-            return self._calibrate(layout, frame, now)
+            return None if frame.pose else self._calibrate(layout, frame, now)
         points = bound.points(frame)
         late = lateness(self._source)
         return BodySample(
@@ -160,7 +188,7 @@ class _Hearing:
             hold=self._source.hold,
             smoothing=self._source.smoothing or 0.0,
             quality=_quality(points, changed),
-            placing=frame.placing,
+            placing=Placing(reason=self._unlike) if self._unlike else frame.placing,
         )
 
     def _bind(self, layout: Layout) -> Observer:
@@ -168,14 +196,40 @@ class _Hearing:
             again = self._layout is not None and layout.names == self._layout.names
             self._layout = layout
             if self._observer is None or not again:
-                source = self._source
-                self._observer, findings = observer(
-                    source, layout, self._description, file=source.name or "stream"
-                )
-                _say(findings)
-                if self._calibrated:
-                    self._drop_unplaced()
+                self._begin(layout)
+        assert self._observer is not None  # begun before
         return self._observer
+
+    def _begin(self, layout: Layout) -> Observer:
+        """Bind the names as nobody has calibrated them yet."""
+        source = self._source
+        self._observer, findings = observer(source, layout, self._description, file=source.name or "stream")
+        _say(findings)
+        if self._calibrated:
+            self._drop_unplaced()
+        return self._observer
+
+    def _fit(self, layout: Layout, now: float) -> SignalSample | None:
+        """What a calibration found that the person asked for; None where it is refused."""
+        frames, self._standing, source = self._standing, [], self._source
+        try:
+            if len(frames) < FEWEST_STANDING:
+                raise InputError.at(source.human, "calibration", "too short", "stand still a little longer")
+            bound, _ = observer(source, layout, self._description, file=source.name or "stream")
+            pose = CalibrationPose(frames[0].pose)
+            bound, found = calibrated(source, frames, layout, bound, self._description, pose=pose)
+        except InputError as error:
+            source.fitted(str(error), None, accepted=False)
+            return None
+        _say(found.findings)
+        if wrong := [finding.text for finding in found.findings if finding.level == "warning"]:
+            source.fitted(wrong[0], found.taller, accepted=False)
+            return None
+        self._observer, self._calibrated = bound, True
+        self._drop_unplaced()
+        self._unlike = unlike(found.taller)
+        source.fitted(self._unlike or found.findings[0].text, found.taller, accepted=True)
+        return SignalSample(source=source.name, seq=0, t=now, values=_residuals(found))
 
     def _drop_unplaced(self) -> None:
         assert self._observer is not None  # bound before
@@ -230,6 +284,14 @@ class _Hearing:
         self._drop_unplaced()
         self._window, self._calibrated = [], True
         return SignalSample(source=self._source.name, seq=0, t=now, values=_residuals(found))
+
+
+def unlike(taller: float | None) -> str:
+    """Why a person is not that of the file, who is so many times as tall; empty when they may be."""
+    if taller is None or abs(taller - 1) <= MOST_UNLIKE:
+        return ""
+    way = f"{100 * abs(taller - 1):.0f} % {'taller' if taller > 1 else 'smaller'}"
+    return f"this person is {way} than that of the workstation file: give their stature"
 
 
 def _residuals(found: Calibrated) -> dict[str, float | bool | str]:

@@ -56,6 +56,10 @@ class Offer(NamedTuple):
     """How well that is known; None where what the file says is exact."""
     scale: float = 1.0
     """Metres of the world in a metre of the visitor, as they see it."""
+    stands: str = ""
+    """``tpose`` or ``npose`` while the visitor says that they stand so."""
+    wearer: int = 0
+    """Counts the visitors who were that person."""
 
 
 class Registering(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -97,6 +101,19 @@ class Held(NamedTuple):
 
     visitor: object
     last: float
+    wearer: int
+
+
+class Fit(NamedTuple):
+    """What the newest calibration of a visitor found that they asked for."""
+
+    accepted: bool
+    text: str
+    taller: float | None
+    """How many times as tall as the person of the file."""
+
+
+POSES = ("", "tpose", "npose")
 
 
 def read(tracking: Tracking, now: float) -> Offer:
@@ -116,13 +133,16 @@ def read(tracking: Tracking, now: float) -> Offer:
         raise ValueError("tracking without a time")
     if not SCALES[0] <= tracking.scale <= SCALES[1]:
         raise ValueError(f"a scale is from {SCALES[0]:g} to {SCALES[1]:g}")
+    if tracking.stands not in POSES:
+        raise ValueError("tracking in a pose that nobody knows")
     with np.errstate(invalid="ignore"):  # a signalling NaN is one more NaN
         rows = np.frombuffer(tracking.poses, "<f4").reshape(n, 7).astype(float)
     guessed = tuple(map(bool, tracking.guessed)) or (False,) * n
     turns = rows[:, 3:]
     return Offer(
-        now, tracking.t, tracking.names, rows[:, :3], turns, guessed, tracking.space, scale=tracking.scale
-    )
+        now, tracking.t, tracking.names, rows[:, :3], turns, guessed, tracking.space,
+        scale=tracking.scale, stands=tracking.stands,
+    )  # fmt: skip
 
 
 class Offers:
@@ -132,6 +152,8 @@ class Offers:
         self._lock = Lock()
         self._waiting: dict[str, dict[object, Callable[[Offer], None]]] = {}
         self._held: dict[str, Held] = {}
+        self._fits: dict[str, Fit] = {}
+        self._wearers = 0
         self.doings = Doings()
         """What visitors do besides."""
         self._rooms: dict[str, Room] = {}
@@ -149,6 +171,7 @@ class Offers:
         """Have every offer for a person given to ``take``, in the server's thread; it must not block."""
         with self._lock:
             self._registering[human] = registering
+            self._fits.pop(human, None)
             self._waiting.setdefault(human, {})[key] = take
 
     def leave(self, human: str, key: object) -> None:
@@ -179,7 +202,12 @@ class Offers:
                 return f"another page is the headset of {human!r}"
             if held is not None and held.visitor is visitor and offer.arrived - held.last < SHORTEST:
                 return ""
-            self._held[human] = Held(visitor, offer.arrived)
+            if held is None or held.visitor is not visitor:
+                self._wearers += 1
+                self._fits.pop(human, None)
+                held = Held(visitor, offer.arrived, self._wearers)
+            self._held[human] = held._replace(last=offer.arrived)
+            offer = offer._replace(wearer=held.wearer)
             room = self._rooms.get(human)
             if room is not None and room.visitor is visitor and room.space == offer.space:
                 offer = offer._replace(cell_from_room=room.cell_from_room, placing=room.placing)
@@ -205,6 +233,17 @@ class Offers:
             if held is None or held.visitor is not visitor:
                 return f"this page is not the headset of {human!r}, whose hand that is"
         return self.doings.do(visitor, what)
+
+    def fit(self, human: str, found: Fit) -> None:
+        """Know what a calibration of a person found that their visitor asked for."""
+        with self._lock:
+            self._fits[human] = found
+
+    def fit_of(self, human: str, visitor: object) -> Fit | None:
+        """What the newest calibration of a visitor found; None when they are not that person or had none."""
+        with self._lock:
+            held = self._held.get(human)
+            return self._fits.get(human) if held is not None and held.visitor is visitor else None
 
     def registering(self, human: str) -> Registering:
         """What the file says of how the room of a person's headset is put in the cell."""

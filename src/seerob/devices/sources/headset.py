@@ -26,7 +26,7 @@ from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.description.capture.mapping import conventions, plain
 from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
-from seerob.devices.live.headset_offers import Offer, Offers, Registering
+from seerob.devices.live.headset_offers import Fit, Offer, Offers, Registering
 from seerob.devices.live.listening import Contact, LiveSource, say_once
 from seerob.protocols.tracking.vive import world_positions, world_turns
 
@@ -84,7 +84,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
         layout: Layout | None = None
         known: set[str] = set()
         begun: float | None = None
-        last = -1.0
+        last, wearer = -1.0, 0
         async with aclosing(self._offers(place)) as offers:
             async for offer in offers:
                 begun = offer.arrived if begun is None else begun
@@ -95,6 +95,8 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
                         continue
                     layout = layout_of(known)
                     self._tell(layout)
+                if offer.wearer != wearer:  # another page has another clock
+                    last, wearer = -1.0, offer.wearer
                 if offer.t <= last:
                     continue
                 last = offer.t
@@ -162,6 +164,9 @@ class _Taking(Headset, frozen=True, kw_only=True):
     def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
         return self._frames(self.offers)
 
+    def fitted(self, said: str, taller: float | None, *, accepted: bool) -> None:
+        self.offers.fit(self.human, Fit(accepted, said, taller))
+
 
 def layout_of(names: Iterable[str]) -> Layout:
     """Rows for what is of use: the names that mean a bone, or all when none does."""
@@ -201,4 +206,6 @@ def frame(offer: Offer, layout: Layout) -> CaptureFrame:
             positions=world_positions(positions),
             orientations=world_turns(turns),
             confidence=sure,
+            pose=offer.stands,
+            wearer=offer.wearer,
         )

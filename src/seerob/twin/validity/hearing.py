@@ -19,7 +19,7 @@ import numpy as np
 from seerob.core.samples import REPEATED, Placing
 from seerob.core.transforms import Array
 from seerob.description.capture.estimated import estimated
-from seerob.description.capture.following import Followed, InvalidPart, held_speed
+from seerob.description.capture.following import COASTS, Followed, InvalidPart, held_speed
 from seerob.description.humans.skeleton import BONES
 from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 from seerob.model.model import Model
@@ -156,7 +156,8 @@ class Hearing:
     leaves_at: float = 0.0
     """Of who stands where he was last said to be: largest speed of a joint then [rad/s or m/s]."""
     once: bool = False
-    """It was heard once, or once after a silence, and that told no speed."""
+    """It was heard once, or once after a silence, and that told no speed; or it is a person who was not heard
+    for longer than the twin goes on."""
     grace: float = 0.0
     """How long after its newest sample it may be late all the same [s]."""
     unlike: Array | None = None
@@ -318,14 +319,16 @@ class Hearing:
     def slack(self, t: float) -> dict[str, float]:
         """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m].
 
-        Of whom nothing is heard meanwhile each bone is held: the twin goes on, the person may turn back.
+        Of whom nothing is heard meanwhile each bone is held: the twin goes on for a while and then stays, the
+        person may have turned back at once.
         """
         found: dict[str, float] = {}
         around = self._said_of_bones(t)
         for said in around:
             found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in said.places.slack.items()}
         if len(around) == 1 and (age := t - around[0].t) > SLACK and around[0].observed:
-            found = {bone: held_speed(bone) * age + found.get(bone, 0.0) for bone in BONES}
+            away = age + min(age, COASTS)
+            found = {bone: held_speed(bone) * away + found.get(bone, 0.0) for bone in BONES}
         return found
 
     def undetermined_angles(self, t: float) -> frozenset[tuple[str, int]]:

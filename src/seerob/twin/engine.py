@@ -174,7 +174,10 @@ class Engine:
         """Mechanisms that follow variables → until when their last jump counts [s], and what is said of it.
         """
         self._unread = coasting  # what a file says was looked at when it was read
-        coasts = {name: min(driven[name], COASTS if name in self._people else math.inf) for name in coasting}
+        coasts = {
+            name: min(driven[name], COASTS if name in self._people else math.inf)
+            for name in coasting & {*driven}
+        }
         self._coasting = {
             name: coasts[name] for name in self._people if name in coasts and name not in complete
         }

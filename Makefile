@@ -23,11 +23,11 @@ BROUGHT := src/seerob/kernels/compiled
 KEPT := $(VENV)/.compiled
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo demo-plc demo-xr test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs docs-site lock audit clean
+.PHONY: help demo demo-plc demo-xr test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs docs-site docs-versions lock audit clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo "also: check format unit web-test package bench soak mutate wire web build docs docs-site lock audit clean"
+	@echo "also: check format unit web-test package bench soak mutate wire web build docs docs-site docs-versions lock audit clean"
 
 # -- the two commands ---------------------------------------------------------------------------
 
@@ -161,6 +161,10 @@ mutate: $(DEV)
 docs-site: $(DEV)
 	$(BIN)/python scripts/site_pages .site/pages
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+# Every release's and this checkout's, each page with a choice of versions: what is published.
+docs-versions: $(DEV)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python scripts/site_versions .site/versions
 
 docs: $(DEV)
 	$(BIN)/python scripts/write-docs

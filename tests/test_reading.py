@@ -39,6 +39,11 @@ WRONG = {
     "unknown at the top": ('titel = "x"', "titel", "'title'"),
     "unknown group": ("[[saftey]]\nkind='velocity'", "saftey", "'safety'"),
     "unknown in a table": (ROBOT + "modle = 1", "robots[0].modle", "'model'"),
+    "other key beside a missing one": (
+        HUMAN.replace("stature", "height").replace("mass = 75\n", ""),
+        "humans[0].height",
+        "did you mean 'stature', which is missing?",
+    ),
     "what is missing, under another name": (
         HUMAN.replace("stature", "height"),
         "humans[0].height",

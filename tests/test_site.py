@@ -1,9 +1,11 @@
 """The documentation site: every link and anchor in it leads somewhere, and it asks nobody else."""
 
+import json
 import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -27,16 +29,32 @@ def build(folder):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
-    subprocess.run([sys.executable, str(ROOT / "scripts/site_pages"), str(folder / "pages")], check=True)
-    done = build(folder)
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts/site_versions"), str(folder)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
+    (folder / "html").symlink_to(folder / version("seerob"))
     return folder
+
+
+def test_each_page_offers_the_versions_that_are_listed_beside_it(site):
+    listed = json.loads((site / "versions.json").read_text())
+    assert listed[0]["version"] == version("seerob")
+    assert all((site / one["version"] / "index.html").exists() for one in listed)
+    assert f"url={version('seerob')}/index.html" in (site / "index.html").read_text()
+    page = (site / "html/docs/install.html").read_text()
+    config = json.loads(re.search(r'<script id="__config"[^>]*>(.*?)</script>', page, re.S)[1])
+    assert config["version"] == {"provider": "mike"}
+    # Where the theme looks: beside the folder of the page's own version.
+    beside = (site / "html/docs/install.html").parent / config["base"] / ".." / "versions.json"
+    assert beside.exists()
 
 
 def test_it_has_every_page_and_finds_words_in_them(site):
     pages = {
         file.relative_to(site / "html").with_suffix(".md").as_posix()
-        for file in (site / "html").rglob("*.html")
+        for file in (site / "html/.").rglob("*.html")
     }
     own = {file.relative_to(ROOT).as_posix() for file in (ROOT / "docs").rglob("*.md")}
     assert own <= pages
@@ -60,7 +78,7 @@ def test_pages_load_nothing_from_elsewhere(site):
 
 
 def test_a_link_or_an_anchor_that_leads_nowhere_is_refused(site, tmp_path):
-    shutil.copytree(site / "pages/docs/sources", tmp_path / "pages/docs/sources")
+    shutil.copytree(ROOT / "docs/sources", tmp_path / "pages/docs/sources")
     (tmp_path / "pages/README.md").write_text(
         "[gone](docs/gone.md), [gone](docs/sources/csv.md#no-such-heading)\n"
     )

@@ -13,7 +13,7 @@ const READ = `
 import json, sys
 import cv2
 import numpy as np
-clip, picture = json.load(sys.stdin)
+clip, picture, found, sought = json.load(sys.stdin)
 video = cv2.VideoCapture(clip, cv2.CAP_FFMPEG)
 count, size = video.get(cv2.CAP_PROP_FRAME_COUNT), [video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT)]
 shown, frames = [], []
@@ -27,7 +27,11 @@ while True:
 coarse = lambda a: cv2.resize(a, (40, 40), interpolation=cv2.INTER_AREA).astype(float)
 far = lambda a, b: float(np.abs(coarse(a) - coarse(b)).mean())
 png = cv2.imread(picture)
-print(json.dumps(dict(count=count, size=size, shown=shown, same=far(frames[-1], png), moved=far(frames[0], frames[-1]))))
+# What a player that went there shows is the picture of that time; of pictures that are alike each is as good.
+due = max(k for k, ms in enumerate(shown) if ms <= sought)
+there = cv2.imread(found)
+off = [far(frame, there) for frame in frames]
+print(json.dumps(dict(due=off[due], least=min(off), count=count, size=size, shown=shown, same=far(frames[-1], png), moved=far(frames[0], frames[-1]))))
 `;
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-clip-"));
 let opened;
@@ -54,7 +58,37 @@ async function taken(name, file) {
   return { to, called: download.suggestedFilename() };
 }
 
-test("a clip has every picture that was drawn, in its time, and ends with what is shown", async () => {
+/** What a video element shows that goes to a share of a clip's length, and when that is. */
+async function playedAt(clip, share, to) {
+  const player = await opened.browser.context.newPage();
+  const [ms, png] = await player.evaluate(
+    async ([data, part]) => {
+      const video = document.createElement("video");
+      const happens = (what) =>
+        new Promise((resolve, reject) => {
+          video.addEventListener(what, resolve, { once: true });
+          video.addEventListener("error", () => reject(new Error(video.error.message)), { once: true });
+        });
+      const ready = happens("loadeddata");
+      video.src = URL.createObjectURL(await (await fetch(`data:video/webm;base64,${data}`)).blob());
+      await ready;
+      const at = part * video.duration;
+      const there = happens("seeked");
+      video.currentTime = at;
+      await there;
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
+      canvas.getContext("2d").drawImage(video, 0, 0);
+      return [1000 * at, canvas.toDataURL("image/png").split(",")[1]];
+    },
+    [fs.readFileSync(clip).toString("base64"), share],
+  );
+  await player.close();
+  fs.writeFileSync(to, Buffer.from(png, "base64"));
+  return { to, ms };
+}
+
+test("a clip has every picture that was drawn, in its time, ends with what is shown, and is gone to by a player", async () => {
   await settled(page);
   const view = page.getByRole("button", { name: "View", exact: true });
   await view.click();
@@ -73,7 +107,8 @@ test("a clip has every picture that was drawn, in its time, and ends with what i
   const lasted = Date.now() - begun;
   const picture = await taken("Picture", "picture.png");
   assert.match(clip.called, /\.webm$/);
-  const read = await askPython(READ, JSON.stringify([clip.to, picture.to]));
+  const sought = await playedAt(clip.to, 0.6, path.join(folder, "sought.png"));
+  const read = await askPython(READ, JSON.stringify([clip.to, picture.to, sought.to, sought.ms]));
   assert.ok(read.shown.length >= 5, `${read.shown}`);
   assert.ok(read.count > 0, `${read.count}`); // as the file says how long it is
   assert.ok(
@@ -81,6 +116,7 @@ test("a clip has every picture that was drawn, in its time, and ends with what i
     `${read.shown}`,
   );
   assert.equal(read.shown[0], 0);
+  assert.ok(read.due < read.least + 0.5, JSON.stringify(read));
   assert.ok(
     read.shown.at(-1) > 1000 && read.shown.at(-1) <= lasted + 100,
     `${read.shown.at(-1)} of ${lasted}`,

@@ -252,7 +252,7 @@ test("what others speak of is removed with them, or not at all", async () => {
   assert.equal(saved(), begun);
 });
 
-test("a section takes away what lies beyond it, also for clicks; panels fold and views are kept", async () => {
+test("a section takes away what lies beyond it, also for clicks; panels are placed, fold and views are kept", async () => {
   await page.keyboard.press("Escape");
   await page.getByRole("button", { name: "View", exact: true }).click();
   const panel = page.locator(".view-panel");
@@ -275,13 +275,30 @@ test("a section takes away what lies beyond it, also for clicks; panels fold and
   await panel.getByLabel("Speed of a point").uncheck();
   await panel.getByRole("button", { name: "Save view" }).click();
   const pixel = () => page.evaluate(() => window.seerob.project([0.8, 0, 0.74]).map(Math.round));
-  await panel.getByLabel("Results").uncheck();
+  const box = (of) => page.locator(of).boundingBox();
+  const { width } = await box(".left");
+  await page.getByRole("separator", { name: "Width of Scene and properties" }).focus();
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction((was) => document.querySelector(".left").offsetWidth >= was + 15, width);
+  await panel.getByRole("button", { name: "Move Results to the left" }).click();
+  await panel.getByRole("button", { name: "Move Plots and time up" }).click();
+  await panel.getByLabel("Results", { exact: true }).uncheck();
   await page.locator(".right").waitFor({ state: "hidden" });
   await page.reload();
   await page.waitForFunction(() => Number.isFinite(window.seerob?.t));
   await page.locator(".right").waitFor({ state: "hidden" });
   await page.getByRole("button", { name: "View", exact: true }).click();
-  await panel.getByLabel("Results").check();
+  await panel.getByLabel("Results", { exact: true }).check();
+  const [left, results, room, time] = await Promise.all([".left", ".right", ".room", ".bottom"].map(box));
+  assert.ok(Math.abs(left.width - width - 16) < 2, `${left.width}, was ${width}`);
+  assert.ok(
+    left.x < results.x && results.x < room.x && time.y < room.y,
+    JSON.stringify([left, results, room, time]),
+  );
+  await panel.getByRole("button", { name: "Move Results to the right" }).click();
+  await panel.getByRole("button", { name: "Move Plots and time down" }).click();
+  await page.getByRole("separator", { name: "Width of Scene and properties" }).press("Home");
+  await page.waitForFunction((was) => document.querySelector(".left").offsetWidth < was + 2, width);
   await page.getByRole("button", { name: "Top", exact: true }).click();
   const fromAbove = await pixel();
   await panel.getByLabel("Saved views").selectOption({ label: "view 1" });

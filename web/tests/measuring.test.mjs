@@ -2,6 +2,7 @@
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
+import { createRequire } from "node:module";
 import os from "node:os";
 import path from "node:path";
 import { after, before, test } from "node:test";
@@ -9,6 +10,7 @@ import { openBrowser } from "./browser.mjs";
 import { python } from "./python.mjs";
 import { replayed } from "./replayed.mjs";
 
+const AXE = fs.readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const CELL = `title = "Measured"
 
 [[robots]]
@@ -98,6 +100,31 @@ test("what is measured is what was recorded, at each instant that is shown", asy
   assert.equal(seen[0], seen[2]);
   await page.keyboard.press("Escape");
   await page.locator(".measure-note").waitFor({ state: "detached" });
+});
+
+test("the reach of a robot that is selected is an outline with a tolerance; axe finds no fault in either note", async () => {
+  await page.evaluate(AXE);
+  const faults = async () => {
+    const { violations } = await page.evaluate(() =>
+      globalThis.axe.run(document, { resultTypes: ["violations"] }),
+    );
+    return violations.map(({ id, nodes }) => `${id} ${nodes[0].target}`);
+  };
+  await page.keyboard.press("d");
+  for (const name of ["ur5e", "wall"])
+    await page.locator(".tree").getByRole("button", { name, exact: true }).click();
+  await measured();
+  assert.deepEqual(await faults(), []);
+  await page.keyboard.press("Escape");
+  await page.getByRole("button", { name: "View", exact: true }).click();
+  await page.locator(".view-panel").getByLabel("Reach of what is selected").check();
+  await page.locator(".tree").getByRole("button", { name: "ur5e", exact: true }).click();
+  await page.locator(".measure-note", { hasText: /reach of ur5e.*up to [0-9.]+.m outside/s }).waitFor();
+  assert.deepEqual(await faults(), []);
+  await page.locator(".view-panel").getByLabel("Reach of what is selected").uncheck();
+  await page.locator(".measure-note").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "View", exact: true }).click();
+  await page.keyboard.press("Escape");
 });
 
 test("the angle of two faces that are clicked is that of the bodies", async () => {

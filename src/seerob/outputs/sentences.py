@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from seerob.core.figures import against, between, figure, margin, with_unit
 from seerob.core.snapshot import Finding, Verdict
 from seerob.outputs.words import said as spoken_as
-from seerob.outputs.words import word
+from seerob.outputs.words import told, word
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES, Series, Worst
 
@@ -256,7 +256,7 @@ def about(series: Series) -> list[str]:
     if worst.verdict is not Verdict.UNDECIDED and (worst.reason or worst.part):
         governs = worst.reason or worst.part
         extra = f" ({worst.part})" if worst.part and worst.part not in governs else ""
-        said.append(spoken_as("What governs there: {what}.", what=f"{governs}{extra}"))
+        said.append(spoken_as("What governs there: {what}.", what=f"{told(governs)}{extra}"))
     return said
 
 

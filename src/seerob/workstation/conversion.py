@@ -105,6 +105,8 @@ def expected(wanted: object, complaint: str) -> str:
 
 T = TypeVar("T", bound=Struct)
 
+_ALSO_CALLED = {"height": "stature", "weight": "mass", "gender": "sex"}
+"""Keys as others would call them."""
 LARGEST = 1e9
 """Numbers beyond this are mistakes: no quantity of a workstation needs them in SI."""
 
@@ -140,8 +142,9 @@ def convert(
         field, factor = _field(name, fields)
         if field is None:
             remedy = _wrong_unit(name, fields) or suggestion(name, [*fields, *beside])
-            if len(missing) == 1 and "did you mean" not in remedy:
-                remedy = f"did you mean {missing[0]!r}, which is missing? {remedy}"
+            meant = _ALSO_CALLED.get(name) or (missing[0] if len(missing) == 1 else "")
+            if meant in missing and "did you mean" not in remedy:
+                remedy = f"did you mean {meant!r}, which is missing? {remedy}"
             problems.append(Problem(file, place, "unknown key", remedy))
         elif field in values:
             problems.append(Problem(file, place, f"{field!r} is given twice, in two units", "keep one"))

@@ -6,7 +6,7 @@ import type { Caption } from "./caption";
 import type { View } from "./view";
 
 const GAP_PX = 2;
-/** Height of the tools at the upper edge of the room, and how far captions are above their points [px]. */
+/** Height of a row of tools at the upper edge of the room, with what is left free around it [px]. */
 const TOOLS_PX = 56;
 /** Height of the legend at the lower edge, and distance from the sides [px]. */
 const LEGEND_PX = 52;
@@ -32,9 +32,13 @@ interface Belonging {
 }
 
 /** Give each caption a place that no other one covers. */
-export function placeCaptions(captions: Iterable<Caption>, { camera, pixel, margins }: View): void {
+export function placeCaptions(
+  captions: Iterable<Caption>,
+  { camera, pixel, margins, toolsPx = TOOLS_PX }: View,
+): void {
   const half = Math.tan((camera.fov * Math.PI) / 360) / pixel;
   const edge = half * camera.aspect;
+  const top = half - toolsPx;
   const placed: Place[] = [];
   const aside: Belonging[] = [];
   for (const caption of captions) {
@@ -45,19 +49,25 @@ export function placeCaptions(captions: Iterable<Caption>, { camera, pixel, marg
     const seen = Math.abs(at.x) < 1 && Math.abs(at.y) < 1 && at.z < 1;
     if (far) caption.lift(0);
     else if (margins && seen && caption.aside) aside.push(belonging);
-    else placed.push(stack(belonging, placed, half, edge, seen));
+    else placed.push(stack(belonging, placed, top, edge, seen));
   }
   // From above, so that lines to what they are about seldom cross.
   for (const belonging of aside.sort((a, b) => b.y - a.y))
-    placed.push(putAside(belonging, placed, half, edge));
+    placed.push(putAside(belonging, placed, half, top, edge));
 }
 
-function putAside({ caption, x, y }: Belonging, placed: readonly Place[], half: number, edge: number): Place {
+function putAside(
+  { caption, x, y }: Belonging,
+  placed: readonly Place[],
+  half: number,
+  top: number,
+  edge: number,
+): Place {
   const { widthPx: width, heightPx } = caption;
   const height = heightPx + GAP_PX;
   if (caption.side === 0 || Math.abs(x) > KEEPS_SIDE * edge) caption.side = x < 0 ? -1 : 1;
   const lowest = -half + LEGEND_PX;
-  const highest = half - TOOLS_PX - height;
+  const highest = top - height;
   const level = 2 * edge < NARROW_PX ? highest : Math.max(Math.min(y - height / 2, highest), lowest);
   const place = { x: caption.side * Math.max(edge - SIDE_PX - width / 2, 0), y: level, width, height };
   for (let other = covered(placed, place); other; other = covered(placed, place)) place.y = other.y - height;
@@ -75,7 +85,7 @@ function putAside({ caption, x, y }: Belonging, placed: readonly Place[], half: 
 function stack(
   { caption, x, y }: Belonging,
   placed: readonly Place[],
-  half: number,
+  top: number,
   edge: number,
   seen: boolean,
 ): Place {
@@ -90,7 +100,7 @@ function stack(
   for (let below = covered(placed, place); below; below = covered(placed, place)) {
     place.y = below.y + below.height;
   }
-  if (place.y > y && place.y + place.height > half - TOOLS_PX) {
+  if (place.y > y && place.y + place.height > top) {
     place.y = y - place.height;
     for (let above = covered(placed, place); above; above = covered(placed, place)) {
       place.y = above.y - place.height;

@@ -8,4 +8,6 @@ export interface View {
   pixel: number;
   /** Whether figures may go to the sides of the picture; in a headset there are none. */
   margins: boolean;
+  /** Height of the tools at the upper edge of the picture [px]; of one row of them when not said. */
+  toolsPx?: number;
 }

@@ -4,7 +4,7 @@ import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
-import { folded } from "../view/kept";
+import { type Column, folded, order, timeAbove, widths } from "../view/kept";
 import { said } from "../words";
 import { CameraNote } from "./CameraNote";
 import { VisitedInstant } from "./ElsewhereNote";
@@ -18,6 +18,7 @@ import { Properties } from "./Properties";
 import { ReachNote } from "./ReachNote";
 import { RightSide } from "./RightSide";
 import { SceneTree } from "./SceneTree";
+import { Splitter } from "./Splitter";
 import { Timeline } from "./Timeline";
 import { TopBar } from "./TopBar";
 import { TransportBar } from "./TransportBar";
@@ -35,7 +36,17 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
     [],
   );
   return (
-    <div class={["app", ...folded.value.map((panel) => `without-${panel}`)].join(" ")}>
+    <div
+      class={[
+        "app",
+        timeAbove.value ? "time-above" : "",
+        ...folded.value.map((panel) => `without-${panel}`),
+      ].join(" ")}
+      style={{
+        "--middle": `"${order.value.join(" ")}"`,
+        "--columns": order.value.map(columnOf).join(" "),
+      }}
+    >
       <TopBar />
       <aside class="left" aria-label={said("Scene and properties")}>
         <SceneTree />
@@ -43,6 +54,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <section class="selection scroll" aria-label={said("Properties")} tabIndex={0}>
           <Properties />
         </section>
+        <Splitter panel="left" name={said("Scene and properties")} />
       </aside>
       <main class="centre">
         <div class="room" ref={place} />
@@ -70,6 +82,19 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <Keys />
     </div>
   );
+}
+
+/** Of columns whose width nobody chose. */
+const WIDTHS: Record<Column, string> = {
+  left: "clamp(190px, 17vw, 270px)",
+  centre: "minmax(0, 1fr)",
+  right: "clamp(396px, 30vw, 460px)",
+};
+
+function columnOf(column: Column): string {
+  if (column !== "centre" && folded.value.includes(column)) return "0px";
+  const width = column === "centre" ? undefined : widths.value[column];
+  return width === undefined ? WIDTHS[column] : `min(${width}px, 60vw)`;
 }
 
 const PLOT_LEAST_PX = 400;

@@ -10,7 +10,7 @@ import { aim, orderedRows } from "../row_order";
 import { shownIn, spoken } from "../units";
 import { margin, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo, Result } from "../wire";
-import { said, word } from "../words";
+import { said, told, word } from "../words";
 import { BasisView } from "./BasisView";
 import { Icon } from "./Icon";
 import { Instants } from "./Instants";
@@ -183,19 +183,19 @@ function WorstInstants({ info }: { info: CriterionInfo }) {
 
 function hint({ info }: Row): string {
   const { basis } = info;
-  return basis ? `${info.title}\n${basis.formula}\n${basis.source}` : info.title;
+  return basis ? `${told(info.title)}\n${basis.formula}\n${basis.source}` : told(info.title);
 }
 
 /** What the whole run came to, and of which share of it that speaks. */
 function RunSoFar({ info }: { info: CriterionInfo }) {
-  const told = soFar.value?.criteria[info.name];
-  if (!told) return null;
+  const known = soFar.value?.criteria[info.name];
+  if (!known) return null;
   const shares: [number, string][] = [
-    [told.decided, word("decided")],
-    [told.undecided, word("undecided")],
-    [told.open, word("not asked")],
-    [told.muted, word("did not apply")],
-    [told.nothing, word("nothing to judge")],
+    [known.decided, word("decided")],
+    [known.undecided, word("undecided")],
+    [known.open, word("not asked")],
+    [known.muted, word("did not apply")],
+    [known.nothing, word("nothing to judge")],
   ];
   const parts = shares
     .filter(([share]) => share > 0)
@@ -203,9 +203,9 @@ function RunSoFar({ info }: { info: CriterionInfo }) {
   return (
     <p class="run-so-far">
       {said(soFar.value?.whole ? word("Run") : word("Run so far"))}:{" "}
-      {said(told.verdict ? STATE_WORDS[told.verdict] : word("no verdict"))};{" "}
+      {said(known.verdict ? STATE_WORDS[known.verdict] : word("no verdict"))};{" "}
       {said("{shares} of the time", { shares: parts.join(", ") })}
-      {told.reason !== "" && `; ${spoken(told.reason)}`}
+      {known.reason !== "" && `; ${spoken(known.reason)}`}
     </p>
   );
 }
@@ -214,7 +214,7 @@ function Details({ row }: { row: Row }) {
   const { info, result } = row;
   return (
     <div class="details-body">
-      <p class="lead">{info.title}</p>
+      <p class="lead">{told(info.title)}</p>
       {result?.interval && (
         <p>
           {said("True value between {limits}, given the tolerances of the inputs.", {

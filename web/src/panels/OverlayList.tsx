@@ -3,7 +3,7 @@
 import { kindsOf, SIGNS } from "../markers/signs";
 import { mutedCriteria, rows, stale, toggleMuted } from "../page_state";
 import { showCaptions, showGrid } from "../scene/viewer";
-import { said } from "../words";
+import { said, told } from "../words";
 import { StateBadge } from "./StateBadge";
 
 const KEYS = 9;
@@ -12,7 +12,7 @@ export function OverlayList() {
   return (
     <div class="overlay-list" id="overlays">
       {rows.value.map(({ info, result, state }, i) => (
-        <label key={info.name} title={info.title}>
+        <label key={info.name} title={told(info.title)}>
           <input
             type="checkbox"
             checked={!mutedCriteria.value.has(info.name)}

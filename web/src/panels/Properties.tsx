@@ -4,7 +4,7 @@ import { doubtAmong, doubts } from "../doubts";
 import { formatJoint, formatNumber, formatQuantity } from "../format";
 import { frame, scene, selectedNodes, selection, stale } from "../page_state";
 import type { JointInfo, MechanismInfo, Node, Scene } from "../wire";
-import { said } from "../words";
+import { said, told } from "../words";
 import { FindingList } from "./Findings";
 
 export function Properties() {
@@ -220,7 +220,7 @@ function CriterionProperties({ run, name }: { run: Scene; name: string }) {
   return (
     <div class="properties">
       <h2>{info.name}</h2>
-      <p>{info.title}</p>
+      <p>{told(info.title)}</p>
       <dl>
         <dt>{said("Kind")}</dt>
         <dd>{info.kind}</dd>

@@ -11,6 +11,7 @@ import { Editor } from "./Editor";
 import { allFindings, Findings } from "./Findings";
 import { Posture } from "./Posture";
 import { Room } from "./Room";
+import { Splitter } from "./Splitter";
 
 const TABS = ["edit", "criteria", "body", "posture", "room", "findings"] as const;
 type Tab = (typeof TABS)[number];
@@ -68,6 +69,7 @@ export function RightSide() {
         {shown === "findings" && <Findings />}
       </div>
       <p class="disclaimer">{said("Evaluation of a model, to be confirmed by measurement.")}</p>
+      <Splitter panel="right" name={said("Results")} />
     </aside>
   );
 }

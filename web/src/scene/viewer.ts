@@ -1,7 +1,7 @@
 // The middle of the page: bodies, markers and viewpoint, told by signals what to show.
 
 import { effect, signal } from "@preact/signals";
-import { Quaternion, type Raycaster, Vector3 } from "three";
+import { type Mesh, Quaternion, type Raycaster, Vector3 } from "three";
 import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
@@ -38,15 +38,18 @@ import { Outline } from "./outline";
 import { nodeAlong, pickOnClick } from "./picking";
 import { Stage } from "./stage";
 import { Viewpoint } from "./viewpoint";
+import { hiding } from "./volumes";
 
 /** Criteria that are labelled in the room, and a room that has space for one. */
 const LABELLED = 3;
 const UNSEEN_LAYER = 31;
 const NARROW_PX = 520;
+/** Above and below the tools of the room. */
+const TOOLS_MARGIN_PX = 20;
 
 export const showCaptions = signal(true);
 export const showGrid = signal(true);
-/** Whether volumes with edges are drawn by those alone, so that they hide nothing of what is inside. */
+/** Whether every volume with edges is drawn by those alone, also where it hides nothing of what is inside. */
 export const outlinesOnly = signal(false);
 /** Nodes whose mesh could not be fetched: they are there, but not to be seen. */
 export const unseen = signal<readonly string[]>([]);
@@ -70,6 +73,7 @@ export class Viewer {
   private coming: Frame | null = null;
   private tickedAt = Number.NEGATIVE_INFINITY;
   private posed = false;
+  private labels = LABELLED;
   private framed = false;
   private dressed = false;
 
@@ -97,7 +101,14 @@ export class Viewer {
       () => this.gizmo.held,
     );
     this.follow();
-    new ResizeObserver(() => this.stage.invalidate()).observe(element);
+    const tools = element.parentElement?.querySelector<HTMLElement>(".view-tools");
+    const resized = new ResizeObserver(() => {
+      if (tools) this.view.toolsPx = tools.offsetHeight + TOOLS_MARGIN_PX;
+      // A phone that is turned.
+      if (this.labelled() !== this.labels) this.draw();
+      this.stage.invalidate();
+    });
+    for (const one of [element, tools]) if (one) resized.observe(one);
   }
 
   /** Show another scene; the viewpoint stays when one has been there before. */
@@ -154,6 +165,7 @@ export class Viewer {
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
     this.view.margins = !this.stage.renderer.xr.isPresenting;
     camera.updateWorldMatrix(true, false);
+    this.fillVolumes();
     this.markers.face(this.view, [...this.doubts.shown()]);
   }
 
@@ -198,12 +210,26 @@ export class Viewer {
     if (this.feed) followProbe(this.feed.t, (name) => this.bodies.byName.get(name)?.group);
   }
 
-  /** Show filled volumes, or their edges alone: a layer that no camera sees. */
-  private outlines(): void {
-    const layer = outlinesOnly.peek() ? UNSEEN_LAYER : 0;
+  /** Volumes with edges, of which one may be all that is seen. */
+  private volumes: Mesh[] = [];
+
+  private findVolumes(): void {
+    this.volumes = [];
     this.stage.world.traverse((part) => {
-      if (part.userData.volume === true) part.layers.set(layer);
+      if (part.userData.volume === true) this.volumes.push(part as Mesh);
     });
+  }
+
+  /** Show volumes filled, or by their edges alone where they would hide what is inside: on a layer of no camera. */
+  private fillVolumes(): void {
+    if (this.volumes.length === 0) return;
+    const boxes = this.volumes.map(({ geometry, matrixWorld }) => {
+      if (!geometry.boundingBox) geometry.computeBoundingBox();
+      return geometry.boundingBox!.clone().applyMatrix4(matrixWorld);
+    });
+    const hides = hiding(boxes, this.stage.camera.getWorldPosition(new Vector3()));
+    for (const [k, volume] of this.volumes.entries())
+      volume.layers.set(outlinesOnly.peek() || hides[k] ? UNSEEN_LAYER : 0);
   }
 
   private arrive(): void {
@@ -220,16 +246,17 @@ export class Viewer {
   private draw(): void {
     const chosen = selection.peek();
     const measured = measuring.peek()?.result;
+    this.labels = this.labelled();
     const asked = [measured, reaching.peek()?.result, axisMarker()].filter((result) => result != null);
     const results = this.frame?.results ?? [];
     this.markers.update(
       [...asked, ...results],
       mutedCriteria.peek(),
       measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null),
-      showCaptions.peek() ? this.labelled() : 0,
+      showCaptions.peek() ? this.labels : 0,
     );
     this.paint();
-    this.outlines();
+    this.findVolumes();
     this.bodies.wear(this.frame?.looks ?? {});
     const doubts = doubtsIn(this.frame);
     this.bodies.doubt(doubts);
@@ -303,7 +330,6 @@ export class Viewer {
     });
     effect(() => {
       void outlinesOnly.value;
-      this.outlines();
       this.stage.invalidate();
     });
     effect(() => {

@@ -1,4 +1,4 @@
-// What this browser keeps for one workstation: views that were saved, and panels that are folded away.
+// What this browser keeps for one workstation: views that were saved, and where panels are, how wide, or folded away.
 
 import { effect, type Signal, signal } from "@preact/signals";
 import { scene } from "../page_state";
@@ -13,10 +13,24 @@ export interface SavedView {
 export const PANELS = ["left", "right", "bottom"] as const;
 export type Panel = (typeof PANELS)[number];
 
+/** What stands beside each other between top and bottom. */
+export const COLUMNS = ["left", "centre", "right"] as const;
+export type Column = (typeof COLUMNS)[number];
+type Widths = Partial<Record<Column, number>>;
+
 const MOST_VIEWS = 20;
+/** Of a panel [px], and of what it leaves of the window. */
+const LEAST_PX = 150;
+const MOST_SHARE = 0.6;
 
 export const views: Signal<readonly SavedView[]> = signal([]);
 export const folded: Signal<readonly Panel[]> = signal([]);
+/** From left to right. */
+export const order: Signal<readonly Column[]> = signal(COLUMNS);
+/** Of panels whose width was chosen [px]. */
+export const widths: Signal<Readonly<Widths>> = signal({});
+/** Whether plots and time are above the room. */
+export const timeAbove = signal(false);
 
 export function saveView(view: Omit<SavedView, "name">): void {
   const taken = new Set(views.value.map(({ name }) => name));
@@ -35,6 +49,25 @@ export function toggleFolded(panel: Panel): void {
     : [...folded.value, panel];
 }
 
+/** Change places with the neighbour on the left (-1) or the right (1). */
+export function moveColumn(column: Column, step: -1 | 1): void {
+  const next = [...order.value];
+  const at = next.indexOf(column);
+  const other = next[at + step];
+  if (other === undefined) return;
+  next[at + step] = column;
+  next[at] = other;
+  order.value = next;
+}
+
+/** Give a panel a width [px], or its own again. */
+export function setWidth(column: Column, px: number | null): void {
+  const { [column]: _, ...rest } = widths.value;
+  const most = Math.max(MOST_SHARE * globalThis.innerWidth, LEAST_PX);
+  widths.value =
+    px === null ? rest : { ...rest, [column]: Math.round(Math.min(Math.max(px, LEAST_PX), most)) };
+}
+
 const keyOf = (title: string): string => `seerob.view.${title}`;
 let title: string | null = null;
 
@@ -45,11 +78,20 @@ effect(() => {
   const kept = read(next);
   views.value = kept.views;
   folded.value = kept.folded;
+  order.value = kept.order;
+  widths.value = kept.widths;
+  timeAbove.value = kept.timeAbove;
   title = next;
 });
 
 effect(() => {
-  const now = JSON.stringify({ views: views.value, folded: folded.value });
+  const now = JSON.stringify({
+    views: views.value,
+    folded: folded.value,
+    order: order.value,
+    widths: widths.value,
+    timeAbove: timeAbove.value,
+  });
   if (title === null) return;
   try {
     localStorage.setItem(keyOf(title), now);
@@ -58,19 +100,39 @@ effect(() => {
   }
 });
 
-function read(of: string): { views: SavedView[]; folded: Panel[] } {
+interface Kept {
+  views: SavedView[];
+  folded: Panel[];
+  order: readonly Column[];
+  widths: Widths;
+  timeAbove: boolean;
+}
+
+function read(of: string): Kept {
+  let kept: Partial<Record<keyof Kept, unknown>> = {};
   try {
-    const kept = JSON.parse(localStorage.getItem(keyOf(of)) ?? "{}");
-    const found: SavedView[] = Array.isArray(kept.views) ? kept.views.filter(isView) : [];
-    return { views: found, folded: PANELS.filter((one) => kept.folded?.includes?.(one)) };
+    kept = JSON.parse(localStorage.getItem(keyOf(of)) ?? "{}") ?? {};
   } catch {
-    return { views: [], folded: [] };
+    // Nothing, or nothing that this page wrote.
   }
+  const list = (given: unknown): unknown[] => (Array.isArray(given) ? given : []);
+  const columns = list(kept.order);
+  const given = (kept.widths ?? {}) as Widths;
+  return {
+    views: list(kept.views).filter(isView),
+    folded: PANELS.filter((one) => list(kept.folded).includes(one)),
+    order: COLUMNS.every((one) => columns.includes(one)) ? (columns.slice(0, 3) as Column[]) : COLUMNS,
+    widths: Object.fromEntries(
+      COLUMNS.filter((one) => (given[one] ?? 0) > 0).map((one) => [one, given[one]]),
+    ),
+    timeAbove: kept.timeAbove === true,
+  };
 }
 
 const isPoint = (point: unknown): boolean =>
   Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
 
-function isView(view: SavedView): boolean {
+function isView(given: unknown): given is SavedView {
+  const view = given as SavedView;
   return typeof view?.name === "string" && isPoint(view.position) && isPoint(view.target);
 }

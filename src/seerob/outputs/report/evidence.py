@@ -11,7 +11,7 @@ from seerob.description.humans.skeleton import BONES
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.report.report import UNKNOWN, WHO, Report, Setup
 from seerob.outputs.sentences import grouped, number
-from seerob.outputs.words import said, told
+from seerob.outputs.words import said, told, word
 from seerob.recording.bone_errors import BoneErrors
 
 
@@ -68,25 +68,31 @@ def not_covered(report: Report) -> Html:
 def evaluated(report: Report) -> Html:
     """Rates, sources, versions, hashes and bodies."""
     scene, log, how = report.scene, report.log, report.setup
-    span = f"{figure(log.start, 's')} to {figure(log.end, 's')}, {log.ticks} ticks, period {scene.period:g} s"
+    span = said(
+        "{start} to {end}, {n} ticks, period {period} s",
+        start=figure(log.start, "s"), end=figure(log.end, "s"), n=log.ticks, period=f"{scene.period:g}",
+    )  # fmt: skip
     facts: list[list[str | Html]] = [
-        ["workstation", scene.title],
-        ["editions of the figures", scene.edition],
-        ["run time", span],
+        [said("workstation"), scene.title],
+        [said("editions of the figures"), scene.edition],
+        [said("run time"), span],
         *([what, value] for what, value in how.engine),
         *(
-            [f"largest tracking error, {e.name}", f"{number(e.error)} rad or m at {e.t:.2f} s"]
+            [
+                said("largest tracking error, {name}", name=e.name),
+                f"{number(e.error)} rad or m, {e.t:.2f} s",
+            ]
             for e in log.tracking
         ),
     ]
     written: list[list[str | Html]] = [
-        ["written", report.date],
-        ["by", tag("code", report.command)],
-        ["hash of all inputs (SHA-256)", tag("code", scene.workstation_hash)],
-        *([f"version of {name}", version] for name, version in report.versions.items()),
+        [said("written"), report.date],
+        [said("by"), tag("code", report.command)],
+        [said("hash of all inputs (SHA-256)"), tag("code", scene.workstation_hash)],
+        *([said("version of {name}", name=name), version] for name, version in report.versions.items()),
     ]
     files = [
-        [name, f"{len(data)} bytes", tag("code", hashlib.sha256(data).hexdigest())]
+        [name, said("{n} bytes", n=len(data)), tag("code", hashlib.sha256(data).hexdigest())]
         for name, data in sorted(report.files.items())
     ]
     alike: dict[tuple[str, Origin, str], list[str]] = {}
@@ -94,10 +100,12 @@ def evaluated(report: Report) -> Html:
         mass = f" {number(node.mass, 'kg')}" if node.mass is not None else ""
         alike.setdefault((node.role, node.mass_origin, node.note), []).append(f"{node.name}{mass}")
     bodies = [
-        ["; ".join(names), role, said(WHO[origin]), note or "–"]
+        ["; ".join(names), role, said(WHO[origin]), told(note) or "–"]
         for (role, origin, note), names in alike.items()
     ]
-    heads = ["source", "drives", "from", "what it is", "time-out", "at its end"]
+    heads = [
+        said(one) for one in ("source", word("drives"), word("from"), word("what it is"), word("time-out"))
+    ] + [said("at its end")]
     return joined(
         [
             table(["", ""], facts),
@@ -107,9 +115,9 @@ def evaluated(report: Report) -> Html:
             tag("h4", said("With what")),
             table(["", ""], written),
             tag("h4", said("Input files")) if files else None,
-            table(["file", "size", "SHA-256"], files) if files else None,
+            table([said("file"), said("size"), "SHA-256"], files) if files else None,
             tag("h4", said("Bodies of the twin")),
-            table(["bodies and masses", "role", "mass is", "geometry"], bodies),
+            table([said("bodies and masses"), said("role"), said("mass is"), said("geometry")], bodies),
             masses(scene),
         ]
     )
@@ -117,12 +125,12 @@ def evaluated(report: Report) -> Html:
 
 def _sources(heads: list[str], how: Setup) -> Html:
     if how.sources:
-        text = (
+        text = said(
             "What is older than its time-out no longer counts: every verdict that needs it is undecided "
             "from then on."
         )
         return joined([table(heads, how.sources), tag("p", text, class_="lead")])
-    return tag("p", "No source: everything stands still." if how.readable else UNKNOWN)
+    return tag("p", said("No source: everything stands still.") if how.readable else UNKNOWN)
 
 
 Cell = str | float | int | None

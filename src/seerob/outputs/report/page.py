@@ -429,9 +429,9 @@ def _described(info: CriterionInfo | None) -> Html | None:
         return None
     about_ = f" {said('Speaks of {names}.', names=', '.join(info.subjects))}" if info.subjects else ""
     between = " " + said(
-        "Between the instants at which it was asked: {how}.", how=info.between or said("bounded")
+        "Between the instants at which it was asked: {how}.", how=told(info.between) or said("bounded")
     )
-    return tag("p", f"{info.title}{about_}{between}", class_="lead")
+    return tag("p", f"{told(info.title)}{about_}{between}", class_="lead")
 
 
 def _picture(report: Report, series: Series) -> Html | None:

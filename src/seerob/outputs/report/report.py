@@ -21,7 +21,7 @@ from seerob.core.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
 from seerob.outputs.html import Html, tag
 from seerob.outputs.palette import MARK, WORD
 from seerob.outputs.sentences import number
-from seerob.outputs.words import said, told, word
+from seerob.outputs.words import said, speaking, told, word
 from seerob.recording.result_log import ResultLog
 from seerob.workstation.source import Source
 from seerob.workstation.workstation import Engine, ReportCover
@@ -147,12 +147,13 @@ def setup(files: dict[str, bytes]) -> Setup:
     if table is None:
         return Setup((("physics", UNKNOWN),), (), readable=False)
     entries = table.get("sources", [])
-    found = [_source(e) for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
     try:
         cover = msgspec.convert(table.get("report", {}), ReportCover)
     except msgspec.ValidationError:
         cover = ReportCover()
-    return Setup(_engine(table.get("engine", {})), tuple(found), readable=True, cover=cover)
+    with speaking(cover.language):
+        found = [_source(e) for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
+        return Setup(_engine(table.get("engine", {})), tuple(found), readable=True, cover=cover)
 
 
 def command() -> str:
@@ -169,16 +170,29 @@ def _engine(table: object) -> tuple[tuple[str, str], ...]:
     except msgspec.ValidationError:
         return (("engine as the file has it", str(table)),)
     return (
-        ("ticks", f"every {number(e.tick, 's')} ({number(1 / e.tick, 'Hz')})"),
-        ("physics", f"steps of {number(e.timestep, 's')} ({number(1 / e.timestep, 'Hz')}), MuJoCo"),
         (
-            "controllers",
-            f"critically damped; bandwidth {number(e.bandwidth, 'Hz')} for robots, "
-            f"{number(e.human_bandwidth, 'Hz')} for people",
+            said("ticks"),
+            said("every {period} ({rate})", period=number(e.tick, "s"), rate=number(1 / e.tick, "Hz")),
         ),
-        ("largest tracking error that is still judged", f"{number(e.tracking_limit)} rad or m"),
-        ("the same of people", f"{number(e.human_tracking_limit)} rad or m"),
-        ("gravity", ", ".join(number(x) for x in e.gravity) + " m/s²"),
+        (
+            said("physics"),
+            said(
+                "steps of {period} ({rate}), MuJoCo",
+                period=number(e.timestep, "s"),
+                rate=number(1 / e.timestep, "Hz"),
+            ),
+        ),
+        (
+            said("controllers"),
+            said(
+                "critically damped; bandwidth {robots} for robots, {people} for people",
+                robots=number(e.bandwidth, "Hz"),
+                people=number(e.human_bandwidth, "Hz"),
+            ),
+        ),
+        (said("largest tracking error that is still judged"), f"{number(e.tracking_limit)} rad or m"),
+        (said("the same of people"), f"{number(e.human_tracking_limit)} rad or m"),
+        (said("gravity"), ", ".join(number(x) for x in e.gravity) + " m/s²"),
     )
 
 
@@ -203,7 +217,11 @@ def _source(entry: dict[str, object]) -> tuple[str, ...]:
         timeout, end = str(rest.get("timeout", "unknown")), "unknown"
     else:
         timeout = number(source.timeout, "s")
-        end = f"starts again after {number(source.loop_pause, 's')}" if source.loop else "stops"
+        end = (
+            said("starts again after {pause}", pause=number(source.loop_pause, "s"))
+            if source.loop
+            else said("stops")
+        )
     return (
         name,
         drives or "–",

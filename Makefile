@@ -129,7 +129,7 @@ bench: $(DEV)
 
 # KINDS="rtde opcua" KILLS=1000: only live sources, these of them, so many kills. Hours without.
 soak: $(DEV)
-	$(if $(KINDS)$(KILLS),SEEROB_SOAK_KINDS="$(KINDS)" SEEROB_SOAK_KILLS=$(or $(KILLS),1000) $(BIN)/pytest -m soak -rP tests/soak/test_live_sources.py,$(BIN)/pytest -m soak tests/soak)
+	$(if $(KINDS)$(KILLS),SEEROB_SOAK_KINDS="$(KINDS)" SEEROB_SOAK_KILLS=$(or $(KILLS),1000) $(BIN)/pytest -m soak -rP tests/soak/test_live_sources.py,$(BIN)/pytest -m soak)
 
 format: $(DEV)
 	$(BIN)/ruff check --fix

@@ -15,6 +15,15 @@ APART = "/test_relations.py"
 gc.disable()
 
 
+def pytest_collection_modifyitems(config, items):
+    """Long runs, marked ``soak`` wherever they lie, run only when asked for: ``pytest -m soak``."""
+    if "soak" in (config.option.markexpr or ""):
+        return
+    if long := [item for item in items if item.get_closest_marker("soak")]:
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if not item.get_closest_marker("soak")]
+
+
 def pytest_collection_finish() -> None:
     """Libraries and tests stay to the end: not looking through them again and again saves a fifteenth.
 

@@ -528,3 +528,12 @@ def test_visuals_of_an_mjcf_are_left_out_too(tmp_path):
     assert ignored.link("arm").visual == ()
     assert len(ignored.link("arm").solids) == len(seen.link("arm").solids)
     assert "shapes for the eye are not read" in texts(ignored)
+
+
+@pytest.mark.parametrize("name", ["arm", "arm.robot"])
+def test_a_file_without_the_customary_ending_is_read_as_what_it_is(tmp_path, name):
+    (tmp_path / name).write_text('<robot name="a"><link name="base"/></robot>')
+    assert [link.name for link in load_robot(name, folder=tmp_path).links] == ["base"]
+    (tmp_path / name).write_bytes(b"solid a\nendsolid a\n")
+    with pytest.raises(InputError, match="is not a robot description"):
+        load_robot(name, folder=tmp_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -65,6 +66,10 @@ def load_robot(
     return with_geometry_of(description, maker)
 
 
+_XML = re.compile(rb"(?:\xef\xbb\xbf)?\s*<")
+"""How XML begins."""
+
+
 class _Asked(NamedTuple):
     """Which robot of a file, and how it is read: arguments of `load_robot`."""
 
@@ -116,13 +121,14 @@ def _read(asked: _Asked, path: Path, resolver: Resolver) -> Description:
         text, files = expanded(path, resolver, asked.arguments)
         robot = urdf.from_text(text, resolver=resolver, name=name, visuals=visuals)
         return replace(robot, files={**robot.files, **files})
-    if path.suffix.lower() not in {".urdf", ".xml"}:
-        readable = ".urdf, .xacro and .xml (URDF or MJCF) are read"
-        raise InputError.at(model, "", f"{path.suffix or 'no ending'!r} is not a robot description", readable)
     try:
         text = content(path, MAX_BYTES)
     except (OSError, TooLarge) as error:
         raise InputError.at(model, "", f"cannot be read: {error}", f"at most {MAX_BYTES} are read") from None
+    if path.suffix.lower() not in {".urdf", ".xml"} and not _XML.match(text):
+        # What a file is, is in it: some packages install URDF without an ending.
+        readable = "URDF, MJCF and .xacro are read"
+        raise InputError.at(model, "", f"{path.name!r} is not a robot description", readable)
     root = parse_xml(text, str(path)).tag
     if root == "robot":
         return urdf.from_text(text, resolver=resolver, name=name, visuals=visuals)

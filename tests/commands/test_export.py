@@ -5,6 +5,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 import trimesh
 
@@ -23,10 +24,8 @@ slide = { along = [0, -1, 0], lower = 0.0, upper = 1.0 }
 
 [[tools]]
 name = "gripper"
-shape = { cylinder = [0.04, 0.12] }
+model = "library:robotiq_2f_85"
 on = "ur5e/tool0"
-at = { position = [0, 0, 0.06] }
-mass = 1.2
 tcp = { position = [0, 0, 0.13] }
 """
 
@@ -128,6 +127,28 @@ def test_mujoco_itself_reads_places_and_masses(cell, tmp_path, kind):
     low, high = theirs.joint("ur5e/elbow_joint").range
     elbow = next(j for j in model.mechanisms["ur5e"].joints if j.name == "elbow_joint")
     assert (low, high) == pytest.approx((elbow.lower, elbow.upper))
+
+
+def test_pinocchio_reads_places_and_masses_of_the_urdf(cell, tmp_path):
+    folder, model, data = cell
+    theirs = pin.buildModelFromUrdf(str(exported(folder, "urdf", tmp_path)))
+    q = pin.neutral(theirs)
+    for mechanism in model.mechanisms.values():
+        for joint, home in zip(mechanism.joints, mechanism.home, strict=True):
+            if mechanism.role == "human":
+                continue
+            number = theirs.getJointId(f"{mechanism.name}/{joint.name}")
+            at = theirs.joints[number].idx_q
+            q[at : at + theirs.joints[number].nq] = home
+    there = theirs.createData()
+    pin.framesForwardKinematics(theirs, there, q)
+    for name, (position, rotation) in places(model, data).items():
+        pose = there.oMf[theirs.getFrameId(name)]
+        assert pose.translation == pytest.approx(position, abs=1e-9), name
+        assert pose.rotation == pytest.approx(rotation, abs=1e-9), name
+    moving = [b for b in _masses(model).values() if theirs.frames[theirs.getFrameId(b.name)].parentJoint]
+    assert pin.computeTotalMass(theirs) == pytest.approx(sum(b.mass.value for b in moving))
+    assert len(moving) == 8  # six links, the gripper and the door
 
 
 def test_openusd_and_trimesh_find_what_is_there_where_it_is(cell, tmp_path):

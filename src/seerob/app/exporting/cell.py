@@ -34,19 +34,7 @@ class Cell:
 
     def placed(self) -> dict[str, Array]:
         """Pose of every link in the world (4, 4), with joints where they are at home."""
-        return base_from_links(self.description, _all(self.description, self.home))
-
-
-def _all(description: Description, q: dict[str, float]) -> dict[str, float]:
-    """Positions of all joints, of those that follow others too."""
-    found = dict(q)
-    for link in description.links:
-        for joint in link.joints:
-            if joint.mimic is not None:
-                found[joint.name] = (
-                    joint.mimic.multiplier * found.get(joint.mimic.joint, 0.0) + joint.mimic.offset
-                )
-    return found
+        return base_from_links(self.description, self.home)
 
 
 def cell_of(model: Model) -> Cell:
@@ -127,7 +115,7 @@ def _things(model: Model) -> tuple[dict[str, tuple[Mesh, ...]], dict[str, Inerti
     )
     unknown = 0
     for thing, color in groups:
-        weighed = thing.mass is not None or thing.density is not None
+        weighed = thing.mass is not None or thing.density is not None or thing.library is not None
         try:
             loaded = load_thing(thing, model.folder, color, needs_mass=weighed)
         except InputError as error:
@@ -137,7 +125,7 @@ def _things(model: Model) -> tuple[dict[str, tuple[Mesh, ...]], dict[str, Inerti
             visual[f"{thing.name}/{piece.name}" if piece.name else thing.name] = piece.visual
         if loaded.inertial is not None:
             inertials[thing.name] = loaded.inertial
-        unknown += not weighed
+        unknown += not weighed or (thing.library is not None and loaded.inertial is None)
     if unknown:
         notes.append(f"{unknown} things have no mass: none is written")
     return visual, inertials, notes

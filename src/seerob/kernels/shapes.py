@@ -58,28 +58,34 @@ class Shapes:
         """
         _check(bodies)
         made: list[_Made] = []
-        known: dict[int, _Made] = {}  # instances share a mesh, which lives as long as their solids
+        # Instances share a mesh, which lives as long as their solids, and the rows of its arrays.
+        known: dict[int, tuple[_Made, list[int], int]] = {}
+        stored: list[_Made] = []
         owned: list[tuple[int, ...]] = []
         which: list[list[int]] = []
         ends = np.zeros(3, int)
-        wide: list[int] = []
+        wide = 0
         for body, (_, solids) in enumerate(bodies):
             owned.append(tuple(range(len(made), len(made) + len(solids))))
             for solid in solids:
-                core = known.get(id(solid.mesh)) or _make(solid, cache)
-                if solid.mesh is not None:
-                    known[id(solid.mesh)] = core
-                tree = core.tree
-                size = np.array([0, 0, len(core.probes)])
-                if tree is not None:
-                    size[:2] = len(tree.nodes), len(tree.triangles)
-                spans = np.column_stack([ends, ends + size]).ravel().tolist()
-                ends += size
-                flags = [tree is not None, core.volume, core.closed]
-                which.append([body, *map(int, flags), *spans, core.corner_count, sum(wide)])
-                wide.append(0 if tree is None else len(tree.boxes))
+                found = None if solid.mesh is None else known.get(id(solid.mesh))
+                if found is None:
+                    core = _make(solid, cache)
+                    tree = core.tree
+                    size = np.array([0, 0, len(core.probes)])
+                    if tree is not None:
+                        size[:2] = len(tree.nodes), len(tree.triangles)
+                    found = core, np.column_stack([ends, ends + size]).ravel().tolist(), wide
+                    ends += size
+                    wide += 0 if tree is None else len(tree.boxes)
+                    stored.append(core)
+                    if solid.mesh is not None:
+                        known[id(solid.mesh)] = found
+                core, spans, first = found
+                flags = [core.tree is not None, core.volume, core.closed]
+                which.append([body, *map(int, flags), *spans, core.corner_count, first])
                 made.append(core)
-        trees = [m.tree for m in made if m.tree is not None]
+        trees = [m.tree for m in stored if m.tree is not None]
         shapes = cls(
             names=tuple(name for name, _ in bodies),
             solids=tuple(owned),
@@ -93,7 +99,7 @@ class Shapes:
             triangles=np.concatenate([np.zeros((0, 13)), *(t.triangles for t in trees)]),
             boxes=np.concatenate([np.zeros((0, 120), np.float32), *(t.boxes for t in trees)]),
             kids=_joined(trees),
-            probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in made)]),
+            probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in stored)]),
         )
         return shapes
 

@@ -7,7 +7,7 @@ where its samples begin. Whom a live source moves is asked for what depends on t
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import mujoco
@@ -134,11 +134,20 @@ def _most(q: Mapping[str, Sequence[Array]]) -> int:
 # -- sizes and masses ---------------------------------------------------------------------------
 
 
+def _owned(bodies: Iterable[Body]) -> dict[str, list[Body]]:
+    """Bodies by the table entry that they belong to."""
+    found: dict[str, list[Body]] = {}
+    for body in bodies:
+        found.setdefault(body.owner, []).append(body)
+    return found
+
+
 def _sizes(model: Model) -> Iterator[Quantity]:
     """Extent of every thing, its mass where a density tells it, and its density where it does not."""
+    owned = _owned(model.bodies)
     for group in ("tools", "workpieces", "parts", "machines", "areas"):
         for i, thing in enumerate(getattr(model.workstation, group)):
-            bodies = [body for body in model.bodies if body.owner == thing.name]
+            bodies = owned.get(thing.name, [])
             solids = [solid for body in bodies for solid in body.solids]
             if not solids:
                 continue
@@ -509,7 +518,8 @@ def _bases(model: Model, place: _Home) -> Iterator[Quantity]:
 
 def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
     """How deep parts that stand reach into each other."""
-    every = [[b for b in _seen(model.bodies) if b.owner == part.name] for part in model.workstation.parts]
+    owned = _owned(_seen(model.bodies))
+    every = [owned.get(part.name, []) for part in model.workstation.parts]
     boxes = np.array([place.box(bodies) for bodies in every]).reshape(-1, 2, 3)
     for i, (part, own) in enumerate(zip(model.workstation.parts, every, strict=True)):
         # Of hundreds of parts few are near each other; whose boxes are apart is not asked.

@@ -23,9 +23,9 @@ from seerob.core.snapshot import Change
 MEMORY, SECONDS = 8 << 30, 1800
 """Memory [byte] and computing time [s] of the process; what OpenCASCADE takes has its own bounds."""
 LONGEST_LINE = 1 << 20
-"""Of what the process says [byte]."""
+"""No line that the process says is longer [byte]."""
 LARGEST_TABLE = 256 << 20
-"""Of what a file became [byte]."""
+"""No table of what a file became is larger [byte]."""
 MOST_AXES = 20
 """Proposals that are told."""
 TABLES = "import-*.json"

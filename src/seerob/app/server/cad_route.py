@@ -23,7 +23,7 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Change
 
 MOST_BYTES = 512 << 20
-"""Of a file."""
+"""No file is larger [byte]."""
 SECONDS = 600.0
 """That bringing it may take."""
 IMPORTED = "imported"
@@ -38,11 +38,11 @@ _VALUES = {
 }
 
 Reading = Callable[[Path, Path, str, Mapping[str, str]], AsyncIterator[dict[str, Any]]]
-"""As `seerob.app.importing.dropped.read_apart`."""
+"""Reads a file in a process of its own: `seerob.app.importing.dropped.read_apart`."""
 Changes = Callable[
     [bytes, Path, str, str], tuple[tuple[Change, ...], tuple[tuple[str, str], ...], dict[str, Any]]
 ]
-"""As `seerob.app.importing.dropped.changes`."""
+"""Says what of a workstation file changes: `seerob.app.importing.dropped.changes`."""
 
 
 class Bringing:

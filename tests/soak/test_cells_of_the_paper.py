@@ -21,6 +21,7 @@ import seerob as sr
 from seerob.core.samples import BodySample, JointSample
 from seerob.core.snapshot import Verdict
 from seerob.recording.recording import Recording
+from seerob.recording.series import CODES
 
 CELLS = Path(__file__).parents[2] / "workstations"
 SLIPPED, SLIPPED_BY_CASTINGS = 0.3, 1.0
@@ -38,6 +39,8 @@ def faster(feed, factor=3):
             said["t_device"] = sample.t_device / factor
         if isinstance(sample, JointSample) and sample.qd is not None:
             said["qd"] = tuple(factor * v for v in sample.qd)
+        if isinstance(sample, JointSample) and sample.tcp_speed is not None:
+            said["tcp_speed"] = factor * sample.tcp_speed
         return replace(sample, **said)
 
     for ticks in zip_longest(*[iter(feed)] * factor, fillvalue=()):
@@ -77,14 +80,14 @@ class Cycle(NamedTuple):
 CYCLES = {
     "motor_station": Cycle(
         26,
-        {"tool speed": 0.4, "arm energy": 0.6},
+        {"tool speed": 0.33, "arm energy": 0.46},
         {"robot – operator": 0.1},
         ("reaches to the motor",),
         "tool speed",
         faster,
     ),
     "assembly_line": Cycle(
-        20, {"tool speed": 0.5, "arm energy": 1.0}, {}, ("reaches to the line",), "tool speed", faster
+        20, {"tool speed": 0.39, "arm energy": 0.57}, {}, ("reaches to the line",), "tool speed", faster
     ),
     "empty_room": Cycle(
         20,
@@ -104,6 +107,10 @@ CYCLES = {
             "iiwa_left elbow speed": 0.22,
             "ur10 elbow speed": 0.18,
             "iiwa_right elbow speed": 0.21,
+            "iiwa_left elbow energy": 0.25,
+            "ur10 elbow energy": 0.42,
+            "iiwa_right elbow energy": 0.24,
+            "ur10 tool energy": 0.35,
             "iiwa_left energy": 0.57,
             "ur10 energy": 0.57,
             "iiwa_right energy": 0.42,
@@ -115,8 +122,8 @@ CYCLES = {
     ),
     "giant_niryo": Cycle(
         50,
-        {"fastest point": 2.3},
-        {"robot – operator": 1.0},
+        {"fastest point": 2.1},
+        {"robot – operator": 0.5},
         ("robot over the belt",),
         "robot – operator",
         lambda feed: nearer(feed, (-0.8, 1.0, 0.0)),
@@ -146,10 +153,13 @@ def run(request, tmp_path_factory):
 def test_figures_of_a_cycle_are_those_of_the_readme(run):
     name, recording = run
     cycle, results = CYCLES[name], recording.results
-    found = {criterion: results[criterion].max for criterion in cycle.most}
+    found = {criterion: results[criterion].max() for criterion in cycle.most}
     assert found == pytest.approx(cycle.most, rel=TOLERANCE)
     for criterion, bound in cycle.least.items():
-        assert results[criterion].min >= bound, criterion
+        series = results[criterion]
+        decided = series.values[series.verdicts != CODES[Verdict.UNDECIDED]]
+        assert len(decided), criterion
+        assert np.nanmin(decided) >= bound, criterion
     for criterion in cycle.exceeded:
         assert results[criterion].verdict is Verdict.EXCEEDED, criterion
     told = {f.subject for f in recording.scene.findings if "no device, an emulator" in f.text}

@@ -14,7 +14,7 @@ import pytest
 
 import seerob as sr
 from seerob.app.console.terminal import Exit
-from seerob.core.samples import BodySample, JointSample
+from seerob.core.samples import BodySample, JointSample, SignalSample
 from seerob.core.snapshot import Verdict
 from seerob.devices.live.listening import LiveSource
 from seerob.recording.recording import Recording
@@ -71,6 +71,20 @@ def run_and_kill(cell, which, folder):
     return Recording.open(folder / "run.mcap")
 
 
+def decided(recording, until, begin):
+    """Names of results that say something before an instant [s]; of those that do after one, when last."""
+    before, after = set(), {}
+    for snapshot in recording.snapshots():
+        for result in snapshot.results:
+            if result.verdict is Verdict.UNDECIDED or (result.verdict is None and result.value is None):
+                continue
+            if snapshot.t < until:
+                before.add(result.name)
+            elif snapshot.t > begin:
+                after[result.name] = snapshot.t
+    return before, after
+
+
 @pytest.mark.soak
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 @pytest.mark.parametrize(
@@ -84,7 +98,7 @@ def run_and_kill(cell, which, folder):
         ("empty_room", 1, "visitor"),
         ("three_robots", 0, "visitor"),
         ("giant_niryo", 0, "niryo"),
-        ("giant_niryo", 1, "operator"),
+        ("giant_niryo", 2, "operator"),
         ("niryo_picking", 0, "niryo"),
         ("two_places", 0, "niryo"),
         ("two_places", 2, "operator"),
@@ -110,17 +124,10 @@ def test_what_depends_on_a_killed_device_is_undecided_within_its_time_out_and_no
         if isinstance(s, JointSample | BodySample) and s.target == whom
     ]
     end = max(heard) + source.timeout
-    limited = {c.name for c in (*file.safety, *file.ergonomics)}
-    before, after, late = set(), set(), {}
-    for snapshot in recording.snapshots():
-        for result in snapshot.results:
-            if result.name not in limited or result.verdict in (Verdict.UNDECIDED, None):
-                continue
-            if snapshot.t < max(heard):
-                before.add(result.name)
-            elif snapshot.t > end + SLACK:
-                after.add(result.name)
-                late[result.name] = snapshot.t
+    before, late = decided(recording, max(heard), end + SLACK)
+    after = set(late)
+    asked = {c.name for c in (*file.safety, *file.ergonomics)}
+    before, after = before & asked, after & asked
     assert recording.duration - end > 3.0
     assert before
     for criterion in (*file.safety, *file.ergonomics):
@@ -128,3 +135,40 @@ def test_what_depends_on_a_killed_device_is_undecided_within_its_time_out_and_no
             assert criterion.name not in after, (criterion.name, late[criterion.name], end)
         elif criterion.name in before:
             assert criterion.name in after
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+@pytest.mark.parametrize(
+    ("cell", "relies"),
+    [
+        ("niryo_picking", {"tool speed"}),
+        ("two_places", {"tool speed"}),
+        ("giant_niryo", {"fastest point", "robot – operator", "robot over the belt"}),
+    ],
+)
+def test_a_killed_plc_leaves_undecided_what_reaches_as_far_as_the_gripper_and_nothing_else(
+    tmp_path, cell, relies
+):
+    recording = run_and_kill(cell, 1, tmp_path / "run")
+    (plc,) = (s for s in sr.load(CELLS / cell).workstation.sources if s.name == "plc")
+    heard = max(s.t for tick in recording.ticks() for s in tick.samples if isinstance(s, SignalSample))
+    end = heard + plc.timeout
+    assert recording.duration - end > 3.0
+    before, after = decided(recording, heard, end + SLACK)
+    assert relies <= before
+    assert not relies & after.keys(), (after, end)
+    assert before - relies <= after.keys()
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+@pytest.mark.parametrize("which", [3, 4])
+def test_a_killed_headset_of_one_who_looks_on_changes_nothing_but_who_is_there(tmp_path, which):
+    recording = run_and_kill("two_places", which, tmp_path / "run")
+    (gone,) = (t for t, visitor in recording.visits() if visitor.event == "left")
+    before, after = decided(recording, gone, gone)
+    assert {"tool speed", "manipulability"} <= before
+    assert before <= after.keys()
+    there = {visitor.device for _, visitor in recording.visits() if visitor.event == "there"}
+    assert there == {"ar", "vr"} - {("ar", "vr")[which - 3]}

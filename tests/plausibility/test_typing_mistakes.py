@@ -710,3 +710,13 @@ def test_what_is_implausible_of_a_sensor_is_of_criteria_that_name_it(tmp_path: P
     (found,) = findings(listed(entries_of(station), station.engine), ())
     assert found.text.startswith("sensors[0].response = 100")
     assert set(found.holds) == {"curtain", *(["separation"] if by else [])}
+
+
+@pytest.mark.parametrize(("on", "said"), [('on = "arm/tool0"\n', True), ("", False)])
+def test_what_lies_in_the_cell_may_be_farther_away_than_what_a_tool_holds(tmp_path, on, said):
+    piece = '[[workpieces]]\nname = "casting"\nshape = { box = [0.1, 0.1, 0.1] }\nmass = 1\n'
+    arm = '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+    (tmp_path / "workstation.toml").write_text(f"{arm}{piece}{on}at = {{ position = [-1.4, 2.4, 0.7] }}\n")
+    station = read(tmp_path)
+    found = list(findings(listed(entries_of(station), station.engine), ()))
+    assert [f.subject for f in found] == ["casting"] * said

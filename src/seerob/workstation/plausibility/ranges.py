@@ -75,8 +75,10 @@ def listed(entries: Entries, engine: Engine) -> Iterator[Quantity]:
                 about=resting(group, table, entries),
                 of=name_of(table),
             ):
+                # What is loose lies in the cell, and on no tool.
+                lies = quantity.kind == "workpieces.at.position" and table.loose
                 if quantity.key not in of_adults or table.adult:
-                    yield quantity
+                    yield quantity._replace(kind="parts.at.position") if lies else quantity
     for group in PLUGINS:
         for i, table in entries.get(group, {}).items():
             kind = f"{group}.{type(table).__module__.rsplit('.', 1)[-1]}"

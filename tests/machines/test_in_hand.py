@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from made_cell import made, two_r
 from seerob.core.samples import GrabSample, JointSample
 from seerob.criteria.ergonomics.owas import Owas
 from seerob.session.run import Judge, bind
+from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
 
 ROD = """
@@ -147,3 +149,32 @@ def test_what_a_hand_holds_is_where_the_hand_is_as_long_as_that_is_known(tmp_pat
                 assert found.verdict == "within", found.reason
         assert found.verdict == verdict
         assert not grab or "operator: not heard for" in found.reason
+
+
+def test_what_a_hand_holds_is_off_as_the_hand_is_and_lags_behind_it(tmp_path):
+    """Farther from the wrist more, where a device knows the hand's turn less well than its place."""
+    model = made(tmp_path, CELL + DISTANCE.format("rod", 0.5) + ROD, {"arm.urdf": two_r()}).model
+    engine = Engine(model, driven={"operator": 9.0, "arm": 9.0})
+    rods = [body.index for body in model.bodies if body.owner == "rod"]
+    off, home = TrackingError(model, rods), tuple(model.mechanisms["operator"].home)
+    for k in range(30):
+        heard = [JointSample(source="p", seq=k, t=0.01 * k, target="operator", q=home)]
+        if k == 10:
+            heard.append(GrabSample(source="r", seq=0, t=0.1, target="operator/right_hand", piece="rod"))
+        engine.take(heard)
+        state = engine.tick() if k else engine.start()
+        if k == 5:
+            assert off.none(state)
+    still = state.lags["rod"]
+    assert 0.0 < still < 0.01
+    assert (off.at(state) == still).all()
+    state.hearing("operator").bones = {"right_hand": (0.02, 0.1)}
+    wrist = state.positions[next(b.index for b in model.bodies if b.name == "operator/right_hand")]
+    body = model.bodies[rods[0]]
+    points = body.corners @ state.rotations[rods[0]].T + state.positions[rods[0]]
+    reach = np.linalg.norm(points - wrist, axis=1).max() + body.radius
+    assert off.at(state)[0] == pytest.approx(0.02 + 0.1 * reach + still)
+    moved = list(home)
+    moved[0] += 0.05
+    engine.take([JointSample(source="p", seq=31, t=0.3, target="operator", q=tuple(moved))])
+    assert engine.tick().lags["rod"] > still

@@ -553,6 +553,7 @@ class Engine:
         self._show(t)
         self._loose.end(t)
         self.state.events, self.state.held = self._loose.said(), self._loose.held()
+        self.state.lags = self._loose.lags()
         strayed = self._strayed
         self._note_errors()
         self.state.path = self._path(start, t, captured=strayed or self._strayed)

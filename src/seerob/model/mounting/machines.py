@@ -126,6 +126,9 @@ AWAY = "away"
 """Where the one is put that is not there."""
 NOWHERE = 1000.0
 """How high that is above the world [m]: nearer than this nothing is away."""
+OFF = 1e-4
+"""How far what a gripper holds may be from where masses and distances have it [m]: its surface counts as so
+much nearer."""
 
 
 def picked_up(
@@ -181,5 +184,6 @@ def graspable(
     body = mounting.body(name, f"{gripper}/{BODY}", palm_from_piece)
     if inertial is not None:
         mounting.inertial(body, inertial)
-    held = replace(piece, name=name, owner=gripper, carrier=gripper, holder=gripper, mass=None)
+    solids = tuple(replace(solid, deviation=solid.deviation + OFF) for solid in piece.solids)
+    held = replace(piece, name=name, owner=gripper, carrier=gripper, holder=gripper, mass=None, solids=solids)
     mounting.entries.append(held)

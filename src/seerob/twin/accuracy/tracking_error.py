@@ -98,6 +98,10 @@ def inferred_errors(
     return found
 
 
+_Point = tuple[int, str, float]
+"""Row of a body, the bone that it is of, and how far it reaches from where that begins [m]."""
+
+
 class TrackingError:
     r"""Bound on the distance of every point of bones of the twin from the same point as devices see it.
 
@@ -112,15 +116,21 @@ class TrackingError:
     How well a device's world is known to lie in the cell (`Hearing.placings`) adds what 95 % of its error
     stay within, farther from where it was registered more.
 
+    What a hand holds is off as a part of that hand, and by how far its spring lets it lag (`State.lags`); so
+    far only is what a gripper holds.
+
     Args:
         model: The compiled workstation.
-        bodies: Of any kind; only those of people can be off.
+        bodies: Of any kind; only those of people and of loose workpieces can be off.
     """
 
     def __init__(self, model: Model, bodies: Sequence[int]) -> None:
-        self._bones: dict[str, list[tuple[int, str, float]]] = {}
+        self._bones: dict[str, list[_Point]] = {}
         self._n = len(bodies)
-        self._accepted = model.estimate_uncertainty
+        self._model, self._accepted = model, model.estimate_uncertainty
+        loose = {piece.name for piece in model.workstation.workpieces if piece.loose}
+        self._pieces: dict[str, list[tuple[int, int]]] = {}
+        """Loose workpiece → row and index of each of its bodies, also of what it is in a gripper."""
         bones = {body.mj: body for body in model.bodies if body.role == "human"}
         for row, index in enumerate(bodies):
             body = model.bodies[index]
@@ -133,15 +143,23 @@ class TrackingError:
                 person = bones[mj].owner
                 bone = bones[mj].name.removeprefix(f"{person}/")
                 self._bones.setdefault(person, []).append((row, bone, reach))
+            for piece in {body.owner, body.name.rpartition("/")[2]} & loose:
+                self._pieces.setdefault(piece, []).append((row, index))
         places = {body.name: body.index for body in model.bodies}
+        people = [human.name for human in model.workstation.humans] if self._pieces else self._bones
         self._joints = {
             person: {bone: places[name] for bone in BONES if (name := f"{person}/{bone}") in places}
-            for person in self._bones
+            for person in people
         }
 
     def none(self, state: State) -> bool:
-        """Whether no device says where any of these people are, and the twin follows: nothing is off then."""
-        for person in self._bones:
+        """Whether no device says where any of these people are, and the twin follows: nothing is off then.
+
+        Nor is anything held that lags.
+        """
+        if any(state.lags.get(piece) for piece in self._pieces):
+            return False
+        for person in {*self._bones, *(person for person, *_ in self._hands(state))}:
             if state.hearing(person, strayed=True).bones or state.stray(person):
                 return False
         return True
@@ -152,39 +170,68 @@ class TrackingError:
         if self.none(state):
             return found
         for person, bones in self._bones.items():
-            hearing = state.hearing(person, strayed=True)
-            stray = bool(state.stray(person))
-            errors = hearing.residual if stray else hearing.bones
-            unaimed = hearing.unaimed(state.t) if errors else {}
-            for row, bone, reach in bones if errors else ():
+            found[[row for row, *_ in bones]] = self._of(state, person, bones)
+        for person, bone, piece in self._hands(state):
+            wrist = self._joints[person][bone]
+            points = [(row, bone, self._reach(state, i, wrist)) for row, i in self._pieces[piece]]
+            rows = [row for row, *_ in points]
+            found[rows] = np.maximum(found[rows], self._of(state, person, points))
+        for piece, rows in self._pieces.items():
+            found[[row for row, _ in rows]] += state.lags.get(piece, 0.0)
+        return found
+
+    def _hands(self, state: State) -> list[tuple[str, str, str]]:
+        """Of each hand that holds one of the workpieces: the person, the bone, and what it holds."""
+        return [
+            (person, bone, piece)
+            for piece in self._pieces
+            for hand in state.held.get(piece, ())
+            for person, _, bone in (hand.rpartition("/"),)
+            if person in self._joints
+        ]
+
+    def _reach(self, state: State, index: int, wrist: int) -> float:
+        """How far a body reaches from where another one, a hand, begins [m]."""
+        body, (R, x) = (
+            self._model.bodies[index],
+            state.placed((index, wrist), allow_estimated=True, strayed=True),
+        )
+        points = body.corners @ R[index].T + x[index] - x[wrist]
+        return float(np.linalg.norm(points, axis=1).max(initial=0.0)) + body.radius + body.deviation
+
+    def _of(self, state: State, person: str, points: Sequence[_Point]) -> Array:
+        """How far points of bones of a person, or of what they hold, are off [m], shape (p,)."""
+        found, where = np.zeros(len(points)), self._joints[person]
+        hearing = state.hearing(person, strayed=True)
+        stray = bool(state.stray(person))
+        errors = hearing.residual if stray else hearing.bones
+        place = {bone: k for k, bone in enumerate(where)}
+        if errors:
+            unaimed, inferred = hearing.unaimed(state.t), self._inferred(state, person, errors)
+            for k, (_, bone, reach) in enumerate(points):
                 position, angle = errors.get(bone, (None, None))
                 chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
-                found[row] = (position or 0.0) + max((angle or 0.0) * reach, chord)
-            inferred = self._inferred(state, person, errors) if errors else {}
-            for row, bone, _ in bones if inferred else ():
-                found[row] = max(found[row], inferred.get(bone, 0.0))
-            if stray:
-                away, turns = state.strayed(person, tuple(self._joints[person].values()))
-                place = {bone: k for k, bone in enumerate(self._joints[person])}
-                for row, bone, reach in bones:
-                    k = place[bone]
-                    found[row] += away[k] + 2 * reach * np.sin(turns[k] / 2)
-            slack = hearing.slack(state.t) if errors else {}
-            for row, bone, _ in bones if slack else ():
-                found[row] += slack.get(bone, 0.0)
-            for placing in hearing.placings(state.t) if errors else ():
-                if placing.covariance:
-                    where = self._joints[person]
-                    _, x = state.captured(person, tuple(where.values()))
-                    place = {bone: k for k, bone in enumerate(where)}
-                    covariance = np.array(placing.covariance).reshape(6, 6)
-                    rows, at = [row for row, *_ in bones], [place[bone] for _, bone, _ in bones]
-                    reaches = np.array([reach for *_, reach in bones])
-                    found[rows] += bound(covariance, np.array(placing.about), x[at], reaches)
-            if person in self._accepted:
-                unobserved = (*hearing.unobserved(state.t), *hearing.unplaced(state.t))
-                for row, bone, _ in bones if unobserved else ():
-                    found[row] = max(found[row], self._accepted[person] * (bone in unobserved))
+                found[k] = (position or 0.0) + max((angle or 0.0) * reach, chord)
+                found[k] = max(found[k], inferred.get(bone, 0.0))
+        if stray:
+            away, turns = state.strayed(person, tuple(where.values()))
+            for k, (_, bone, reach) in enumerate(points):
+                at = place[bone]
+                found[k] += away[at] + 2 * reach * np.sin(turns[at] / 2)
+        if errors:
+            slack = hearing.slack(state.t)
+            found += [slack.get(bone, 0.0) for _, bone, _ in points]
+        for placing in hearing.placings(state.t) if errors else ():
+            if placing.covariance:
+                _, x = state.captured(person, tuple(where.values()))
+                covariance = np.array(placing.covariance).reshape(6, 6)
+                at = [place[bone] for _, bone, _ in points]
+                reaches = np.array([reach for *_, reach in points])
+                found += bound(covariance, np.array(placing.about), x[at], reaches)
+        if person in self._accepted:
+            unobserved = (*hearing.unobserved(state.t), *hearing.unplaced(state.t))
+            for k, (_, bone, _) in enumerate(points):
+                found[k] = max(found[k], self._accepted[person] * (bone in unobserved))
         return found
 
     def _inferred(

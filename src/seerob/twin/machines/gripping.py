@@ -28,7 +28,7 @@ from seerob.core.shapes import Solid
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.distance.least import Query, Shapes
 from seerob.model.model import Body, Model
-from seerob.model.mounting.machines import AWAY, BODY, FINGERS, RESTING
+from seerob.model.mounting.machines import AWAY, BODY, FINGERS, OFF, RESTING
 from seerob.twin.attachments import Columns
 from seerob.twin.machines.following import ON_ITS_WAY
 from seerob.twin.machines.loose import Loose
@@ -90,10 +90,6 @@ def own_masses(model: Model) -> Model:
     """Copy the MuJoCo model, so that masses and places may change, when something is picked up."""
     changes = any(piece.rest is not None or piece.loose for piece in model.workstation.workpieces)
     return replace(model, mj=model.mj.__copy__()) if changes else model
-
-
-OFF = 1e-4
-"""How far what a gripper holds may be from where masses and distances have it [m]."""
 
 
 class Grips:

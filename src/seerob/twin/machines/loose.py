@@ -317,6 +317,29 @@ class Loose:
         """Workpieces that hands and grippers hold, each with these."""
         return {name: tuple(piece.hands) for name, piece in self._pieces.items() if piece.hands}
 
+    def lags(self) -> dict[str, float]:
+        """How far what is held is at most from where it would be if it were fixed [m], by name.
+
+        What still comes to a hand from afar is nothing that somebody could hold, and is where it is.
+        """
+        return {
+            name: max(self._lag(piece, spring) for spring in piece.hands.values())
+            for name, piece in self._pieces.items()
+            if piece.hands
+        }
+
+    def _lag(self, piece: _Piece, spring: _Spring) -> float:
+        if spring.reels:
+            return 0.0
+        wanted, here = (
+            _pose(self._data, spring.carrier) @ spring.carrier_from_piece,
+            _pose(self._data, piece.body),
+        )
+        com = self._mj.body_ipos[piece.body]
+        shift = (wanted - here)[:3, :3] @ com + (wanted - here)[:3, 3]
+        turn = float(np.linalg.norm(_rotation_vector(wanted[:3, :3] @ here[:3, :3].T)))
+        return float(np.linalg.norm(shift)) + 2 * piece.radius * math.sin(0.5 * turn)
+
     def _grab(self, sample: GrabSample, t: float) -> None:
         hand = sample.target
         held = next((piece for piece in self._pieces.values() if hand in piece.hands), None)

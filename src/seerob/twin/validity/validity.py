@@ -78,6 +78,8 @@ class Validity:
         """Which of MuJoCo's bodies moves each body."""
         self.held: dict[str, tuple[str, ...]] = {}
         """Loose workpiece → hands and grippers that hold it."""
+        self.lags: dict[str, float] = {}
+        """How far each of those is from where it would be if it were fixed there [m]: any of its points."""
         self._hearings = hearings
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False

@@ -505,6 +505,11 @@ def test_what_is_brought_is_bounded_and_of_who_may_edit_alone(desk, file, monkey
     assert brought(server, "a.step", b"x", "?tolerance=1") == 400
     assert brought(server, "a.step", b"") == 400
     assert brought(server, "never.step", b"", "?again=1") == 404
+    (file.parent / "elsewhere").mkdir()
+    (file.parent / "imported").mkdir(exist_ok=True)
+    (file.parent / "imported/linked").symlink_to(file.parent / "elsewhere")
+    assert brought(server, "linked.step", b"x") == 403
+    assert not list((file.parent / "elsewhere").iterdir())
     monkeypatch.setattr(cad_route, "MOST_BYTES", 1000)
     assert brought(server, "a.step", bytes(1001)) == 413
     assert brought(server, "a.step", iter([bytes(600), bytes(600)])) == 413

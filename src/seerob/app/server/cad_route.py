@@ -77,6 +77,8 @@ class Bringing:
             stem = Path(name).stem
             folder = self._desk.file.resolve().parent / IMPORTED / stem
             file = folder / name
+            if folder.resolve() != folder:
+                return PlainTextResponse("its folder is a link\n", 403)
             if again and not file.is_file():
                 return PlainTextResponse("there is no such file here yet\n", 404)
             if not again and (refusal := await self._take(request, file)) is not None:
@@ -90,8 +92,6 @@ class Bringing:
         size = 0
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            if file.parent.resolve() != file.parent:
-                return PlainTextResponse("its folder is a link\n", 403)
             async with asyncio.timeout(SECONDS):
                 with coming.open("wb") as opened:
                     async for piece in request.stream():

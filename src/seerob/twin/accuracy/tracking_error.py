@@ -176,8 +176,8 @@ class TrackingError:
             points = [(row, bone, self._reach(state, i, wrist)) for row, i in self._pieces[piece]]
             rows = [row for row, *_ in points]
             found[rows] = np.maximum(found[rows], self._of(state, person, points))
-        for piece, rows in self._pieces.items():
-            found[[row for row, _ in rows]] += state.lags.get(piece, 0.0)
+        for piece, bodies in self._pieces.items():
+            found[[row for row, _ in bodies]] += state.lags.get(piece, 0.0)
         return found
 
     def _hands(self, state: State) -> list[tuple[str, str, str]]:
@@ -216,8 +216,8 @@ class TrackingError:
         if stray:
             away, turns = state.strayed(person, tuple(where.values()))
             for k, (_, bone, reach) in enumerate(points):
-                at = place[bone]
-                found[k] += away[at] + 2 * reach * np.sin(turns[at] / 2)
+                row = place[bone]
+                found[k] += away[row] + 2 * reach * np.sin(turns[row] / 2)
         if errors:
             slack = hearing.slack(state.t)
             found += [slack.get(bone, 0.0) for _, bone, _ in points]

@@ -105,10 +105,12 @@ test("what is measured is what was recorded, at each instant that is shown", asy
 test("the reach of a robot that is selected is an outline with a tolerance; axe finds no fault in either note", async () => {
   await page.evaluate(AXE);
   const faults = async () => {
+    // What is out of date, as while the machine is busy, is dim.
+    await page.waitForFunction(() => !document.querySelector(".stale"));
     const { violations } = await page.evaluate(() =>
       globalThis.axe.run(document, { resultTypes: ["violations"] }),
     );
-    return violations.map(({ id, nodes }) => `${id} ${nodes[0].target}`);
+    return violations.map(({ id, nodes }) => `${id} ${nodes[0].target}: ${nodes[0].failureSummary}`);
   };
   await page.keyboard.press("d");
   for (const name of ["ur5e", "wall"])

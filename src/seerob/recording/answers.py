@@ -80,10 +80,9 @@ class Answers:
         """
         nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
         low, high = (self.value, self.value) if self.interval is None else self.interval
-        if not contradicted(
-            *(np.array(each, float) for each in (self.value, self.limit, low, high)),
-            np.array(self.verdict, np.uint8), np.array(nothing, np.bool_), ROUNDING, at_most, self.exact,
-        ):  # fmt: skip
+        value, limit, least, most = (np.array(each, float) for each in (self.value, self.limit, low, high))
+        codes, idle = np.array(self.verdict, np.uint8), np.array(nothing, np.bool_)
+        if not contradicted(value, limit, least, most, codes, idle, ROUNDING, at_most, self.exact):
             return None
         within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
         ends = np.array([self.value, low, high], float)

@@ -195,6 +195,10 @@ CALLS = {
     "criteria.safety.effective_mass.principal_masses": {"inverse": np.eye(3)},
     "criteria.safety.joint_torque.shares": {"torques": TWO, "limits": 10 * TWO, "uncertainty": TWO},
     "criteria.safety.kinetic_energy.kinetic_energy": {"M": M, "qd": TWO},
+    "criteria.safety.point_energy.point_energy": {
+        "inverse": np.eye(3),
+        "velocity": np.array([0.3, 0.4, 0.0]),
+    },
     "criteria.safety.manipulability.singular_values": {"J_v": J},
     "criteria.safety.manipulability.least_value_after": {"J": np.eye(6)},
     "criteria.safety.separation.separation_bound": {
@@ -334,6 +338,7 @@ STRICT = {
 BELOW = {
     "criteria.safety.joint_torque.shares": "limits uncertainty",
     "criteria.safety.kinetic_energy.kinetic_energy": "M",
+    "criteria.safety.point_energy.point_energy": "inverse",
     "criteria.safety.separation.separation_bound": "v_h T_r T_s xi",
     "criteria.safety.tool_force.wrench_from_torques": "damped_below",
     "criteria.safety.tool_force.largest_error": "uncertainty",

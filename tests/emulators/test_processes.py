@@ -137,7 +137,7 @@ def test_a_run_says_so_when_there_is_none(tmp_path, capsys):
         ("assembly_line", {"ur10", "operator"}, 2),
         ("empty_room", {"ur5", "visitor"}, 2),
         ("three_robots", {"iiwa_left", "ur10", "iiwa_right", "visitor"}, 1),
-        ("giant_niryo", {"niryo", "operator"}, 2),
+        ("giant_niryo", {"niryo", "operator"}, 3),
         ("niryo_picking", {"niryo"}, 2),
         ("two_places", {"niryo", "operator"}, 5),
     ],

@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
+from seerob.core.domains import at_least
 from seerob.core.errors import Undecided
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Basis, Sphere
@@ -42,11 +43,16 @@ def point_energy(inverse: Array, velocity: Array) -> Array:
 
     Returns:
         Energy [J], shape (...); 0 of a point that stands still.
+
+    Raises:
+        ValueError: The matrix is none of an inverse mass.
     """
     square = np.vecdot(velocity, velocity)
     pushed = np.vecdot(velocity, np.matvec(inverse, velocity))
-    moves = square > 0
-    return np.where(moves, 0.5 * square**2 / np.where(moves, pushed, 1.0), 0.0)
+    stands = square == 0
+    with np.errstate(divide="ignore"):  # what cannot be pushed that way, and moves so all the same
+        energy = np.where(stands, 0.0, 0.5 * square**2 / np.where(stands, 1.0, pushed))
+    return at_least("energy of Λ⁻¹, an inverse mass matrix,", energy, 0.0, "J")
 
 
 class PointEnergy(Criterion, frozen=True, kw_only=True):

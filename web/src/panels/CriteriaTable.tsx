@@ -39,13 +39,13 @@ export function CriteriaTable() {
           <tr>
             <th scope="col">{said("Criterion")}</th>
             <th scope="col" class="number">
-              Value
+              {said("Value")}
             </th>
             <th scope="col" class="number">
-              Limit
+              {said("Limit")}
             </th>
             <th scope="col" class="state">
-              State
+              {said("State")}
             </th>
           </tr>
         </thead>

@@ -3,7 +3,7 @@
 import { doubts } from "../doubts";
 import { scene, stale } from "../page_state";
 import { coloring, hasScores, shownScore } from "../posture/coloring";
-import { said } from "../words";
+import { said, word } from "../words";
 import { ScaleBar } from "./ScoreColors";
 import { StateBadge } from "./StateBadge";
 
@@ -21,14 +21,19 @@ export function Legend() {
         ))}
         {doubts.value.size > 0 && (
           <li class="doubt-key">
-            <i aria-hidden="true" /> may be elsewhere
+            <i aria-hidden="true" /> {said("may be elsewhere")}
           </li>
         )}
       </ul>
       {hasScores.value && coloring.value !== "verdict" && shownScore.value !== null && (
         <p>
-          person: {shownScore.value} {coloring.value === "overall" ? "overall" : "by body part"}, best{" "}
-          <ScaleBar /> worst; own colour: not scored
+          {said(
+            coloring.value === "overall"
+              ? word("person: {score} overall, best")
+              : word("person: {score} by body part, best"),
+            { score: shownScore.value },
+          )}{" "}
+          <ScaleBar /> {said("worst; own colour: not scored")}
         </p>
       )}
     </section>

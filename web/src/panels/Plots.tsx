@@ -39,7 +39,7 @@ export function Plots({ count }: { count: number }) {
             class={width.value === title ? "on" : ""}
             onClick={() => setWidth(title)}
           >
-            {title}
+            {title === "All" ? said("All") : title}
           </button>
         ))}
       </fieldset>

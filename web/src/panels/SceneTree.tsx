@@ -10,13 +10,13 @@ import { said, word } from "../words";
 import { Icon } from "./Icon";
 
 const ROLES: readonly [role: string, title: string][] = [
-  ["robot", "Robots"],
-  ["human", "Humans"],
-  ["tool", "Tools"],
-  ["workpiece", "Workpieces"],
-  ["part", "Parts"],
-  ["machine", "Machines"],
-  ["area", "Areas"],
+  ["robot", word("Robots")],
+  ["human", word("Humans")],
+  ["tool", word("Tools")],
+  ["workpiece", word("Workpieces")],
+  ["part", word("Parts")],
+  ["machine", word("Machines")],
+  ["area", word("Areas")],
 ];
 
 interface Owner {
@@ -33,7 +33,7 @@ export function SceneTree() {
     owners: owners.value.filter((o) => o.role === role),
   }));
   const known = new Set(ROLES.map(([role]) => role));
-  roles.push({ title: "Other", owners: owners.value.filter((o) => !known.has(o.role)) });
+  roles.push({ title: word("Other"), owners: owners.value.filter((o) => !known.has(o.role)) });
   return (
     <section class="tree" aria-label={said("Scene")}>
       <label class="search">
@@ -53,7 +53,7 @@ export function SceneTree() {
           .filter((role) => role.owners.length > 0)
           .map((role) => (
             <div key={role.title} class="role">
-              <h2>{role.title}</h2>
+              <h2>{said(role.title)}</h2>
               <ul>
                 {role.owners.map((owner) => (
                   <OwnerItem key={owner.name} owner={owner} open={search.value !== ""} />

@@ -115,15 +115,15 @@ class Steps:
         goal: Array = pose_matrix(step.to).copy()
         if step.near is None:
             return goal
-        away = {}
-        for name, body in self._pieces:
-            if fnmatchcase(name, step.of) and not (
-                snapshot.doubts.get(body.name) or snapshot.doubts.get(body.mover)
-            ):
-                place = _pose(snapshot, body)[:3, 3]
-                away[name] = float(np.linalg.norm(place - step.near)), place
-        nearest, place = min(away.values(), key=lambda each: each[0], default=(math.inf, None))
-        if nearest > step.within or place is None:
+        near = np.array(step.near)
+        places = [
+            _pose(snapshot, body)[:3, 3]
+            for name, body in self._pieces
+            if fnmatchcase(name, step.of)
+            and not (snapshot.doubts.get(body.name) or snapshot.doubts.get(body.mover))
+        ]
+        place = min(places, key=lambda each: float(np.linalg.norm(each - near)), default=None)
+        if place is None or np.linalg.norm(place - near) > step.within:
             self.word = f"{step.name or 'a step'} waits for {step.of}"
             return None
         goal[:3, 3] += place

@@ -180,8 +180,7 @@ def test_the_tool_point_of_the_program_is_used_unless_the_source_says_another(tm
         ("w.urp", urp("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>"), "entities"),
         ("w.urp", urp("<a>"), "is not XML"),
         ("w.urp", urp("<a/>"), "no waypoint"),
-        ("w.urp", urp(polyscope("<Loop>" + MOVE.format(waypoint("a", A)) + "</Loop>")), "Loop: what is done"),
-        ("w.urp", urp(polyscope("<Script/>" + MOVE.format(waypoint("a", A)))), "Script"),
+        ("w.urp", urp(polyscope("<Loop>" + MOVE.format(waypoint("a", A)) + "</Loop>")), "`Loop` is left out"),
         ("w.urp", urp(polyscope(MOVE.format(waypoint("a", [float("nan")] * 6)))), "are no numbers"),
         ("w.urp", urp(polyscope(waypoint("a", A))), "no move of a known type"),
         ("w.script", b"movej([0,0,0,0,0,0,0])", "7 joint positions"),
@@ -226,7 +225,7 @@ def test_nodes_of_a_polyscope_program_that_are_left_out_are_named(tmp_path):
     inside = MOVE.format(waypoint("a", A) + waypoint("b", B)) + nodes
     (tmp_path / "w.urp").write_bytes(urp(polyscope(inside)))
     texts = " ".join(f.text for f in opened(tmp_path, file="w.urp").findings)
-    assert "taken to move nothing and left out: Gripper, Popup" in texts
+    assert "taken to move nothing were left out, with their waiting: Gripper (1), Popup (1)" in texts
 
 
 def test_a_file_that_unpacks_without_end_is_not_unpacked(tmp_path):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, field
 
 from seerob.core.errors import InputError, Problem, suggestion
 from seerob.core.plugin import load
@@ -86,6 +86,9 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
     [rad or m]; needed with a log."""
     points: tuple[Point, ...] = ()
     """Waypoints by hand instead of a file; their keys are below."""
+    values: dict[str, float | bool | str] = field(default_factory=dict)
+    """What a program needs and does not give, by its name there: ``pick = "p[0.4, 0, 0.3, 0, 3.14, 0]"``; a
+    text is in the program's language, with its units."""
     origin: MotionOrigin = MotionOrigin.PLANNED
     """What the motion is a motion of: the timing is made here, so it is preliminary."""
     joint_speed: Annotated[Above | None, unit("rad/s")] = None
@@ -138,6 +141,10 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
             *notes((text, *said), target.name, level="assumed"),
             *notes(tuple(f"{where}: {r}" for r in (*program.remarks, *found.remarks)), target.name),
             *notes(tuple(f"{where}: {d}" for d in found.deviations), target.name, level="warning"),
+            *(
+                Finding(level="warning", subject=target.name, text=f"{where}: {said}", holds=(target.name,))
+                for said in (*program.left_out, *found.unsure)
+            ),
         )
 
     def motion(self, program: Program, arm: Arm, limits: JointLimits) -> Continuous:
@@ -163,7 +170,11 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         if self.file and (kind := log_kind(path)) is not None:
             return logged_program(kind, path, self.file, self.robot, self.tolerance)
         if self.file:
-            return read_program(path, self.file)
+            found = read_program(path, self.file, self.values)
+            if self.tcp is not None and any(w.tool is not None for w in found.waypoints):
+                what = "the program goes with several tool points, tcp is one"
+                raise InputError.at(self.file, "tcp", what, "leave it out")
+            return found
         return Program(IN_TABLE, tuple(p.waypoint(f"points[{i}]") for i, p in enumerate(self.points)))
 
     def arm(self, program: Program, target: Target) -> tuple[Arm, tuple[str, ...]]:
@@ -216,7 +227,11 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
                 turn = rotation_from_rpy(self.tcp.rpy)
             return transform(turn, self.tcp.position), "that tcp says"
         if program.tcp is not None:
-            return transform(rotation_from_wxyz(program.tcp.wxyz), program.tcp.position), "that set_tcp says"
+            return transform(
+                rotation_from_wxyz(program.tcp.wxyz), program.tcp.position
+            ), "that the program says"
+        if any(w.tool is not None for w in program.waypoints):
+            return np.eye(4), "that the program says for each move"
         return np.eye(4), "at the origin"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +94,14 @@ class Arm:
                     )
                 root_from_base = root_from_base @ part.parent_from_link
             self.base_from_root = inverse(root_from_base)
+
+    def carrying(self, link_from_tcp: ArrayLike) -> Arm:
+        """Return this arm with another tool point, in the frame of the link that carries it, (4, 4)."""
+        other = copy(self)
+        links = self._chain[0].copy()
+        links[-1] = link_from_tcp
+        other._chain = (links, *self._chain[1:])
+        return other
 
     def posture(self, q: ArrayLike) -> Posture:
         """Where the arm is.

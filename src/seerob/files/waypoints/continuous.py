@@ -12,7 +12,7 @@ rounding may have at its ends the one that is passed in the shortest time is tak
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -20,13 +20,13 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from seerob.core.errors import InputError, Problem
-from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.core.transforms import Array, rotation_from_wxyz, transform
 from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.inverse import Branch, branch, is_classic, solutions, why_not
+from seerob.files.waypoints.inverse import Branch, Solution, branch, is_classic, solutions, why_not
 from seerob.files.waypoints.pieces import SINGULAR, Piece, Rounding, joint_line, rounding, tool_way
 from seerob.files.waypoints.timing import JointLimits, Limits, Profile, profile, reachable
-from seerob.files.waypoints.waypoint import Program, Waypoint
+from seerob.files.waypoints.waypoint import Configuration, Program, Waypoint
 from seerob.workstation.source import Target
 
 SLOPES = (1.2, 1.4, 1.6, 1.8, 2.0, 2.2)
@@ -55,21 +55,23 @@ class Leg:
     """Whether it does not stop at its end."""
     rounding: Rounding | None = None
     """What it is, when it is a rounding; its speeds are rates then."""
+    arm: Arm | None = None
+    """The arm with the tool point of this move."""
+    radius: float = 0.0
+    """Of the blend at its end [m]."""
+    share: float = 0.0
+    """Instead of a radius: share of half of the shorter move."""
 
 
-def rounded(
-    legs: list[Leg], program: Program, arm: Arm, joints: JointLimits, deviations: list[str]
-) -> list[Leg]:
+def rounded(legs: list[Leg], given: Arm, joints: JointLimits, deviations: list[str]) -> list[Leg]:
     """The legs with roundings between those that do not stop.
 
     Args:
         legs: Moves; cut where they are rounded off.
-        program: Whose blend radii count.
-        arm: The robot.
+        given: The robot.
         joints: What they may do.
         deviations: What is done otherwise than asked is added.
     """
-    radius = {w.shown: w.blend for w in program.waypoints}
     for k, leg in enumerate(legs):
         if leg.blend and (k + 1 == len(legs) or leg.pause > 0):
             leg.blend = False
@@ -80,9 +82,10 @@ def rounded(
     for k, leg in enumerate(legs[:-1]):
         if not leg.blend:
             continue
-        r = radius[leg.place]
-        if math.isinf(r):
-            half = min(leg.piece.length, legs[k + 1].piece.length) / 2
+        r = leg.radius
+        arm = leg.arm or given
+        if math.isinf(r) or leg.share:
+            half = (leg.share or 1.0) * min(leg.piece.length, legs[k + 1].piece.length) / 2
             cuts[k][1], cuts[k + 1][0] = leg.piece.length - half, half
             continue
         corner = arm.posture(leg.piece.last).position
@@ -99,7 +102,7 @@ def rounded(
         if leg.blend:
             nxt = legs[k + 1]
             each = [rounding(whole, nxt.piece, cuts[k][1], cuts[k + 1][0], slope) for slope in SLOPES]
-            rates = [_rate(arm, curve, leg, nxt, joints) for curve in each]
+            rates = [_rate(leg.arm or given, curve, leg, nxt, joints) for curve in each]
             best = int(np.argmax(rates))
             curve, v = each[best], rates[best]
             found.append(Leg(curve.piece, leg.limits, leg.place, v0=v, v1=v, rounding=curve))
@@ -185,6 +188,8 @@ class Goals:
         self._program, self._arm, self._wanted = program, arm, branch
         self.remarks: list[str] = []
         self.deviations: list[str] = []
+        self.unsure: list[str] = []
+        """Waypoints that another branch than the program's may have been taken for."""
         self.found: list[Array] = []
         """Joint positions of each waypoint that was gone to."""
         head = program.waypoints[0]
@@ -193,7 +198,7 @@ class Goals:
                 f"the first waypoint ({head.shown}) is a pose: its branch depends on where the robot stands"
             )
             raise InputError.at(program.file, "start", what, "give start, the joint positions [rad or m]")
-        given = ((w.shown, q) for w in program.waypoints for q in (w.q, w.near))
+        given = ((w.shown, q) for w in program.waypoints for q in (w.q, w.near, w.via_q))
         for where, q in (("start", start), *given):
             if q is not None and len(q) != arm.n:
                 what = f"{len(q)} joint positions, the robot has {arm.n} joints"
@@ -205,6 +210,7 @@ class Goals:
             if head.q is None:
                 self._here = self._solved(head)
                 self.remarks.clear()  # it is gone to again, as the first of the waypoints
+                self.unsure.clear()
             self.remarks.append(f"the motion begins in its first waypoint, {head.shown}")
         self.first: Array = self._here
         if arm.n > 6 and any(w.pose is not None or w.move.of_tool for w in program.waypoints):
@@ -243,9 +249,10 @@ class Goals:
         assert pose is not None
         rotation, position = rotation_from_wxyz(pose.wxyz), np.array(pose.position)
         near = self._here if waypoint.near is None else np.array(waypoint.near, float)
-        ways = solutions(self._arm, rotation, position, near)
+        arm = carrying(self._arm, waypoint)
+        ways = solutions(arm, rotation, position, near)
         if not ways:
-            what = why_not(self._arm, rotation, position, near)
+            what = why_not(arm, rotation, position, near)
             remedy = "is the base or the tool point another one?"
             raise InputError.at(self._program.file, waypoint.shown, what, remedy)
         fitting = [w for w in ways if self._wanted in (None, w.branch)]
@@ -253,6 +260,8 @@ class Goals:
             there = "; ".join(str(w.branch) for w in ways)
             what = f"the pose is not reached on the branch {self._wanted}"
             raise InputError.at(self._program.file, waypoint.shown, what, f"it is on: {there}")
+        if self._wanted is None and waypoint.configuration is not None:
+            return self._configured(arm, waypoint, ways, near)
         chosen = fitting[0]
         others = f", one of {len(ways)} found" if self._arm.n == 6 else ""
         nearest = "nearest to " + ("where the robot is" if waypoint.near is None else "qnear")
@@ -263,9 +272,59 @@ class Goals:
             self.remarks.append(f"{waypoint.shown}: solution {nearest}{others}")
         return chosen.q
 
+    def _configured(self, arm: Arm, waypoint: Waypoint, ways: Sequence[Solution], near: Array) -> Array:
+        """The way of reaching a pose that the program's configuration means."""
+        meant = waypoint.configuration
+        assert meant is not None
+        fitting = [q for way in ways if (q := _within(arm, meant, way, near, self._classic)) is not None]
+        told = bool(meant.ranges or (meant.like and self._classic))
+        if fitting and told and len(fitting) == 1:
+            self.remarks.append(f"{waypoint.shown}: the one of {len(ways)} solutions with {meant.text}")
+            return fitting[0]
+        if len(ways) > 1 or not fitting:
+            many = f"{len(fitting)} of {len(ways)} solutions may be meant by {meant.text}"
+            why = many if fitting else f"none of {len(ways)} solutions has {meant.text}"
+            self.unsure.append(
+                f"{waypoint.shown}: {why}; the one nearest to where the robot is was taken (give branch)"
+            )
+        return fitting[0] if fitting else ways[0].q
+
     def _name(self, waypoint: Waypoint, q: Array) -> None:
         if self._classic:
             self.remarks.append(f"{waypoint.shown}: branch {branch(self._arm.posture(q))} (kept on the way)")
+
+
+def carrying(arm: Arm, waypoint: Waypoint) -> Arm:
+    """The arm with the tool point of a waypoint."""
+    if waypoint.tool is None:
+        return arm
+    tool = waypoint.tool
+    return arm.carrying(transform(rotation_from_wxyz(tool.wxyz), tool.position))
+
+
+AT_EDGE = 1e-4
+"""A joint that is beyond the edge of a configuration by less is on it [rad]."""
+
+
+def _within(arm: Arm, meant: Configuration, way: Solution, near: Array, classic: bool) -> Array | None:
+    """Joint positions of a way in the ranges of a configuration, whole turns aside, if there are any."""
+    if meant.like and classic and len(meant.like) == arm.n:
+        sides = branch(arm.posture(np.array(meant.like, float)))
+        own = branch(arm.posture(way.q))
+        pairs = ((own.shoulder == sides.shoulder), (own.elbow == sides.elbow))
+        if any(said is not None and said != same for said, same in zip(meant.sides, pairs, strict=True)):
+            return None
+    q = np.array(way.q, float)
+    for i, span in enumerate(meant.ranges[: arm.n]):
+        if span is None or arm.slides[i]:
+            continue
+        turned = q[i] + 2 * np.pi * np.arange(-2, 3)
+        low, high = max(span[0], arm.lower[i]), min(span[1], arm.upper[i])
+        there = turned[(turned >= low - AT_EDGE) & (turned <= high + AT_EDGE)]
+        if not there.size:
+            return None
+        q[i] = there[np.argmin(np.abs(there - near[i]))]
+    return q
 
 
 NO_BLEND = 1e-6
@@ -305,6 +364,8 @@ class Continuous:
     remarks: tuple[str, ...] = ()
     deviations: tuple[str, ...] = field(default=())
     """What may differ on a controller, or was changed."""
+    unsure: tuple[str, ...] = ()
+    """Waypoints that may be on another branch in the program: of that robot nothing is within."""
 
 
 def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -> Continuous:
@@ -326,7 +387,8 @@ def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -
     remarks: list[str] = []
     rests = 0.0
     for k, (before, waypoint, q) in enumerate(goals.steps()):
-        piece = _piece(program, arm, before, waypoint, q)
+        own = carrying(arm, waypoint)
+        piece = _piece(program, own, before, waypoint, q)
         if piece is None:
             if legs:
                 legs[-1].pause += waypoint.pause
@@ -334,29 +396,34 @@ def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -
                 rests += waypoint.pause
             continue
         goals.reached(piece.last)
-        leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
-        _slowed(leg, limits, wish.tool_turn, arm, deviations)
+        most = _limits(program, waypoint, wish, piece, limits, own)
+        leg = Leg(piece, most, waypoint.shown, waypoint.duration, waypoint.pause, arm=own)
+        tool_turn = wish.tool_turn if waypoint.turn is None else waypoint.turn
+        _slowed(leg, limits, tool_turn, own, deviations)
         if piece.least < SINGULAR:
             deviations.append(
                 f"{waypoint.shown}: near a singularity at {100 * piece.least_at:.0f} % of the way (least "
                 f"singular value {piece.least:.2g}): joints turn fast there, and controllers differ"
             )
         if piece.turning:
-            remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
-        elif wish.tool_turn is None and (rate := piece.turn * leg.limits.speed) > FAST_TURN:
+            if waypoint.turn is None:
+                remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
+        elif tool_turn is None and (rate := piece.turn * leg.limits.speed) > FAST_TURN:
             deviations.append(
                 f"{waypoint.shown}: the tool turns at up to {rate:.2g} rad/s on this way (give tool_turn): "
                 "how fast a controller lets it turn is not modelled"
             )
         legs.append(leg)
-        leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)
-    legs = rounded(legs, program, arm, limits, deviations)
+        leg.radius, leg.share = waypoint.blend, waypoint.blend_share
+        leg.blend = max(waypoint.blend, leg.share) > NO_BLEND and k + 1 < len(program.waypoints)
+    legs = rounded(legs, arm, limits, deviations)
     meet(legs)
     trajectory = _sampled(legs, program.file, wish.period, goals.first, rests)
     if any(leg.piece.tool for leg in legs):
         remarks.append(_of_joints(trajectory, arm, limits))
     remarks += goals.remarks
-    return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.deviations, *deviations))
+    said = (*goals.deviations, *deviations)
+    return Continuous(trajectory, tuple(goals.found), tuple(remarks), said, tuple(goals.unsure))
 
 
 def _complete(program: Program, wish: Wish) -> None:
@@ -366,7 +433,7 @@ def _complete(program: Program, wish: Wish) -> None:
         kind = "tool" if w.move.of_tool else "joint"
         unit = "m" if w.move.of_tool else "rad"
         wanted.setdefault(f"{kind}_jerk", f"{unit}/s³")
-        if w.speed is None:
+        if w.speed is None and w.share is None and w.along is None and w.turn is None:
             wanted.setdefault(f"{kind}_speed", f"{unit}/s")
         if w.acceleration is None:
             wanted.setdefault(f"{kind}_acceleration", f"{unit}/s²")
@@ -381,14 +448,47 @@ def _complete(program: Program, wish: Wish) -> None:
         raise InputError(missing)
 
 
-def _limits(waypoint: Waypoint, wish: Wish, piece: Piece) -> Limits:
+def _limits(
+    program: Program, waypoint: Waypoint, wish: Wish, piece: Piece, limits: JointLimits, arm: Arm
+) -> Limits:
     kind = "tool" if waypoint.move.of_tool else "joint"
-    given = {"speed": waypoint.speed, "acceleration": waypoint.acceleration, "jerk": None}
-    figures = [
+    given = {"acceleration": waypoint.acceleration, "jerk": None}
+    acceleration, jerk = (
         own if own is not None else float(getattr(wish, f"{kind}_{key}")) for key, own in given.items()
-    ]
+    )
+    if waypoint.acceleration is None:
+        acceleration *= waypoint.acceleration_share
     scale = 1.0 if piece.tool else piece.leading
-    return Limits(*(figure / scale for figure in figures))
+    speed = _speed(program, waypoint, wish, piece, limits, arm)
+    return Limits(speed, acceleration / scale, jerk / scale)
+
+
+def _speed(
+    program: Program, waypoint: Waypoint, wish: Wish, piece: Piece, limits: JointLimits, arm: Arm
+) -> float:
+    """Along a piece."""
+    if piece.tool:
+        if piece.turning and waypoint.turn is not None:
+            return waypoint.turn
+        if waypoint.speed is None and waypoint.turn is not None:
+            return waypoint.turn / max(piece.turn, 1e-6)
+        return float(waypoint.speed if waypoint.speed is not None else wish.tool_speed or 0.0)
+    if waypoint.share is None and waypoint.along is None:
+        return (
+            float(waypoint.speed if waypoint.speed is not None else wish.joint_speed or 0.0) / piece.leading
+        )
+    # Of its own largest speeds, the user's where the description has none.
+    most = float(np.min(limits.speed / np.maximum(piece.fastest(), 1e-12)))
+    if not math.isfinite(most):
+        if wish.joint_speed is None:
+            what = f"{waypoint.shown}: a share of the joints' largest speeds, which nobody gave"
+            raise InputError.at(program.file, "joint_speed", what, "give joint_speed or velocity_limits")
+        most = wish.joint_speed / piece.leading
+    if waypoint.share is not None:
+        return waypoint.share * most
+    places = arm.posture(piece.derivative(np.linspace(0.0, piece.length, FINE + 1), 0)).position
+    way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    return min(most, float(waypoint.along or 0.0) * piece.length / max(way, 1e-9))
 
 
 def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Array) -> Piece | None:
@@ -400,6 +500,8 @@ def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Arr
         at = arm.posture(q)
         rotation, position = at.rotation, at.position
     via = None if waypoint.via is None else np.array(waypoint.via.position)
+    if waypoint.via_q is not None:
+        via = arm.posture(np.array(waypoint.via_q, float)).position
     return tool_way(arm, before, rotation, position, via=via, file=program.file, place=waypoint.shown)
 
 

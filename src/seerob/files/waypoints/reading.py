@@ -353,12 +353,13 @@ TABLES = (".csv", ".tsv", ".txt", *WORKBOOKS)
 KNOWN = ".script .urp .toml .yaml .yml .csv .tsv .txt .xlsx"
 
 
-def read_program(path: Path, file: str) -> Program:
+def read_program(path: Path, file: str, values: Mapping[str, float | bool | str] | None = None) -> Program:
     """The waypoints of a file.
 
     Args:
         path: Where it is.
         file: Its name, for messages.
+        values: What a program needs and does not give; see `Waypoints.values` of the source.
 
     Raises:
         InputError: It is missing, too large, of no known kind, or wrong.
@@ -373,8 +374,10 @@ def read_program(path: Path, file: str) -> Program:
         held = content(path, MAX_BYTES)
     except TooLarge as error:
         raise InputError.at(file, "", str(error), "split the file") from None
-    if suffix == ".script":
-        return read_urscript(held, file)
-    if suffix == ".urp":
-        return read_urp(held, file)
+    given = values or {}
+    reader = {
+        ".script": read_urscript, ".urp": read_urp,
+    }.get(suffix)  # fmt: skip
+    if reader is not None:
+        return reader(held, file, given)
     return read_structured(held, file, yaml=suffix != ".toml")

@@ -1,43 +1,44 @@
-"""URScript programs: the waypoints of ``movej``, ``movel``, ``movep``, ``movec`` with constants.
+"""URScript programs: the waypoints of ``movej``, ``movel``, ``movep``, ``movec`` whose goals are known.
 
-A program is parsed, never executed. Constants are numbers, lists, poses, names, and arithmetic on them. What
-would need execution (branches, loops, variables that sensors or functions set) is named with its line and
-refused, because the motion behind it is not known; statements and blocks that move nothing are left out and
-counted. A program that goes round for ever is read as one round. Defaults of speed and acceleration are those
-of [URScript]_.
+A program is gone through, never executed: constants, variables, lists, arithmetic on numbers and poses,
+functions with what they move, loops and ``if`` whose conditions are known. What needs a controller (branches
+on inputs, motions that a sensor ends) is left out with its line, see `flow`; a goal that the program does
+not give (``get_from_camera()``) is asked for. A program that goes round for ever is read as one round.
+Defaults of speed and acceleration are those of [URScript]_.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
-from seerob.core.errors import InputError, Problem
-from seerob.core.transforms import wxyz_from
-from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Move, Program, ToolPose, Waypoint
-
-TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<text>\"[^\"]*\"|'[^']*')"
-    r"|(?P<name>[A-Za-z_]\w*)|(?P<sign>[-+*/(),=\[\]]))"
+from seerob.core.errors import InputError
+from seerob.core.transforms import (
+    Array,
+    inverse,
+    rotation_from_wxyz,
+    transform,
+    wxyz_from,
+    wxyz_from_rotation,
 )
-MAX_DEPTH = 40
-MAX_TOKENS = 4_000
-FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "d2r": math.radians,
-    "r2d": math.degrees,
-    "sqrt": math.sqrt,
-    "sin": math.sin,
-    "cos": math.cos,
-}
-
-
-class NotConstant(Exception):
-    """What stands there is not a constant; the message says what."""
+from seerob.files.waypoints.expressions import Expression, finite, given, number, tokens, truth
+from seerob.files.waypoints.flow import (
+    MAX_CALLS,
+    MAX_NESTED,
+    Asked,
+    Block,
+    Item,
+    Line,
+    NotKnown,
+    Walk,
+    lines_of,
+    waited,
+)
+from seerob.files.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Inverse:
     """[rad]"""
 
 
-Value = float | bool | str | tuple[float, ...] | PoseValue | Inverse
+Value = float | bool | str | tuple["Value", ...] | PoseValue | Inverse
 
 
 @dataclass(frozen=True)
@@ -68,241 +69,226 @@ class Call:
     named: Mapping[str, Value]
 
 
-def tokens(text: str) -> list[str]:
-    """Pieces of one statement.
+def _length(value: Value) -> float:
+    if not isinstance(value, tuple):
+        raise NotKnown("a list is expected")
+    return float(len(value))
 
-    Raises:
-        NotConstant: A character that is none of the language's constants, or too many pieces.
+
+NUMBERS: dict[str, Callable[..., float]] = {
+    "d2r": math.radians,
+    "r2d": math.degrees,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
+    "atan2": math.atan2,
+    "pow": math.pow,
+    "floor": lambda x: float(math.floor(x)),
+    "ceil": lambda x: float(math.ceil(x)),
+}
+"""Functions of numbers."""
+
+
+def _pose_trans(a: PoseValue, b: PoseValue) -> PoseValue:
+    return _value(_matrix(a) @ _matrix(b))
+
+
+def _pose_inv(a: PoseValue) -> PoseValue:
+    return _value(inverse(_matrix(a)))
+
+
+def _pose_add(a: PoseValue, b: PoseValue) -> PoseValue:
+    """Positions are added, rotations follow each other."""
+    turned = _matrix(a) @ transform(_matrix(b)[:3, :3])
+    turned[:3, 3] = np.add(a.numbers[:3], b.numbers[:3])
+    return _value(turned)
+
+
+def _interpolate_pose(a: PoseValue, b: PoseValue, share: float) -> PoseValue:
+    """On the line from one position to the other, turning evenly."""
+    first, last = _matrix(a), _matrix(b)
+    (turn,) = _vectors(first[:3, :3].T @ last[:3, :3])
+    found = first @ transform(rotation_from_wxyz(wxyz_from("rotation_vector", share * turn[None])[0]))
+    found[:3, 3] = (1 - share) * first[:3, 3] + share * last[:3, 3]
+    return _value(found)
+
+
+def _point_dist(a: PoseValue, b: PoseValue) -> float:
+    return float(np.linalg.norm(np.subtract(a.numbers[:3], b.numbers[:3])))
+
+
+POSES: dict[str, tuple[tuple[type, ...], Callable[..., Value]]] = {
+    "pose_trans": ((PoseValue, PoseValue), _pose_trans),
+    "pose_inv": ((PoseValue,), _pose_inv),
+    "pose_add": ((PoseValue, PoseValue), _pose_add),
+    "interpolate_pose": ((PoseValue, PoseValue, float), _interpolate_pose),
+    "point_dist": ((PoseValue, PoseValue), _point_dist),
+}
+"""Functions of poses, with the kinds of their arguments."""
+FUNCTIONS = (*NUMBERS, *POSES, "length", "get_inverse_kin")
+
+
+class Reader(Expression[Value]):
+    """Reads the pieces of one statement.
+
+    Args:
+        pieces: Of `tokens`.
+        names: Values of the variables; None for one whose value is not known.
+        script: Whose functions are called, and who knows what the user gives.
     """
-    found, at = [], 0
-    text = text.rstrip()
-    while at < len(text):
-        match = TOKEN.match(text, at)
-        if match is None:
-            raise NotConstant(f"{text[at:].strip()[:20]!r} is no constant")
-        found.append(match[0].strip())
-        at = match.end()
-        if len(found) > MAX_TOKENS:
-            raise NotConstant("a statement this long is not read")
-    return found
 
-
-class Reader:
-    """Reads the pieces of one statement from left to right."""
-
-    def __init__(self, pieces: list[str], names: Mapping[str, Value | None]) -> None:
-        """Begin.
-
-        Args:
-            pieces: Of `tokens`.
-            names: Values of the variables; None for one whose value is not a constant.
-        """
-        self._pieces, self._at, self._names, self._depth = pieces, 0, names, 0
+    def __init__(
+        self, pieces: list[str], names: Mapping[str, Value | None], script: Script | None = None
+    ) -> None:
+        super().__init__(pieces)
+        self._names, self._script = names, script
 
     def call(self) -> Call:
         """The whole statement as a call."""
-        found = self._called(self._take())
+        found = self._called(self.take())
         self.end()
         return found
 
     def _called(self, name: str) -> Call:
-        self._expect("(")
+        self.expect("(")
         arguments: list[Value] = []
         named: dict[str, Value] = {}
-        while self._peek() != ")":
-            if self._peek(1) == "=":
-                key = self._take()
-                self._take()
+        while self.peek() != ")":
+            if self.peek(1) == "=":
+                key = self.take()
+                self.take()
                 named[key] = self.value()
             elif named:
-                raise NotConstant("an argument without a name after one with a name")
+                raise NotKnown("an argument without a name after one with a name")
             else:
                 arguments.append(self.value())
-            if self._peek() != ")":
-                self._expect(",")
-        self._take()
+            if self.peek() != ")":
+                self.expect(",")
+        self.take()
         return Call(name, tuple(arguments), named)
 
-    def end(self) -> None:
-        """Nothing may follow."""
-        if self._at < len(self._pieces):
-            raise NotConstant(f"{self._peek()!r} is not expected there")
-
-    def value(self) -> Value:
-        """A sum."""
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
-            raise NotConstant(f"nested deeper than {MAX_DEPTH}")
-        left = self._product()
-        while self._peek() in ("+", "-"):
-            sign = 1.0 if self._take() == "+" else -1.0
-            left = _number(left) + sign * _number(self._product())
-        self._depth -= 1
-        return left
-
-    def _product(self) -> Value:
-        left = self._single()
-        while self._peek() in ("*", "/"):
-            times = self._take() == "*"
-            right = _number(self._single())
-            if not times and right == 0:
-                raise NotConstant("a division by zero")
-            left = _number(left) * right if times else _number(left) / right
-        return left
-
-    def _single(self) -> Value:
-        negative = False
-        while self._peek() in ("-", "+"):
-            negative ^= self._take() == "-"
-        value = self._atom()
-        return -_number(value) if negative else value
-
-    def _atom(self) -> Value:
-        piece = self._take()
-        if piece == "(":
-            value = self.value()
-            self._expect(")")
-            return value
+    def atom(self, piece: str) -> Value:
+        """What begins with a piece, see `Expression`."""
         if piece == "[":
-            return self._list()
-        if piece == "p" and self._peek() == "[":
-            self._take()
-            numbers = self._list()
+            return tuple(self.listed("]"))
+        if piece == "p" and self.peek() == "[":
+            self.take()
+            numbers = tuple(number(v) for v in self.listed("]"))
             if len(numbers) != 6:
-                raise NotConstant(f"a pose of {len(numbers)} numbers, not 6")
+                raise NotKnown(f"a pose of {len(numbers)} numbers, not 6")
             return PoseValue(numbers)
         if piece[:1] in "\"'":
             return piece[1:-1]
-        if piece[:1].isdigit() or piece[:1] == ".":
-            return _finite(float(piece))
-        if piece in ("True", "False"):
-            return piece == "True"
-        if piece in FUNCTIONS and self._peek() == "(":
-            self._take()
-            value = _number(self.value())
-            self._expect(")")
-            try:
-                return _finite(FUNCTIONS[piece](value))
-            except ValueError as error:
-                raise NotConstant(f"{piece}({value:g}) is no number") from error
-        if piece == "get_inverse_kin" and self._peek() == "(":
-            return _inverse(self._called(piece))
+        if self.peek() == "(":
+            return self._function(piece)
         if piece not in self._names and piece == "pi":
             return math.pi
         known = self._names.get(piece)
         if known is None:
-            raise NotConstant(f"{piece!r} is not a constant that the program gives")
+            known = None if self._script is None else self._script.given(piece)
+        if known is None:
+            if not piece.isidentifier():
+                raise NotKnown(f"{piece!r} is not expected there")
+            return self._element(piece)
         return known
 
-    def _list(self) -> tuple[float, ...]:
-        numbers: list[float] = []
-        while self._peek() != "]":
-            numbers.append(_number(self.value()))
-            if self._peek() != "]":
-                self._expect(",")
-        self._take()
-        return tuple(numbers)
+    def _element(self, piece: str) -> Value:
+        """What the user gives for an element of something that is not known: ``digital_in[1]``."""
+        if self.peek() == "[" and self.peek(2) == "]" and self._script is not None:
+            text = f"{piece}[{self.peek(1)}]"
+            known = self._script.given(text)
+            if known is not None:
+                self.at += 3
+                return known
+            raise Asked(text)
+        raise Asked(piece)
 
-    def _peek(self, ahead: int = 0) -> str:
-        at = self._at + ahead
-        return self._pieces[at] if at < len(self._pieces) else ""
+    def _function(self, name: str) -> Value:
+        begin = self.at - 1
+        if name in MOVES or MOVES_OTHERWISE.match(name):
+            raise NotKnown(f"{name} moves the robot inside of another statement")
+        if name in FUNCTIONS:
+            return _known(self._called(name))
+        if self._script is not None and self._script.defines(name):
+            return self._script.returned(self._called(name))
+        depth = 0
+        while True:  # its arguments need not be known
+            depth += {"(": 1, ")": -1}.get(self.take(), 0)
+            if depth == 0:
+                break
+        text = "".join(self.pieces[begin : self.at])
+        known = None if self._script is None else self._script.given(text)
+        if known is None:
+            raise Asked(text)
+        return known
 
-    def _take(self) -> str:
-        piece = self._peek()
-        if not piece:
-            raise NotConstant("it ends too early")
-        self._at += 1
-        return piece
+    def after(self, value: Value) -> Value:
+        """An index behind a value."""
+        while self.peek() == "[":
+            self.take()
+            index = number(self.value())
+            self.expect("]")
+            items: Sequence[Value] | None = value.numbers if isinstance(value, PoseValue) else None
+            if items is None and isinstance(value, tuple):
+                items = value
+            if items is None or index != int(index) or not 0 <= index < len(items):
+                raise NotKnown(f"no element {index:g} there")
+            value = items[int(index)]
+        return value
 
-    def _expect(self, piece: str) -> None:
-        if self._take() != piece:
-            raise NotConstant(f"{piece!r} is missing")
+
+def _known(call: Call) -> Value:
+    """A function that is known, worked out."""
+    if call.name == "get_inverse_kin":
+        return _inverse(call)
+    if call.named:
+        raise NotKnown(f"{call.name} with names of arguments is not read")
+    if call.name == "length":
+        return _length(call.arguments[0] if call.arguments else "")
+    if call.name in POSES:
+        kinds, function = POSES[call.name]
+        if [type(v) for v in call.arguments] != list(kinds):
+            raise NotKnown(f"{call.name} needs {', '.join(k.__name__ for k in kinds)}")
+        return function(*call.arguments)
+    numbers = [number(v) for v in call.arguments]
+    try:
+        return finite(NUMBERS[call.name](*numbers))
+    except (ValueError, OverflowError, TypeError) as error:
+        shown = ", ".join(f"{x:g}" for x in numbers)
+        raise NotKnown(f"{call.name}({shown}) is no number") from error
 
 
 def _inverse(call: Call) -> Inverse:
     given = dict(zip(("x", "qnear"), call.arguments, strict=False)) | dict(call.named)
     pose, near = given.get("x"), given.get("qnear")
     if given.get("tcp", "active_tcp") != "active_tcp":
-        raise NotConstant("get_inverse_kin for another tool point is not read")
+        raise NotKnown("get_inverse_kin for another tool point is not read")
     if not isinstance(pose, PoseValue) or not isinstance(near, tuple):
-        raise NotConstant("get_inverse_kin needs a constant pose and a constant qnear")
-    return Inverse(pose, near)
-
-
-def _number(value: Value) -> float:
-    if isinstance(value, bool) or not isinstance(value, float):
-        raise NotConstant("a number is expected")
-    return _finite(value)
-
-
-def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise NotConstant("a number beyond all bounds")
-    return value
+        raise NotKnown("get_inverse_kin needs a constant pose and a constant qnear")
+    return Inverse(pose, tuple(number(v) for v in near))
 
 
 MOVES = ("movej", "movel", "movep", "movec")
 MOVES_OTHERWISE = re.compile(
     r"(servo[jcl]|speed[jl]|stop[jl]|force_mode|freedrive_mode|teach_mode|conveyor|track_|path_|move\w+|"
-    r"teachmode|screw_driving|tool_contact|set_conveyor)"
+    r"teachmode|screw_driving|tool_contact|set_conveyor|optimove)"
 )
 """Begin of calls that move the robot in ways that are not modelled."""
-DEFINITIONS = ("thread", "def", "sec")
-"""Begin of what runs beside the program, or when it is called."""
-OPENING = ("if", "while", "for", "thread")
-BETWEEN = ("elif", "else")
+HERE = ("get_actual_joint_positions()", "get_target_joint_positions()")
+HERE_POSE = ("get_actual_tcp_pose()", "get_target_tcp_pose()")
 LEAVING = ("return", "break", "continue", "halt", "kill", "join")
 """What follows a block with one of these may never be reached, or not when it seems."""
-ENDLESS = re.compile(r"while\s*\(?\s*True\s*\)?\s*:")
-ASSIGNMENT = re.compile(r"^(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*)$")
+ASSIGNMENT = re.compile(r"^(?:(global|local)\s+)?([A-Za-z_]\w*)\s*(\[.*\])?\s*=(?!=)\s*(.*)$")
+DEFINED = re.compile(r"(?:def|sec|thread)\s+([A-Za-z_]\w*)\s*\((.*)\)\s*:$")
 _TEXT = re.compile(r"\"[^\"]*\"|'[^']*'")
 _CALL = re.compile(r"([A-Za-z_]\w*)\s*\(")
-
-
-def moving(statement: str) -> str:
-    """Name of the first call in a statement that moves the robot; empty when none does."""
-    calls = _CALL.findall(_TEXT.sub("", statement))
-    return next((name for name in calls if name in MOVES or MOVES_OTHERWISE.match(name)), "")
-
-
-class Block:
-    """A block that is read past to its end.
-
-    Args:
-        line: Where it begins.
-        word: What it begins with.
-    """
-
-    def __init__(self, line: int, word: str) -> None:
-        self.line, self.word = line, word
-        self.defines = word in DEFINITIONS
-        self.names: set[str] = set()
-        """What is given another value in it."""
-        self.matters = False
-        """Whether something in it moves the robot or its tool point, or keeps from what follows."""
-        self._depth = 1
-
-    def take(self, word: str, statement: str) -> bool:
-        """The next statement; whether it was the block's last.
-
-        Args:
-            word: What the statement begins with.
-            statement: Without its comment.
-        """
-        if statement == "end":
-            self._depth -= 1
-        elif statement.endswith(":") and word not in BETWEEN:
-            self._depth += 1
-        if (match := ASSIGNMENT.match(statement)) is not None:
-            self.names.add(match[1])
-        self.matters |= bool(moving(statement)) or word == "set_tcp"
-        self.matters |= not self.defines and (word in LEAVING or bool(ENDLESS.fullmatch(statement)))
-        return self._depth == 0
-
-
-MAX_BYTES = 16 << 20
+NODE = re.compile(r"\$\s*(\d+)\s*(?:\"([^\"]*)\")?")
+"""Marks the node of PolyScope's tree that a statement comes from."""
 MAX_LINES = 200_000
-MAX_PROBLEMS = 20
 JOINT_SPEED, JOINT_ACCELERATION = 1.05, 1.4
 """Of ``movej`` where it does not say [rad/s, rad/s²]."""
 TOOL_SPEED, TOOL_ACCELERATION = 0.25, 1.2
@@ -313,217 +299,374 @@ SIGNATURES = {
     "movep": (Move.PROCESS, ("pose", "a", "v", "r")),
     "movec": (Move.CIRCULAR, ("pose_via", "pose_to", "a", "v", "r", "mode")),
 }
-BLOCKS = ("elif", "else", "return", "break", "continue", "kill", "join")
-DEFINITION = re.compile(r"^(def|sec)\s+[A-Za-z_]\w*\s*\(\s*\)\s*:$")
-NODE = re.compile(r"\$\s*\d+\b")
-"""Marks the node of PolyScope's tree that a statement comes from."""
-REMEDY = "export a program without it, or record the motion on the controller"
+DEFAULTS = (
+    "gone through, not executed; speeds and accelerations that a move does not give are the defaults of "
+    f"URScript: {JOINT_SPEED:g} rad/s and {JOINT_ACCELERATION:g} rad/s² of the leading joint, "
+    f"{TOOL_SPEED:g} m/s and {TOOL_ACCELERATION:g} m/s² of the tool point"
+)
 
 
-def read_urscript(content: bytes, file: str) -> Program:
+def read_urscript(
+    content: bytes, file: str, values: Mapping[str, float | bool | str] | None = None
+) -> Program:
     """The waypoints of a program.
 
     Args:
         content: The file.
         file: Its name, for messages.
+        values: What it needs and does not give, by its name there; a text is an expression of the language.
 
     Raises:
-        InputError: With every statement whose motion is not known, by line.
+        InputError: Every value that is needed and was not given, or nothing that moves.
     """
-    if len(content) > MAX_BYTES:
-        raise InputError.at(file, "", f"{len(content)} bytes", f"at most {MAX_BYTES} are read")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError.at(file, "", f"is not text: {error}", "give a .script file") from error
-    lines = text.splitlines()
-    if len(lines) > MAX_LINES:
-        raise InputError.at(file, "", f"{len(lines)} lines", f"at most {MAX_LINES} are read")
-    found = _Script(file)
-    for number, line in enumerate(lines, start=1):
-        statement = _bare(line)
-        if statement:
-            found.take(number, statement)
-        if len(found.problems) >= MAX_PROBLEMS:
-            break
-    return found.program()
+    script = Script(file, values or {})
+    script.run_text(lines_of(content, file), main=True)
+    script.remarks.append(DEFAULTS)
+    return script.program(nothing="no move with constants")
 
 
-class _Script:
-    def __init__(self, file: str) -> None:
-        self.file = file
-        self.problems: list[Problem] = []
-        self._waypoints: list[Waypoint] = []
-        self._names: dict[str, Value | None] = {}
+class Script(Walk):
+    """A program of URScript."""
+
+    def __init__(self, file: str, values: Mapping[str, float | bool | str]) -> None:
+        super().__init__(file, values)
+        self.names: dict[str, Value | None] = {}
+        self._functions: dict[str, tuple[Block, tuple[tuple[str, str], ...]]] = {}
         self._changing: set[str] = set()
         """Names that something beside the program gives a value."""
-        self._open = self._definitions = 0
-        self._tcp: ToolPose | None = None
-        self._left_out: dict[str, int] = {}
-        self._block: Block | None = None
-        self._round: int | None = None
-        """Blocks that are open around the loop that never ends; None without one."""
-        self._round_line = 0
-        self._after = False
-        """Whether that loop has ended."""
+        self._locals: set[str] | None = None
+        self._returned: Value | None = None
+        self.tcp: ToolPose | None = None
 
-    def take(self, line: int, statement: str) -> None:
+    def run_text(self, lines: Sequence[str], *, main: bool = False, at: str = "") -> str:
+        """Run a text.
+
+        Args:
+            lines: Of it.
+            main: Whether the first of its functions is run when nothing else in it is.
+            at: Put before the places of its lines.
+        """
+        if len(lines) > MAX_LINES:
+            raise InputError.at(self.file, at, f"{len(lines)} lines", f"at most {MAX_LINES} are read")
+        items = self._parsed(lines, at)
+        if main and not any(self._acts(item) for item in items):
+            first = next((i for i in items if isinstance(i, Block) and i.word == "def"), None)
+            end = self.run([i for i in items if i is not first])
+            return end if first is None else self.run(first.body)
+        return self.run(items)
+
+    def _acts(self, item: Item) -> bool:
+        return isinstance(item, Line) and ASSIGNMENT.match(item.text) is None and not NODE.match(item.text)
+
+    def _parsed(self, lines: Sequence[str], at: str) -> list[Item]:
+        """Statements and blocks."""
+        top: list[Item] = []
+        open_: list[tuple[Block | None, list[Item]]] = [(None, top)]
+        node = ""
+        for k, raw in enumerate(lines, start=1):
+            text = _bare(raw)
+            if not text:
+                continue
+            if (match := NODE.match(text)) is not None:
+                node = f" (node {match[1]}{f' {match[2]}' if match[2] else ''})"
+                continue
+            place = f"{at}line {k}{node}"
+            word = re.split(r"\W", text, maxsplit=1)[0]
+            block, items = open_[-1]
+            if text == "end":
+                if len(open_) > 1:
+                    open_.pop()
+                continue
+            if word in ("elif", "else") and text.endswith(":"):
+                if block is None or block.kind != "if":
+                    raise InputError.at(self.file, place, f"`{word}` without an `if`", "export it again")
+                condition = text[len(word) : -1].strip() if word == "elif" else ""
+                block.arms.append((condition, []))
+                open_[-1] = block, block.body
+                continue
+            if text.endswith(":"):
+                kind = {"if": "if", "while": "while"}.get(word, "other")
+                condition = text[len(word) : -1].strip() if kind != "other" else text
+                new = Block(place, word, kind, [(condition, [])])
+                items.append(new)
+                open_.append((new, new.body))
+                if len(open_) > MAX_NESTED:
+                    raise InputError.at(
+                        self.file, place, f"nested deeper than {MAX_NESTED}", "is it a program?"
+                    )
+                continue
+            items.append(Line(place, text))
+        if len(open_) > 1 and (block := open_[-1][0]) is not None:
+            raise InputError.at(
+                self.file, block.at, f"`{block.word}`: its `end` is missing", "export it again"
+            )
+        return top
+
+    # -- what it is told --------------------------------------------------------------------------
+
+    def given(self, name: str) -> Value | None:
+        """What the user gives under a name, or what is known of where the robot is."""
+        value = given(self.values, name)
+        if isinstance(value, str):
+            return Reader(tokens(value), {}).whole()
+        if value is not None:
+            return value if isinstance(value, bool) else float(value)
+        last = self.waypoints[-1] if self.waypoints else None
+        if last is not None and last.blend == 0 and self.lost < len(self.waypoints):
+            if name in HERE:
+                return last.q
+            if name in HERE_POSE and last.pose is not None and last.tool == self.tcp:
+                return _value(transform(rotation_from_wxyz(last.pose.wxyz), last.pose.position))
+        return None
+
+    def defines(self, name: str) -> bool:
+        """Whether the program has a function of that name."""
+        return name in self._functions
+
+    def returned(self, call: Call) -> Value:
+        """What a function of the program returns; what it moves is gone to."""
+        self._call(call)
+        if self._returned is None:
+            raise Asked(f"{call.name}()")
+        return self._returned
+
+    def evaluate(self, text: str) -> Value:
+        """The value of an expression.
+
+        Raises:
+            NotKnown: It is not known.
+        """
+        return Reader(tokens(text), self.names, self).whole()
+
+    # -- the walk -----------------------------------------------------------------------------------
+
+    def true(self, condition: str) -> bool:
+        """Whether a condition holds, see `Walk`."""
+        try:
+            return truth(self.evaluate(condition))
+        except NotKnown as error:
+            raise NotKnown(f"whether {condition.strip('()')[:60]} holds only a controller knows") from error
+
+    def matters(self, statement: str) -> bool:
+        """Whether a statement moves or leaves, see `Walk`."""
         word = re.split(r"\W", statement, maxsplit=1)[0]
-        begun = self._definitions or self._waypoints
-        if self._block is not None:
-            if self._block.take(word, statement):
-                self._leave_out(self._block)
-                self._block = None
-        elif NODE.match(statement):
-            pass
-        elif ENDLESS.fullmatch(statement) and self._round is None and self._open == self._definitions:
-            self._round, self._round_line = self._open, line
-            self._open += 1
-        elif statement.endswith(":") and (word in OPENING or (word in DEFINITIONS and begun)):
-            self._block = Block(line, word)
-        elif DEFINITION.match(statement):
-            self._definitions += 1
-            self._open += 1
-        elif statement == "end" and self._open:
-            self._open -= 1
-            self._after |= self._open == self._round
-        elif word in BLOCKS or statement.endswith(":") or word == "def":
-            self._wrong(line, f"`{word}`", "what is done there only a controller knows")
-        elif (match := ASSIGNMENT.match(statement)) is not None:
-            self._assign(line, match[1], match[2])
-        else:
-            self._statement(line, word, statement)
+        bare = _TEXT.sub("", statement)
+        if word in LEAVING or word == "set_tcp":
+            return True
+        for name in _CALL.findall(bare):
+            if name in MOVES or MOVES_OTHERWISE.match(name) or name == "set_tcp":
+                return True
+            if name in self._functions and self._moving(name):
+                return True
+        return bool(re.fullmatch(r"while\s*\(?\s*True\s*\)?\s*:?", statement))
 
-    def _leave_out(self, block: Block) -> None:
-        """What a block does to the names is known to a controller alone."""
-        self._names |= dict.fromkeys(block.names)
-        self._changing |= block.names if block.defines else set()
-        if block.matters:
-            self._wrong(block.line, f"`{block.word}`", "what is done there only a controller knows")
-        else:
-            self._left_out[block.word] = self._left_out.get(block.word, 0) + 1
+    def _moving(self, name: str, depth: int = 0) -> bool:
+        """Whether a function of the program moves the robot or its tool point."""
+        block = self._functions[name][0]
+        calls = {n for text in block.lines() for n in _CALL.findall(_TEXT.sub("", text))}
+        if any(n in MOVES or MOVES_OTHERWISE.match(n) or n == "set_tcp" for n in calls):
+            return True
+        inner = [n for n in calls if n in self._functions and n != name]
+        return depth < MAX_CALLS and any(self._moving(n, depth + 1) for n in inner)
 
-    def _assign(self, line: int, name: str, text: str) -> None:
-        if call := moving(text):
-            self._wrong(line, f"`{call}`", "what moves the robot stands in a statement of its own")
+    def forget(self, statement: str) -> None:
+        """What a statement changes is not known, see `Walk`."""
+        if (match := ASSIGNMENT.match(statement)) is not None:
+            self.names[match[2]] = None
+        for name in _CALL.findall(_TEXT.sub("", statement)):
+            if name in self._functions:
+                for text in self._functions[name][0].lines():
+                    if (match := ASSIGNMENT.match(text)) is not None and match[2] in self.names:
+                        self.names[match[2]] = None
+        if statement.startswith("set_tcp"):
+            self.tcp = None
+
+    def breaks(self, statement: str) -> bool:
+        """Whether a statement leaves, see `Walk`."""
+        return re.split(r"\W", statement, maxsplit=1)[0] in LEAVING
+
+    def _block(self, block: Block) -> str:
+        if block.word == "def" and (match := DEFINED.match(block.arms[0][0])) is not None:
+            if match[1] not in self._functions:
+                parameters = [p.partition("=") for p in match[2].split(",") if p.strip()]
+                self._functions[match[1]] = (
+                    block,
+                    tuple((name.strip(), default.strip()) for name, _, default in parameters),
+                )
+            return ""
+        if block.word in ("thread", "sec"):
+            texts = list(block.lines())
+            for text in texts:
+                if (match := ASSIGNMENT.match(text)) is not None:
+                    self._changing.add(match[2])
+                    self.names[match[2]] = None
+            if any(self._beside(text) for text in texts):
+                self.leave(block.at, block.word, "what moves beside the program only a controller knows")
+            else:
+                self.quiet(block.word)
+            return ""
+        return super()._block(block)
+
+    def _beside(self, text: str) -> bool:
+        """Whether a statement of a thread moves the robot or its tool point."""
+        calls = _CALL.findall(_TEXT.sub("", text))
+        return any(n in MOVES or MOVES_OTHERWISE.match(n) or n == "set_tcp" for n in calls)
+
+    def do(self, line: Line) -> str:
+        """Run one statement, see `Walk`."""
+        text = line.text
+        word = re.split(r"\W", text, maxsplit=1)[0]
+        if word in ("break", "return"):
+            return self._leaving(word, text)
+        if word == "halt":
+            return "never"
+        if word == "continue":
+            raise NotKnown("is not followed")
+        if (match := ASSIGNMENT.match(text)) is not None:
+            self._assign(match)
+            return ""
+        if re.fullmatch(r"(run|join|kill)\s+\w+\s*(\(\s*\))?", text):
+            self.quiet(word)
+            return ""
+        if re.fullmatch(r"[A-Za-z_]\w*\s*\(.*\)", text) is None:
+            raise NotKnown("is no statement that is known here")
+        if word in self._functions:
+            self._call(Reader(tokens(text), self.names, self).call())
+        elif word in SIGNATURES:
+            call = Reader(tokens(text), self.names, self).call()
+            self.waypoints.append(_waypoint(line.at, call, self.tcp))
+        elif word == "sleep":
+            seconds = _arguments(Reader(tokens(text), self.names, self).call(), ("t",)).get("t")
+            waited(self.waypoints, number(seconds))
+        elif word == "set_tcp":
+            call = Reader(tokens(text), self.names, self).call()
+            pose = next(iter(_arguments(call, ("pose", "tcp_name")).values()), None)
+            if not isinstance(pose, PoseValue):
+                raise NotKnown("needs a constant pose")
+            self.tcp = _pose(pose)
+        elif self.matters(text):
+            raise NotKnown("moves the robot in a way that is not modelled")
+        else:
+            self.quiet(word)
+        return ""
+
+    def _leaving(self, word: str, text: str) -> str:
+        if word == "return":
+            rest = text[6:].strip()
+            self._returned = None
+            if rest:
+                try:
+                    self._returned = self.evaluate(rest)
+                except NotKnown:
+                    self._returned = None
+        return word
+
+    def _assign(self, match: re.Match[str]) -> None:
+        scope, name, index, text = match.groups()
+        if self._locals is not None and scope != "global" and name not in self.names:
+            self._locals.add(name)
         # A name that is no constant matters only where a waypoint needs it.
         try:
-            reader = Reader(tokens(text), self._names)
-            value = reader.value()
-            reader.end()
-        except NotConstant:
-            self._names[name] = None
-            return
-        # A name that is given twice is the latest, as the program runs from top to bottom.
-        self._names[name] = None if name in self._changing else value
+            value: Value | None = self.evaluate(text)
+        except NotKnown:
+            if self.matters(text):
+                self.names[name] = None
+                raise
+            value = None
+        if index is not None:
+            value = self._changed(name, index, value)
+        self.names[name] = None if name in self._changing else value
 
-    def _statement(self, line: int, name: str, statement: str) -> None:
-        known = name in SIGNATURES or name in ("sleep", "set_tcp")
+    def _changed(self, name: str, index: str, value: Value | None) -> Value | None:
+        """A list or pose with one element that is another."""
+        held = self.names.get(name)
         try:
-            call = Reader(tokens(statement), self._names).call() if known else None
-            if call is None:
-                started = re.fullmatch(r"run\s+\w+\s*\(\s*\)", statement)
-                if not (started or re.fullmatch(r"[A-Za-z_]\w*\s*\(.*\)", statement)):
-                    raise NotConstant("is no statement that is known here")
-                if moving(statement):
-                    raise NotConstant("moves the robot in a way that is not modelled")
-                self._left_out[name] = self._left_out.get(name, 0) + 1
-            elif name == "sleep":
-                self._sleep(call)
-            elif name == "set_tcp":
-                self._set_tcp(call)
-            elif self._after:
-                raise NotConstant("stands behind a loop that never ends")
-            else:
-                self._waypoints.append(self._waypoint(line, call))
-                if len(self._waypoints) > MAX_WAYPOINTS:
-                    raise NotConstant(f"more than {MAX_WAYPOINTS} waypoints")
-        except NotConstant as error:
-            self._wrong(line, f"`{name}`", str(error))
+            place = number(self.evaluate(index[1:-1]))
+        except NotKnown:
+            return None
+        items = list(held.numbers if isinstance(held, PoseValue) else held if isinstance(held, tuple) else ())
+        if value is None or place != int(place) or not 0 <= place < len(items):
+            return None
+        items[int(place)] = value
+        if isinstance(held, PoseValue):
+            return PoseValue(tuple(number(v) for v in items))
+        return tuple(items)
 
-    def _sleep(self, call: Call) -> None:
-        seconds = _arguments(call, ("t",)).get("t")
-        if not isinstance(seconds, float) or isinstance(seconds, bool) or not 0 <= seconds <= 1e5:
-            raise NotConstant("needs a time of 0 s or more")
-        if self._waypoints:
-            self._waypoints[-1] = self._waypoints[-1].waiting(seconds)
+    def _call(self, call: Call) -> None:
+        """Run a function of the program."""
+        block, parameters = self._functions[call.name]
+        if self._depth >= MAX_CALLS:
+            raise NotKnown(f"calls are followed {MAX_CALLS} deep")
+        bound = dict(zip((p for p, _ in parameters), call.arguments, strict=False)) | dict(call.named)
+        outer, held = self._locals, {p: self.names.get(p) for p, _ in parameters}
+        there = {p for p, _ in parameters if p in self.names}
+        for name, default in parameters:
+            value = bound.get(name)
+            self.names[name] = self.evaluate(default) if value is None and default else value
+        self._locals, self._returned = set(), None
+        self._depth += 1
+        try:
+            end = self.run(block.body)
+        finally:
+            for name in self._locals:
+                self.names.pop(name, None)
+            for name, before in held.items():
+                if name in there:
+                    self.names[name] = before
+                else:
+                    self.names.pop(name, None)
+            self._locals = outer
+            self._depth -= 1
+        if end == "never":
+            raise NotKnown("a loop in it never ends")
 
-    def _set_tcp(self, call: Call) -> None:
-        pose = next(iter(_arguments(call, ("pose", "tcp_name")).values()), None)
-        if not isinstance(pose, PoseValue):
-            raise NotConstant("needs a constant pose")
-        new = _pose(pose)
-        if self._waypoints and self._tcp != new:
-            raise NotConstant("changes the tool point after the first move; split the program there")
-        self._tcp = new
 
-    def _waypoint(self, line: int, call: Call) -> Waypoint:
-        move, names = SIGNATURES[call.name]
-        given = _arguments(call, names)
-        goal = given.get("pose_to") if move is Move.CIRCULAR else given.get(names[0])
-        q = pose = via = near = None
-        if isinstance(goal, Inverse):
-            pose, near = _pose(goal.pose), goal.near
-        elif isinstance(goal, PoseValue):
-            pose = _pose(goal)
-        elif isinstance(goal, tuple):
-            q = goal
-        else:
-            raise NotConstant("needs constant joint positions or a constant pose")
-        if move is Move.CIRCULAR:
-            middle = given.get("pose_via")
-            if not isinstance(middle, PoseValue) or pose is None:
-                raise NotConstant("via and goal must be constant poses (joint positions are not read here)")
+def _waypoint(at: str, call: Call, tool: ToolPose | None) -> Waypoint:
+    move, names = SIGNATURES[call.name]
+    given = _arguments(call, names)
+    goal = given.get("pose_to") if move is Move.CIRCULAR else given.get(names[0])
+    q = pose = via = via_q = near = None
+    if isinstance(goal, Inverse):
+        pose, near = _pose(goal.pose), goal.near
+    elif isinstance(goal, PoseValue):
+        pose = _pose(goal)
+    elif isinstance(goal, tuple):
+        q = tuple(number(v) for v in goal)
+    else:
+        raise NotKnown("needs constant joint positions or a constant pose")
+    if move is Move.CIRCULAR:
+        middle = given.get("pose_via")
+        if isinstance(middle, PoseValue):
             via = _pose(middle)
-            if given.get("mode", 0.0) not in (0.0, 1.0):
-                raise NotConstant("mode is 0 or 1")
-            if given.get("mode") == 1.0:
-                raise NotConstant("mode = 1 (orientation fixed relative to the tangent) is not modelled")
-        tool = move.of_tool
-        duration = _positive(given, "t", None)
-        speed = _positive(given, "v", TOOL_SPEED if tool else JOINT_SPEED)
-        acceleration = _positive(given, "a", TOOL_ACCELERATION if tool else JOINT_ACCELERATION)
-        radius = given.get("r", 0.0)
-        if isinstance(radius, bool) or not isinstance(radius, float) or not 0 <= radius <= 10:
-            raise NotConstant("r is a radius of 0 m or more")
-        return Waypoint(
-            place=f"line {line}",
-            move=move,
-            q=q,
-            pose=pose,
-            near=near,
-            via=via,
-            speed=speed,
-            acceleration=acceleration,
-            duration=duration,
-            blend=radius,
-        )
-
-    def _wrong(self, line: int, what: str, why: str) -> None:
-        self.problems.append(Problem(self.file, f"line {line}", f"{what}: {why}", REMEDY))
-
-    def program(self) -> Program:
-        if self._block is not None:
-            self._wrong(self._block.line, f"`{self._block.word}`", "its `end` is missing")
-        if self._round is not None and not self._after:
-            self._wrong(self._round_line, "`while`", "its `end` is missing")
-        if not self.problems and not self._waypoints:
-            self.problems.append(
-                Problem(self.file, "", "no move with constants", "give a program that moves")
-            )
-        if self.problems:
-            raise InputError(self.problems)
-        remarks = [
-            "parsed, not executed; speeds and accelerations that a move does not give are the defaults of "
-            f"URScript: {JOINT_SPEED:g} rad/s and {JOINT_ACCELERATION:g} rad/s² of the leading joint, "
-            f"{TOOL_SPEED:g} m/s and {TOOL_ACCELERATION:g} m/s² of the tool point"
-        ]
-        if self._round is not None:
-            remarks.append("the program goes round for ever; it is read as one round")
-        if self._left_out:
-            each = ", ".join(f"{name} ({count})" for name, count in sorted(self._left_out.items())[:12])
-            remarks.append(f"statements taken to move nothing were left out, with their waiting: {each}")
-        return Program(self.file, tuple(self._waypoints), tuple(remarks), self._tcp, controller=True)
+        elif isinstance(middle, tuple):
+            via_q = tuple(number(v) for v in middle)
+        else:
+            raise NotKnown("via must be constant joint positions or a constant pose")
+        if given.get("mode", 0.0) not in (0.0, 1.0):
+            raise NotKnown("mode is 0 or 1")
+        if given.get("mode") == 1.0:
+            raise NotKnown("mode = 1 (orientation fixed relative to the tangent) is not modelled")
+    of_tool = move.of_tool
+    duration = _positive(given, "t", None)
+    speed = _positive(given, "v", TOOL_SPEED if of_tool else JOINT_SPEED)
+    acceleration = _positive(given, "a", TOOL_ACCELERATION if of_tool else JOINT_ACCELERATION)
+    radius = number(given.get("r", 0.0))
+    if not 0 <= radius <= 10:
+        raise NotKnown("r is a radius of 0 m or more")
+    return Waypoint(
+        place=at,
+        move=move,
+        q=q,
+        pose=pose,
+        near=near,
+        via=via,
+        via_q=via_q,
+        speed=speed,
+        acceleration=acceleration,
+        duration=duration,
+        blend=radius,
+        tool=tool,
+    )
 
 
 def _bare(line: str) -> str:
@@ -541,25 +684,25 @@ def _bare(line: str) -> str:
 
 def _arguments(call: Call, names: tuple[str, ...]) -> dict[str, Value]:
     if len(call.arguments) > len(names):
-        raise NotConstant(f"has {len(call.arguments)} arguments, not at most {len(names)}")
+        raise NotKnown(f"has {len(call.arguments)} arguments, not at most {len(names)}")
     given = dict(zip(names, call.arguments, strict=False))
     for key, value in call.named.items():
         # movej is documented with q and movel with pose; both take either.
         name = names[0] if key in ("q", "pose") and names[0] in ("q", "pose") else key
         if name not in names or name in given:
-            raise NotConstant(f"argument {key!r} is unknown or given twice")
+            raise NotKnown(f"argument {key!r} is unknown or given twice")
         given[name] = value
     return given
 
 
 def _positive(given: dict[str, Value], key: str, default: float | None) -> float | None:
     value = given.get(key, 0.0 if key == "t" else default)
-    if isinstance(value, bool) or not isinstance(value, float) or not isfinite(value):
-        raise NotConstant(f"{key} is no number")
+    if isinstance(value, bool) or not isinstance(value, float):
+        raise NotKnown(f"{key} is no number")
     if key == "t" and value == 0:
         return None
     if not 0 < value <= 1e4:
-        raise NotConstant(f"{key} = {value:g} is not above 0")
+        raise NotKnown(f"{key} = {value:g} is not above 0")
     return value
 
 
@@ -568,5 +711,23 @@ def _pose(value: PoseValue) -> ToolPose:
     try:
         w, i, j, k = wxyz_from("rotation_vector", np.array([turn]))[0].tolist()
     except ValueError as error:
-        raise NotConstant(str(error)) from error
+        raise NotKnown(str(error)) from error
     return ToolPose((x, y, z), (w, i, j, k))
+
+
+def _matrix(value: PoseValue) -> Array:
+    pose = _pose(value)
+    return transform(rotation_from_wxyz(pose.wxyz), pose.position)
+
+
+def _vectors(rotation: Array) -> Array:
+    """Rotation vector [rad], shape (1, 3)."""
+    w, *axis = wxyz_from_rotation(rotation).tolist()
+    sine = math.sqrt(sum(x * x for x in axis))
+    angle = 2 * math.atan2(sine, w)
+    return np.array([[x * (angle / sine if sine > 1e-12 else 2.0) for x in axis]])
+
+
+def _value(matrix: Array) -> PoseValue:
+    turn = _vectors(matrix[:3, :3])[0]
+    return PoseValue(tuple(map(float, (*matrix[:3, 3], *turn))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -40,6 +41,20 @@ class ToolPose:
 
 
 @dataclass(frozen=True)
+class Configuration:
+    """Which of the ways of reaching a pose a program means, as its controller tells them apart."""
+
+    text: str
+    """As it is written: ``S 2, T 35``."""
+    ranges: tuple[tuple[float, float] | None, ...] = ()
+    """Where each joint is [rad]: from, up to; None where it is not said."""
+    like: tuple[float, ...] = ()
+    """Joint positions of a posture that ``sides`` are told by [rad]; empty where they are not."""
+    sides: tuple[bool | None, bool | None] = (None, None)
+    """Whether shoulder and elbow are on the side of that posture; None where it is not said."""
+
+
+@dataclass(frozen=True)
 class Waypoint:
     """One waypoint; exactly one of ``q`` and ``pose``."""
 
@@ -55,6 +70,8 @@ class Waypoint:
     the robot is when not given."""
     via: ToolPose | None = None
     """A pose on the way of `Move.CIRCULAR`; only its position counts."""
+    via_q: tuple[float, ...] | None = None
+    """Joint positions on the way of `Move.CIRCULAR`, instead of ``via`` [rad or m]."""
     speed: float | None = None
     """Speed of the leading joint [rad/s or m/s], or of the tool point [m/s]."""
     acceleration: float | None = None
@@ -66,6 +83,20 @@ class Waypoint:
     for half of the shorter of both moves."""
     pause: float = 0.0
     """Time that the robot stands there [s]."""
+    share: float | None = None
+    """Of `Move.JOINT`: share of the joints' own largest speeds, instead of ``speed``."""
+    along: float | None = None
+    """Of `Move.JOINT`: mean speed of the tool point on the way [m/s], instead of ``speed``."""
+    acceleration_share: float = 1.0
+    """Share of the acceleration that the source gives, where the program gives no other."""
+    turn: float | None = None
+    """Largest turning speed of the tool where the tool's way is given [rad/s]."""
+    blend_share: float = 0.0
+    """Instead of ``blend``: share of half of the shorter of both moves."""
+    tool: ToolPose | None = None
+    """Its own tool point, where those of a program differ; that of the program when not given."""
+    configuration: Configuration | None = None
+    """Which way of reaching ``pose`` is meant, where the program says it."""
 
     @property
     def shown(self) -> str:
@@ -89,3 +120,13 @@ class Program:
     """Tool point in the frame of the flange, where the file says it."""
     controller: bool = False
     """Whether the file is a controller's own, with poses in the controller's base frame."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the motion that are not known, each with its place: of that robot nothing is within."""
+
+
+def one_tool(waypoints: Sequence[Waypoint]) -> tuple[tuple[Waypoint, ...], ToolPose | None]:
+    """The waypoints, and the tool point that all of them have; each keeps its own where they differ."""
+    tools = {w.tool for w in waypoints}
+    if len(tools) != 1:
+        return tuple(waypoints), None
+    return tuple(replace(w, tool=None) for w in waypoints), next(iter(tools))

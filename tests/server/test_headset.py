@@ -11,6 +11,7 @@ from websockets.exceptions import InvalidStatus
 from seerob.app.server.access import Tokens
 from seerob.app.server.live import Live
 from seerob.app.server.serving import Server
+from seerob.core.samples import BodySample
 from seerob.core.snapshot import Tracked, Tracking
 from seerob.description.capture.estimated import estimated
 from seerob.description.capture.mapping import conventions
@@ -269,15 +270,22 @@ def fitted(page, samples, places, sway=0.0):
     for k in range(12):
         page.see(1000 + k, places=places + sway * (-1) ** k + 3e-7 * (k % 3), stands="tpose")
         time.sleep(2 * SHORTEST)
-    end, k, answer, fewer = time.monotonic() + PATIENCE, 2000, None, len(samples)
-    while (answer is None or answer.fits is None or len(samples) == fewer) and time.monotonic() < end:
+    end, k, answer, told = time.monotonic() + PATIENCE, 2000, None, None
+    after = []
+    while not after and time.monotonic() < end:
         page.see(k, places=places + 3e-7 * (k % 3))
         k += 1
-        try:
-            answer = page.answer(timeout=0.02)
-        except TimeoutError:
-            fewer = len(samples) if answer is None else fewer
-    return answer, samples[-1]
+        if told is None:
+            try:
+                answer = page.answer(timeout=0.02)
+            except TimeoutError:
+                continue
+            # What comes from now on is seen as it was fitted.
+            told = None if answer.fits is None else len(samples)
+        else:
+            time.sleep(0.01)
+            after = [sample for sample in samples[told:] if isinstance(sample, BodySample)]
+    return answer, after[-1]
 
 
 def test_who_stands_with_arms_to_the_sides_is_fitted(server, samples):

@@ -78,6 +78,7 @@ BELOW = {
     "device_distance",
     "light_curtain",
     "manipulability",
+    "manual_handling",
     "minimum_distance",
     "pressure_mat",
     "safety_area",
@@ -90,6 +91,10 @@ PHASE = """
 [[phases]]
 title = "stands"
 start = 0
+cycle = 10
+exertion = 3
+exertions = 2
+exertion_time = 0.5
 load = 0
 muscle_arms = false
 muscle_body = false
@@ -103,6 +108,8 @@ rapid = false
 LEFT_OUT = {
     "contact_force": "is never within, and wants contacts that act",
     "niosh": "depends on nobody: lifts are entered",
+    "hand_activity": "depends on nobody: exertions are entered",
+    "manual_handling": "depends on nobody: loads are entered",
     "path_speed": "needs a map of a motion",
     "waypoints": "draws, and has no limit",
     "posture_table": "is iso_11226 with a table of one's own",
@@ -114,6 +121,7 @@ ERGONOMICS = {
     "eaws_posture": "cycle = 60\n",
     "iso_11226": "",
     "en_1005_4": "",
+    "strain_index": "daily = 14400\nlimit = 10\n",
     "acme.bending": "limit = 10\n",
     "acme.bent_load": "limit = 2\n",
 }

@@ -16,6 +16,7 @@ from seerob.model.model import Model
 from seerob.recording.answers import Flags
 from seerob.workstation.tables.task_phase import (
     ROUNDING,
+    Borg,
     Kilograms,
     Period,
     Phase,
@@ -23,11 +24,13 @@ from seerob.workstation.tables.task_phase import (
     Sides,
     Stance,
     TaskPhase,
+    Wrist,
     check_order,
     phase_at,
 )
 
 __all__ = [
+    "Borg",
     "Kilograms",
     "Period",
     "Phase",
@@ -35,6 +38,7 @@ __all__ = [
     "Sides",
     "Stance",
     "TaskPhase",
+    "Wrist",
     "check_order",
     "entered_for",
     "on_sides",

@@ -5,6 +5,7 @@ A rule has phases of its own, or reads those of ``[[phases]]``, which every rule
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeVar
@@ -15,6 +16,10 @@ from msgspec.structs import fields
 Kilograms = Annotated[float, Meta(ge=0, extra={"unit": "kg"}, extra_json_schema={"x-unit": "kg"})]
 Seconds = Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
 Period = Annotated[float, Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
+Borg = Annotated[float, Meta(ge=0, le=10)]
+Wrist = Annotated[
+    float, Meta(ge=-math.pi / 2, le=math.pi / 2, extra={"unit": "rad"}, extra_json_schema={"x-unit": "rad"})
+]
 Sides = Literal["none", "left", "right", "both"]
 Stance = Literal[
     "sitting",
@@ -91,7 +96,7 @@ class TaskPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     load_use: Literal["intermittent", "static", "repeated", "shock"] | None = None
     """How the load acts; not needed for a load of 0."""
     hand: Literal["left", "right", "both"] = "both"
-    """Which arm carries the load."""
+    """Which arm carries the load, and makes the exertions."""
     coupling: Literal["good", "fair", "poor", "unacceptable"] | None = None
     """How well the load can be held."""
     supported_arms: Sides | None = None
@@ -112,6 +117,15 @@ class TaskPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Small movements repeated more than 4 times per minute."""
     rapid: bool | None = None
     """Rapid large changes of posture, or an unstable base."""
+    exertion: Borg | None = None
+    """Greatest force of a hand in the phase, on Borg's CR-10 scale, or a tenth of its strength in percent; 0
+    for none."""
+    exertions: Annotated[float, Meta(ge=0)] | None = None
+    """Exertions of a hand in the phase."""
+    exertion_time: Seconds | None = None
+    """How long one of them lasts [s]."""
+    wrist: Wrist | None = None
+    """Wrist in the exertions, flexion above 0 and extension below [rad], instead of the twin's."""
 
 
 P = TypeVar("P", bound=Phase)

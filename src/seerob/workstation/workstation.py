@@ -106,7 +106,7 @@ class ReportCover(_Table, frozen=True, kw_only=True):
     logo: str | None = None
     """A PNG or JPEG file of at most 1 MB, beside this one."""
     language: Literal["en", "de", "fr", "es", "it"] = "en"
-    """Of headings, verdicts and sentences; what criteria and findings say is English in all of them."""
+    """Of headings, verdicts and sentences; formulas, sources and names stay as they are."""
 
 
 class Robot(_Table, frozen=True, kw_only=True):

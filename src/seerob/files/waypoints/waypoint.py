@@ -45,7 +45,7 @@ class Configuration:
     """Which of the ways of reaching a pose a program means, as its controller tells them apart."""
 
     text: str
-    """As it is written: ``S 2, T 35``."""
+    """The program's own words for it: ``S 2, T 35``."""
     ranges: tuple[tuple[float, float] | None, ...] = ()
     """Where each joint is [rad]: from, up to; None where it is not said."""
     like: tuple[float, ...] = ()

@@ -298,6 +298,7 @@ CALLS = {
     "criteria.ergonomics.hand_activity.activity": {"share": HALF, "per_second": HALF},
     "criteria.ergonomics.hand_activity.force_at": {"hal": HALF, "at_no_activity": 5.6},
     "criteria.ergonomics.manual_handling.share_of": {"load": 5.0, "half": 10.0, "variation": 0.3},
+    "criteria.ergonomics.ocra_checklist.time_factor": {"daily": 3600.0},
     "criteria.ergonomics.strain_index.composite": {"strain": TWO, "per_minute": TWO},
     "criteria.ergonomics.strain_index.daily_multiplier": {"daily": TWO},
     "criteria.ergonomics.strain_index.frequency_multiplier": {"per_minute": TWO},

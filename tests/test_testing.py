@@ -110,6 +110,7 @@ LEFT_OUT = {
     "niosh": "depends on nobody: lifts are entered",
     "hand_activity": "depends on nobody: exertions are entered",
     "manual_handling": "depends on nobody: loads are entered",
+    "ocra_checklist": "depends on nobody: answers are entered",
     "path_speed": "needs a map of a motion",
     "waypoints": "draws, and has no limit",
     "posture_table": "is iso_11226 with a table of one's own",

@@ -209,6 +209,20 @@ def test_what_nobody_entered_is_undecided_and_asked_for(tmp_path, gone, said):
         assert re.search(said, found[name].reason)
 
 
+def test_the_basis_says_what_was_entered_and_that_the_wrist_is_the_twins(tmp_path):
+    station = made(tmp_path, person() + PHASES.replace("exertion_time = 2\n", "") + RULES)
+    strain, hands = (
+        {each.name: (each.value, each.origin) for each in rule.basis(station.model).inputs}
+        for rule in station.workstation.ergonomics
+    )
+    for told_ in (strain, hands):
+        assert told_["exertion, screws"] == (3.0, "given")
+        assert told_["exertion time, screws"] == (None, "missing")
+        assert "exertions, walks" not in told_
+    assert strain["wrist, screws"] == ("as it is", "computed")
+    assert "wrist, screws" not in hands
+
+
 def test_exertions_that_do_not_fit_into_their_phase_are_refused(tmp_path):
     text = PHASES.replace("exertion_time = 2", "exertion_time = 4") + RULES
     with pytest.raises(InputError, match="2 exertions of 4 s in screws, which lasts 6 s"):

@@ -19,8 +19,7 @@ from seerob.core.snapshot import Basis, Input, Level, Origin, Result
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
-from seerob.criteria.scoring.basis import entered
-from seerob.criteria.scoring.exertions import ExertionPhase, HandWork, hand_work, hours_input
+from seerob.criteria.scoring.exertions import HandWork, exertion_inputs, hand_work, hours_input
 from seerob.description.humans.skeleton import SIDES
 from seerob.model.model import Model
 from seerob.model.provenance import given
@@ -205,7 +204,7 @@ class HandActivity(Criterion, frozen=True, kw_only=True):
             "implementation has them and from memory, 1); Radwin et al., Ergonomics 58(2), 2015, 173-183 "
             "(as two public abstracts have the equation, 2+)",
             inputs=(
-                *entered(phases, ExertionPhase()),
+                *exertion_inputs(phases, wrist=False),
                 hours_input(self.daily),
                 rated,
                 *(() if self.limit is None else (given("limit", self.limit, ""),)),

@@ -6,7 +6,7 @@ a factor of the time per day. Answers that lie between two rows of the checklist
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal, cast
 
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
@@ -62,7 +62,7 @@ class OcraArm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 def points(arm: OcraArm) -> dict[str, float]:
     """Points of an arm of which nothing is missing: frequency, force and posture."""
-    table, given_ = published("ocra_checklist"), cast("dict[str, Any]", asdict(arm))
+    table, given_ = published("ocra_checklist"), asdict(arm)
 
     def of(name: str) -> float:
         return reached(float(given_[name]), table[name])

@@ -20,8 +20,8 @@ from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
-from seerob.criteria.scoring.basis import ACCURACY_NOTE, entered, posture_quality
-from seerob.criteria.scoring.exertions import Exertion, ExertionPhase, hand_work, hours_input
+from seerob.criteria.scoring.basis import ACCURACY_NOTE, posture_quality
+from seerob.criteria.scoring.exertions import Exertion, ExertionPhase, exertion_inputs, hand_work, hours_input
 from seerob.criteria.scoring.measured import Measured
 from seerob.criteria.scoring.phases import phase_at
 from seerob.criteria.scoring.rule import PostureRule, bind_posture
@@ -236,7 +236,7 @@ class StrainIndex(PostureRule, frozen=True, kw_only=True):
             "meet (1); the papers were not read",
             inputs=(
                 *provenance.motion(model, self.human),
-                *entered(phases, ExertionPhase()),
+                *exertion_inputs(phases, wrist=True),
                 *rates,
                 hours_input(self.daily),
                 *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured, model, self.human),

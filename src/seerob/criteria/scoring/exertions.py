@@ -17,6 +17,7 @@ from seerob.core.snapshot import Input, Origin
 from seerob.criteria.scoring.phases import Borg, Phase, Seconds, Wrist, shared_phases
 from seerob.description.humans.skeleton import SIDES
 from seerob.model.model import Model
+from seerob.model.provenance import given
 from seerob.workstation.tables.task_phase import ROUNDING
 
 GIVE = {
@@ -131,6 +132,36 @@ def _gaps(phases: Sequence[ExertionPhase], ends: Sequence[float], cycle: float) 
     edges += [(end, after.start) for end, (_, after) in zip(ends, pairwise(phases), strict=False)]
     edges.append((ends[-1], cycle))
     return [(a, b) for a, b in edges if b - a > ROUNDING]
+
+
+def exertion_inputs(phases: Sequence[ExertionPhase], *, wrist: bool) -> tuple[Input, ...]:
+    """What was entered of the exertions, for a basis; what a phase without any does not need is left out.
+
+    Args:
+        phases: In their order.
+        wrist: Whether the wrist is an input, too: the twin's where none was entered.
+    """
+    found = []
+    for phase in phases:
+        where = f", {phase.title or f'from {phase.start:g} s on'}"
+        idle = phase.exertion == 0 or phase.exertions == 0
+        for name in ("exertion", *(() if phase.exertion == 0 else ("exertions", "exertion_time"))):
+            value = getattr(phase, name)
+            if value is None and idle:
+                continue
+            unit = "s" if name == "exertion_time" else ""
+            origin, said = (Origin.MISSING, "not entered") if value is None else (Origin.GIVEN, "[[phases]]")
+            label = name.replace("_", " ") + where
+            found.append(Input(name=label, value=value, unit=unit, origin=origin, source=said))
+        if idle:
+            continue
+        found.append(Input(name=f"hand{where}", value=phase.hand, origin=Origin.GIVEN, source="[[phases]]"))
+        if wrist and phase.wrist is None:
+            twins = Input(name=f"wrist{where}", value="as it is", origin=Origin.COMPUTED, source="the twin")
+            found.append(twins)
+        elif wrist:
+            found.append(given(f"wrist{where}", float(phase.wrist or 0.0), "rad"))
+    return tuple(found)
 
 
 def hours_input(hours: float | None) -> Input:

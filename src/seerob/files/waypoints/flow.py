@@ -286,6 +286,11 @@ def _key(name: str) -> str:
     return name if name.replace("_", "").replace("-", "").isalnum() else f'"{name}"'
 
 
+def still(values: Mapping[str, float | bool | str], name: str) -> bool:
+    """Whether the user says that a call moves nothing: ``"grip()" = true``."""
+    return any(k.replace(" ", "").lower() == f"{name}()".lower() and v is True for k, v in values.items())
+
+
 def waited(waypoints: list[Waypoint], seconds: float) -> None:
     """The robot stands where it is for ``seconds`` more.
 

@@ -38,6 +38,9 @@ from seerob.files.tables.table_files import (
     encoding_of,
     sheets,
 )
+from seerob.files.waypoints.fanuc import read_fanuc
+from seerob.files.waypoints.krl import read_krl
+from seerob.files.waypoints.rapid import read_rapid
 from seerob.files.waypoints.urp import read_urp
 from seerob.files.waypoints.urscript import read_urscript
 from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Move, Program, ToolPose, Waypoint
@@ -350,7 +353,7 @@ def _check_keys(value: Any, file: str) -> None:
 
 
 TABLES = (".csv", ".tsv", ".txt", *WORKBOOKS)
-KNOWN = ".script .urp .toml .yaml .yml .csv .tsv .txt .xlsx"
+KNOWN = ".script .urp .src .mod .prg .ls .toml .yaml .yml .csv .tsv .txt .xlsx"
 
 
 def read_program(path: Path, file: str, values: Mapping[str, float | bool | str] | None = None) -> Program:
@@ -375,9 +378,19 @@ def read_program(path: Path, file: str, values: Mapping[str, float | bool | str]
     except TooLarge as error:
         raise InputError.at(file, "", str(error), "split the file") from None
     given = values or {}
+    if suffix == ".src":
+        return read_krl(held, file, given, beside=_beside(path))
     reader = {
         ".script": read_urscript, ".urp": read_urp,
+        ".mod": read_rapid, ".prg": read_rapid, ".ls": read_fanuc,
     }.get(suffix)  # fmt: skip
     if reader is not None:
         return reader(held, file, given)
     return read_structured(held, file, yaml=suffix != ".toml")
+
+
+def _beside(path: Path) -> list[bytes]:
+    """What KUKA's programs have their data in, what all share first: ``$config.dat``, ``<name>.dat``."""
+    wanted = ("$config.dat", f"{path.stem}.dat".lower())
+    there = {f.name.lower(): f for f in islice(path.parent.iterdir(), 10_000) if f.suffix.lower() == ".dat"}
+    return [content(there[name], MAX_BYTES) for name in wanted if name in there]

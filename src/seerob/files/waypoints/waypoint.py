@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from seerob.core.samples import Vec3, Vec4
+from seerob.core.transforms import Array, rotation_from_wxyz, transform, wxyz_from_rotation
 
 MAX_WAYPOINTS = 20_000
 """More are no program, but a recording."""
@@ -38,6 +39,18 @@ class ToolPose:
     """[m]"""
     wxyz: Vec4
     """Unit quaternion."""
+
+    @classmethod
+    def of(cls, matrix: Array) -> ToolPose:
+        """From a transform, (4, 4)."""
+        x, y, z = matrix[:3, 3].tolist()
+        w, i, j, k = wxyz_from_rotation(matrix[:3, :3]).tolist()
+        return cls((x, y, z), (w, i, j, k))
+
+    @property
+    def matrix(self) -> Array:
+        """As a transform, (4, 4)."""
+        return transform(rotation_from_wxyz(self.wxyz), self.position)
 
 
 @dataclass(frozen=True)

@@ -284,3 +284,21 @@ def test_functions_are_the_few_that_are_constant():
     assert Reader(tokens("[1, [2]][1][0]"), {}).value() == 2
     with pytest.raises(NotKnown):
         Reader(tokens("[1, [2]][2]"), {}).value()
+
+
+def test_a_function_that_moves_nothing_may_return_early_and_then_says_nothing():
+    text = """def clear(x):
+  if heard():
+    return 0
+  end
+  return 1
+end
+place = clear(
+  1
+)
+rpc.call(1)
+movej([0,0,0,0,0,1])
+movej([place,0,0,0,0,1])
+"""
+    assert "needs place" in told("main = 1\n" + text)
+    assert told("main = 1\n" + text, {"place": 2}) == ""

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -141,7 +143,7 @@ class _Teach(Walk):
         q, pose, tool, meant = goal
         blend = re.search(r"\bCNT\s*(\d+)", rest)
         acceleration = re.search(r"\bACC\s*(\d+)", rest)
-        return Waypoint(
+        found = Waypoint(
             place=at,
             move=kind,
             q=q,
@@ -152,10 +154,10 @@ class _Teach(Walk):
             acceleration_share=int(acceleration[1]) / 100 if acceleration else 1.0,
             tool=tool,
             configuration=meant if kind is Move.JOINT else None,
-            **self._speed(rest, kind),
         )
+        return replace(found, **self._speed(rest, kind))
 
-    def _speed(self, rest: str, kind: Move) -> dict[str, float]:
+    def _speed(self, rest: str, kind: Move) -> dict[str, Any]:
         match = SPEED.search(rest)
         if match is None:
             name = rest.split(maxsplit=1)[0] if rest.split() else "its speed"
@@ -201,12 +203,12 @@ class _Teach(Walk):
         if held is None:
             raise NotKnown(f"P[{number}] is not in /POS")
         held = held.split("GP2", 1)[0]
-        figures = {m[1]: m[2] for m in FIGURE.finditer(held.partition("CONFIG")[0] + _behind(held))}
+        written = {m[1]: m[2] for m in FIGURE.finditer(held.partition("CONFIG")[0] + _behind(held))}
         frame, tool = (_chosen(held, key, now) for key, now in (("UF", self._frame), ("UT", self._tool)))
-        self._external.add(tuple(v for k, v in sorted(figures.items()) if k[0] == "E"))
-        if any("*" in v for v in figures.values()):
+        self._external.add(tuple(v for k, v in sorted(written.items()) if k[0] == "E"))
+        if any("*" in v for v in written.values()):
             raise NotKnown(f"P[{number}] was never taught")
-        numbers = {k: float(v) for k, v in figures.items()}
+        numbers = {k: float(v) for k, v in written.items()}
         if "J1" in numbers:
             joints = [numbers[k] for k in sorted(numbers) if k[0] == "J"]
             return self._joints(joints), None, self._tool_point(tool), None

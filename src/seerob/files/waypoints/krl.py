@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -410,6 +412,7 @@ class _Krl(Walk):
         via = goals[0] if kind is Move.CIRCULAR else None
         tool = self._now("tool")
         speeds = self._cp() if kind.of_tool else self._ptp()
+        blend = self._blend(kind, blends)
         self.waypoints.append(
             Waypoint(
                 place=at,
@@ -421,10 +424,9 @@ class _Krl(Walk):
                 via_q=None if via is None else via[0],
                 tool=None if tool is None else ToolPose.of(tool),
                 configuration=meant if kind is Move.JOINT else None,
-                **speeds,
-                **self._blend(kind, blends),
             )
         )
+        self.waypoints[-1] = replace(self.waypoints[-1], **speeds, **blend)
 
     def _with(self, text: str) -> None:
         """Of a spline motion: ``WITH $VEL_AXIS[1]=SVEL_JOINT(100.0), $TOOL=STOOL2(FP1), …``."""
@@ -463,7 +465,7 @@ class _Krl(Walk):
         value = self._names.get(name)
         return value if isinstance(value, float) and not isinstance(value, bool) and value > 0 else None
 
-    def _ptp(self) -> dict[str, float]:
+    def _ptp(self) -> dict[str, Any]:
         percent = self._figure("vel ptp") or self._figure("$vel_axis[1]")
         return {
             "share": min(percent or 100.0, 100.0) / 100,
@@ -471,8 +473,8 @@ class _Krl(Walk):
             / 100,
         }
 
-    def _cp(self) -> dict[str, float]:
-        found = {"acceleration_share": min(self._figure("acc cp") or 100.0, 100.0) / 100}
+    def _cp(self) -> dict[str, Any]:
+        found: dict[str, Any] = {"acceleration_share": min(self._figure("acc cp") or 100.0, 100.0) / 100}
         if (speed := self._figure("$vel.cp")) is not None:
             found["speed"] = speed
         if (acceleration := self._figure("$acc.cp")) is not None:
@@ -482,7 +484,7 @@ class _Krl(Walk):
             found["turn"] = math.radians(min(turns))
         return found
 
-    def _blend(self, kind: Move, blends: Sequence[str]) -> dict[str, float]:
+    def _blend(self, kind: Move, blends: Sequence[str]) -> dict[str, Any]:
         if not blends:
             return {}
         if kind.of_tool:

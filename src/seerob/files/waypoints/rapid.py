@@ -137,8 +137,11 @@ class _Reader(Expression[Value]):
         self.take()
         if name not in ("offs", "reltool"):
             x = number(arguments[0] if arguments else None)
-            of = {"abs": abs, "sqrt": math.sqrt, "round": round, "trunc": math.trunc}
-            return float(of[name](x)) if name in of else float(getattr(math, name)(math.radians(x)))
+            angle = math.radians(x)
+            if name == "sqrt" and x < 0:
+                raise NotKnown(f"sqrt({x:g}) is no number")
+            of = {"abs": abs(x), "sqrt": math.sqrt(abs(x)), "sin": math.sin(angle), "cos": math.cos(angle)}
+            return of[name] if name in of else float(round(x) if name == "round" else math.trunc(x))
         if len(arguments) != 4 or not isinstance(arguments[0], tuple) or len(arguments[0]) < 2:
             raise NotKnown(f"{name} needs a robtarget and three numbers")
         target, shift = arguments[0], [number(v) for v in arguments[1:]]
@@ -348,15 +351,16 @@ class _Module(Walk):
     def _assign(self, match: re.Match[str]) -> None:
         name, behind, text = match[1].lower(), match[2], match[3]
         try:
-            value: Value | None = self._evaluated(text)
+            new = self._evaluated(text)
             if behind:
                 path = [
                     MEMBERS[p.lower()] if p[0].isalpha() else int(p) - 1 for p in re.findall(r"\w+", behind)
                 ]
-                value = _put(self._names.get(name), path, value)
+                new = _put(self._names.get(name), path, new)
         except (NotKnown, KeyError, ValueError):
-            value = None
-        self._names[name] = value
+            self._names[name] = None
+        else:
+            self._names[name] = new
 
     # -- motions ------------------------------------------------------------------------------------
 

@@ -37,6 +37,8 @@ QUIET = frozenset(
 MOVING = frozenset({"Force", "Pallet", "Seek", "ContributedNode", "ConveyorTracking", "Screwdriving"})
 """Elements that may move the robot even where no waypoint stands in them."""
 SAID = "joint angles of fixed waypoints are taken, and the tool point beside them; features are not"
+SIGNS = {ord("≟"): "==", ord("≠"): "!=", ord("≤"): "<=", ord("≥"): ">=", ord("≔"): "="}
+"""Signs that PolyScope shows, and what URScript writes for them."""
 FIXED = re.compile(r"waypoint #(\d+)")
 
 
@@ -145,7 +147,9 @@ class _Tree(Script):
             items += self._script(node, at)
         elif tag == "Assignment":
             name = self._variable(node)
-            items.append(Line(at, f"global {name} = {_expression(node)}" if name else "unknown: no variable"))
+            items.append(
+                Line(at, f"global {name} = {self._expression(node)}" if name else "unknown: no variable")
+            )
         elif tag == "If":
             self._if(node, move, at, depth, items)
         elif tag == "Loop":
@@ -170,11 +174,11 @@ class _Tree(Script):
         inside: list[Item] = []
         self._children(node, move, at, depth, inside)
         if kind == "if":
-            items.append(Block(at, "If", "if", [(_expression(node) or "?", inside)]))
+            items.append(Block(at, "If", "if", [(self._expression(node) or "?", inside)]))
         elif kind in ("else", "elseif") and items and _open_if(items[-1]):
             last = items[-1]
             assert isinstance(last, Block)
-            last.arms.append(("" if kind == "else" else _expression(node) or "?", inside))
+            last.arms.append(("" if kind == "else" else self._expression(node) or "?", inside))
         else:
             items.append(Block(at, "If", "other", [("", inside)]))
 
@@ -188,7 +192,7 @@ class _Tree(Script):
         if kind in ("count", "counting", "times") and count.strip().isdigit():
             return Block(at, "Loop", "count", [(f"count {count.strip()}", inside)])
         if kind == "expression":
-            return Block(at, "Loop", "while", [(_expression(node) or "?", inside)])
+            return Block(at, "Loop", "while", [(self._expression(node) or "?", inside)])
         return Block(at, "Loop", "other", [("", inside)])
 
     def _called_tree(self, node: Element, at: str, depth: int, items: list[Item]) -> None:
@@ -229,9 +233,28 @@ class _Tree(Script):
         name = "" if meant is None else meant.get("name", "")
         return name if name.isidentifier() else ""
 
+    def _expression(self, node: Element) -> str:
+        """The text of an expression, whose characters, tokens and variables stand one by one."""
+        held = next((e for e in node if _tag(e) == "expression"), None)
+        if held is None:
+            return ""
+        found = []
+        for part in held:
+            if _tag(part) == "ExpressionChar":
+                found.append(part.get("character", "?"))
+            else:
+                names = (
+                    part.get("token"),
+                    part.get("name"),
+                    part.get("referencedName"),
+                    self._variable(part),
+                )
+                found.append(next((name for name in names if name), "?"))
+        return "".join(found).translate(SIGNS).strip()
+
     def _script(self, node: Element, at: str) -> list[Item]:
         cached = next((e for e in node if _tag(e) == "cachedContents"), None)
-        text = _expression(node) if cached is None else cached.text or ""
+        text = self._expression(node) if cached is None else cached.text or ""
         if not text.strip():
             return [Line(at, "unknown Script: its text is not in this file")]
         return self._parsed(text.splitlines(), f"{at}, ")
@@ -250,7 +273,7 @@ class _Tree(Script):
         if node.get("type", "Fixed") == "Variable":
             figures = {"a": acceleration, "v": speed, "r": blend}
             said = "".join(f", {k}={v!r}" for k, v in figures.items() if v is not None)
-            goal = self._variable(node) or _expression(node) or "?"
+            goal = self._variable(node) or self._expression(node) or "?"
             items.append(Line(at, f"move{_LETTER[kind]}({goal}{said})"))
             return
         if node.get("type", "Fixed") != "Fixed" or angles is None:
@@ -328,20 +351,6 @@ def _path(path: str, node: Element, tag: str) -> str:
     name = node.get("name") or node.get("motionType") or ""
     own = f"{tag} {name!r}" if name else tag
     return f"{path} / {own}" if path else own
-
-
-def _expression(node: Element) -> str:
-    """The text of an expression, whose characters and tokens stand one by one."""
-    held = next((e for e in node if _tag(e) == "expression"), None)
-    if held is None:
-        return ""
-    found = []
-    for part in held:
-        if _tag(part) == "ExpressionChar":
-            found.append(part.get("character", "?"))
-        else:
-            found.append(part.get("token") or part.get("name") or part.get("referencedName") or "?")
-    return "".join(found).strip()
 
 
 def _tool(offset: tuple[float, ...] | None) -> ToolPose | None:

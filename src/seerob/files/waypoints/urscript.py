@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -336,6 +336,8 @@ class Script(Walk):
         """Names that something beside the program gives a value."""
         self._locals: set[str] | None = None
         self._returned: Value | None = None
+        self._calm = self._doubt = False
+        """Whether what is run is a function that moves nothing; and whether it may have returned before."""
         self.tcp: ToolPose | None = None
 
     def run_text(self, lines: Sequence[str], *, main: bool = False, at: str = "") -> str:
@@ -363,10 +365,7 @@ class Script(Walk):
         top: list[Item] = []
         open_: list[tuple[Block | None, list[Item]]] = [(None, top)]
         node = ""
-        for k, raw in enumerate(lines, start=1):
-            text = _bare(raw)
-            if not text:
-                continue
+        for k, text in _statements(lines):
             if (match := NODE.match(text)) is not None:
                 node = f" (node {match[1]}{f' {match[2]}' if match[2] else ''})"
                 continue
@@ -451,7 +450,7 @@ class Script(Walk):
         """Whether a statement moves or leaves, see `Walk`."""
         word = re.split(r"\W", statement, maxsplit=1)[0]
         bare = _TEXT.sub("", statement)
-        if word in LEAVING or word == "set_tcp":
+        if (word in LEAVING and not (word == "return" and self._calm)) or word == "set_tcp":
             return True
         for name in _CALL.findall(bare):
             if name in MOVES or MOVES_OTHERWISE.match(name) or name == "set_tcp":
@@ -480,6 +479,7 @@ class Script(Walk):
                         self.names[match[2]] = None
         if statement.startswith("set_tcp"):
             self.tcp = None
+        self._doubt |= statement.startswith("return")
 
     def breaks(self, statement: str) -> bool:
         """Whether a statement leaves, see `Walk`."""
@@ -527,6 +527,9 @@ class Script(Walk):
             return ""
         if re.fullmatch(r"(run|join|kill)\s+\w+\s*(\(\s*\))?", text):
             self.quiet(word)
+            return ""
+        if re.fullmatch(r"\w+\.\w+\s*\(.*\)", text) and not self.matters(text):
+            self.quiet(text.partition("(")[0])  # a call of another computer
             return ""
         if re.fullmatch(r"[A-Za-z_]\w*\s*\(.*\)", text) is None:
             raise NotKnown("is no statement that is known here")
@@ -604,6 +607,8 @@ class Script(Walk):
             value = bound.get(name)
             self.names[name] = self.evaluate(default) if value is None and default else value
         self._locals, self._returned = set(), None
+        state = self._calm, self._doubt
+        self._calm, self._doubt = not self._moving(call.name), False
         self._depth += 1
         try:
             end = self.run(block.body)
@@ -615,7 +620,10 @@ class Script(Walk):
                     self.names[name] = before
                 else:
                     self.names.pop(name, None)
+            if self._doubt:
+                self._returned = None
             self._locals = outer
+            self._calm, self._doubt = state
             self._depth -= 1
         if end == "never":
             raise NotKnown("a loop in it never ends")
@@ -667,6 +675,24 @@ def _waypoint(at: str, call: Call, tool: ToolPose | None) -> Waypoint:
         blend=radius,
         tool=tool,
     )
+
+
+def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str]]:
+    """Statements with the number of their first line; one whose brackets are open goes on."""
+    held, begin, depth = "", 0, 0
+    for k, raw in enumerate(lines, start=1):
+        text = _bare(raw)
+        if not text:
+            continue
+        begin = begin if held else k
+        held = f"{held} {text}" if held else text
+        plain = _TEXT.sub("", text)
+        depth += sum(plain.count(c) for c in "([") - sum(plain.count(c) for c in ")]")
+        if depth <= 0 or k - begin > 200:
+            yield begin, held
+            held, depth = "", 0
+    if held:
+        yield begin, held
 
 
 def _bare(line: str) -> str:

@@ -49,7 +49,7 @@ class ToolPose:
 
     @property
     def matrix(self) -> Array:
-        """As a transform, (4, 4)."""
+        """The transform that it is, (4, 4)."""
         return transform(rotation_from_wxyz(self.wxyz), self.position)
 
 

@@ -58,7 +58,7 @@ def test_which_kinds_bound_from_below():
 
 
 def test_units_of_all_kinds():
-    units = dict.fromkeys(BELOW | {"waypoints"}, "m") | {
+    units = dict.fromkeys(BELOW & {*kinds("safety")} | {"waypoints"}, "m") | {
         "effective_mass": "kg",
         "force_polytope": "N",
         "kinetic_energy": "J",

@@ -274,7 +274,10 @@ class Mounted(Thing, frozen=True, kw_only=True):
 class Tool(Mounted, frozen=True, kw_only=True):
     """Something mounted on a robot, real or virtual: it changes the twin's masses and torques."""
 
-    model: Annotated[str, Meta(pattern=r"^library:[a-z0-9_]+$")] | None = None
+    model: (
+        Annotated[str, Meta(pattern=r"^library:[a-z0-9_]+$", description="library: and the name of a tool")]
+        | None
+    ) = None
     """A tool of the library, as ``library:robotiq_2f_85``, instead of a mesh or a shape: its envelope, mass
     and working point, unless they are given here."""
     tcp: Pose | None = None

@@ -10,10 +10,12 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.core.quantities import Pose
 from seerob.core.samples import JointSample
+from seerob.core.verdict import Verdict
 from seerob.description.robots import library
 from seerob.devices.sources.waypoints import Waypoints
 from seerob.files.waypoints.reading import read_program
 from seerob.session.reading import convert_workstation
+from seerob.session.station import load
 from seerob.workstation.source import Target
 
 A = (0.0, -70.0, 80.0, -100.0, -90.0, 0.0)
@@ -258,3 +260,34 @@ def test_a_position_beyond_a_limit_is_refused(tmp_path):
     (tmp_path / "w.script").write_text("movej([0,0,0,0,0,0])\nmovej([7,0,0,0,0,0])", encoding="utf-8")
     with pytest.raises(InputError, match="above its limit"):
         opened(tmp_path, file="w.script")
+
+
+CELL = """
+engine.physics = false
+[[robots]]
+name = "arm"
+model = "library:ur10e"
+[[sources]]
+kind = "waypoints"
+robot = "arm"
+file = "a.script"
+joint_jerk = 20.0
+values = { "get_standard_digital_in(2)" = false }
+[[safety]]
+kind = "kinetic_energy"
+name = "E"
+robot = "arm"
+limit = 240
+"""
+BRANCH = "movej([0,-1.2,1.2,-1.5,-1.5,0])\nif (get_standard_digital_in({})):\n  movej([1,0,0,0,0,0])\nend\n"
+
+
+@pytest.mark.parametrize(("pin", "verdict"), [(1, Verdict.UNDECIDED), (2, Verdict.WITHIN)])
+def test_of_a_robot_whose_motion_is_left_out_nothing_is_within(tmp_path, pin, verdict):
+    (tmp_path / "w.toml").write_text(CELL, encoding="utf-8")
+    text = BRANCH.format(pin) + "movej([0.3,-1.2,1.2,-1.5,-1.5,0])\n"
+    (tmp_path / "a.script").write_text(text, encoding="utf-8")
+    summary = load(tmp_path / "w.toml").run(end=0.02)
+    assert summary.results["E"].verdict is verdict
+    held = [f for f in summary.scene.findings if "arm" in f.holds]
+    assert len(held) == (verdict is Verdict.UNDECIDED)

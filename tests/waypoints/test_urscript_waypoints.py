@@ -152,7 +152,7 @@ def test_a_program_as_polyscope_exports_it_is_one_round_of_its_moves():
             "log(movel(q))",
             "line 3: `log(movel(q))` is left out: moves the robot in a way that is not modelled",
         ),
-        ("if (x):|movej(q)|end", "line 3: `if` is left out: whether x holds only a controller knows"),
+        ("if (x):|movej(q)|end", "line 3: `if` is left out: whether (x) holds only a controller knows"),
         ("for_each(movec(q))", "line 3: `for_each"),
         ("def away():|movej(q)|servoj(q)|end|away()", "line 5: `servoj(q)` is left out"),
         ("thread t():|movej(q)|end", "line 3: `thread`"),

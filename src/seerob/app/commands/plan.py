@@ -285,6 +285,9 @@ class _Given:
         self._path = path
         source = Waypoints(robot=robot, file=str(path))
         self._program = source.program(path)
+        if self._program.left_out:
+            remedy = "give what it needs, or the goals in a table"
+            raise InputError.at(path, "", f"its motion is not known: {self._program.left_out[0]}", remedy)
         target = Target(name=robot, description=self._mechanism.description)
         self._arm, said = source.arm(self._program, target)
         for text in said:
@@ -296,6 +299,7 @@ class _Given:
         import numpy as np
 
         from seerob.core.transforms import rotation_from_wxyz
+        from seerob.files.waypoints.continuous import carrying
         from seerob.files.waypoints.inverse import solutions, why_not
 
         near = self._mechanism.home if start is None else np.array(start)
@@ -308,9 +312,10 @@ class _Given:
                 goals.append(waypoint.q or ())
                 continue
             pose = rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position)
-            ways = solutions(self._arm, *pose, near)
+            arm = carrying(self._arm, waypoint)
+            ways = solutions(arm, *pose, near)
             if not ways:
-                what = why_not(self._arm, *pose, near)
+                what = why_not(arm, *pose, near)
                 remedy = "is the base or the tool point another one?"
                 raise InputError.at(self._path, waypoint.shown, what, remedy)
             self._ways[k] = len(ways)

@@ -444,7 +444,7 @@ class Script(Walk):
         try:
             return truth(self.evaluate(condition))
         except NotKnown as error:
-            raise NotKnown(f"whether {condition.strip('()')[:60]} holds only a controller knows") from error
+            raise NotKnown(f"whether {condition[:60]} holds only a controller knows") from error
 
     def matters(self, statement: str) -> bool:
         """Whether a statement moves or leaves, see `Walk`."""

@@ -265,6 +265,16 @@ def test_of_many_a_limit_is_kept_by_what_keeps_it_of_one(at_most):
             assert keep_many(values, limits).tolist() == expected
 
 
+@pytest.mark.parametrize("at_most", [True, False])
+@pytest.mark.parametrize("limit", [-2e3, -0.5, 0.5, 2e3])
+def test_many_within_by_less_than_rounding_contradict_themselves(limit, at_most):
+    for share, wrong in ((0.5, True), (2.0, False)):
+        off = share * ROUNDING * max(1.0, abs(limit))
+        value = np.array([limit - off if at_most else limit + off])
+        found = Answers(value, np.array([limit]), np.array([0], np.uint8), None, None)
+        assert (found.contradictions(at_most=at_most) is not None) is wrong
+
+
 class Any(Criterion, frozen=True, kw_only=True):
     """Says whatever it is told to say."""
 

@@ -5,6 +5,7 @@ Uses anywidget (extra ``notebook``), which Jupyter, VS Code and marimo show.
 
 from __future__ import annotations
 
+import gzip
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,12 +89,12 @@ def _kind() -> Any:
     import anywidget
     import traitlets
 
-    script = _PAGE / "notebook.js"
+    script = _PAGE / "notebook.js.gz"
     if not script.is_file():
         raise InputError.at(script, "", "is not built", "run make web; a released package contains it")
 
     class RunView(anywidget.AnyWidget):
-        _esm = script.read_text(encoding="utf-8")
+        _esm = gzip.decompress(script.read_bytes()).decode()
         scene = traitlets.Bytes().tag(sync=True)
         meshes = traitlets.Dict().tag(sync=True)
         frames: Any = traitlets.List().tag(sync=True)

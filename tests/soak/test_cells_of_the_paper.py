@@ -183,7 +183,7 @@ PIECES = {
     "two_places": {("gripper", "on_the_belt"): (5.7, 0.3)},
     "giant_niryo": {
         ("gripper", "on_the_belt"): (5.6, 0.5),
-        ("operator/right_hand", "in_the_box"): (4.4, 0.5),
+        ("operator/right_hand", "in_the_box"): (4.9, 0.5),
     },
 }
 """How long after it was taken a casting is placed, by who took it and where to: [s] and tolerance."""

@@ -255,6 +255,13 @@ def test_fanuc():
     assert foreign.startswith("line 14: `AUFRUF MAKRO1` is left out")
     assert offset.startswith("line 8: `J PR[4]")
     assert jump.startswith("line 9: `IF DI[1]=ON,JMP LBL[2]` is left out")
+    for turns, moves in (("10", "10"), False), (("10", "90"), True):
+        two = LS.replace("J6=     0.000 deg\n", f"J6=     0.000 deg\n   GP2:\n\tJ1= {turns[0]}.000 deg\n")
+        two = two.replace("R =     -.500 deg\n", f"R =     -.500 deg\n   GP2:\n\tJ1= {turns[1]}.000 deg\n")
+        two = two.replace("R =     0.000 deg\n", f"R =     0.000 deg\n   GP2:\n\tJ1= {turns[1]}.000 deg\n")
+        found = read_fanuc(two.encode(), "pick.ls", values)
+        assert found.waypoints == program.waypoints
+        assert any("another group" in part for part in found.left_out) is moves
 
 
 @pytest.mark.parametrize("read", [read_krl, read_rapid, read_fanuc])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Generic, TypeVar
+from collections.abc import Iterator, Mapping, MutableMapping
+from typing import Any, Generic, TypeVar
 
-from seerob.files.waypoints.flow import NotKnown
+from seerob.files.waypoints.flow import NotKnown, Walk
 
 TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<text>\"[^\"]*\"|'[^']*')"
@@ -210,6 +210,54 @@ def truth(value: object) -> bool:
     if not isinstance(value, bool):
         raise NotKnown("a truth value is expected")
     return value
+
+
+class Evaluating(Walk):
+    """A walk through a language that has expressions."""
+
+    @abstractmethod
+    def evaluate(self, text: str) -> object:
+        """The value of an expression.
+
+        Raises:
+            NotKnown: It is not known.
+        """
+
+    def true(self, condition: str) -> bool:
+        """Whether a condition holds, see `Walk`."""
+        try:
+            return truth(self.evaluate(condition))
+        except NotKnown as error:
+            raise NotKnown(f"whether {condition[:60]} holds only a controller knows") from error
+
+    def times(
+        self, match: re.Match[str] | None, names: MutableMapping[str, Any], *, falls: bool = False
+    ) -> Iterator[None]:
+        """Rounds of a loop that counts.
+
+        Args:
+            match: Its variable, first and last number, and step, if any; None where it says something else.
+            names: Values by name, where the variable is set before each round.
+            falls: Whether it counts down where it says no step and the last number is less.
+
+        Raises:
+            NotKnown: How often it is run is not known.
+        """
+        if match is None:
+            raise NotKnown("how often it is run is not known")
+        first, last = (number(self.evaluate(match[k])) for k in (2, 3))
+        step = number(self.evaluate(match[4])) if match[4] else (-1.0 if falls and last < first else 1.0)
+        if step == 0:
+            raise NotKnown("a step of 0")
+
+        def rounds() -> Iterator[None]:
+            x = first
+            while (x <= last) if step > 0 else (x >= last):
+                names[match[1].lower()] = x
+                yield None
+                x += step
+
+        return rounds()
 
 
 def finite(value: float) -> float:

@@ -64,7 +64,8 @@ class _Teach(Walk):
         self._points = {int(m[1]): m[2] for m in POINT.finditer(points)}
         self._tool = self._frame = 0
         self._override = 1.0
-        self._external: set[tuple[str, ...]] = set()
+        self._beside: set[tuple[str, ...]] = set()
+        """Where external axes and other groups are at points that are gone to."""
 
     def go(self) -> None:
         """From statement to statement, and over jumps that are made always."""
@@ -83,8 +84,9 @@ class _Teach(Walk):
                 k = labels[jump[1]]
             elif self.run([line]):
                 break
-        if len(self._external) > 1:
-            self.leave("/POS", "E1", "external axes move the robot or the workpiece")
+        if len(self._beside) > 1:
+            what = "external axes or another group move the robot, the workpiece or another robot"
+            self.leave("/POS", "E1, GP2", what)
         self.remarks.append(
             "poses are in the controller's world, whose origin is at the height of axis 2, on axis 1; CNT is "
             "taken as a share of half of the shorter move, as no radius is written"
@@ -202,10 +204,11 @@ class _Teach(Walk):
         held = self._points.get(int(number))
         if held is None:
             raise NotKnown(f"P[{number}] is not in /POS")
-        held = held.split("GP2", 1)[0]
+        held, _, others = held.partition("GP2")
         written = {m[1]: m[2] for m in FIGURE.finditer(held.partition("CONFIG")[0] + _behind(held))}
         frame, tool = (_chosen(held, key, now) for key, now in (("UF", self._frame), ("UT", self._tool)))
-        self._external.add(tuple(v for k, v in sorted(written.items()) if k[0] == "E"))
+        beside = [v for k, v in sorted(written.items()) if k[0] == "E"]
+        self._beside.add((*beside, *(m[2] for m in FIGURE.finditer(others))))
         if any("*" in v for v in written.values()):
             raise NotKnown(f"P[{number}] was never taught")
         numbers = {k: float(v) for k, v in written.items()}

@@ -19,7 +19,7 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.transforms import Array, rotation_from_rpy, transform
-from seerob.files.waypoints.expressions import Expression, given, number, tokens, truth
+from seerob.files.waypoints.expressions import Evaluating, Expression, given, number, tokens
 from seerob.files.waypoints.flow import (
     MAX_CALLS,
     Asked,
@@ -27,7 +27,6 @@ from seerob.files.waypoints.flow import (
     Item,
     Line,
     NotKnown,
-    Walk,
     lines_of,
     still,
     waited,
@@ -165,7 +164,7 @@ class _Reader(Expression[Value]):
         return value
 
 
-class _Krl(Walk):
+class _Krl(Evaluating):
     def __init__(self, file: str, values: Mapping[str, float | bool | str]) -> None:
         super().__init__(file, values)
         self._texts: dict[str, str] = {}
@@ -211,29 +210,23 @@ class _Krl(Walk):
         if known is None and plain not in self._names and plain in self._texts:
             text = self._texts.pop(plain)
             try:
-                known = self._names[plain] = self._evaluated(text)
+                known = self._names[plain] = self.evaluate(text)
             except NotKnown:
                 self._names[plain] = None
         if known is not None:
             return known
         said = given(self.values, name)
         if isinstance(said, str):
-            return self._evaluated(said)
+            return self.evaluate(said)
         if said is not None:
             return said if isinstance(said, bool) else float(said)
         raise Asked(name)
 
-    def _evaluated(self, text: str) -> Value:
+    def evaluate(self, text: str) -> Value:
+        """The value of an expression, see `Evaluating`."""
         return _Reader(tokens(text), self).whole()
 
     # -- the walk -----------------------------------------------------------------------------------
-
-    def true(self, condition: str) -> bool:
-        """Whether a condition holds, see `Walk`."""
-        try:
-            return truth(self._evaluated(condition))
-        except NotKnown as error:
-            raise NotKnown(f"whether {condition[:60]} holds only a controller knows") from error
 
     def matters(self, statement: str) -> bool:
         """Whether a statement moves or leaves, see `Walk`."""
@@ -259,20 +252,7 @@ class _Krl(Walk):
         match = re.fullmatch(
             r"(\w+)\s*=\s*(.+?)\s+TO\s+(.+?)(?:\s+STEP\s+(.+))?", block.arms[0][0], re.IGNORECASE
         )
-        if match is None:
-            raise NotKnown("how often it is run is not known")
-        first, last = (number(self._evaluated(match[k])) for k in (2, 3))
-        step = number(self._evaluated(match[4])) if match[4] else 1.0
-        if step == 0:
-            raise NotKnown("a step of 0")
-        return self._rounds(match[1].lower(), first, last, step)
-
-    def _rounds(self, name: str, first: float, last: float, step: float) -> Iterator[None]:
-        x = first
-        while (x <= last) if step > 0 else (x >= last):
-            self._names[name] = x
-            yield None
-            x += step
+        return self.times(match, self._names)
 
     def do(self, line: Line) -> str:
         """Run one statement, see `Walk`."""
@@ -286,7 +266,7 @@ class _Krl(Walk):
         elif match := re.match(r"BAS\s*\(\s*#(\w+)\s*(?:,\s*(.+?))?\s*\)$", text, re.IGNORECASE):
             self._bas(match[1].lower(), match[2])
         elif match := re.match(r"WAIT\s+SEC\s+(.+)", text, re.IGNORECASE):
-            waited(self.waypoints, number(self._evaluated(match[1])))
+            waited(self.waypoints, number(self.evaluate(match[1])))
         elif match := re.fullmatch(r"(\w+)\s*\((.*)\)", text):
             if still(self.values, match[1]):
                 self.quiet(match[1])
@@ -312,12 +292,12 @@ class _Krl(Walk):
         index = match[2] or ""
         if index and not re.fullmatch(r"\[\s*\d+\s*\]", index):
             try:
-                index = f"[{number(self._evaluated(index[1:-1])):g}]"
+                index = f"[{number(self.evaluate(index[1:-1])):g}]"
             except NotKnown:
                 return
         name = "".join((match[1] + index).split()).lower()
         try:
-            value: Value | None = self._evaluated(match[4])
+            value: Value | None = self.evaluate(match[4])
         except NotKnown:
             value = None
         if name in ("$tool", "$base") and not match[3]:
@@ -346,21 +326,21 @@ class _Krl(Walk):
 
     def _bas(self, what: str, argument: str | None) -> None:
         if what in ("tool", "base"):
-            value = number(self._evaluated(argument or ""))
+            value = number(self.evaluate(argument or ""))
             if what == "tool":
                 self._tool = f"TOOL_DATA[{value:g}]" if value else NULL
             else:
                 self._base = f"BASE_DATA[{value:g}]" if value else NULL
         elif what in ("vel_ptp", "ptp_params"):
-            self._names["vel ptp"] = self._evaluated(argument or "")
+            self._names["vel ptp"] = self.evaluate(argument or "")
             self._taken(what, "pdat_act", "acc ptp")
         elif what in ("vel_cp", "cp_params"):
-            self._names["$vel.cp"] = self._evaluated(argument or "")
+            self._names["$vel.cp"] = self.evaluate(argument or "")
             self._taken(what, "ldat_act", "acc cp")
         elif what == "acc_ptp":
-            self._names["acc ptp"] = self._evaluated(argument or "")
+            self._names["acc ptp"] = self.evaluate(argument or "")
         elif what == "acc_cp":
-            self._names["$acc.cp"] = self._evaluated(argument or "")
+            self._names["$acc.cp"] = self.evaluate(argument or "")
         elif what in ("frames", "ptp_dat", "cp_dat"):
             self._frames()
 
@@ -447,7 +427,7 @@ class _Krl(Walk):
         for key, name in (("SVEL_JOINT", "vel ptp"), ("SVEL_CP", "$vel.cp")):
             match = re.search(rf"{key}\s*\(\s*([-+.\w]+)", text, re.IGNORECASE)
             if match is not None:
-                self._names[name] = self._evaluated(match[1])
+                self._names[name] = self.evaluate(match[1])
         for key, name, apo in (("SACC_JOINT", "acc ptp", "pdat_act"), ("SACC_CP", "acc cp", "ldat_act")):
             match = re.search(rf"{key}\s*\(\s*(\w+)", text, re.IGNORECASE)
             held = None if match is None else self._held(match[1])
@@ -506,7 +486,7 @@ class _Krl(Walk):
         return held
 
     def _goal(self, text: str) -> tuple[tuple[float, ...] | None, ToolPose | None, Configuration | None]:
-        value = self._evaluated(text)
+        value = self.evaluate(text)
         if not isinstance(value, dict):
             raise NotKnown(f"{text} is no position")
         axes = [k for k in AXES if k in value]

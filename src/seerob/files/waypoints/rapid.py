@@ -17,7 +17,7 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
-from seerob.files.waypoints.expressions import Expression, given, number, tokens, truth
+from seerob.files.waypoints.expressions import Evaluating, Expression, given, number, tokens, truth
 from seerob.files.waypoints.flow import (
     MAX_CALLS,
     Asked,
@@ -25,7 +25,6 @@ from seerob.files.waypoints.flow import (
     Item,
     Line,
     NotKnown,
-    Walk,
     lines_of,
     still,
     waited,
@@ -174,7 +173,7 @@ class _Reader(Expression[Value]):
         return value
 
 
-class _Module(Walk):
+class _Module(Evaluating):
     def __init__(self, file: str, values: Mapping[str, float | bool | str]) -> None:
         super().__init__(file, values)
         self._names: dict[str, Value | None] = {}
@@ -213,11 +212,12 @@ class _Module(Walk):
         if match is None:
             return
         try:
-            self._names[match[1].lower()] = None if match[3] is None else self._evaluated(match[3])
+            self._names[match[1].lower()] = None if match[3] is None else self.evaluate(match[3])
         except NotKnown:
             self._names[match[1].lower()] = None
 
-    def _evaluated(self, text: str) -> Value:
+    def evaluate(self, text: str) -> Value:
+        """The value of an expression, see `Evaluating`."""
         return _Reader(tokens(text), self).whole()
 
     def value(self, name: str) -> Value:
@@ -253,13 +253,6 @@ class _Module(Walk):
 
     # -- the walk -----------------------------------------------------------------------------------
 
-    def true(self, condition: str) -> bool:
-        """Whether a condition holds, see `Walk`."""
-        try:
-            return truth(self._evaluated(condition))
-        except NotKnown as error:
-            raise NotKnown(f"whether {condition[:60]} holds only a controller knows") from error
-
     def matters(self, statement: str) -> bool:
         """Whether a statement moves or leaves, see `Walk`."""
         word = re.split(r"\W", statement, maxsplit=1)[0].lower()
@@ -281,20 +274,7 @@ class _Module(Walk):
         match = re.fullmatch(
             r"(\w+)\s+FROM\s+(.+?)\s+TO\s+(.+?)(?:\s+STEP\s+(.+))?", block.arms[0][0], re.IGNORECASE
         )
-        if match is None:
-            raise NotKnown("how often it is run is not known")
-        first, last = (number(self._evaluated(match[k])) for k in (2, 3))
-        step = number(self._evaluated(match[4])) if match[4] else (1.0 if last >= first else -1.0)
-        if step == 0:
-            raise NotKnown("a step of 0")
-        return self._rounds(match[1].lower(), first, last, step)
-
-    def _rounds(self, name: str, first: float, last: float, step: float) -> Iterator[None]:
-        x = first
-        while (x <= last) if step > 0 else (x >= last):
-            self._names[name] = x
-            yield None
-            x += step
+        return self.times(match, self._names, falls=True)
 
     def do(self, line: Line) -> str:
         """Run one instruction, see `Walk`."""
@@ -307,14 +287,12 @@ class _Module(Walk):
         elif word in ("return", "exit"):
             return "return" if word == "return" else "never"
         elif word == "waittime":
-            waited(
-                self.waypoints, number(self._evaluated(text[8:].rpartition("\\")[2].removeprefix("InPos,")))
-            )
+            waited(self.waypoints, number(self.evaluate(text[8:].rpartition("\\")[2].removeprefix("InPos,"))))
         elif word == "confj":
             self._meant = "off" not in text.lower()
         elif word == "accset":
             first = text[6:].split(",")[0]
-            self._acceleration = min(max(number(self._evaluated(first)), 20.0), 100.0) / 100
+            self._acceleration = min(max(number(self.evaluate(first)), 20.0), 100.0) / 100
         elif word in self._procedures and ":=" not in text.partition("(")[0]:
             return self._called(word, text[len(word) :].strip())
         elif word in ("velset", "goto", "exitcycle", "raise") or (
@@ -341,7 +319,7 @@ class _Module(Walk):
         if len(given_) != len(names) or switches or "\\" in names:
             raise NotKnown("its arguments are not followed")
         held = {n: self._names.get(n) for n in names}
-        self._names |= {n: self._evaluated(value) for n, value in zip(names, given_, strict=True)}
+        self._names |= {n: self.evaluate(value) for n, value in zip(names, given_, strict=True)}
         self._depth += 1
         end = self.run(block.body)
         self._depth -= 1
@@ -351,7 +329,7 @@ class _Module(Walk):
     def _assign(self, match: re.Match[str]) -> None:
         name, behind, text = match[1].lower(), match[2], match[3]
         try:
-            new = self._evaluated(text)
+            new = self.evaluate(text)
             if behind:
                 path = [
                     MEMBERS[p.lower()] if p[0].isalpha() else int(p) - 1 for p in re.findall(r"\w+", behind)
@@ -372,13 +350,13 @@ class _Module(Walk):
         if len(rest) < 2 or "conc" in switches:
             raise NotKnown("its arguments are not known")
         speed, zone = (
-            self._evaluated(rest[0]),
-            self._evaluated(rest[1]) if rest[1].lower() != "fine" else (True, 0.0),
+            self.evaluate(rest[0]),
+            self.evaluate(rest[1]) if rest[1].lower() != "fine" else (True, 0.0),
         )
         tool = self._tool(rest[2] if len(rest) > 2 else "tool0")
         work = self._work(switches.get("wobj", "wobj0"))
-        goal = self._evaluated(points[-1])
-        via = self._evaluated(points[0]) if kind is Move.CIRCULAR else None
+        goal = self.evaluate(points[-1])
+        via = self.evaluate(points[0]) if kind is Move.CIRCULAR else None
         q, pose, meant = None, None, None
         if word == "moveabsj":
             q = tuple(math.radians(v) for v in self._axes(goal))
@@ -386,7 +364,7 @@ class _Module(Walk):
             pose = self._target(goal, work)
             meant = _configuration(goal)
         v_tcp, v_ori = self._speed(rest[0], speed, switches)
-        duration = number(self._evaluated(switches["t"])) if "t" in switches else None
+        duration = number(self.evaluate(switches["t"])) if "t" in switches else None
         of_tool = kind.of_tool
         most = v_tcp is None
         return Waypoint(
@@ -415,14 +393,14 @@ class _Module(Walk):
             raise NotKnown(f"{name} is no speeddata")
         v_tcp, v_ori = number(speed[0]), number(speed[1])
         if "v" in switches:
-            v_tcp = number(self._evaluated(switches["v"]))
+            v_tcp = number(self.evaluate(switches["v"]))
         if not (v_tcp > 0 and v_ori > 0):
             raise NotKnown(f"{name} is not above 0")
         return v_tcp * 1e-3, math.radians(v_ori)
 
     def _zone(self, zone: Value, switches: Mapping[str, str]) -> float:
         if "z" in switches:
-            return number(self._evaluated(switches["z"])) * 1e-3
+            return number(self.evaluate(switches["z"])) * 1e-3
         if not isinstance(zone, tuple) or len(zone) < 2:
             raise NotKnown("no zonedata")
         return 0.0 if truth(zone[0]) else min(max(number(zone[1]), 0.0), 1e4) * 1e-3
@@ -446,7 +424,7 @@ class _Module(Walk):
         return ToolPose.of(work @ _frame(goal[:2]))
 
     def _tool(self, name: str) -> ToolPose:
-        value = self._evaluated(name)
+        value = self.evaluate(name)
         if not isinstance(value, tuple) or len(value) < 2:
             raise NotKnown(f"{name} is no tooldata")
         if not truth(value[0]):
@@ -454,7 +432,7 @@ class _Module(Walk):
         return ToolPose.of(_frame(value[1]))
 
     def _work(self, name: str) -> Array:
-        value = self._evaluated(name)
+        value = self.evaluate(name)
         if not isinstance(value, tuple) or len(value) != 5:
             raise NotKnown(f"{name} is no wobjdata")
         if truth(value[0]) or not truth(value[1]):

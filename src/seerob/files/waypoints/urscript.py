@@ -25,7 +25,7 @@ from seerob.core.transforms import (
     wxyz_from,
     wxyz_from_rotation,
 )
-from seerob.files.waypoints.expressions import Expression, finite, given, number, tokens, truth
+from seerob.files.waypoints.expressions import Evaluating, Expression, finite, given, number, tokens
 from seerob.files.waypoints.flow import (
     MAX_CALLS,
     MAX_NESTED,
@@ -34,7 +34,6 @@ from seerob.files.waypoints.flow import (
     Item,
     Line,
     NotKnown,
-    Walk,
     lines_of,
     waited,
 )
@@ -325,7 +324,7 @@ def read_urscript(
     return script.program(nothing="no move with constants")
 
 
-class Script(Walk):
+class Script(Evaluating):
     """A program of URScript."""
 
     def __init__(self, file: str, values: Mapping[str, float | bool | str]) -> None:
@@ -438,13 +437,6 @@ class Script(Walk):
         return Reader(tokens(text), self.names, self).whole()
 
     # -- the walk -----------------------------------------------------------------------------------
-
-    def true(self, condition: str) -> bool:
-        """Whether a condition holds, see `Walk`."""
-        try:
-            return truth(self.evaluate(condition))
-        except NotKnown as error:
-            raise NotKnown(f"whether {condition[:60]} holds only a controller knows") from error
 
     def matters(self, statement: str) -> bool:
         """Whether a statement moves or leaves, see `Walk`."""

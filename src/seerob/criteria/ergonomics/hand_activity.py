@@ -8,7 +8,7 @@ activity: :math:`0.56 (10 - HAL)` for the TLV, :math:`3.6 - 0.56 HAL` for the ac
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple, cast
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from msgspec import Meta
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from seerob.core.domains import number
 from seerob.core.snapshot import Basis, Input, Level, Origin, Result
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
+from seerob.criteria.figure import Figure, Shown, verdict_of
+from seerob.criteria.scoring.entered import EnteredMethod
 from seerob.criteria.scoring.exertions import HandWork, exertion_inputs, hand_work, hours_input
 from seerob.description.humans.skeleton import SIDES
 from seerob.model.model import Model
@@ -72,15 +72,9 @@ class Hand(NamedTuple):
     """Its force over that of the line: computed, least and greatest."""
 
 
-class HandActivity(Criterion, frozen=True, kw_only=True):
+class HandActivity(EnteredMethod, frozen=True, kw_only=True):
     """Force of the worse hand over what the ACGIH TLV or action limit for hand activity admits (2018)."""
 
-    instants: ClassVar[str] = "accepted: exertions are entered, and do not change during a run"
-    adults: ClassVar[bool] = True
-    whole: ClassVar[bool] = False  # exertions are entered, whoever is seen
-
-    human: str
-    """Whose hands."""
     line: Literal["tlv", "action_limit"]
     """Which line: the TLV, or the action limit below it."""
     daily: Annotated[float, Meta(gt=0, le=86400, extra={"unit": "s"})] | None = None
@@ -95,36 +89,14 @@ class HandActivity(Criterion, frozen=True, kw_only=True):
         """Up to the line, and beyond it."""
         return (Level(up_to=1, name=f"up to the {self.line.replace('_', ' ')}"),)
 
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
-
-    def depends(self, model: Model) -> tuple[str, ...]:
-        """Nobody: exertions are entered."""
-        return ()
-
-    def compute(self, model: Model) -> Compute:
-        """Look up every name in the model once and return the function that tells the share.
+    def figure(self, model: Model) -> Figure:
+        """The share of what is entered.
 
         Raises:
             InputError: Exertions last longer than their phase.
         """
-        model.human(self.human)
         _, work = hand_work(model, self.human, self.name)
-        figure = self._figure(work)
-
-        def compute(twin: Twin) -> Figure:
-            return figure
-
-        return compute
-
-    def one_by_one(self, model: Model) -> str:
-        """Nothing: what is entered is the same at every instant."""
-        return ""
-
-    def present(self, model: Model) -> Present:
-        """Return the function that says how both hands stand."""
-        return lambda state, figure, verdict: cast("Shown", figure.beside)
+        return self._figure(work)
 
     def _figure(self, work: HandWork) -> Figure:
         absent = work.missing if self.daily is not None else (*work.missing, "daily, the time per day")

@@ -14,8 +14,8 @@ from msgspec import Meta, Struct, structs
 from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.snapshot import Basis, Input, Level, Origin, Result
-from seerob.criteria.criterion import Criterion
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
+from seerob.criteria.figure import Figure, Shown, verdict_of
+from seerob.criteria.scoring.entered import EnteredMethod
 from seerob.criteria.scoring.phases import Kilograms
 from seerob.criteria.scoring.spans import published
 from seerob.model.model import Model
@@ -164,17 +164,11 @@ def _known(value: float | None) -> float:
     return value
 
 
-class ManualHandling(Criterion, frozen=True, kw_only=True):
+class ManualHandling(EnteredMethod, frozen=True, kw_only=True):
     """Share of people who find a load acceptable: LM-MMH equations (2021), after Snook and Ciriello."""
 
     unit: ClassVar[str] = "%"
     at_most: ClassVar[bool] = False
-    instants: ClassVar[str] = "accepted: loads are entered, and do not change during a run"
-    adults: ClassVar[bool] = True
-    whole: ClassVar[bool] = False  # loads are entered, whoever is seen
-
-    human: str
-    """Who handles the loads."""
     tasks: tuple[Handling, ...]
     """What is lifted, lowered, pushed, pulled and carried; the worst counts."""
     population: Literal["female", "male", "both"]
@@ -189,21 +183,12 @@ class ManualHandling(Criterion, frozen=True, kw_only=True):
         """Below the share that the authors name."""
         return (Level(up_to=75, name="up to 75 %"),)
 
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
-
-    def depends(self, model: Model) -> tuple[str, ...]:
-        """Nobody: loads are entered."""
-        return ()
-
-    def compute(self, model: Model) -> Compute:
-        """Look up every name in the model once and return the function that tells the share.
+    def figure(self, model: Model) -> Figure:
+        """The share of what is entered.
 
         Raises:
             InputError: The equations do not apply.
         """
-        model.human(self.human)
         tasks = self.entered(model)
         problems = [
             Problem(
@@ -218,12 +203,7 @@ class ManualHandling(Criterion, frozen=True, kw_only=True):
             problems.append(Problem(self.name, "tasks", "there is none", "describe at least one"))
         if problems:
             raise InputError(problems)
-        figure = self._figure(tasks)
-
-        def compute(twin: Twin) -> Figure:
-            return figure
-
-        return compute
+        return self._figure(tasks)
 
     def entered(self, model: Model) -> tuple[Handling, ...]:
         """The tasks with the loads of the phases that they name.
@@ -231,11 +211,7 @@ class ManualHandling(Criterion, frozen=True, kw_only=True):
         Raises:
             UnknownName: A task names a phase that does not exist.
         """
-        phases = {
-            phase.title: phase
-            for phase in reversed(model.workstation.phases)
-            if phase.title and phase.human in ("", self.human)
-        }
+        phases = self.titled_phases(model)
         for task in self.tasks:
             if task.phase and task.phase not in phases:
                 raise UnknownName("phase", task.phase, phases)
@@ -243,14 +219,6 @@ class ManualHandling(Criterion, frozen=True, kw_only=True):
             structs.replace(task, load=phases[task.phase].load) if task.phase and task.load is None else task
             for task in self.tasks
         )
-
-    def one_by_one(self, model: Model) -> str:
-        """Nothing: what is entered is the same at every instant."""
-        return ""
-
-    def present(self, model: Model) -> Present:
-        """Return the function that says what governs, and shows each task."""
-        return lambda state, figure, verdict: cast("Shown", figure.beside)
 
     def _figure(self, tasks: tuple[Handling, ...]) -> Figure:
         absent = [f"{what} of task {i + 1}" for i, task in enumerate(tasks) for what in task.missing()]

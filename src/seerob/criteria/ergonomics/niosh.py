@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, ClassVar, Literal, cast
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta, Struct, structs
@@ -22,8 +22,8 @@ from seerob.core.domains import number
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.snapshot import Basis, Input, Origin, Result
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
+from seerob.criteria.figure import Figure, Shown, verdict_of
+from seerob.criteria.scoring.entered import EnteredMethod
 from seerob.criteria.scoring.phases import Kilograms, Seconds
 from seerob.criteria.scoring.spans import published
 from seerob.model.model import Model
@@ -285,15 +285,9 @@ class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         )
 
 
-class Niosh(Criterion, frozen=True, kw_only=True):
+class Niosh(EnteredMethod, frozen=True, kw_only=True):
     """Lifting index of the revised NIOSH equation, composite when there are several lifts."""
 
-    instants: ClassVar[str] = "accepted: lifts are entered, and what is entered does not change during a run"
-    adults: ClassVar[bool] = True
-    whole: ClassVar[bool] = False  # lifts are entered, whoever is seen
-
-    human: str
-    """Who lifts."""
     lifts: tuple[Lift, ...]
     """The lifting tasks; several are alternated by the same person."""
     work: Annotated[float, Meta(gt=0, le=28800, extra={"unit": "s"})]
@@ -305,33 +299,15 @@ class Niosh(Criterion, frozen=True, kw_only=True):
     limit: Annotated[float, Meta(gt=0)] | None = None
     """Greatest admissible lifting index; the equation's authors aim at 1."""
 
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
-
-    def depends(self, model: Model) -> tuple[str, ...]:
-        """Nobody: lifts are entered."""
-        return ()
-
-    def compute(self, model: Model) -> Compute:
-        """Look up every name in the model once and return the function that tells the index.
+    def figure(self, model: Model) -> Figure:
+        """The index of what is entered.
 
         Raises:
             InputError: The equation does not apply.
         """
-        model.human(self.human)
         lifts = self.entered(model)
         self._refuse(lifts)
-        figure = self._index(lifts)
-
-        def compute(twin: Twin) -> Figure:
-            return figure
-
-        return compute
-
-    def present(self, model: Model) -> Present:
-        """Return the function that says what governs, and shows each lift."""
-        return lambda state, figure, verdict: cast("Shown", figure.beside)
+        return self._index(lifts)
 
     def entered(self, model: Model) -> tuple[Lift, ...]:
         """The lifts with what they take from the phases that every rule shares.
@@ -339,11 +315,7 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         Raises:
             UnknownName: A lift names a phase that does not exist.
         """
-        phases = {
-            phase.title: phase
-            for phase in reversed(model.workstation.phases)
-            if phase.title and phase.human in ("", self.human)
-        }
+        phases = self.titled_phases(model)
         found = []
         for lift in self.lifts:
             if not lift.phase:
@@ -376,10 +348,6 @@ class Niosh(Criterion, frozen=True, kw_only=True):
                 problems.append(Problem(self.name, f"lifts[{i}].heaviest", what, "give the greatest mass"))
         if problems:
             raise InputError(problems)
-
-    def one_by_one(self, model: Model) -> str:
-        """Nothing: what is entered is the same at every instant."""
-        return ""
 
     def _tasks(self, lifts: tuple[Lift, ...]) -> list[Task]:
         """The lifts as the equation takes them; none where something of them is not entered."""

@@ -6,15 +6,15 @@ a factor of the time per day. Answers that lie between two rows of the checklist
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, cast
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
 
 from seerob.core.domains import number
 from seerob.core.snapshot import Basis, Input, Level, Origin, Result
-from seerob.criteria.criterion import Criterion
-from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
+from seerob.criteria.figure import Figure, Shown, verdict_of
+from seerob.criteria.scoring.entered import EnteredMethod
 from seerob.criteria.scoring.spans import published
 from seerob.description.humans.skeleton import SIDES
 from seerob.model.model import Model
@@ -96,15 +96,9 @@ def time_factor(daily: float) -> float:
     return reached(minutes, published("ocra_checklist")["minutes"])
 
 
-class OcraChecklist(Criterion, frozen=True, kw_only=True):
+class OcraChecklist(EnteredMethod, frozen=True, kw_only=True):
     """Score of the OCRA checklist (2006) of the worse arm; what it asks is entered."""
 
-    instants: ClassVar[str] = "accepted: answers are entered, and do not change during a run"
-    adults: ClassVar[bool] = True
-    whole: ClassVar[bool] = False  # answers are entered, whoever is seen
-
-    human: str
-    """Whose arms."""
     right: OcraArm = OcraArm()
     """What the right arm does."""
     left: OcraArm = OcraArm()
@@ -126,31 +120,9 @@ class OcraChecklist(Criterion, frozen=True, kw_only=True):
         table = published("ocra_checklist")
         return tuple(Level(up_to=top, name=name) for top, name in table["bands"])
 
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
-
-    def depends(self, model: Model) -> tuple[str, ...]:
-        """Nobody: answers are entered."""
-        return ()
-
-    def compute(self, model: Model) -> Compute:
-        """Look up every name in the model once and return the function that tells the score."""
-        model.human(self.human)
-        figure = self._figure()
-
-        def compute(twin: Twin) -> Figure:
-            return figure
-
-        return compute
-
-    def one_by_one(self, model: Model) -> str:
-        """Nothing: what is entered is the same at every instant."""
-        return ""
-
-    def present(self, model: Model) -> Present:
-        """Return the function that says what the score is made of, for both arms."""
-        return lambda state, figure, verdict: cast("Shown", figure.beside)
+    def figure(self, model: Model) -> Figure:
+        """The score of what is entered."""
+        return self._figure()
 
     def _missing(self) -> list[str]:
         own = [name for name in ("daily", "recovery", "physical", "pace") if getattr(self, name) is None]

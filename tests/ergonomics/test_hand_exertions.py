@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from made_cell import made, person, results_at
 from seerob.core.errors import InputError
@@ -186,7 +187,10 @@ def test_exertions_against_their_limits(tmp_path):
     assert [part.value for part in strain.parts] == [strain.value, 0.0]
     hal = float(hand_activity.activity(0.4, 0.2))
     assert hands.value == pytest.approx(3 / (5.6 - 0.56 * hal))
-    assert hands.interval[0] < hands.value < hands.interval[1]
+    off = norm.ppf(0.975) * math.sqrt(1.28)  # what 95 % of the equation's errors stay within
+    force = hands.value * (5.6 - 0.56 * hal)
+    bounds = [force / (5.6 - 0.56 * min(max(hal + side * off, 0), 10)) for side in (-1, 1)]
+    assert hands.interval == pytest.approx(bounds, rel=1e-4)
     assert hands.verdict == "within"
 
 

@@ -26,8 +26,9 @@ from seerob.model.provenance import given
 
 LONGEST = 8 * 3600.0
 """For longer days the TLV says nothing [s]."""
-SPREAD = math.sqrt(1.28)
-"""How far the equation is off, root mean square on observations of others (Akkas et al. 2015)."""
+SPREAD = 1.96 * math.sqrt(1.28)
+"""How far the equation is off in 95 % of cases: 1.96 times the root mean square error on observations of
+others (Akkas et al. 2015), as of errors that are normal."""
 LIGHT = 1.0
 """Exertions of less than a tenth of the strength are not counted."""
 ZERO = {"tlv": 5.6, "action_limit": 3.6}
@@ -164,7 +165,7 @@ class HandActivity(EnteredMethod, frozen=True, kw_only=True):
                 name="spread of the computed activity",
                 value=SPREAD,
                 origin=Origin.STATED,
-                source="Akkas et al. 2015: mean square error 1.28 on observations of others",
+                source="95 % of mean square error 1.28 on observations of others, Akkas et al. 2015",
             )
             if self.activity is None
             else given("activity", self.activity, "")

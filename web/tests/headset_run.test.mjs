@@ -92,14 +92,15 @@ function turn([x, y, z, w], v) {
 const inBody = ({ position, quaternion: [x, y, z, w] }, p) => turn([-x, -y, -z, w], minus(p, position));
 const inWorld = ({ position, quaternion }, p) => plus(position, turn(quaternion, p));
 
-/** Where bones are once they stand still. */
+/** Where bones are once they have stood still for 0.3 s of the run. */
 async function stand(names) {
-  let before = null;
-  for (let k = 0; k < 200; k += 1) {
+  let since = null;
+  for (let k = 0; k < 1000; k += 1) {
     await pictures(page, 4);
-    const now = await Promise.all(names.map(at));
-    if (before && now.every((p, i) => length(minus(p.position, before[i].position)) < 2e-3)) return now;
-    before = now;
+    const [t, now] = [await page.evaluate(() => window.seerob.t), await Promise.all(names.map(at))];
+    const still = since?.poses.every((p, i) => length(minus(now[i].position, p.position)) < 5e-4);
+    if (!still) since = { t, poses: now };
+    else if (t - since.t >= 0.3) return now;
   }
   throw new Error("the person does not come to rest");
 }

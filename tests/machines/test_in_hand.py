@@ -41,14 +41,15 @@ OWAS = (
 )
 
 
-def said(folder, text, grab=True, seconds=0.6):
-    """What every criterion says while the right hand holds the rod."""
+def said(folder, text, grab=True, seconds=0.6, turns=0.0):
+    """What every criterion says while the right hand holds the rod, and the arm turns so fast [rad/s]."""
     model = made(folder, text, {"arm.urdf": two_r()}).model
     engine, judge = Engine(model, driven={"operator": 9.0, "arm": 9.0}), Judge(bind(model))
     homes = {name: tuple(model.mechanisms[name].home) for name in ("operator", "arm")}
     for k in range(round(seconds / 0.01)):
         t = 0.01 * k
-        engine.take([JointSample(source="p", seq=k, t=t, target=n, q=q) for n, q in homes.items()])
+        poses = homes | {"arm": (homes["arm"][0] + turns * t, *homes["arm"][1:])} if turns else homes
+        engine.take([JointSample(source="p", seq=k, t=t, target=n, q=q) for n, q in poses.items()])
         if grab and k == 20:
             engine.take([GrabSample(source="r", seq=0, t=t, target="operator/right_hand", piece="rod")])
         state = engine.tick() if k else engine.start()
@@ -178,3 +179,33 @@ def test_what_a_hand_holds_is_off_as_the_hand_is_and_lags_behind_it(tmp_path):
     moved[0] += 0.05
     engine.take([JointSample(source="p", seq=31, t=0.3, target="operator", q=tuple(moved))])
     assert engine.tick().lags["rod"] > still
+
+
+CONTACT = (
+    '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "arm"\nhuman = "operator"\n'
+    "horizon = {}\ncontact_area = {{ arm = 1e-4 }}\n"
+)
+MOUNTED = """
+[[tools]]
+name = "rod"
+on = "operator/right_hand"
+shape = { box = [1.2, 1.2, 1.2] }
+mass = 3.0
+at = { position = [0, 0, 0] }
+"""
+
+
+@pytest.mark.parametrize("rod", [ROD, MOUNTED], ids=["loose", "mounted"])
+def test_no_limit_is_known_of_who_is_hit_through_what_is_held(tmp_path, rod):
+    """The arm is far from every bone, and may hit the rod that is held."""
+    found, cell = {}, CELL.replace("[1.6, 0", "[2.3, 0")
+    for held, horizon, turns in ((rod, 1.7, 0.01), ("", 1.7, 0.01), (rod, 0.2, 0.01), (rod, 1.7, 0.0)):
+        loose = held == ROD
+        text = cell + held + CONTACT.format(horizon)
+        seconds = 0.6 if loose else 0.05
+        found[bool(held), horizon, turns] = said(tmp_path, text, loose, seconds, turns)["contact"]
+    hit = found.pop((True, 1.7, 0.01))
+    assert hit.verdict == "undecided"
+    assert "operator holds rod, which may be hit from 1.7 m on" in hit.reason
+    assert not any("may be hit" in each.reason for each in found.values())
+    assert found[False, 1.7, 0.01].verdict is None

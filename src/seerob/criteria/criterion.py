@@ -192,6 +192,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         compute = self.compute(model)
         return lambda states: answers_of(compute(states), len(states), at_most=self.at_most)
 
+    def hits(self, model: Model) -> tuple[tuple[int, ...], float, float] | None:
+        """Bodies whose contacts it limits, from how near people [m] and how fast [m/s] on; None of none."""
+        return None
+
     def remembers(self, model: Model) -> bool:
         """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
         return False

@@ -3,6 +3,8 @@
 A workpiece `on` a hand is one of the person's shapes. A loose one (`seerob.twin.machines.loose`) is a thing
 of its own: while a hand holds it, what is asked of the person alone says nothing of how far it reaches,
 unless the same is asked of it. And a method that is told a load is not told enough where hands hold more.
+Limits of contact are of body regions as heavy as they are: who is hit through what a hand holds, or by a
+hand that is heavier by it, is hit otherwise.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from seerob.criteria.question import Bound
 from seerob.criteria.scoring.handled import unweighed
 from seerob.criteria.scoring.phases import Phase, entered_for, phase_at
 from seerob.model.model import Model
+from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.state import State
 
 MORE = 1e-6
@@ -59,7 +62,18 @@ class InHand:
         loads = ((i, _entered_load(model, each)) for i, each in enumerate(criteria))
         self._loads = {i: load for i, load in loads if load is not None}
         """Place of each that is told a load → that load at an instant of the run [s]."""
-        self.never = not self._masses and not (any(self._always.values()) and self._loads)
+        self._hits = {i: hits for i, each in enumerate(criteria) if (hits := each.hits(model)) is not None}
+        """Place of each that limits contact → what may hit people, from how near [m] and fast [m/s] on."""
+        self._gaps: dict[tuple[int, str], Callable[[State], float]] = {}
+        self._mounted = {
+            model.bodies[i].owner: (name,)
+            for name, mechanism in model.mechanisms.items()
+            if mechanism.role == "human"
+            for i in mechanism.carried
+        }
+        """What is mounted on a bone → on whose."""
+        told = bool(self._mounted and self._hits) or bool(any(self._always.values()) and self._loads)
+        self.never = not self._masses and not told
         """Whether nobody can hold anything that counts."""
 
     def reasons(self, state: State, results: Sequence[Result]) -> dict[int, str]:
@@ -79,7 +93,34 @@ class InHand:
                     found[i] = f"{person} holds {what}, and load says {load:g} kg: give all that hands hold"
         if held:
             found |= self._nearer(state, results)
+        for i, (moving, horizon, standstill) in self._hits.items():
+            if not (state.fastest_speeds(moving) > standstill).any():
+                continue
+            for piece, holders in (*held.items(), *self._mounted.items()):
+                people = {holder.partition("/")[0] for holder in holders} & self._always.keys()
+                if people and not self._gap(i, piece)(state) > horizon:
+                    found[i] = (
+                        f"{', '.join(sorted(people))} holds {piece}, which may be hit from {horizon:g} m on: "
+                        "no limit is known of who is hit through what is held"
+                    )
         return found
+
+    def _gap(self, i: int, piece: str) -> Callable[[State], float]:
+        """How near what may hit people is to what is held at least, at an instant [m]."""
+        if (i, piece) not in self._gaps:
+            moving, model = self._hits[i][0], self._model
+            pieces = [body.index for body in model.bodies if body.owner == piece]
+            if not all(model.bodies[b].solids for b in (*moving, *pieces)):
+                self._gaps[i, piece] = lambda state: 0.0
+            else:
+                gap, off = model.gap(moving, pieces), TrackingError(model, pieces)
+
+                def nearest(state: State) -> float:
+                    found = gap.query.minimum(state.rotations, state.positions).distance
+                    return found - gap.deviation - float(off.at(state).max(initial=0.0))
+
+                self._gaps[i, piece] = nearest
+        return self._gaps[i, piece]
 
     def _nearer(self, state: State, results: Sequence[Result]) -> dict[int, str]:
         """Who judges a hand, and nobody what it holds, with less room than that reaches."""

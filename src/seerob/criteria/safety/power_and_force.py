@@ -137,6 +137,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         """Everybody who can be hit, or who carries a surface that clamps."""
         return tuple(model.mechanisms)
 
+    def hits(self, model: Model) -> tuple[tuple[int, ...], float, float]:
+        """What moves of the robot, from the horizon on."""
+        return model.mover(self.robot).moving, self.horizon, min(STANDSTILL, STILL)
+
     def bind(self, model: Model) -> Evaluate:
         """Return the function that judges one instant: of who is partly seen, what is seen first."""
         contacts = Contacts(self, model)

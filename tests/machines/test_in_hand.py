@@ -181,6 +181,42 @@ def test_what_a_hand_holds_is_off_as_the_hand_is_and_lags_behind_it(tmp_path):
     assert engine.tick().lags["rod"] > still
 
 
+@pytest.mark.parametrize("off", [0.02, None])
+def test_what_a_hand_let_go_is_as_far_off_as_it_was_until_one_takes_it(tmp_path, off):
+    """Also when the hand is well known later; and where nobody knew the hand, nobody knows what it let go."""
+    model = made(tmp_path, CELL + DISTANCE.format("rod", 0.5) + ROD, {"arm.urdf": two_r()}).model
+    engine, judge = Engine(model, driven={"operator": 9.0 if off else 0.2, "arm": 9.0}), Judge(bind(model))
+    rods = [body.index for body in model.bodies if body.owner == "rod"]
+    error, homes = (
+        TrackingError(model, rods),
+        {n: tuple(model.mechanisms[n].home) for n in ("operator", "arm")},
+    )
+    found = {}
+    for k in range(60):
+        heard = [JointSample(source="p", seq=k, t=0.01 * k, target="arm", q=homes["arm"])]
+        if off or k < 15:
+            heard.append(JointSample(source="p", seq=k, t=0.01 * k, target="operator", q=homes["operator"]))
+        grabs = {10: "rod", 40: "", 55: "rod" if off else ""}
+        if k in grabs:
+            hand = "operator/right_hand"
+            heard.append(GrabSample(source="r", seq=k, t=0.01 * k, target=hand, piece=grabs[k]))
+        engine.take(heard)
+        state = engine.tick() if k else engine.start()
+        # As a source that tells how far off it is would say.
+        if off:
+            state.hearing("operator").bones = {"right_hand": (off, 0.0)} if k < 45 else {}
+        found[k] = judge(state)[0], float(error.at(state).max()) if off else 0.0
+    if off is None:
+        assert found[59][0].verdict == "undecided"
+        assert "rod: let go by a hand that was not known (operator: not heard for" in found[59][0].reason
+        return
+    assert found[5][1] == 0.0
+    assert found[30][1] > off
+    assert found[54][1] >= off, "what was let go is off as the hand was then"
+    assert found[54][0].interval[0] <= found[54][0].value - off
+    assert found[59][1] < off, "who takes it anew has it in the hand"
+
+
 CONTACT = (
     '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "arm"\nhuman = "operator"\n'
     "horizon = {}\ncontact_area = {{ arm = 1e-4 }}\n"

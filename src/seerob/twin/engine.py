@@ -23,7 +23,7 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
-from seerob.core.errors import InputError, SimulationDiverged
+from seerob.core.errors import InputError, SimulationDiverged, Undecided
 from seerob.core.samples import (
     BodySample,
     GrabSample,
@@ -42,6 +42,7 @@ from seerob.kernels.bound import COLUMNS
 from seerob.model.model import Mechanism, Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.twin import controller_check
+from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
 from seerob.twin.control.reference import Reference
@@ -254,6 +255,10 @@ class Engine:
         for index in self._loose.bodies():
             self.state.attachments.unknown.pop(index, None)
         self._grips = Grips(self.state, self._mj, self._loose)
+        self._off = {
+            name: TrackingError(model, [b.index for b in model.bodies if b.owner == name])
+            for name in self._loose.names
+        }
         self._tick = 0
         self._now = 0.0
         """Instant of the last tick [s]."""
@@ -543,7 +548,9 @@ class Engine:
             hearing.forget(start)
         self.signals.forget(start)
         self._broken.clear()
-        self._broken.update(self._loose.begin(self._before))
+        for name in (put := self._loose.begin(self._before)):
+            self.state.left.pop(name, None)
+        self._broken.update(put)
         if self.physics:
             self._step(start, t)
         else:
@@ -552,8 +559,7 @@ class Engine:
         self._now = t
         self._show(t)
         self._loose.end(t)
-        self.state.events, self.state.held = self._loose.said(), self._loose.held()
-        self.state.lags = self._loose.lags()
+        self._note_held()
         strayed = self._strayed
         self._note_errors()
         self.state.path = self._path(start, t, captured=strayed or self._strayed)
@@ -699,6 +705,24 @@ class Engine:
         self.state.refresh(t)
         if self._grips.follow(self.state):
             self.state.refresh(t)
+
+    def _note_held(self) -> None:
+        """What hands and grippers hold now; what hands let go lies as far off as they were."""
+        state, held = self.state, self._loose.held()
+        for name, holders in state.held.items():
+            people = {holder.rpartition("/")[0] for holder in holders} & self._people.keys()
+            if name in held or not people:
+                continue
+            try:
+                state.left[name] = float(self._off[name].at(state).max(initial=0.0))
+            except Undecided as unknown:
+                self._loose.lose([name], f"{name}: let go by a hand that was not known ({unknown})")
+        for name, holders in held.items():
+            if {holder.rpartition("/")[0] for holder in holders} & self._people.keys():
+                state.left.pop(name, None)
+        for name in self._loose.snapped():
+            state.left.pop(name, None)
+        state.events, state.held, state.lags = self._loose.said(), held, self._loose.lags()
 
     def _note_errors(self) -> None:
         if not self.controllers:

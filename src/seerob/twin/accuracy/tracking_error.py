@@ -117,7 +117,7 @@ class TrackingError:
     stay within, farther from where it was registered more.
 
     What a hand holds is off as a part of that hand, and by how far its spring lets it lag (`State.lags`); so
-    far only is what a gripper holds.
+    far only is what a gripper holds. What a hand let go stays as far off as it was then (`State.left`).
 
     Args:
         model: The compiled workstation.
@@ -155,9 +155,9 @@ class TrackingError:
     def none(self, state: State) -> bool:
         """Whether no device says where any of these people are, and the twin follows: nothing is off then.
 
-        Nor is anything held that lags.
+        Nor is anything held that lags, nor was let go by a hand that was off.
         """
-        if any(state.lags.get(piece) for piece in self._pieces):
+        if any(state.lags.get(piece) or state.left.get(piece) for piece in self._pieces):
             return False
         for person in {*self._bones, *(person for person, *_ in self._hands(state))}:
             if state.hearing(person, strayed=True).bones or state.stray(person):
@@ -177,7 +177,7 @@ class TrackingError:
             rows = [row for row, *_ in points]
             found[rows] = np.maximum(found[rows], self._of(state, person, points))
         for piece, bodies in self._pieces.items():
-            found[[row for row, _ in bodies]] += state.lags.get(piece, 0.0)
+            found[[row for row, _ in bodies]] += state.lags.get(piece, 0.0) + state.left.get(piece, 0.0)
         return found
 
     def _hands(self, state: State) -> list[tuple[str, str, str]]:

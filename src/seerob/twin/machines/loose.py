@@ -317,6 +317,10 @@ class Loose:
         """Workpieces that hands and grippers hold, each with these."""
         return {name: tuple(piece.hands) for name, piece in self._pieces.items() if piece.hands}
 
+    def snapped(self) -> list[str]:
+        """Workpieces that a place pulls into its pose."""
+        return [name for name, piece in self._pieces.items() if piece.pulled is not None]
+
     def lags(self) -> dict[str, float]:
         """How far what is held is at most from where it would be if it were fixed [m], by name.
 

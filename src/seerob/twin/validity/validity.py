@@ -80,6 +80,8 @@ class Validity:
         """Loose workpiece → hands and grippers that hold it."""
         self.lags: dict[str, float] = {}
         """How far each of those is from where it would be if it were fixed there [m]: any of its points."""
+        self.left: dict[str, float] = {}
+        """How far off others may be that a hand let go [m]: as far as that hand was, until one takes them."""
         self._hearings = hearings
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False

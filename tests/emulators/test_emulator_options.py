@@ -8,7 +8,7 @@ import pytest
 from seerob.app import cli
 from seerob.app.commands.emulate import PACKAGE, options_of, parser_of
 from seerob.app.console.terminal import Exit
-from seerob.app.emulation.options import EmulatorOptions
+from seerob.app.emulation.options import EmulatorOptions, RobotOptions, target_of
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.plugin import kinds, load
 from seerob.workstation.conversion import described, unit_of
@@ -94,3 +94,15 @@ def test_kinds_lists_them(capsys):
     said = capsys.readouterr().out
     assert "period [ms]" in said
     assert all(f"  {kind} " in said for kind in KINDS)
+
+
+def test_what_of_a_program_is_left_out_is_said(tmp_path):
+    """Only a controller knows its inputs: the rest is played."""
+    (tmp_path / "a.script").write_text(
+        "movej([0, -1.5, 1.5, 0, 0, 0], a=1, v=1)\nif read_input():\n  movej([1, -1.5, 1.5, 0, 0, 0])\nend\n"
+        "movej([0.2, -1.5, 1.5, 0, 0, 0], a=1, v=1)\n"
+    )
+    plays = RobotOptions(robot="ur10", waypoints=str(tmp_path / "a.script"))
+    motion, what = plays.motion(target_of("ur10"))
+    assert motion(60.0)[0] == pytest.approx((0.2, -1.5, 1.5, 0, 0, 0))
+    assert "a.script, without line 2: " in what

@@ -230,7 +230,9 @@ class RobotOptions(EmulatorOptions, frozen=True, kw_only=True):
         from seerob.app.emulation.motions import swing
 
         if self.waypoints is not None:
-            return _through(Path(self.waypoints), target, start), f"through the waypoints of {self.waypoints}"
+            motion, left_out = _through(Path(self.waypoints), target, start)
+            without = f", without {'; '.join(left_out)}" if left_out else ""
+            return motion, f"through the waypoints of {self.waypoints}{without}"
         if self.file is not None:
             return read(Path(self.file), target), self.file
         return swing(start), "a calm swing"
@@ -296,7 +298,8 @@ def _played(opened: Opened) -> Motion:
     return played([s.t for s in samples], [s.q for s in samples], speeds)
 
 
-def _through(path: Path, target: Target, home: Sequence[float]) -> Motion:
+def _through(path: Path, target: Target, home: Sequence[float]) -> tuple[Motion, tuple[str, ...]]:
+    """Its motion, and which parts of the program are left out since only a controller knows them."""
     import msgspec
 
     from seerob.devices.sources.waypoints import Waypoints
@@ -306,4 +309,4 @@ def _through(path: Path, target: Target, home: Sequence[float]) -> Motion:
     program = source.program(path)
     if program.waypoints and program.waypoints[0].q is None:
         source = msgspec.structs.replace(source, start=tuple(home))
-    return _played(source.open(path.parent, target))
+    return _played(source.open(path.parent, target)), program.left_out

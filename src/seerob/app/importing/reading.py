@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from seerob.core.errors import InputError
+from seerob.core.printable import printable
+from seerob.core.shapes import Mesh
 from seerob.description.cad import described, scene, sdf, step, threedxml, usd
 from seerob.description.cad.assembly import Assembly, baked
-from seerob.description.mesh import MAX_BYTES, MAX_FACES, file_content
+from seerob.description.mesh import FARTHEST, MAX_BYTES, MAX_FACES, file_content
 from seerob.description.mesh_files import MeshSource
 
 TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 """Formats besides mesh files whose surfaces are triangles already, by the ending that `recognised` says."""
+LARGEST = 1e30
+"""No number of a shape or a transform is larger before both are put together; nothing overflows then."""
 FINEST, COARSEST = 1e-3, 50.0
 """Tolerances that are taken [mm]."""
 
@@ -47,7 +53,7 @@ def read(
         raise InputError.at("--tolerance", "", f"a {format_} file has triangles already")
     progress(f"reading {file.name}")
     if ending in scene.FORMATS:
-        return baked(scene.read(file, ending, units=units, up=up))
+        return _near(scene.read(file, ending, units=units, up=up), file)
     if units or up:
         what = "only a mesh file does not say its unit or which axis is up"
         raise InputError.at("--units" if units else "--up", "", what, "leave it out")
@@ -55,7 +61,7 @@ def read(
     source.files[file.name] = source.data
     if ending in TRIANGLES:
         known = {".3dxml": threedxml.read, ".usd": usd.read, ".sdf": sdf.read}
-        return baked(known[ending](source) if ending in known else described.read(source, ending))
+        return _near(known[ending](source) if ending in known else described.read(source, ending), file)
     tolerance = step.TOLERANCE * 1e3 if tolerance is None else tolerance
     if not FINEST <= tolerance <= COARSEST:
         what = f"{tolerance:g} mm"
@@ -63,4 +69,39 @@ def read(
     found = step.read(
         source, iges=ending == ".igs", tolerance=tolerance * 1e-3, cache=cache, progress=progress
     )
-    return baked(found)
+    return _near(found, file)
+
+
+def _near(assembly: Assembly, file: Path) -> Assembly:
+    """The assembly, its places rigid, where all of it is within `FARTHEST`.
+
+    Raises:
+        InputError: Something is farther away, or nowhere.
+    """
+    _within(assembly, file, LARGEST)
+    rigid = baked(assembly)
+    _within(rigid, file, FARTHEST)
+    return rigid
+
+
+def _within(assembly: Assembly, file: Path, most: float) -> None:
+    for shape in assembly.shapes:
+        for size in (shape.deviation, *(_reach(mesh) for mesh in shape.pieces)):
+            _bounded(file, shape.name, size, most)
+    for instance in assembly.instances:
+        _bounded(file, "/".join(instance.path), float(np.abs(instance.world_from_shape).max()), most)
+    for moving in assembly.mechanisms:
+        for link in moving.description.links:
+            meshes = (*link.visual, *(solid.mesh for solid in link.solids if solid.mesh is not None))
+            for size in (float(np.abs(link.parent_from_link).max()), *map(_reach, meshes)):
+                _bounded(file, link.name, size, most)
+
+
+def _reach(mesh: Mesh) -> float:
+    return float(np.abs(mesh.vertices).max(initial=0.0))
+
+
+def _bounded(file: Path, name: str, size: float, most: float) -> None:
+    if not size <= most:
+        what = f"{size:.3g} m, which is beyond {most:g} m"
+        raise InputError.at(file, printable(name)[:200], what, "check its unit and its transforms")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import logging
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -18,12 +19,15 @@ from live_story import open_files, wait_for
 from scripted_sources import AtOnce, Delayed, Large, Missing, Mistaken, Scripted, Stubborn
 from seerob.core.plugin import kinds, load
 from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.description.robots import library
 from seerob.devices.live import source_process
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.live.receivers import Receivers
 from seerob.devices.live.source_process import pickled_source
 from seerob.devices.sources.headset import Headset
-from seerob.workstation.source import Source
+from seerob.devices.sources.natnet import Natnet
+from seerob.devices.sources.rtde import Rtde
+from seerob.workstation.source import Source, Target
 
 
 def taken(listening, kind=JointSample):
@@ -222,3 +226,26 @@ def test_what_a_kind_loads_before_it_listens_can_be_loaded():
     assert modules >= {"asyncua", "aiomqtt", "pymodbus.client"}
     for module in sorted(modules):
         importlib.import_module(module)
+
+
+def test_who_needs_no_links_listens_without_numpy():
+    """A third of its process would be numpy's."""
+    kinds_of = [
+        kind for kind in kinds("sources") if not getattr(load("sources", kind, Source), "links", True)
+    ]
+    assert {"rtde", "fri", "drfl", "modbus_robot", "opcua", "mqtt"} <= set(kinds_of)
+    modules = [
+        "seerob.devices.live.listening_process",
+        *(f"seerob.devices.sources.{kind}" for kind in kinds_of),
+    ]
+    code = f"import sys, {', '.join(modules)}; print('numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_links_of_the_target_are_told_to_whom_they_are_of_use():
+    target = Target(name="arm", description=library.load("ur5e"))
+    for kind, told in ((Rtde, False), (Natnet, True)):
+        source = kind(**({"robot": "arm", "host": "127.0.0.1"} if kind is Rtde else {"human": "operator"}))
+        _, there = pickle.loads(pickled_source(source, target))
+        assert (there.description is not None) == told

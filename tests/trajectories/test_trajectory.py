@@ -4,14 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import Quality
-from seerob.files.trajectories.trajectory import (
-    MotionOrigin,
-    Trajectory,
-    TrajectorySamples,
-    derive_velocities,
-    origin_finding,
-)
+from seerob.files.trajectories.trajectory import Trajectory, TrajectorySamples, derive_velocities
 
 
 def made(**changes):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import LARGEST_SPEED
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
@@ -35,12 +36,10 @@ from seerob.files.trajectories.checks import (
 )
 from seerob.files.trajectories.trajectory import (
     QUIET,
-    MotionOrigin,
     Trajectory,
     TrajectorySamples,
     derive_velocities,
     derived_noise,
-    origin_finding,
 )
 from seerob.workstation.source import Opened, Source, Target
 

@@ -16,12 +16,12 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, suggestion
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.motion_files import PoseFrame, fixed_links
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros.ros_messages import Content, Joints, Plan, RosMessage, Transform
 from seerob.protocols.ros.rosbridge import SILENCE, ReceivedMessage

@@ -12,7 +12,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -21,10 +21,12 @@ from seerob.core.errors import InputError
 from seerob.core.quantities import NotBefore, Seconds
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import Array
-from seerob.description.description import Description
 from seerob.workstation.tables.controls import Control
 from seerob.workstation.variables import Variable
+
+if TYPE_CHECKING:  # numpy is not loaded where one source listens in a process of its own
+    from seerob.core.transforms import Array
+    from seerob.description.description import Description
 
 Row4 = tuple[float, float, float, float]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]

@@ -41,8 +41,6 @@ from seerob.core.samples import (
     key,
 )
 from seerob.devices.live.device_clock import HOLD
-from seerob.files.trajectories.checks import disagreement
-from seerob.files.trajectories.trajectory import TrajectorySamples
 from seerob.workstation.source import Opened, Target
 
 SPAN = 0.5
@@ -459,6 +457,8 @@ class Contradictions:
             path = max(now.length[k] - then.length[k], abs(went))
             lag = LAG * max(abs(now.qd[k]), abs(then.qd[k]), path / (now.t - then.t))
             if off > NOISE[unit] + SHARE * path + lag:
+                from seerob.files.trajectories.checks import disagreement  # numpy, which few need
+
                 how = disagreement(went * went, said * said, went * said)
                 return (
                     f"the velocity of joint {k + 1} {how or 'is not that of its positions'}: they went "
@@ -507,6 +507,8 @@ def looked_at(opened: Opened, name: str, target: Target | None) -> Opened:
     if not 0 <= opened.duration < math.inf:
         what = f"the duration is {opened.duration} s"
         raise InputError.at(name, "open", what, "give the time from the first to the last sample")
+    from seerob.files.trajectories.trajectory import TrajectorySamples
+
     if isinstance(opened.samples, TrajectorySamples):
         return opened  # a motion as a whole was looked at when it was made
     return replace(opened, samples=LookedAt(opened.samples, name, target))

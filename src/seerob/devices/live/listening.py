@@ -37,7 +37,6 @@ from seerob.core.host_name import check_host, check_url
 from seerob.core.printable import printable
 from seerob.core.samples import BodySample, GrabSample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding, SourceLine
-from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock, Instant
 from seerob.devices.live.held_back import HeldBack
@@ -225,6 +224,9 @@ class LiveSource(Source, frozen=True, kw_only=True):
     live: ClassVar[bool] = True
     own_process: ClassVar[bool] = True
     """Whether it may listen in another process: not who takes what this one has."""
+    links: ClassVar[bool] = True
+    """Whether `listen` needs the links of its target (`Target.description`); a process that does without
+    them, and so without numpy, is a third smaller."""
     loads: ClassVar[tuple[str, ...]] = ()
     """Libraries that it needs when it listens: loaded before anybody does, since that holds others up."""
     asked: ClassVar[bool] = False
@@ -600,6 +602,8 @@ class _Person:
     """What one device said of a person."""
 
     def __init__(self) -> None:
+        from seerob.description.capture.frozen import Frozen  # numpy, which who hears nobody does without
+
         self.frozen = Frozen(live=True)
         self._content: int | None = None
         self._since = 0.0

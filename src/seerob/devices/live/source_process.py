@@ -30,7 +30,6 @@ from threading import Event, Lock, Thread
 from typing import IO, NamedTuple
 
 import msgspec
-import numpy as np
 from msgspec.structs import replace
 
 from seerob.core.errors import SeerobError
@@ -165,7 +164,8 @@ class SharedMailbox:
 
 def _plain(value: object) -> float | bool | int:
     """Numbers of numpy, which some libraries give."""
-    if isinstance(value, np.generic):
+    numpy = sys.modules.get("numpy")  # without it there are none
+    if numpy is not None and isinstance(value, numpy.generic):
         return value.item()  # type: ignore[no-any-return]
     raise TypeError(f"a {type(value).__name__} in a sample")
 
@@ -220,7 +220,8 @@ def pickled_source(source: LiveSource, target: Target | None) -> bytes | None:
     if not type(source).own_process or type(source).__module__ == "__main__":
         return None
     try:
-        return pickle.dumps((source, target))
+        told = target if target is None or source.links else replace(target, description=None)
+        return pickle.dumps((source, told))
     except Exception:  # whatever stands in its way
         return None
 

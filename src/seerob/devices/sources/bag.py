@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
+from seerob.core.motion_origin import origin_finding
 from seerob.core.samples import JointSample, Quality
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, wxyz_from_rotation
@@ -22,7 +23,7 @@ from seerob.files.motion_capture import ros_bag
 from seerob.files.motion_capture.ros_bag import Recorded, TimeBase, topics_of
 from seerob.files.trajectories.checks import sampling_findings
 from seerob.files.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
-from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory, origin_finding
+from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory
 from seerob.protocols.ros.ros_messages import Content, Joints, Plan
 from seerob.workstation.source import Opened, Target
 

@@ -11,14 +11,14 @@ import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.listening import LiveSource
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import doosan_drfl
 from seerob.protocols.robots.doosan_drfl import (
@@ -42,6 +42,7 @@ DEGREE = math.pi / 180
 class Drfl(LiveSource, frozen=True, kw_only=True):
     """A Doosan controller, live, through the maker's library and a bridge."""
 
+    links: ClassVar[bool] = False
     robot: str
     """The robot it drives."""
     host: str = "127.0.0.1"

@@ -12,16 +12,16 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import REORDERED
 from seerob.devices.live.differentiation import SAMPLES, Differentiator
 from seerob.devices.live.listening import LiveSource
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import fri
@@ -157,6 +157,7 @@ class _Answering:
 class Fri(LiveSource, frozen=True, kw_only=True):
     """A KUKA LBR controller, live, through FRI."""
 
+    links: ClassVar[bool] = False
     robot: str
     """The robot it drives."""
     host: str

@@ -12,10 +12,11 @@ from math import pi
 from pathlib import Path
 
 from seerob.core.errors import InputError
+from seerob.core.motion_origin import MotionOrigin
 from seerob.core.snapshot import Finding
 from seerob.devices.motion_files import Joints, Log, TrajectoryFile, missing, notes, open_log
 from seerob.files.tables.mapping import AngleUnit
-from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
+from seerob.files.trajectories.trajectory import Trajectory
 from seerob.workstation.source import Target
 
 JOINT = re.compile(r"(axisQ(?:Msr|Cmd\w*?))_(.+)\[(\d{1,2})\]")

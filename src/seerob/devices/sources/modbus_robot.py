@@ -17,11 +17,11 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.listening import LiveSource
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc import modbus
 from seerob.protocols.plc.modbus import (
@@ -46,6 +46,7 @@ COARSE = "its registers are too coarse for energies, impact and measured torques
 class ModbusRobot(LiveSource, frozen=True, kw_only=True):
     """A robot whose controller has its joints in Modbus registers."""
 
+    links: ClassVar[bool] = False
     loads: ClassVar[tuple[str, ...]] = ("pymodbus.client",)
     asked: ClassVar[bool] = True
 

@@ -14,13 +14,13 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.extras import need
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.variables.access import missing, with_absolute_paths
 from seerob.devices.variables.live_source import PULSES
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc.opcua_client import Changes, NodeValue, Security, Way, connect, not_pinned
 from seerob.protocols.plc.opcua_robotics import MODES, Robot, robots
@@ -36,6 +36,7 @@ LOAD = "load"
 class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
     """A robot, live, through OPC UA for Robotics (OPC 40010)."""
 
+    links: ClassVar[bool] = False
     loads: ClassVar[tuple[str, ...]] = ("asyncua",)
     asked: ClassVar[bool] = True
     tells_changes: ClassVar[bool] = True

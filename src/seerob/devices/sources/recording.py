@@ -17,10 +17,11 @@ import numpy as np
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, suggestion
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Sample
 from seerob.core.snapshot import Finding
 from seerob.files.trajectories.checks import Beyond, joint_count_check, limit_check, sampling_findings
-from seerob.files.trajectories.trajectory import MAX_SAMPLES, MotionOrigin, Trajectory, origin_finding
+from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory
 from seerob.workstation.source import Opened, Source, Target
 
 if TYPE_CHECKING:

@@ -12,16 +12,15 @@ import math
 from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from msgspec import Meta
 
 from seerob.core.errors import InputError
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.description.robots.calibration import Calibration, off_by
 from seerob.devices.live.listening import Contact, LiveSource, at_start, because
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots import rtde, ur_primary
 from seerob.protocols.robots.rtde import (
@@ -36,6 +35,9 @@ from seerob.protocols.robots.rtde import (
     quality,
 )
 from seerob.workstation.source import Opened, Target, driven_robot
+
+if TYPE_CHECKING:
+    from seerob.description.robots.calibration import Calibration
 
 _log = logging.getLogger(__name__)
 
@@ -156,6 +158,7 @@ def _safety(values: Mapping[str, Value]) -> int | None:
 class Rtde(LiveSource, frozen=True, kw_only=True):
     """A Universal Robots controller, live, through RTDE."""
 
+    links: ClassVar[bool] = False
     robot: str
     """The robot it drives."""
     host: str
@@ -211,6 +214,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
             found = at_start(self.calibration())
             if target.description is None:
                 raise ProtocolError("there is no model to compare it with")
+            from seerob.description.robots.calibration import off_by
+
             off = off_by(target.description, found, f"rtde {self.host}")
         except InputError as error:
             level, text, other = "warning", f"its kinematics are {error.problems[0].what}", True
@@ -239,6 +244,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
             OSError: There is no connection.
             ProtocolError: It says something else.
         """
+        from seerob.description.robots.calibration import Calibration
+
         k = await ur_primary.read_kinematics(self.host, self.primary_port, PRIMARY_WITHIN)
         return Calibration(theta=k.theta, a=k.a, d=k.d, alpha=k.alpha, checksum=k.checksum)
 

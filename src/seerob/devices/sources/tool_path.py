@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.devices.motion_files import PoseFrame, fixed_links
@@ -18,7 +19,6 @@ from seerob.files.tables.mapping import Mapping
 from seerob.files.tables.motion import read_tool_motion
 from seerob.files.trajectories.checks import sampling_findings
 from seerob.files.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
-from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.workstation.source import Opened, Source, Target
 
 FARTHEST = 30.0

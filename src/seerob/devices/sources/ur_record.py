@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
+from seerob.core.motion_origin import MotionOrigin
 from seerob.core.snapshot import Finding
 from seerob.devices.motion_files import Joints, Log, LogValues, TrajectoryFile, notes, open_log
-from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
+from seerob.files.trajectories.trajectory import Trajectory
 from seerob.workstation.source import Target
 
 PREFIX = {Joints.MEASURED: "actual", Joints.COMMANDED: "target"}

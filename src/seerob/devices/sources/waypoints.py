@@ -17,6 +17,7 @@ import numpy as np
 from msgspec import Meta, field
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.motion_origin import MotionOrigin
 from seerob.core.plugin import load
 from seerob.core.quantities import Pose, Radians, unit
 from seerob.core.same_names import by_name
@@ -24,7 +25,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
 from seerob.description.description import Description
 from seerob.devices.motion_files import TrajectoryFile, notes
-from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
+from seerob.files.trajectories.trajectory import Trajectory
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.continuous import Continuous, Wish, continuous
 from seerob.files.waypoints.inverse import parse

@@ -83,6 +83,7 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
     """Base of the sources that read the variables of machines; which ones, the dictionary says."""
 
     reads_variables: ClassVar[bool] = True
+    links: ClassVar[bool] = False
     by_exception: ClassVar[bool] = True
     """Whether the device speaks up when something changes: then a value stands as long as the connection
     does. Else it grows old from when it was said."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.samples import LARGEST, JointSample, Quality
-from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 
 THREE = 3.0
@@ -39,37 +37,6 @@ MAX_SAMPLES = 5_000_000
 """More rows than this are refused: 80 minutes at 1 kHz."""
 LATEST = 1e12
 """A time beyond it is no time in seconds, but a stamp in another unit [s]."""
-
-
-class MotionOrigin(StrEnum):
-    """What a recorded motion is a motion of; anything but the real controller is preliminary."""
-
-    CONTROLLER = "controller"
-    """Logged from the real robot's controller."""
-    VENDOR_EMULATOR = "vendor_emulator"
-    """The maker's own controller software without the robot (URSim, a virtual controller)."""
-    SIMULATOR = "simulator"
-    """A generic simulator or offline programming tool with its own motion planner."""
-    PLANNED = "planned"
-    """A path that nobody has executed, not even in a simulator."""
-    RECORDING = "recording"
-    """One of our own recordings; what fed it is written there."""
-
-
-def origin_finding(origin: MotionOrigin, subject: str, file: str) -> Finding:
-    """What whoever reads a result must know of where the motion comes from; points by hand are no file."""
-    named = f" ({file})" if file else ""
-    if origin is MotionOrigin.CONTROLLER:
-        return Finding(level="note", subject=subject, text=f"motion logged from the controller{named}")
-    if origin is MotionOrigin.RECORDING:
-        return Finding(level="note", subject=subject, text=f"motion replayed from a recording{named}")
-    what = {
-        MotionOrigin.VENDOR_EMULATOR: "the maker's emulator",
-        MotionOrigin.SIMULATOR: "a generic simulator",
-        MotionOrigin.PLANNED: "a plan that was not executed",
-    }[origin]
-    text = f"motion comes from {what}{named}: preliminary until it is confirmed on the controller"
-    return Finding(level="assumed", subject=subject, text=text)
 
 
 class Timed:

@@ -12,6 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError
+from seerob.core.quantities import Pose
 from seerob.core.samples import BodySample, Quality
 from seerob.core.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
@@ -215,6 +216,15 @@ def test_a_stream_says_what_it_hears_with_both_clocks():
     source = Heard(human="operator", said=(), latency=0.05)
     assert source.behind() == pytest.approx(1 / 60 + 0.005 + 0.05)
     assert replace(source, delay=0.03).behind() == 0.03
+
+
+def test_how_well_the_place_of_a_device_is_known_is_in_every_sample():
+    (exact,) = heard(frame(0.0))
+    assert exact.placing is None
+    (known,) = heard(frame(0.0), at=Pose(position=(1, 2, 3)), at_accuracy=0.01, at_accuracy_turn=0.02)
+    assert known.placing.about == (1, 2, 3)
+    wanted = np.diag([0.01**2] * 3 + [0.02**2] * 3)
+    assert np.reshape(known.placing.covariance, (6, 6)) == pytest.approx(wanted)
 
 
 def test_a_stream_follows_one_person_and_whoever_appears_where_that_one_was_lost():

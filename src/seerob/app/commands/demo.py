@@ -42,7 +42,7 @@ SHIPPED = {
 """What each shows; the first is run when none is named."""
 PICTURE = "picture.png"
 """File in the folder of each cell of the paper, which shows it (`scripts/make-cells`)."""
-ADDRESSES = ("host", "bind", "url", "port")
+ADDRESSES = ("host", "bind", "url", "port", "address")
 
 
 def add(sub: argparse.ArgumentParser) -> None:
@@ -105,7 +105,7 @@ def addresses(tables: dict[str, Any]) -> Iterator[str]:
     Args:
         tables: The file.
     """
-    for table in ("sources", "targets"):
+    for table in ("sources", "targets", "cameras"):
         for i, entry in enumerate(tables.get(table, ())):
             whose = (
                 f"{entry.get('kind', table[:-1])} {entry.get('name') or entry.get('robot') or ''}".rstrip()
@@ -115,6 +115,9 @@ def addresses(tables: dict[str, Any]) -> Iterator[str]:
                     yield f"{table}[{i}].{key} = {json.dumps(entry[key])}  {whose}"
             if "origin" in entry:
                 yield f"{table}[{i}].origin: leave it out for a real robot  {whose}"
+            if table == "cameras" and "calibration" in entry:
+                said = f"{table}[{i}].calibration = {json.dumps(entry['calibration'])}"
+                yield f"{said}  seerob calibrate camera finds it  {whose}"
             if entry.get("kind") == "headset":
                 yield f"{table}[{i}]: no address; open the page in the headset's browser  {whose}"
 

@@ -15,6 +15,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import content
@@ -65,6 +66,9 @@ CLOSED = 1e-3
 """A motion whose ends differ by no more [rad or m] is played round and round."""
 SWING, SWING_PERIOD = 0.25, 8.0
 """Amplitude [rad] and period [s]."""
+STANDS = 8.0
+"""Who works in rounds stands still so long at first, at least [s]."""
+T = TypeVar("T")
 
 
 def swing(home: Sequence[float]) -> Motion:
@@ -100,10 +104,10 @@ def played(times: Sequence[float], q: Sequence[Joints], qd: Sequence[Joints]) ->
             return q[-1], (0.0,) * len(q[-1])
         t = t % times[-1] if closed and times[-1] > 0 else max(t, 0.0)
         k = min(bisect_right(times, t), len(times) - 1) - 1
-        T = times[k + 1] - times[k]
-        s = (t - times[k]) / T
+        length = times[k + 1] - times[k]
+        s = (t - times[k]) / length
         rows = zip(q[k], q[k + 1], qd[k], qd[k + 1], strict=True)
-        both = [_cubic(s, T, *row) for row in rows]
+        both = [_cubic(s, length, *row) for row in rows]
         return tuple(x for x, _ in both), tuple(v for _, v in both)
 
     return motion
@@ -133,6 +137,31 @@ def in_step(motion: Motion, period: float) -> Motion:
         return motion((t + ahead[0]) % period)
 
     return stepped
+
+
+def in_rounds(seen: Callable[[float], T], period: float) -> Callable[[float], T]:
+    """What a person does, in rounds that begin at whole multiples of a period of this machine's clock.
+
+    At first they stand as at its beginning, for `STANDS` and until the next round, as calibrations ask for.
+
+    Args:
+        seen: What a device sees of them at a time since the beginning of a round [s].
+        period: Of a round [s].
+    """
+    ahead: list[float] = []
+
+    def at(t: float) -> T:
+        if not ahead:
+            ahead.append(time.time() - t)
+        return seen(round_time(t + ahead[0], period, ahead[0]))
+
+    return at
+
+
+def round_time(clock: float, period: float, begun: float) -> float:
+    """How far a round has come [s], as of `in_rounds`; of the clock's seconds, as ``begun`` is."""
+    first = math.ceil((begun + STANDS) / period) * period
+    return clock % period if clock >= first else 0.0
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,13 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, runtime_checkable
 
+import numpy as np
 from msgspec import Meta
 
 from seerob.app.emulation.wire import Faults
 from seerob.core.errors import InputError
 from seerob.core.host_name import check_host
+from seerob.core.transforms import Array
 from seerob.workstation.emulator import Emulator
 
 if TYPE_CHECKING:
@@ -123,6 +125,13 @@ class EmulatorOptions(Emulator, frozen=True, kw_only=True):
         """
         raise NotImplementedError
 
+    def person_before(self) -> tuple[str, Array] | None:
+        """Keyframes of the person whom it sees in rounds, and the device's world from theirs, (4, 4).
+
+        None where it sees nobody, or nobody who keeps step with others.
+        """
+        return None
+
 
 # -- people -------------------------------------------------------------------------------------
 
@@ -141,6 +150,12 @@ class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
         str, option("motion to play: an .mvnx or .bvh recording, or keyframes (.toml, library:…)")
     ] = LIBRARY
     noise: Noise = NOISE
+
+    def person_before(self) -> tuple[str, Array] | None:
+        """Who stands in the device's own world."""
+        if getattr(self, "in_step", None) is None or self.file.endswith((".mvnx", ".bvh")):
+            return None
+        return self.file, np.eye(4)
 
     def person(self) -> Person:
         """Who moves.
@@ -163,6 +178,10 @@ class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
 
 # -- robots -------------------------------------------------------------------------------------
 
+IN_ROUNDS = (
+    "period of the person's rounds, which begin at whole multiples of it by the clock of this machine; "
+    "before the first they stand still"
+)
 IN_STEP = "period of its rounds, which begin at whole multiples of it by the clock of this machine"
 CALM = {
     "joint_speed": 0.5,

@@ -21,6 +21,7 @@ from seerob.core.host_name import is_loopback
 from seerob.devices.live.listening import LiveSource
 from seerob.protocols.ros import ros_tcp, rosbridge
 from seerob.workstation.source import Source
+from seerob.workstation.tables.cameras import Camera
 from seerob.workstation.tables.writing import CartesianTarget, TargetWire
 
 if TYPE_CHECKING:
@@ -118,7 +119,8 @@ def at_ports(station: Station, moves: Iterable[Move]) -> Station:
     own = station.workstation
     sources = tuple([_followed(source, to) for source in own.sources])
     targets = tuple([_target(target, to) for target in own.targets])
-    return station.with_addresses(replace(own, sources=sources, targets=targets))
+    cameras = tuple([_camera(camera, to) for camera in own.cameras])
+    return station.with_addresses(replace(own, sources=sources, targets=targets, cameras=cameras))
 
 
 def _followed(source: Any, to: dict[tuple[str, int], int]) -> Any:
@@ -131,12 +133,21 @@ def _followed(source: Any, to: dict[tuple[str, int], int]) -> Any:
         if (host, port := getattr(source, option, 0)) in to
     }
     if url := getattr(source, "url", ""):
-        parts = urlsplit(url)
-        own = parts.port or _USUAL.get(parts.scheme, 0)
-        if (port := to.get((_plain(parts.hostname or "-"), own))) is not None:
-            netloc = f"{parts.netloc.removesuffix(f':{parts.port}')}:{port}"
-            changed["url"] = parts._replace(netloc=netloc).geturl()
+        changed["url"] = _moved(url, to)
     return replace(source, **changed) if changed else source
+
+
+def _camera(camera: Camera, to: dict[tuple[str, int], int]) -> Camera:
+    return camera if camera.address is None else replace(camera, address=_moved(camera.address, to))
+
+
+def _moved(url: str, to: dict[tuple[str, int], int]) -> str:
+    parts = urlsplit(url)
+    own = parts.port or _USUAL.get(parts.scheme, 0)
+    if (port := to.get((_plain(parts.hostname or "-"), own))) is None:
+        return url
+    netloc = f"{parts.netloc.removesuffix(f':{parts.port}')}:{port}"
+    return parts._replace(netloc=netloc).geturl()
 
 
 def _target(target: CartesianTarget, to: dict[tuple[str, int], int]) -> CartesianTarget:

@@ -13,7 +13,7 @@ from seerob.app.emulation.options import COMMAND, EmulatorOptions, Ready, Server
 from seerob.app.emulation.wire import FaultyWire
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_loopback
-from seerob.core.plugin import load
+from seerob.core.plugin import kinds, load
 from seerob.workstation.source import Source
 
 
@@ -153,5 +153,7 @@ def probes_of(kind: str, host: str, port: int, *, sends: bool, commands: tuple[s
 
 def _port_option(kind: str, port: int) -> str:
     """The port, where the source expects another one."""
+    if kind not in kinds("sources"):  # what is looked at, such as a camera's picture
+        return ""
     usual = {field.name: field.default for field in fields(load("sources", kind, Source))}.get("port", port)
     return "" if port == usual else f" --port {port}"

@@ -10,7 +10,17 @@ from typing import Annotated
 import numpy as np
 
 from seerob.app.emulation.message_sender import MessageSender, Way
-from seerob.app.emulation.options import LIBRARY, NOISE, EmulatorOptions, Noise, Ready, option, port
+from seerob.app.emulation.motions import in_rounds
+from seerob.app.emulation.options import (
+    IN_ROUNDS,
+    LIBRARY,
+    NOISE,
+    EmulatorOptions,
+    Noise,
+    Ready,
+    option,
+    port,
+)
 from seerob.core.transforms import Array, inverse, rotation_from_rpy, transform
 from seerob.description.capture.mapping import conventions, plain
 from seerob.description.description import Description
@@ -175,12 +185,22 @@ class Kinect(EmulatorOptions, frozen=True, kw_only=True):
     rate: Annotated[float, option("pictures per second", "Hz", ge=1, le=60)] = 30.0
     noise: Noise = NOISE
     websocket: Annotated[bool, option("let listeners connect; else UDP")] = False
+    in_step: Annotated[float, option(IN_ROUNDS, "s", gt=0)] | None = None
+
+    def person_before(self) -> tuple[str, Array] | None:
+        """Who stands before the camera."""
+        return (self.file, inverse(CAMERA)) if self._keyframes and self.in_step is not None else None
+
+    @property
+    def _keyframes(self) -> bool:
+        return self.file.startswith("library:") or self.file.endswith(".toml")
 
     def ready(self) -> Ready:
         """The sender."""
-        keyframes = self.file.startswith("library:") or self.file.endswith(".toml")
-        scene = animated(self.file) if keyframes else recorded(Path(self.file), self.subject)
+        scene = animated(self.file) if self._keyframes else recorded(Path(self.file), self.subject)
         scene = measured(scene, self.noise)
+        if self.in_step is not None:
+            scene = in_rounds(scene, self.in_step)
         to = None if self.websocket else (self.to, self.port)
         server = KinectSender(scene, to=to, host=self.host, port=self.port, rate=self.rate)
         where = self.host if self.websocket else self.to

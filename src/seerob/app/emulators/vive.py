@@ -8,8 +8,9 @@ from typing import Annotated, Literal
 import numpy as np
 
 from seerob.app.emulation.message_sender import MessageSender, Way
+from seerob.app.emulation.motions import in_rounds
 from seerob.app.emulation.mvn_person import FIVE, WORN, Person
-from seerob.app.emulation.options import PersonOptions, Ready, option, port
+from seerob.app.emulation.options import IN_ROUNDS, PersonOptions, Ready, option, port
 from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
 from seerob.protocols.tracking import mvn_pose
 from seerob.protocols.tracking.vive import PORT, Device, Devices, encode
@@ -108,19 +109,22 @@ class Vive(PersonOptions, frozen=True, kw_only=True):
         Literal["least", "all", "hand"],
         option("the least five for a whole body, all nine, or one on the right hand"),
     ] = "least"
+    in_step: Annotated[float, option(IN_ROUNDS, "s", gt=0)] | None = None
 
     def ready(self) -> Ready:
         """The sender."""
-        trackers = worn(
-            self.person(), {"least": FIVE, "all": tuple(WORN), "hand": ("right_hand",)}[self.trackers]
-        )
+        person = self.person()
+        if self.in_step is not None:
+            person = in_rounds(person, self.in_step)
+        roles = {"least": FIVE, "all": tuple(WORN), "hand": ("right_hand",)}[self.trackers]
+        trackers = worn(person, roles)
         to = None if self.websocket else (self.to, self.port)
         server = ViveSender(trackers, to=to, host=self.host, port=self.port, rate=self.rate)
         where = self.host if self.websocket else self.to
         hear = (CONNECT,) if self.websocket else ()
         return Ready(
             server,
-            f"{len(trackers(0.0).devices)} trackers on a person, {self.file}",
+            f"{len(roles)} trackers on a person, {self.file}",
             f"{where}:{self.port}",
             hear,
         )

@@ -32,11 +32,13 @@ class Camera:
     """[px]"""
     height: int
     """[px]"""
+    field_of_view: float = FIELD_OF_VIEW
+    """Vertical [rad]."""
 
     @property
     def focal(self) -> float:
         """Focal length [px]."""
-        return float(self.height / 2 / np.tan(FIELD_OF_VIEW / 2))
+        return float(self.height / 2 / np.tan(self.field_of_view / 2))
 
     def local(self, points: Array) -> Array:
         """Points (n, 3) of the world in the camera's right, down, forward [m]."""
@@ -58,7 +60,7 @@ class Camera:
 
     def scaled(self, factor: int) -> Camera:
         """Return a camera with this view and ``factor`` times as many pixels each way."""
-        return Camera(self.eye, self.axes, self.width * factor, self.height * factor)
+        return Camera(self.eye, self.axes, self.width * factor, self.height * factor, self.field_of_view)
 
 
 def look_along(

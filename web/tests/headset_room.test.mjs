@@ -155,15 +155,18 @@ async function reach(point, short = 0.1) {
   await put(page, [0, 1.64, 0], [x, y + 0.02, z + short], [0, -0.1, -1]);
 }
 
-/** Wait until a body is there [m], and stays there for a tenth of a second of run time. */
-const arrives = (name, point, within) =>
+/** Wait until a body is there [m] and rests: less than 5 mm in a quarter of a second of run time. */
+const rests = (name, point, within) =>
   page.waitForFunction(
     ([body, wanted, most]) => {
       const { position } = window.seerob.pose(body) ?? {};
+      if (!position) return false;
       const { t } = window.seerob;
-      const off = position ? Math.hypot(...position.map((v, i) => v - wanted[i])) : Number.POSITIVE_INFINITY;
-      window.arrivedAt = off < most ? (window.arrivedAt ?? t) : undefined;
-      return t - window.arrivedAt > 0.1;
+      const far = (other) => Math.hypot(...position.map((v, i) => v - other[i]));
+      window.rested ??= {};
+      const since = window.rested[body];
+      if (!since || far(since.position) > 5e-3) window.rested[body] = { t, position };
+      return far(wanted) < most && t - window.rested[body].t > 0.25;
     },
     [name, point, within],
     { polling: 20 },
@@ -179,8 +182,9 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
   await page.waitForFunction(() => window.seerob.pose("blank/body").position[1] > 0.8, null, { polling: 50 });
   const [x, y, z] = await at("blank/body");
   await reach([x, y, z]);
-  // Where a grip is, a hand is about: the person is another than the visitor.
-  await arrives("operator/right_hand", [x, y + 0.05, z], 0.25);
+  // Where a grip is, a hand is about: the person is another than the visitor. What is taken keeps its place in the
+  // hand, so the hand has come to rest.
+  await rests("operator/right_hand", [x, y + 0.05, z], 0.25);
   await trigger(1);
   await happened("blank taken");
   // The world of three.js has z of the cell as y, and y of the cell as -z.
@@ -195,7 +199,7 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
   ];
   for (const [aside, up] of way) {
     await reach([x, y + up, z + aside]);
-    await arrives("blank/body", [x, y + up, z + aside], 0.07);
+    await rests("blank/body", [x, y + up, z + aside], 0.15);
   }
   await trigger(0);
   await happened("round ended");

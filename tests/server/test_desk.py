@@ -3,9 +3,11 @@
 import http.client
 import json
 import os
+import runpy
 import stat
 import tomllib
 from contextlib import ExitStack
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -34,6 +36,8 @@ from seerob.core.snapshot import (
 from seerob.workstation.allowed import NOTHING
 from seerob.workstation.editing import changed
 from server.frames import Visitor
+
+MADE = runpy.run_path(str(Path(__file__).parents[2] / "scripts/make-imported-line"))
 
 CELL = b"""# A cell; this line and all others that nobody edits stay.
 title = "Edited"
@@ -497,12 +501,53 @@ def test_a_cad_file_that_a_page_brings_becomes_parts_and_accepted_axes_a_robot(d
     assert file.read_bytes() == CELL
 
 
+def test_an_assembly_comes_with_the_files_that_it_names_and_with_densities(desk, file):
+    server, _ = desk
+    other, main = MADE["Step"](), MADE["Step"]()
+    other.cylinder("pin", 5.0, 20.0)
+    block, pin = main.box("block", (40.0, 20.0, 10.0)), main.elsewhere("pin", "the pin.stp")
+    place = MADE["place"]
+    main.assembly("fixture", [(block, "base", place()), (pin, "left", place(10, 10, 10))])
+    with Page(server) as page:
+
+        def taken(*arguments):
+            *_, found = brought(server, "a.step", *arguments)
+            page._id += 1
+            edit = Edit(id=page._id, action="change", revision=page.draft.revision, brought=found["brought"])
+            page.socket.send(msgspec.msgpack.encode(edit))
+            assert page.until(lambda m: isinstance(m, Edited) and m.id == edit.id).accepted
+            while page.draft.revision == edit.revision:
+                page.read()
+            return found, {part["name"]: part for part in page.draft.tables["parts"][2:]}
+
+        page.of(Draft)
+        assert brought(server, "the%20pin.stp", other.text().encode(), "?beside=a.step") == 204
+        found, parts = taken(main.text().encode(), "?density=2700&triangles=400")
+        assert found["options"]["density"] == ["2700"]
+        assert not found["left_out"]
+        assert {name: part["density"] for name, part in parts.items()} == {
+            "fixture/base": 2700,
+            "fixture/left": 2700,
+        }
+        assert parts["fixture/left"]["triangles"] == 400
+        # What is not said again is as before; what is empty is none.
+        found, parts = taken(b"", "?again&smaller=25&triangles=")
+        assert list(parts) == ["fixture/base"]
+        assert parts["fixture/base"]["density"] == 2700
+        assert "triangles" not in parts["fixture/base"]
+        assert [row["name"] for row in page.draft.tables["left_out"]] == ["a: --smaller 25"]
+        assert brought(server, "a.step", b"", "?again&smaller=0")[-1]["problems"][0][0] == "smaller"
+
+
 def test_what_is_brought_is_bounded_and_of_who_may_edit_alone(desk, file, monkeypatch):
     server, _ = desk
     assert brought(server, "a.step", b"x", origin="http://elsewhere.example") == 403
     for name in ("..%2Fa.step", ".a.step", "a", "a%2Fb.step", "a..step"):
         assert brought(server, name, b"x") in (400, 404, 405)
-    assert brought(server, "a.step", b"x", "?tolerance=1") == 400
+    assert brought(server, "a.step", b"x", "?nonsense=1") == 400
+    assert brought(server, "a.step", b"x", "?smaller=much") == 400
+    for name in ("..", ".a", "import-0.json", "a%2Fb.stp", "a%5Cb.stp", "a%0A.stp"):
+        assert brought(server, name, b"x", "?beside=a.step") in (400, 404, 405)
     assert brought(server, "a.step", b"") == 400
     assert brought(server, "never.step", b"", "?again=1") == 404
     (file.parent / "elsewhere").mkdir()

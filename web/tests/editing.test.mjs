@@ -317,14 +317,28 @@ test("a CAD file that is dropped becomes parts, an axis that is accepted a mecha
   made.stdout.resume();
   await new Promise((resolve) => made.once("exit", resolve));
   const step = fs.readFileSync(path.join(folder, "door.step"), "utf8");
-  const dropped = await page.evaluateHandle((text) => {
-    const data = new DataTransfer();
-    data.items.add(new File([text], "a door.STEP"));
-    return data;
-  }, step);
-  await page.dispatchEvent(".room", "drop", { dataTransfer: dropped });
+  const drop = async (files) => {
+    const dataTransfer = await page.evaluateHandle((all) => {
+      const data = new DataTransfer();
+      for (const [name, text] of all) data.items.add(new File([text], name));
+      return data;
+    }, files);
+    await page.dispatchEvent(".room", "drop", { dataTransfer });
+  };
   const told = page.locator(".bringing");
+  await drop([
+    ["a.step", step],
+    ["b.step", step],
+  ]);
+  await told.getByText("none of these names the others").waitFor();
+  // The panel that tells of it opens by itself.
+  await page.getByRole("tab", { name: "Findings" }).click();
+  await drop([
+    ["the hinge.stp", step],
+    ["a door.STEP", step.replace("HEADER;", "/* the hinge.stp */ HEADER;")],
+  ]);
   await told.getByText("a_door.step: 2 parts, in the draft").waitFor();
+  assert.ok(fs.existsSync(path.join(folder, "imported/a_door/the hinge.stp")));
   await page.waitForFunction(() => window.seerob.pose("door/leaf") !== null);
   const hinge = told.locator(".axes label", { hasText: "on one axis" }).first();
   await hinge.getByRole("checkbox").check();

@@ -86,6 +86,19 @@ test("? says what the keys do, and time stands still behind it", async () => {
   await said.waitFor({ state: "hidden" });
 });
 
+test("a file that is dropped where none is edited stays, and the page says where it may go", async () => {
+  const dropped = await page.evaluateHandle(() => {
+    const data = new DataTransfer();
+    data.items.add(new File(["x"], "line.step"));
+    return data;
+  });
+  await page.dispatchEvent(".room", "drop", { dataTransfer: dropped });
+  const note = page.getByRole("alert").filter({ hasText: "line.step" });
+  await note.getByText("seerob edit").waitFor();
+  await note.getByRole("button", { name: "Close" }).click();
+  await note.waitFor({ state: "detached" });
+});
+
 test("] goes to where a limit begins to be exceeded, and [ back", async () => {
   const start = await settled(page);
   await page.keyboard.press("]");

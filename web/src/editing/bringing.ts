@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import type { Finding, Mistake, Result, Segment } from "../wire";
+import { said } from "../words";
 import { askBrought, mayEdit } from "./draft";
 
 /** An axis that shapes of a file speak for. */
@@ -25,6 +26,8 @@ interface Found {
   left_out: { name: string; why: string }[];
   axes: Axis[];
   accepted: string[];
+  /** As `seerob import` has them, by name. */
+  options: Record<string, string | number | string[] | null>;
 }
 
 export interface Bringing {
@@ -45,11 +48,8 @@ export const marked = signal<ReadonlySet<number>>(new Set());
 /** The proposal that is pointed at, to be shown in the room. */
 export const pointedAt = signal<Axis | null>(null);
 
-/** What a file that does not say it is told by the user. */
-export interface Told {
-  units?: string;
-  up?: string;
-}
+/** What the user says of a file, as options of `seerob import`; what is left out is as it was before. */
+export type Told = Record<string, string>;
 
 /** Letters that a name has on its way: `line A.step` is `line_A.step`. */
 export const plain = (name: string): string => {
@@ -62,21 +62,59 @@ export const plain = (name: string): string => {
   return `${letters.slice(0, 60) || "part"}${ending.toLowerCase()}`;
 };
 
-/** Bring a file; what is found is in the draft when this is over, unless something is wrong. */
-export function bring(file: File, told: Told = {}): Promise<void> {
+/** How much of a file is looked through for names of others [byte]. */
+const LOOKED_AT = 64 * 2 ** 20;
+
+/**
+ * Bring a file, or several of which one names the others; what is found is in the draft when this is over, unless
+ * something is wrong.
+ */
+export async function bring(files: readonly File[]): Promise<void> {
   marked.value = new Set();
-  return read(plain(file.name), file, { ...told });
+  if (files.length === 0) return;
+  const mains = files.length === 1 ? [...files] : await unnamed(files);
+  const [main] = mains;
+  if (mains.length !== 1 || main === undefined) {
+    const names = mains.map(({ name }) => name).join(", ");
+    const mistakes = [
+      {
+        key: names,
+        what: said("none of these names the others"),
+        remedy: said("bring them one after another, each with the files that it names"),
+      },
+    ];
+    bringing.value = { name: "", saying: "", mistakes, found: null, added: false };
+    return;
+  }
+  await read(main.name, main, {}, files);
+}
+
+/** Files that no other one names; all of them where they name each other in a circle. */
+async function unnamed(files: readonly File[]): Promise<File[]> {
+  const named = new Set<string>();
+  for (const file of files) {
+    const text = new TextDecoder().decode(await file.slice(0, LOOKED_AT).arrayBuffer());
+    for (const { name } of files) if (name !== file.name && text.includes(name)) named.add(name);
+  }
+  const found = files.filter(({ name }) => !named.has(name));
+  return found.length > 0 ? found : [...files];
 }
 
 /** Have the file that was brought last read again, with something told of it, or with axes accepted. */
 export function readAgain(told: Told, accept: readonly number[] = []): Promise<void> {
   const now = bringing.peek();
   if (!now) return Promise.resolve();
-  const axes: Record<string, string> = accept.length > 0 ? { accept: accept.join(",") } : {};
+  const axes: Told = accept.length > 0 ? { accept: accept.join(",") } : {};
   return read(now.name, null, { ...told, ...axes, again: "" });
 }
 
-async function read(name: string, file: File | null, options: Record<string, string>): Promise<void> {
+async function read(
+  named: string,
+  file: File | null,
+  options: Told,
+  files: readonly File[] = [],
+): Promise<void> {
+  const name = plain(named);
   if (!mayEdit.peek() || bringing.peek()?.saying) return;
   pointedAt.value = null;
   bringing.value = { name, saying: "sending …", mistakes: [], found: null, added: false };
@@ -85,12 +123,13 @@ async function read(name: string, file: File | null, options: Record<string, str
   };
   const fail = (what: string): void => say({ saying: "", mistakes: [{ key: name, what, remedy: "" }] });
   try {
-    const query = new URLSearchParams(options);
-    const answer = await fetch(`/cad/${encodeURIComponent(name)}?${query}`, {
-      method: "POST",
-      headers: { "Content-Type": "application/octet-stream" },
-      body: file ?? "",
-    });
+    for (const beside of files) {
+      if (beside === file) continue;
+      say({ saying: `sending ${beside.name} …` });
+      const answer = await sent(beside.name, { beside: name }, beside);
+      if (!answer.ok) return fail(`${beside.name}: ${(await answer.text()).trim() || answer.status}`);
+    }
+    const answer = await sent(name, options, file ?? "");
     if (!answer.ok || !answer.body) return fail((await answer.text()).trim() || `status ${answer.status}`);
     for await (const told of lines(answer.body)) {
       if (typeof told.say === "string") say({ saying: told.say });
@@ -102,6 +141,13 @@ async function read(name: string, file: File | null, options: Record<string, str
     fail(`could not be sent: ${error instanceof Error ? error.message : String(error)}`);
   }
 }
+
+const sent = (name: string, query: Told, body: File | ""): Promise<Response> =>
+  fetch(`/cad/${encodeURIComponent(name)}?${new URLSearchParams(query)}`, {
+    method: "POST",
+    headers: { "Content-Type": "application/octet-stream" },
+    body,
+  });
 
 async function add(found: Found, say: (now: Partial<Bringing>) => void): Promise<void> {
   const { accepted, mistakes } = found.brought

@@ -6,6 +6,7 @@ import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
 import { type Column, folded, order, timeAbove, widths } from "../view/kept";
 import { said } from "../words";
+import { Strayed } from "./Bringing";
 import { CameraNote } from "./CameraNote";
 import { VisitedInstant } from "./ElsewhereNote";
 import { Keys } from "./Keys";
@@ -65,6 +66,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <CameraNote />
         <Legend />
         <VisitedInstant />
+        <Strayed />
       </main>
       <RightSide />
       <footer class="bottom">

@@ -1,37 +1,76 @@
 // A CAD file on its way into the draft: dropped or chosen, how far it is, what was found, axes to be accepted.
 
-import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { signal, useSignal } from "@preact/signals";
 import { bring, bringing, marked, pointedAt, readAgain } from "../editing/bringing";
+import { mayEdit } from "../editing/draft";
 import { said, word } from "../words";
 import { MistakeList } from "./MistakeList";
 
 /** Endings of files that do not say their unit, or which axis is up. */
 const SILENT = /\.(stl|obj|ply|off)$/;
-const ACCEPTS =
-  ".step,.stp,.p21,.igs,.iges,.3dxml,.glb,.gltf,.obj,.stl,.ply,.off,.3mf,.dae,.zae,.usd,.usda,.usdc,.usdz,.sdf,.urdf";
+/** Whether files are over the page. */
+const over = signal(false);
+/** Names of files that were dropped where no file is edited. */
+const strayed = signal("");
+
+const carries = (event: DragEvent): boolean => event.dataTransfer?.types.includes("Files") ?? false;
+
+/**
+ * Take files that are dropped anywhere on the page, which a browser would open instead of it; `open` shows the panel
+ * that tells of them.
+ */
+export function listenToDrops(open: () => void): () => void {
+  const drag = (event: DragEvent): void => {
+    if (!carries(event)) return;
+    event.preventDefault();
+    over.value = event.type === "dragover";
+  };
+  const drop = (event: DragEvent): void => {
+    drag(event);
+    const files = [...(event.dataTransfer?.files ?? [])];
+    if (files.length === 0) return;
+    if (!mayEdit.peek()) {
+      strayed.value = files.map(({ name }) => name).join(", ");
+      return;
+    }
+    open();
+    void bring(files);
+  };
+  const listen = { dragover: drag, dragleave: drag, drop };
+  for (const [name, act] of Object.entries(listen)) document.addEventListener(name, act as EventListener);
+  return () => {
+    for (const [name, act] of Object.entries(listen))
+      document.removeEventListener(name, act as EventListener);
+  };
+}
+
+/** What becomes of a file that is dropped on a page that edits none. */
+export function Strayed() {
+  if (strayed.value === "") return null;
+  return (
+    <div class="strayed" role="alert">
+      <p>
+        {said(
+          "{names} stays where it is: this page shows a run and edits no file. Drop it on the page of one of these, with the folder of the workstation:",
+          { names: strayed.value },
+        )}
+      </p>
+      <p>
+        <code>seerob edit</code> · <code>seerob run --edit</code>
+      </p>
+      <button
+        type="button"
+        onClick={() => {
+          strayed.value = "";
+        }}
+      >
+        {said("Close")}
+      </button>
+    </div>
+  );
+}
 
 export function Bringing() {
-  const over = useSignal(false);
-  useEffect(() => {
-    const files = (event: DragEvent): boolean => event.dataTransfer?.types.includes("Files") ?? false;
-    const drag = (event: DragEvent): void => {
-      if (!files(event)) return;
-      event.preventDefault();
-      over.value = event.type === "dragover";
-    };
-    const drop = (event: DragEvent): void => {
-      drag(event);
-      const file = event.dataTransfer?.files[0];
-      if (file) void bring(file);
-    };
-    const listen = { dragover: drag, dragleave: drag, drop };
-    for (const [name, act] of Object.entries(listen)) document.addEventListener(name, act as EventListener);
-    return () => {
-      for (const [name, act] of Object.entries(listen))
-        document.removeEventListener(name, act as EventListener);
-    };
-  }, []);
   const now = bringing.value;
   return (
     <section class={`bringing ${over.value ? "over" : ""}`} aria-label={said("Bring a CAD file")}>
@@ -39,12 +78,12 @@ export function Bringing() {
         {said("Bring a CAD file")} <span class="unit">{said("or drop it anywhere on the page")}</span>
         <input
           type="file"
-          accept={ACCEPTS}
+          multiple
           disabled={now !== null && now.saying !== ""}
           onChange={(event) => {
-            const file = event.currentTarget.files?.[0];
+            const files = [...(event.currentTarget.files ?? [])];
             event.currentTarget.value = "";
-            if (file) void bring(file);
+            void bring(files);
           }}
         />
       </label>
@@ -58,6 +97,7 @@ export function Bringing() {
           <MistakeList mistakes={now.mistakes} keys />
           {now.mistakes.length > 0 && SILENT.test(now.name) && <Silent />}
           {now.found && <Found />}
+          {now.name !== "" && now.saying === "" && <Options key={now.name} />}
         </>
       )}
     </section>
@@ -98,6 +138,42 @@ function Silent() {
         {said("Read it so")}
       </button>
     </div>
+  );
+}
+
+const OPTIONS = [
+  ["density", word("Densities [kg/m³]"), "2700, S235JR=7850"],
+  ["tolerance", word("Tolerance [mm]"), "0.1"],
+  ["without", word("Without parts"), "*/screw_*"],
+  ["smaller", word("Without parts smaller than [mm]"), ""],
+  ["unreachable", word("Without parts that nothing thicker can touch [mm]"), ""],
+  ["triangles", word("Most triangles of a part"), "20000"],
+  ["ground", word("Part that stands"), ""],
+] as const;
+
+/** What may be said of the file, as it was said last. */
+function Options() {
+  const given = bringing.value!.found?.options ?? {};
+  const texts = useSignal<Record<string, string>>({});
+  return (
+    <details class="options">
+      <summary>{said("Densities, and what is left out")}</summary>
+      {OPTIONS.map(([name, title, example]) => (
+        <label key={name}>
+          {said(title)}{" "}
+          <input
+            value={texts.value[name] ?? String(given[name] ?? "").replaceAll(",", ", ")}
+            placeholder={example}
+            onInput={(event) => {
+              texts.value = { ...texts.value, [name]: event.currentTarget.value };
+            }}
+          />
+        </label>
+      ))}
+      <button type="button" onClick={() => void readAgain(texts.value)}>
+        {said("Read it so")}
+      </button>
+    </details>
   );
 }
 

@@ -1,11 +1,13 @@
 // What is said: verdicts, contacts on the body, posture, and what to know of the model.
 
 import { computed, useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
 import { controls, isLoose } from "../doing";
 import { mayEdit } from "../editing/draft";
 import { scene } from "../page_state";
 import { said, word } from "../words";
 import { BodyMap } from "./BodyMap";
+import { listenToDrops } from "./Bringing";
 import { CriteriaTable } from "./CriteriaTable";
 import { Editor } from "./Editor";
 import { allFindings, Findings } from "./Findings";
@@ -33,6 +35,13 @@ export function RightSide() {
     (name) => (name !== "edit" || mayEdit.value) && (name !== "room" || hasRoom.value),
   );
   const shown = tab.value ?? tabs[0]!;
+  useEffect(
+    () =>
+      listenToDrops(() => {
+        tab.value = "edit";
+      }),
+    [],
+  );
   const open = (name: Tab): void => {
     tab.value = name;
   };

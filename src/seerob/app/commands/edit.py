@@ -177,7 +177,7 @@ def serving(
         meshes=station.model.meshes,
         feed=trial,
         desk=desk,
-        bringing=Bringing(desk, dropped.read_apart, dropped.changes),
+        bringing=Bringing(desk, dropped.read_apart, dropped.changes, dropped.former),
         ruler=lambda: trial.ruler,
         host=host,
         port=port,

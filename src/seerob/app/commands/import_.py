@@ -129,7 +129,14 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
             cache=cache_folder(),
             progress=say,
         )
-    assembly = _moving(options, _wanted(options, assembly))
+    assembly = reading.wanted(
+        assembly,
+        patterns=options.without,
+        smaller=options.smaller,
+        unreachable=options.unreachable,
+        triangles=options.triangles,
+    )
+    assembly = _moving(options, assembly)
     own = set[str]()
     if before is not None:
         made_before = {row["mesh"] for row in before["parts"]}
@@ -144,34 +151,6 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
         _revise(folder, before, made, shown)
     _say(options.file, assembly, made)
     return Exit.WITHIN
-
-
-def _wanted(options: argparse.Namespace, assembly: Assembly) -> Assembly:
-    """The assembly without what the user leaves out."""
-    from seerob.description.cad.assembly import without, without_numbers
-
-    for key in ("smaller", "unreachable"):
-        given = getattr(options, key)
-        if given is not None and not 0 < given <= 1e4:
-            raise InputError.at(f"--{key}", "", f"{given:g} mm", "more than 0 and at most 10000 mm")
-    if options.triangles is not None and not 100 <= options.triangles <= 20_000_000:
-        what = f"{options.triangles} triangles"
-        raise InputError.at("--triangles", "", what, "at least 100 are needed to show a shape")
-    try:
-        smaller = None if options.smaller is None else options.smaller * 1e-3
-        assembly = without(assembly, options.without, smaller)
-    except ValueError as error:
-        names = ", ".join(assembly.names()[:5])
-        raise InputError.at("--without", "", str(error), f"full names, as {names}") from None
-    if options.unreachable is None:
-        return assembly
-    from seerob.app.importing.unreachable import unreachable
-
-    try:
-        inside = unreachable(assembly, options.unreachable * 1e-3)
-    except ValueError as error:
-        raise InputError.at("--unreachable", "", f"{options.unreachable:g} mm", str(error)) from None
-    return without_numbers(assembly, inside, f"--unreachable {options.unreachable:g}; inside of others")
 
 
 def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:

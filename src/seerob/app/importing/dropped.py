@@ -29,12 +29,16 @@ LARGEST_TABLE = 256 << 20
 MOST_AXES = 20
 """Proposals that are told."""
 TABLES = "import-*.json"
-OPTIONS = ("units", "up", "accept")
-"""What a page may say of a file."""
+OPTIONS = (
+    *("units", "up", "accept", "ground", "tolerance", "density"),
+    *("without", "smaller", "unreachable", "triangles"),
+)
+"""What a page may say of a file, as the options of ``seerob import``; several values have commas between."""
+_LISTS, _NUMBERS, _COUNTS = ("density", "without"), ("tolerance", "smaller", "unreachable"), ("triangles",)
 
 
 async def read_apart(
-    file: Path, folder: Path, under: str, options: Mapping[str, str]
+    file: Path, folder: Path, under: str, options: Mapping[str, str], former: Mapping[str, Any]
 ) -> AsyncIterator[dict[str, Any]]:
     """What the process says: lines ``say``, and at last ``table`` (a file in the folder) or ``problems``.
 
@@ -42,9 +46,12 @@ async def read_apart(
         file: The CAD file.
         folder: Where its meshes and the table go; there already.
         under: The folder as paths of the workstation file say it.
-        options: Of `OPTIONS`, as text.
+        options: Of `OPTIONS`, as text; those that are left out are as they were for this file before, and
+            those that are empty are none.
+        former: Options of before, as `former` tells them.
     """
     asked = {"file": str(file), "folder": str(folder), "under": under, "options": dict(options)}
+    asked["former"] = dict(former)
     command = (sys.executable, "-P", "-m", __name__, json.dumps(asked))
     process = await asyncio.create_subprocess_exec(
         *command,
@@ -93,11 +100,32 @@ def changes(
     made = _table(folder / table)
     assert made is not None
     tables = read_tables(raw, file)
-    older = [t for name in sorted(folder.glob(TABLES)) if (t := _table(name)) is not None]
-    before = max((_there(t, tables) for t in older), key=lambda found: found[0], default=(0, {}))[1]
+    before = _older(tables, folder)[0]
     now = {group: tuple(made[group]) for group in ("parts", "robots", "left_out")}
     found, told = changes_of(tables, before, now, file)
     return tuple(found), tuple(told), made
+
+
+def former(raw: bytes, folder: Path, file: str) -> dict[str, Any]:
+    """Options of the revision that the workstation file says most of; none where it says nothing of one.
+
+    Args:
+        raw: The workstation file.
+        folder: Where the tables of revisions are.
+        file: Name of the workstation file, for messages.
+    """
+    from seerob.app.importing.revision import read_tables
+
+    options = _older(read_tables(raw, file), folder)[1].get("options")
+    return options if isinstance(options, dict) else {}
+
+
+def _older(tables: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Rows of the older revision that the workstation file has, and the revision's table."""
+    older = [t for name in sorted(folder.glob(TABLES)) if (t := _table(name)) is not None]
+    found = [(*_there(table, tables), table) for table in older]
+    same, rows, table = max(found, key=lambda one: one[0], default=(0, {}, {}))
+    return (rows, table) if same else ({}, {})
 
 
 def _table(file: Path) -> dict[str, Any] | None:
@@ -129,14 +157,22 @@ def _there(table: Mapping[str, Any], tables: Mapping[str, Any]) -> tuple[int, di
 def _main(asked: Mapping[str, Any]) -> None:
     _limit()
     try:
-        table = _read(Path(asked["file"]), Path(asked["folder"]), asked["under"], asked["options"])
+        table = _read(
+            Path(asked["file"]), Path(asked["folder"]), asked["under"], asked["options"], asked["former"]
+        )
         _tell({"table": table})
     except InputError as error:
-        _tell({"problems": [tuple(problem) for problem in error.problems][:20]})
+        _tell({"problems": [_plain(problem) for problem in error.problems][:20]})
     except MemoryError:
         _tell({"problems": [(Path(asked["file"]).name, "", "takes too much memory to read", "")]})
     except (SeerobError, OSError) as error:
         _tell({"problems": [(Path(asked["file"]).name, "", str(error), "")]})
+
+
+def _plain(problem: Problem) -> tuple[str, ...]:
+    """A problem as a page shows it, where options are no words with dashes."""
+    file, *rest = problem
+    return (file.removeprefix("--"), *rest)
 
 
 def _tell(what: Mapping[str, Any]) -> None:
@@ -152,11 +188,11 @@ def _limit() -> None:
             resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
 
 
-def _read(file: Path, folder: Path, under: str, options: Mapping[str, str]) -> str:
+def _read(file: Path, folder: Path, under: str, options: Mapping[str, str], former: Mapping[str, Any]) -> str:
     """Write meshes and the table of a file; name of the table."""
     from seerob.app.console.terminal import cache_folder
     from seerob.app.importing import reading
-    from seerob.app.importing.folder import Densities, files
+    from seerob.app.importing.folder import densities, files
     from seerob.core.files.whole_file import whole_file
     from seerob.description.cad.recognised import recognised
     from seerob.description.mesh import MAX_BYTES, file_content
@@ -169,8 +205,23 @@ def _read(file: Path, folder: Path, under: str, options: Mapping[str, str]) -> s
         raise InputError.at(
             file.name, "", "is a plant, not a part of one", "seerob import makes a cell of it"
         )
+    asked = _asked(former, options)
+    given = densities(asked["density"])
     assembly = reading.read(
-        file, ending, units=options.get("units"), up=options.get("up"), cache=cache_folder(), progress=say
+        file,
+        ending,
+        tolerance=asked["tolerance"],
+        units=asked["units"],
+        up=asked["up"],
+        cache=cache_folder(),
+        progress=say,
+    )
+    assembly = reading.wanted(
+        assembly,
+        patterns=asked["without"],
+        smaller=asked["smaller"],
+        unreachable=asked["unreachable"],
+        triangles=asked["triangles"],
     )
     axes: list[dict[str, Any]] = []
     told: list[str] = []
@@ -190,13 +241,18 @@ def _read(file: Path, folder: Path, under: str, options: Mapping[str, str]) -> s
             }
             for p in found[:MOST_AXES]
         ]
-        numbers = _numbers(options.get("accept", ""), len(axes))
+        numbers = _numbers(asked["accept"] or "", len(axes))
         if numbers:
+            stands = asked["ground"]
+            if stands is not None and stands not in names:
+                raise InputError.at(file.name, "ground", f"there is no part {stands!r}", "give a full name")
+            ground = None if stands is None else names.index(stands)
+            chosen = [found[n - 1] for n in numbers]
             try:
-                assembly, told = accepted(assembly, [found[n - 1] for n in numbers], plain_name(file.stem))
+                assembly, told = accepted(assembly, chosen, plain_name(file.stem), ground)
             except ValueError as error:
                 raise InputError.at(file.name, "axes", str(error), "accept other ones") from None
-    made = files(assembly, file, Densities(), options=dict(options), progress=say)
+    made = files(assembly, file, given, options=asked, progress=say)
     renamed = {}
     for name, content in made.meshes.items():
         renamed[name] = _by_content(name, content, made.robots)
@@ -220,6 +276,29 @@ def _read(file: Path, folder: Path, under: str, options: Mapping[str, str]) -> s
     with whole_file(folder / name) as hidden:
         hidden.write_bytes(text)
     return name
+
+
+def _asked(former: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
+    """Options by name, as ``seerob import`` has them, those of before where none is given.
+
+    Raises:
+        InputError: One is no number.
+    """
+    asked: dict[str, Any] = {}
+    for key in OPTIONS:
+        text = options.get(key)
+        if text is None:
+            asked[key] = former.get(key)
+        elif key in _LISTS:
+            asked[key] = [word for piece in text.split(",") if (word := piece.strip())]
+        elif key in _NUMBERS or key in _COUNTS:
+            try:
+                asked[key] = (int if key in _COUNTS else float)(text) if text.strip() else None
+            except ValueError:
+                raise InputError.at(f"--{key}", "", f"{text!r} is no number", "give one") from None
+        else:
+            asked[key] = text or None
+    return asked | {key: asked[key] or [] for key in _LISTS}
 
 
 def _by_content(name: str, content: bytes, robots: Iterable[Mapping[str, Any]]) -> str:

@@ -1,6 +1,7 @@
 """``POST /cad/<name>``: a CAD file that a page brings to the workstation which it edits.
 
-Who may edit the file may do it, from the page's own origin; one file at a time. The answer is lines of JSON:
+Who may edit the file may do it, from the page's own origin; one file at a time. Files that it names come
+before it (``?beside=<its name>``), under the names that it has for them. The answer is lines of JSON:
 ``say`` while it is read, and at last ``problems``, or what was found with the number by which the page asks
 for its changes (`seerob.core.page_messages.Edit.brought`).
 """
@@ -28,21 +29,30 @@ SECONDS = 600.0
 """That bringing it may take."""
 IMPORTED = "imported"
 """Folder beside the workstation file."""
+MOST_BESIDE, MOST_TOGETHER = 500, 2 << 30
+"""Files of one folder, and their sum [byte]."""
 MOST_TOLD = 200
 """Findings, and things that changed, that are told to the page; the table has them all."""
 _NAME = re.compile(r"[A-Za-z0-9_\-][A-Za-z0-9_.\-]{0,80}\.[A-Za-z0-9]{1,8}")
+_BESIDE = re.compile(r"(?!\.|import-.*\.json$)[^/\\\x00-\x1f\x7f]{1,120}")
+"""Names that a file may have for others; tables are this program's own."""
 _VALUES = {
-    "units": re.compile("[a-z]{1,4}"),
-    "up": re.compile("[xyz]"),
-    "accept": re.compile(r"[\d,]{1,100}"),
+    "units": re.compile("[a-z]{0,4}"),
+    "up": re.compile("[xyz]?"),
+    "accept": re.compile(r"[\d,]{0,100}"),
+    "ground": re.compile(r"[\w/.\-]{0,500}"),
+    **dict.fromkeys(("tolerance", "smaller", "unreachable", "triangles"), re.compile(r"[\d.eE+\-]{0,20}")),
+    **dict.fromkeys(("density", "without"), re.compile(r"[^\x00-\x1f\x7f]{0,1000}")),
 }
 
-Reading = Callable[[Path, Path, str, Mapping[str, str]], AsyncIterator[dict[str, Any]]]
+Reading = Callable[[Path, Path, str, Mapping[str, str], Mapping[str, Any]], AsyncIterator[dict[str, Any]]]
 """Reads a file in a process of its own: `seerob.app.importing.dropped.read_apart`."""
 Changes = Callable[
     [bytes, Path, str, str], tuple[tuple[Change, ...], tuple[tuple[str, str], ...], dict[str, Any]]
 ]
 """Says what of a workstation file changes: `seerob.app.importing.dropped.changes`."""
+Former = Callable[[bytes, Path, str], Mapping[str, Any]]
+"""Says the options of before: `seerob.app.importing.dropped.former`."""
 
 
 class Bringing:
@@ -52,10 +62,11 @@ class Bringing:
         desk: Whose workstation file they are for.
         read: Reads one.
         changes: Says what of the workstation file changes.
+        former: Says with which options a file was read before.
     """
 
-    def __init__(self, desk: Desk, read: Reading, changes: Changes) -> None:
-        self._desk, self._read, self._changes = desk, read, changes
+    def __init__(self, desk: Desk, read: Reading, changes: Changes, former: Former) -> None:
+        self._desk, self._read, self._changes, self._former = desk, read, changes, former
         self._busy = asyncio.Lock()
 
     async def answer(self, request: Request) -> Response:
@@ -63,10 +74,13 @@ class Bringing:
         name = request.path_params["name"]
         if Role.CONTROL not in request.scope["state"]["roles"]:
             return PlainTextResponse("this page may not edit\n", 403)
-        if not _NAME.fullmatch(name) or ".." in name:
-            return PlainTextResponse("letters, digits, _ - and . with an ending, please\n", 400)
         asked = dict(request.query_params)
         again = asked.pop("again", None) is not None
+        main = asked.pop("beside", name)
+        if not _NAME.fullmatch(main) or ".." in main:
+            return PlainTextResponse("letters, digits, _ - and . with an ending, please\n", 400)
+        if not _BESIDE.fullmatch(name):
+            return PlainTextResponse("no such name\n", 400)
         if any(key not in _VALUES or not _VALUES[key].fullmatch(value) for key, value in asked.items()):
             return PlainTextResponse("no such option\n", 400)
         if int(request.headers.get("content-length") or 0) > MOST_BYTES:
@@ -74,7 +88,7 @@ class Bringing:
         if self._busy.locked():
             return PlainTextResponse("another file is being read\n", 409)
         async with self._busy:
-            stem = Path(name).stem
+            stem = Path(main).stem
             folder = self._desk.file.resolve().parent / IMPORTED / stem
             file = folder / name
             if folder.resolve() != folder:
@@ -83,6 +97,8 @@ class Bringing:
                 return PlainTextResponse("there is no such file here yet\n", 404)
             if not again and (refusal := await self._take(request, file)) is not None:
                 return refusal
+            if name != main:
+                return Response(status_code=204)
         under = f"{IMPORTED}/{stem}"
         return StreamingResponse(self._told(file, folder, under, asked), media_type="application/x-ndjson")
 
@@ -92,6 +108,9 @@ class Bringing:
         size = 0
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
+            others = [f.stat().st_size for f in file.parent.iterdir() if f.is_file() and f != file]
+            if len(others) >= MOST_BESIDE or sum(others) > MOST_TOGETHER:
+                return PlainTextResponse("too many files in its folder\n", 507)
             async with asyncio.timeout(SECONDS):
                 with coming.open("wb") as opened:
                     async for piece in request.stream():
@@ -114,7 +133,9 @@ class Bringing:
         self, file: Path, folder: Path, under: str, options: Mapping[str, str]
     ) -> AsyncIterator[bytes]:
         async with self._busy:
-            reading = self._read(file, folder, under, options)
+            raw, _ = self._desk.newest
+            former = await asyncio.to_thread(self._former, raw, folder, str(self._desk.file))
+            reading = self._read(file, folder, under, options, former)
             try:
                 async for told in reading:
                     found = await self._found(folder, told["table"]) if "table" in told else told
@@ -139,4 +160,5 @@ class Bringing:
             "left_out": made["left_out"][:MOST_TOLD],
             "axes": made["axes"],
             "accepted": made["accepted"],
+            "options": made["options"],
         }

@@ -50,14 +50,33 @@ export async function show(page, url) {
   await page.waitForSelector("tr[data-criterion]");
 }
 
-/** Wait until the shown run time stays the same, and return it. */
+/** Wait until a page has drawn so many pictures. */
+export function frames(page, count) {
+  return page.evaluate(
+    (n) =>
+      new Promise((done) => {
+        const each = () => (n-- > 0 ? requestAnimationFrame(each) : done());
+        each();
+      }),
+    count,
+  );
+}
+
+/**
+ * Wait until the shown run time stays the same, and return it.
+ *
+ * That says something only while the page draws and its server answers: on a loaded machine either may do nothing
+ * for a second.
+ */
 export async function settled(page) {
   let before = Number.NaN;
   for (;;) {
     const t = await page.evaluate(() => window.seerob.t);
     if (t === before) return t;
     before = t;
-    await page.waitForTimeout(300);
+    await page.waitForTimeout(200);
+    await page.evaluate(async () => (await fetch(location.pathname, { cache: "no-store" })).text());
+    await frames(page, 5);
   }
 }
 

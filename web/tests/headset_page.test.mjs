@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { HEADSET, pictures, pressInRoom, put } from "./emulated_headset.mjs";
-import { open } from "./expect.mjs";
+import { frames, open } from "./expect.mjs";
 
 const NEAR = 1e-3;
 let opened;
@@ -37,7 +37,7 @@ test("who looks stands where the page looked from, turns and goes, and comes bac
   let seen = await shown();
   for (let before = null; String(before) !== String(seen); seen = await shown()) {
     before = seen;
-    await page.waitForTimeout(1000);
+    await frames(page, 30);
   }
   await press("enter VR");
   await page.getByRole("status").getByText("headset on").waitFor({ timeout: 120_000 });

@@ -189,7 +189,10 @@ async function overAPicture() {
 /** A cell of the paper over the picture of its camera, once the person is heard and works. */
 async function cellOverItsPicture(cell, camera) {
   const at = path.join(ROOT, "workstations", cell);
-  const [run, browser] = await Promise.all([running(at, "--emulated"), openBrowser({ width: 1600, height: 900 })]);
+  const [run, browser] = await Promise.all([
+    running(at, "--emulated"),
+    openBrowser({ width: 1600, height: 900 }),
+  ]);
   await show(browser, run.url);
   await browser.page.getByRole("button", { name: camera, exact: true }).click();
   await browser.page.locator(".camera-note").getByText("95 % of its error").waitFor();

@@ -11,7 +11,6 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
 from msgspec import Meta
 
 from seerob.app.emulation.wire import Faults
@@ -150,12 +149,6 @@ class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
         str, option("motion to play: an .mvnx or .bvh recording, or keyframes (.toml, library:…)")
     ] = LIBRARY
     noise: Noise = NOISE
-
-    def person_before(self) -> tuple[str, Array] | None:
-        """Who stands in the device's own world."""
-        if getattr(self, "in_step", None) is None or self.file.endswith((".mvnx", ".bvh")):
-            return None
-        return self.file, np.eye(4)
 
     def person(self) -> Person:
         """Who moves.

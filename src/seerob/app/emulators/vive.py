@@ -11,7 +11,7 @@ from seerob.app.emulation.message_sender import MessageSender, Way
 from seerob.app.emulation.motions import in_rounds
 from seerob.app.emulation.mvn_person import FIVE, WORN, Person
 from seerob.app.emulation.options import IN_ROUNDS, PersonOptions, Ready, option, port
-from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
+from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
 from seerob.protocols.tracking import mvn_pose
 from seerob.protocols.tracking.vive import PORT, Device, Devices, encode
 
@@ -110,6 +110,11 @@ class Vive(PersonOptions, frozen=True, kw_only=True):
         option("the least five for a whole body, all nine, or one on the right hand"),
     ] = "least"
     in_step: Annotated[float, option(IN_ROUNDS, "s", gt=0)] | None = None
+
+    def person_before(self) -> tuple[str, Array] | None:
+        """Who stands in the world of the lighthouses."""
+        keyframes = not self.file.endswith((".mvnx", ".bvh"))
+        return (self.file, np.eye(4)) if keyframes and self.in_step is not None else None
 
     def ready(self) -> Ready:
         """The sender."""

@@ -110,6 +110,18 @@ def test_a_workpiece_is_taken_carried_and_put_into_a_box(tmp_path):
     assert cell.at()[2] == pytest.approx(0.825, abs=2e-3), "it lies on the table"
 
 
+def test_a_box_is_filled_by_as_many_as_it_takes_and_what_is_taken_out_counts_no_more(tmp_path):
+    other = BLANK.replace('"blank"', '"other"').replace("0.25, -0.25", "0.38, -0.25")
+    cell = carried(tmp_path, PERSON + TABLE + BLANK + other + BOX + "full = 2\n")
+    cell.grab(RIGHT, "blank").go(40).grab(RIGHT).go(60)
+    assert [e.what for e in cell.events] == ["taken", "placed", "round", "taken", "placed", "round"]
+    cell.go(100, -0.6).grab(RIGHT, "other").go(80).go(100, 0.6).grab(RIGHT).go(80)
+    assert [e.what for e in cell.events[6:]] == ["taken", "placed", "round", "filled"]
+    filled = cell.events[-1]
+    assert (filled.piece, filled.where, filled.count) == ("other", "box", 1)
+    assert filled.took == pytest.approx(filled.t - cell.events[0].t)
+
+
 def test_what_is_let_go_beside_every_place_is_dropped_where_it_lies(tmp_path):
     cell = carried(tmp_path, way=0.15)
     assert cell.said() == [("taken", RIGHT, ""), ("dropped", RIGHT, "")]

@@ -18,10 +18,14 @@ import pytest
 from msgspec.structs import replace
 
 import seerob as sr
-from seerob.core.samples import BodySample, JointSample
+from emulated_rounds import rounds, standing_at
+from seerob.core.samples import BodySample, GrabSample, JointSample
 from seerob.core.snapshot import Verdict
+from seerob.description.humans import keyframes
 from seerob.recording.recording import Recording
 from seerob.recording.series import CODES
+from seerob.session.reading import read
+from seerob.session.station import Station
 
 CELLS = Path(__file__).parents[2] / "workstations"
 SLIPPED, SLIPPED_BY_CASTINGS = 0.3, 0.2
@@ -79,7 +83,7 @@ class Cycle(NamedTuple):
 
 CYCLES = {
     "motor_station": Cycle(
-        26,
+        34,
         {"tool speed": 0.33, "arm energy": 0.46},
         {"robot – operator": 0.1},
         ("reaches to the motor",),
@@ -87,7 +91,7 @@ CYCLES = {
         faster,
     ),
     "assembly_line": Cycle(
-        20, {"tool speed": 0.39, "arm energy": 0.57}, {}, ("reaches to the line",), "tool speed", faster
+        24, {"tool speed": 0.39, "arm energy": 0.57}, {}, ("reaches to the line",), "tool speed", faster
     ),
     "empty_room": Cycle(
         20,
@@ -121,7 +125,7 @@ CYCLES = {
         faster,
     ),
     "giant_niryo": Cycle(
-        50,
+        76,
         {"fastest point": 2.1},
         {"robot – operator": 0.5},
         ("robot over the belt",),
@@ -183,7 +187,8 @@ PIECES = {
     "two_places": {("gripper", "on_the_belt"): (5.7, 0.3)},
     "giant_niryo": {
         ("gripper", "on_the_belt"): (5.6, 0.5),
-        ("operator/right_hand", "in_the_box"): (4.9, 0.5),
+        ("operator/right_hand", "in_box_a"): (4.9, 0.5),
+        ("operator/right_hand", "in_box_b"): (4.9, 0.5),
     },
 }
 """How long after it was taken a casting is placed, by who took it and where to: [s] and tolerance."""
@@ -198,3 +203,33 @@ def test_castings_go_their_way(run):
         assert found, (by, where)
         assert found == pytest.approx([took] * len(found), abs=off)
     assert not [event for event in events if event.what in ("torn", "dropped", "refused")]
+
+
+@pytest.mark.soak
+def test_two_boxes_are_filled_in_rounds_of_twelve_seconds_whatever_the_machine():
+    """Of giant_niryo, sample by sample: robot and PLC as they are emulated, the person by their keyframes."""
+    file = read(CELLS / "giant_niryo")
+    station = Station(replace(file, safety=(), ergonomics=()))
+    (source,) = (s for s in file.sources if getattr(s, "human", ""))
+    worn = next(e for e in file.emulators if getattr(e, "grabs", ""))
+    person = station.model.mechanisms[source.human].description
+    played = keyframes.sample(keyframes.read(worn.file, person, folder=station.model.folder), person, 100)
+
+    def at(t):
+        return standing_at(played.q[round(100 * t) % len(played.q)], source.at)
+
+    grabs = [
+        GrabSample(source="room", seq=k, t=t, target=grab.hand, piece=grab.piece)
+        for k, (t, grab) in enumerate(worn.grabbed())
+    ]
+    feed = rounds(station, 62.0, people={source.human: at}, grabs=grabs)
+    events = station.run(feed=feed, end=62.0).results.events
+    filled = [(e.where, e.count) for e in events if e.what == "filled"]
+    assert filled == [("in_box_a", 1), ("in_box_b", 2)]
+    _, *took = [e.took for e in events if e.what == "round"]
+    assert took == pytest.approx([12.0] * 3, abs=0.3)
+    for (by, where), (seconds, off) in PIECES["giant_niryo"].items():
+        found = [e.took for e in events if (e.what, e.by, e.where) == ("placed", by, where)]
+        assert len(found) == (4 if by == "gripper" else 2)
+        assert found == pytest.approx([seconds] * len(found), abs=off)
+    assert not [e for e in events if e.what in ("torn", "dropped", "refused")]

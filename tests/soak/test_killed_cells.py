@@ -173,3 +173,13 @@ def test_a_killed_headset_of_one_who_looks_on_changes_nothing_but_who_is_there(t
     assert before <= after.keys()
     there = {visitor.device for _, visitor in recording.visits() if visitor.event == "there"}
     assert there == {"ar", "vr"} - {("ar", "vr")[which - 3]}
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+@pytest.mark.parametrize("cell", ["motor_station", "assembly_line"])
+def test_a_killed_camera_changes_nothing_that_is_said(tmp_path, cell):
+    recording = run_and_kill(cell, 2, tmp_path / "run")
+    before, after = decided(recording, KILLED_AFTER, KILLED_AFTER)
+    assert {"tool speed", "arm energy"} <= before
+    assert before <= after.keys()

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "d9ba5c03e0a77381";
+export const SCHEMA = "e277352cfc9a3c7b";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -550,8 +550,8 @@ export interface Event {
   t: number;
   /**
    * `taken`, `handed` (another hand has it now), `torn` (out of a hand or gripper), `placed`,
-   * `dropped`, `returned` (to where it begins again), `refused` (a hand could not take it) or `round`
-   * (a round of work ended).
+   * `dropped`, `returned` (to where it begins again), `refused` (a hand could not take it), `round`
+   * (a round of work ended) or `filled` (it was the last that a place takes).
    */
   what: string;
   piece: string;
@@ -559,8 +559,13 @@ export interface Event {
   by?: string;
   /** Place where it was put, or from which it was taken; empty where it is none. */
   where?: string;
-  /** Of `placed` and `dropped` the time since it was taken [s], of `round` its cycle time [s]. */
+  /**
+   * Of `placed` and `dropped` the time since it was taken [s], of `round` its cycle time [s], of
+   * `filled` the time since that place was filled before, or since anything was taken first [s].
+   */
   took?: number | null;
+  /** Of `filled` how many places have been filled so far, in all. */
+  count?: number;
   /** Why it was refused or torn out. */
   reason?: string;
 }

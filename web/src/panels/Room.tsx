@@ -4,7 +4,7 @@ import { controls, mayPull, press, pull, refused, release, standsAt } from "../d
 import { soFar } from "../page_state";
 import type { ControlInfo } from "../wire";
 import { said } from "../words";
-import { eventLine } from "./event_line";
+import { eventFigures, eventLine } from "./event_line";
 
 export function Room() {
   const events = soFar.value?.events ?? [];
@@ -23,6 +23,9 @@ export function Room() {
       <section aria-label={said("Events")}>
         <h2>{said("Events")}</h2>
         {events.length === 0 && <p>{said("Nothing has happened yet.")}</p>}
+        {eventFigures(events).map((text) => (
+          <p key={text}>{text}</p>
+        ))}
         <ol class="events">
           {events.map((event, k) => (
             <li key={k}>{eventLine(event)}</li>

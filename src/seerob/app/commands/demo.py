@@ -33,7 +33,7 @@ SHIPPED = {
     "motor_station": "live: an LBR iiwa and a person with trackers, both emulated",
     "assembly_line": "live: a UR10 and a person whom a depth camera sees, both emulated",
     "empty_room": "live: a UR5 in an empty room, its line virtual, a tracker on a hand; emulated",
-    "giant_niryo": "live: a Niryo One ten times as large, a person in VR who fills a box; emulated",
+    "giant_niryo": "live: a Niryo One ten times as large, a person in VR who fills boxes; emulated",
     "three_robots": "live: two LBR iiwa and a UR10 on a line, a visitor with a headset, who is emulated",
     "niryo_picking": "live: a Niryo One and a conveyor; virtual castings are picked and ride away; emulated",
     "two_places": "live: a robot at one place, a captured person at another, visitors of both; emulated",

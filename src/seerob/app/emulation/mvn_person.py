@@ -35,6 +35,8 @@ WORN = {
 """Roles and the segments that they sit on."""
 FIVE = ("waist", "left_foot", "right_foot", "left_hand", "right_hand")
 """The least with which a whole body is followed."""
+ARMS = ("left_elbow", "right_elbow")
+"""Of a person of whom only arms are followed."""
 RATE = 120.0
 """Of keyframes [Hz]."""
 _NAMES = {

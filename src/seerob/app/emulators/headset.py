@@ -272,7 +272,7 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
             port=self.port,
             rate=self.rate,
             body=self.body,
-            grabs=tuple(self._grabs()),
+            grabs=tuple(self.grabbed()),
             in_step=self.in_step,
             introduction=self._introduction() if self.name else None,
         )
@@ -297,7 +297,12 @@ class Headset(PersonOptions, frozen=True, kw_only=True):
             turn=(w, x, y, z),
         )
 
-    def _grabs(self) -> Iterator[tuple[float, Grab]]:
+    def grabbed(self) -> Iterator[tuple[float, Grab]]:
+        """What hands take and let go, and when [s].
+
+        Raises:
+            InputError: One is none.
+        """
         for text in filter(None, map(str.strip, self.grabs.split(","))):
             match text.split():
                 case [t, hand, *piece] if len(piece) < 2 and _number(t) is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from seerob.app.emulation.message_sender import MessageSender, Way
 from seerob.app.emulation.motions import in_rounds
-from seerob.app.emulation.mvn_person import FIVE, WORN, Person
+from seerob.app.emulation.mvn_person import ARMS, FIVE, WORN, Person
 from seerob.app.emulation.options import IN_ROUNDS, PersonOptions, Ready, option, port
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
 from seerob.protocols.tracking import mvn_pose
@@ -106,8 +106,8 @@ class Vive(PersonOptions, frozen=True, kw_only=True):
     port: Annotated[int, port("port to send to, or to listen at with --websocket")] = PORT
     websocket: Annotated[bool, option("let listeners connect; else UDP")] = False
     trackers: Annotated[
-        Literal["least", "all", "hand"],
-        option("the least five for a whole body, all nine, or one on the right hand"),
+        Literal["least", "all", "arms", "hand"],
+        option("the least five for a whole body, all nine, two on the arms, or one on the right hand"),
     ] = "least"
     in_step: Annotated[float, option(IN_ROUNDS, "s", gt=0)] | None = None
 
@@ -121,7 +121,7 @@ class Vive(PersonOptions, frozen=True, kw_only=True):
         person = self.person()
         if self.in_step is not None:
             person = in_rounds(person, self.in_step)
-        roles = {"least": FIVE, "all": tuple(WORN), "hand": ("right_hand",)}[self.trackers]
+        roles = {"least": FIVE, "all": tuple(WORN), "arms": ARMS, "hand": ("right_hand",)}[self.trackers]
         trackers = worn(person, roles)
         to = None if self.websocket else (self.to, self.port)
         server = ViveSender(trackers, to=to, host=self.host, port=self.port, rate=self.rate)

@@ -15,6 +15,7 @@ WORDS = {
     "dropped": word("dropped"),
     "refused": word("not taken"),
     "round": word("round ended"),
+    "filled": word("filled"),
 }
 
 
@@ -31,6 +32,8 @@ def events_section(log: ResultLog) -> Html | None:
             n=len(rounds), mean=f"{mean:.2f}", least=f"{least:.2f}", most=f"{most:.2f}",
         )  # fmt: skip
         parts.append(tag("p", text))
+    if filled := [event for event in log.events if event.what == "filled"]:
+        parts.append(tag("p", said("{n} boxes or other places filled.", n=filled[-1].count)))
     if len(log.events) == MOST_EVENTS:
         parts.append(tag("p", said("The first {n} events; later ones are in the recording.", n=MOST_EVENTS)))
     head = [

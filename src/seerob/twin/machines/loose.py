@@ -185,6 +185,10 @@ class Loose:
         self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
         self._rounds: dict[str, float] = {}
         """When the last round ended at each place [s]."""
+        self._filling: dict[str, int] = {}
+        """How many workpieces lie in each place that they fill."""
+        self._filled: list[float] = []
+        """When places were filled [s]."""
         self._first: float | None = None
         """When anything was taken first [s]."""
         self._before: dict[str, tuple[Array, Array]] = {}
@@ -374,6 +378,8 @@ class Loose:
             self._say(t, "handed", piece, by=hand)
         else:
             self._say(t, "taken", piece, by=hand, where=piece.place)
+            if self._filling.get(piece.place):
+                self._filling[piece.place] -= 1
             piece.taken = t
             self._first = t if self._first is None else self._first
         piece.hands[hand] = spring
@@ -548,9 +554,22 @@ class Loose:
             self._back.append((piece, place.returns))
             self._say(t, "returned", piece, where=place.returns)
         if place.ends_round:
-            begun = self._rounds.get(place.name, self._first or 0.0)
+            before = max(self._rounds.values(), default=self._first or 0.0)
+            begun = self._rounds.get(place.name, before)
             self._rounds[place.name] = t
             self._say(t, "round", piece, by=piece.by, where=place.name, took=t - begun)
+        if place.full is not None:
+            self._fill(place.name, place.full, piece, t)
+
+    def _fill(self, place: str, full: int, piece: _Piece, t: float) -> None:
+        """One more lies in a place that takes so many; the next ones begin another."""
+        self._filling[place] = self._filling.get(place, 0) + 1
+        if self._filling[place] < full:
+            return
+        self._filling[place] = 0
+        begun = self._filled[-1] if self._filled else self._first or 0.0
+        self._filled.append(t)
+        self._say(t, "filled", piece, by=piece.by, where=place, took=t - begun, count=len(self._filled))
 
     def _say(
         self,
@@ -562,8 +581,11 @@ class Loose:
         where: str = "",
         took: float | None = None,
         reason: str = "",
+        count: int = 0,
     ) -> None:
-        said = Event(t=t, what=what, piece=piece.name, by=by, where=where, took=took, reason=reason)
+        said = Event(
+            t=t, what=what, piece=piece.name, by=by, where=where, took=took, reason=reason, count=count
+        )
         self.events.append(said)
 
     def said(self) -> tuple[Event, ...]:

@@ -28,3 +28,5 @@ class Place(Table, frozen=True, kw_only=True):
     """Place in whose pose a workpiece that comes to rest here is at the next tick: an endless supply."""
     ends_round: bool = False
     """Whether a workpiece that is put here ends a round, of which the cycle time is told."""
+    full: Annotated[int, Meta(ge=1, le=1000)] | None = None
+    """How many workpieces fill it: then an event says so, how often it was filled and how long that took."""

@@ -12,21 +12,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from seerob.app.emulation.motions import played, values
-from seerob.app.emulation.options import RobotOptions
-from seerob.core.samples import JointSample, SignalSample
+from emulated_rounds import rounds, standing_at
 from seerob.core.snapshot import Verdict
 from seerob.description.humans.posture import posture
-from seerob.devices.live.listening import LiveSource
 from seerob.session.reading import read
 from seerob.session.station import Station
 
 CELLS = Path(__file__).parents[1] / "workstations"
 TOLERANCE = 0.1
 """Of figures, as READMEs say."""
-TICK = 0.01
-HEADING = 3
-"""Among the joints of a person, after the place of the waist."""
 
 
 class Cell(NamedTuple):
@@ -59,52 +53,22 @@ ROUNDS = {
 }
 
 
-def moved(station, cell, *, mutated):
-    """What everybody does: joint values of a time [s], by name."""
-    ways, emulators = {}, [e for e in station.workstation.emulators if isinstance(e, RobotOptions)]
-    for source, opened in station.sources:
-        if not isinstance(source, LiveSource):
-            said = list(opened.samples)
-            ways[source.target()] = played([s.t for s in said], [s.q for s in said], [s.qd for s in said])
-        elif getattr(source, "robot", ""):
-            robot = emulators.pop(0)
-            path = str(station.model.folder / robot.waypoints)
-            ways[source.robot], _ = replace(robot, waypoints=path, in_step=None).motion(robot.target())
-        elif getattr(source, "human", "") and any(cell.nearer):
-            standing = posture(station.model.mechanisms[source.human].description, "standing").copy()
-            standing[:3] += np.add(source.at.position, cell.nearer if mutated else 0.0)
-            standing[HEADING] = source.at.rpy[2]
-            still = tuple(standing.tolist()), (0.0,) * len(standing)
-            ways[source.human] = lambda _, still=still: still
-    return ways
-
-
 def judged(name, *, mutated):
     """What the criteria of a cell come to that are asked here, of a round as it is or of a mutation."""
-    cell = ROUNDS[name]
+    cell, file = ROUNDS[name], read(CELLS / name)
     pace = cell.faster if mutated else 1.0
-    file = read(CELLS / name)
     safety = tuple(c for c in file.safety if c.name in {*cell.most, cell.kept})
     engine = replace(file.engine, physics=False)
     bare = replace(file, safety=safety, ergonomics=(), engine=engine, workpieces=(), places=(), targets=())
-    station = Station(bare)
-    tables = [values(CELLS / name / e.values) for e in file.emulators if getattr(e, "values", None)]
-    ways = moved(station, cell, mutated=mutated)
-
-    def heard():
-        for k in range(int(cell.seconds / pace / TICK) + 1):
-            t = k * TICK
-            row: list[JointSample | SignalSample] = []
-            for who, way in ways.items():
-                q, qd = way(pace * t)
-                qd = tuple(pace * v for v in qd)
-                row.append(JointSample(source="told", target=who, seq=k, t=t, q=q, qd=qd))
-            for table in tables:
-                said = {path.lower(): 1e-3 * table.value(path, t) for path in table.columns}
-                row.append(SignalSample(source="plc", seq=k, t=t, values=said))
-            yield tuple(row)
-
-    return station.run(feed=heard(), end=cell.seconds / pace).results
+    station, people = Station(bare), {}
+    for source in file.sources if any(cell.nearer) else ():
+        if human := getattr(source, "human", ""):
+            still = posture(station.model.mechanisms[human].description, "standing").copy()
+            at = tuple(np.add(source.at.position, cell.nearer if mutated else 0.0).tolist())
+            stands = standing_at(still, replace(source.at, position=at))
+            people[human] = lambda _, stands=stands: stands
+    end = cell.seconds / pace
+    return station.run(feed=rounds(station, end, pace=pace, people=people), end=end).results
 
 
 @pytest.mark.parametrize("name", ROUNDS)

@@ -561,7 +561,7 @@ export interface Event {
   where?: string;
   /**
    * Of `placed` and `dropped` the time since it was taken [s], of `round` its cycle time [s], of
-   * `filled` the time since that place was filled before, or since anything was taken first [s].
+   * `filled` the time since a place was filled before, or since anything was taken first [s].
    */
   took?: number | null;
   /** Of `filled` how many places have been filled so far, in all. */

@@ -1,6 +1,7 @@
 """Being here puts this folder on the path, so that tests can ``from oracles.… import …``."""
 
 import gc
+import os
 
 import pytest
 from hypothesis import settings
@@ -49,3 +50,19 @@ def pytest_xdist_make_scheduler(config, log):
             return nodeid if file.endswith(APART) else file
 
     return ByFile(config, log)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _gaps_at_joints_are_kept(tmp_path_factory):
+    """How fast parts close at a joint is worked out once for all workers: 2.5 s of a UR10.
+
+    Whoever runs a cell finds that kept at the second start.
+    """
+    from seerob.criteria.contact import joint_gaps
+
+    base = tmp_path_factory.getbasetemp()
+    kept = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "gaps"
+    rates = joint_gaps._rates
+    joint_gaps._rates = lambda *given: rates(*given[:-1], given[-1] or kept)
+    yield
+    joint_gaps._rates = rates

@@ -2,6 +2,7 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -15,13 +16,19 @@ STRUCTS = [c for c in vars(snapshot).values() if isinstance(c, type) and issubcl
 STRUCTS.remove(msgspec.Struct)
 
 
+@cache
+def typescript() -> str:
+    """What is written, once: each time it takes a third of a second."""
+    return wire.typescript()
+
+
 def test_the_file_in_the_repository_is_current():
     assert wire.is_current(), "run `make wire`"
 
 
 @pytest.mark.parametrize("cls", STRUCTS, ids=lambda c: c.__name__)
 def test_an_interface_has_exactly_the_keys_that_are_encoded(cls):
-    body = re.search(rf"^export interface {cls.__name__} {{\n(.*?)^}}", wire.typescript(), re.M | re.S)[1]
+    body = re.search(rf"^export interface {cls.__name__} {{\n(.*?)^}}", typescript(), re.M | re.S)[1]
     declared = re.findall(r"^  (\w+)\??:", body, re.M)
     tag = ["type"] if cls.__struct_config__.tag else []
     assert declared == tag + [f.encode_name for f in msgspec.structs.fields(cls)]
@@ -34,9 +41,7 @@ def test_encoded_messages_have_the_keys_of_their_interface():
         snapshot.Snapshot(seq=1, t=0.0, poses=b"", results=(snapshot.Result(name="a"),)),
     ):
         data = msgspec.msgpack.decode(msgspec.msgpack.encode(message))
-        body = re.search(rf"interface {type(message).__name__} {{\n(.*?)^}}", wire.typescript(), re.M | re.S)[
-            1
-        ]
+        body = re.search(rf"interface {type(message).__name__} {{\n(.*?)^}}", typescript(), re.M | re.S)[1]
         left_out = {
             field.name
             for field in msgspec.structs.fields(message)
@@ -49,7 +54,7 @@ def test_encoded_messages_have_the_keys_of_their_interface():
 def test_the_page_knows_the_order_of_all_that_is_an_array_on_the_wire():
     arrays = {c for c in STRUCTS if c.__struct_config__.array_like}
     assert set(wire.ARRAYS) == arrays
-    orders = re.search(r"^export const FIELDS = {\n(.*?)^}", wire.typescript(), re.M | re.S)[1]
+    orders = re.search(r"^export const FIELDS = {\n(.*?)^}", typescript(), re.M | re.S)[1]
     found = dict(re.findall(r"^  (\w+): (\[.*\]),$", orders, re.M))
     for cls in arrays:
         tag = cls.__struct_config__.tag
@@ -66,7 +71,7 @@ def test_the_page_knows_the_order_of_all_that_is_an_array_on_the_wire():
 
 
 def test_types_map_to_what_a_decoder_gives():
-    text = wire.typescript()
+    text = typescript()
     assert "  poses: Uint8Array;" in text
     assert "  verdict: Verdict | null;" in text
     assert "  markers: Marker[];" in text
@@ -79,7 +84,7 @@ def test_types_map_to_what_a_decoder_gives():
 
 
 def test_every_docstring_of_a_field_goes_along():
-    text = " ".join(wire.typescript().replace("*", " ").split())
+    text = " ".join(typescript().replace("*", " ").split())
     source = Path(snapshot.__file__).read_text(encoding="utf-8")
     docs = re.findall(r'^    """(.*?)"""$', source, re.M | re.S)
     assert len(docs) > 50
@@ -135,7 +140,7 @@ def test_typescript_accepts_it(tmp_path):
     node = shutil.which("node")
     if not (tsc.exists() and node):
         # The web checks compile the page with this file; here it is only an early word.
-        assert wire.typescript().count("{") == wire.typescript().count("}")
+        assert typescript().count("{") == typescript().count("}")
         return
     done = subprocess.run(
         [node, str(tsc.resolve()), "--noEmit", "--strict", "--target", "es2022", str(wire.FILE)],

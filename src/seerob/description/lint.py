@@ -14,6 +14,7 @@ import numpy as np
 
 from seerob.core.errors import Problem
 from seerob.core.quantities import LENGTHS
+from seerob.core.remembered import remembered
 from seerob.core.shapes import Solid
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
@@ -195,6 +196,7 @@ def odd_density(density: float) -> str:
     )
 
 
+@remembered
 def too_light(link: Link) -> str:
     """Why a body of a link's shape weighs more than is said; empty when it may not, or has no volume."""
     if link.inertial is None or not link.solids or link.inertial.origin is Origin.GIVEN:
@@ -205,6 +207,7 @@ def too_light(link: Link) -> str:
     return f"{link.inertial.mass:.3g} kg in {volume:.3g} m³ is lighter than any foam: give it in masses"
 
 
+@remembered
 def as_good_as_a_point(link: Link) -> str:
     """Why the mass of a link is spread farther than its file says; empty when it need not be, or is little.
 
@@ -224,6 +227,7 @@ def _gyration(inertial: Inertial) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(inertial.inertia).max() / inertial.mass))
 
 
+@remembered
 def filled(solid: Solid) -> float:
     """What a solid encloses [m³]; 0 where its mesh is open."""
     if solid.mesh is None:

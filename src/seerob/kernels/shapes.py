@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ class Shapes:
             for solid in solids:
                 found = None if solid.mesh is None else known.get(id(solid.mesh))
                 if found is None:
-                    core = _make(solid, cache)
+                    core = _made(solid, cache)
                     tree = core.tree
                     size = np.array([0, 0, len(core.probes)])
                     if tree is not None:
@@ -138,6 +139,18 @@ class _Made:
     ball: Array
     corners: Array
     corner_count: int
+
+
+_KNOWN: WeakKeyDictionary[Solid, _Made] = WeakKeyDictionary()
+"""Of solids that live; nobody changes one, and cells share those of the library."""
+
+
+def _made(solid: Solid, cache: Path | None) -> _Made:
+    """A solid as the kernel wants it, made once."""
+    found = _KNOWN.get(solid)
+    if found is None:
+        found = _KNOWN[solid] = _make(solid, cache)
+    return found
 
 
 def _make(solid: Solid, cache: Path | None) -> _Made:

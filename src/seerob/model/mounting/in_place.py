@@ -340,12 +340,19 @@ class _Home:
 
     def depth(self, outer: Body, inner: Body) -> float:
         """How deep one reaches into the other [m]."""
+        if not _meet(self.box([outer]), self.box([inner])):
+            return 0.0
         if self.distance((outer.index,), (inner.index,), 0.1) > 0:
             return 0.0
         pairs = [(outer.index, inner.index), (inner.index, outer.index)]
         asked = Depths(self.shapes).ask(self.rotations, self.positions, pairs)
         # Of a thin plate through a body, only the body says how deep.
         return max(found.at_least for found in asked)
+
+
+def _meet(one: Array, other: Array) -> bool:
+    """Whether two boxes, as of `_Home.box`, have a point in common: what is in boxes that do not is apart."""
+    return bool((one[0] <= other[1]).all() and (one[1] >= other[0]).all())
 
 
 def _seen(bodies: Sequence[Body]) -> list[Body]:
@@ -430,7 +437,7 @@ def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quan
                 if owner == table.name or not own:
                     continue
                 a, b = [body.index for body in own], [body.index for body in bodies]
-                if place.distance(a, b, 0.1) > 0:
+                if not _meet(place.box(own), place.box(bodies)) or place.distance(a, b, 0.1) > 0:
                     continue
                 deep, inner, outer = max(
                     ((place.depth(y, x), x.name, y.name) for x in own for y in bodies),

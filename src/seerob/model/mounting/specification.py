@@ -10,6 +10,7 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.quantities import Pose
+from seerob.core.remembered import remembered
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform, wxyz_from_rotation
@@ -163,8 +164,14 @@ def extreme_points(solids: Sequence[Solid]) -> tuple[Array, float]:
                 corner if len(corner) == 2 else np.vstack([corner, corner[1] + corner[2] - corner[0]])
             )
             continue
-        vertices = solid.mesh.vertices[np.unique(solid.mesh.faces)]
-        # Flat or too few points: all of them are as good.
-        faces = convex_hull(vertices)
-        points.append(vertices if faces is None else vertices[np.unique(faces)])
+        points.append(_hull_corners(solid.mesh))
     return (np.vstack(points), radius) if points else (np.zeros((0, 3)), 0.0)
+
+
+@remembered
+def _hull_corners(mesh: Mesh) -> Array:
+    """Corners of the convex hull of a mesh [m], shape (k, 3)."""
+    vertices = mesh.vertices[np.unique(mesh.faces)]
+    faces = convex_hull(vertices)
+    # Flat or too few points: all of them are as good.
+    return vertices if faces is None else vertices[np.unique(faces)]

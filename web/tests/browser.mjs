@@ -55,7 +55,7 @@ export async function openBrowser({ width = 960, height = 640, flags = [] } = {}
     viewport: { width, height },
   });
   // For whatever is waited for: a loaded machine takes long, and a test that fails may.
-  context.setDefaultTimeout(120_000);
+  context.setDefaultTimeout(240_000);
   const page = context.pages()[0] ?? (await context.newPage());
   const complaints = [];
   const outside = [];

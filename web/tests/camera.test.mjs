@@ -72,7 +72,7 @@ before(async () => {
     break;
   }
   run.stdout.resume();
-  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 120_000 });
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 240_000 });
 });
 
 after(async () => {
@@ -90,7 +90,7 @@ after(async () => {
 const note = () => page.locator(".camera-note");
 const look = async (name) => {
   await page.getByRole("button", { name, exact: true }).click();
-  await note().getByText(name, { exact: true }).waitFor({ timeout: 60_000 });
+  await note().getByText(name, { exact: true }).waitFor({ timeout: 240_000 });
 };
 const room = () => page.locator(".room canvas").boundingBox();
 
@@ -129,7 +129,7 @@ const BALLS = {
 };
 
 async function registered() {
-  await note().getByText("95 % of its error at the board").waitFor({ timeout: 60_000 });
+  await note().getByText("95 % of its error at the board").waitFor({ timeout: 240_000 });
   for (const name of ["middle", "corner", "other", "edge"]) {
     let found;
     for (let k = 0; k < 60; k += 1) {
@@ -147,7 +147,7 @@ async function registered() {
 }
 
 test("balls are drawn where a webcam sees them, and hidden by what is real", {
-  timeout: 300_000,
+  timeout: 900_000,
 }, async () => {
   assert.equal(Object.values(places).flat().every(Number.isFinite), true);
   await look("webcam");
@@ -156,32 +156,32 @@ test("balls are drawn where a webcam sees them, and hidden by what is real", {
 });
 
 test("and where a network camera sees them; without pictures of the present nothing is drawn", {
-  timeout: 300_000,
+  timeout: 900_000,
 }, async () => {
   await look("network");
   await registered();
   films = false;
   await note()
     .getByText(/its picture stands still|its camera: timed out/)
-    .waitFor({ timeout: 60_000 });
+    .waitFor({ timeout: 240_000 });
   assert.equal((await middles("middle")).red.n, 0);
   films = true;
-  await note().getByText("95 % of its error").waitFor({ timeout: 60_000 });
+  await note().getByText("95 % of its error").waitFor({ timeout: 240_000 });
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });
 
 test("a camera of unknown or bad pose shows its picture alone, and says so", {
-  timeout: 300_000,
+  timeout: 900_000,
 }, async () => {
   for (const [name, why] of [
     ["unplaced", "where it stands is not known"],
     ["worse", "off by 200 mm at the board, more than 50 mm"],
   ]) {
     await look(name);
-    await note().getByText(why).waitFor({ timeout: 60_000 });
+    await note().getByText(why).waitFor({ timeout: 240_000 });
     assert.equal(await page.evaluate(() => window.seerob.occludes("plate")), true);
   }
   await page.getByRole("button", { name: "worse", exact: true }).click();
-  await note().waitFor({ state: "detached", timeout: 60_000 });
+  await note().waitFor({ state: "detached", timeout: 240_000 });
   assert.equal(await page.evaluate(() => window.seerob.occludes("plate")), false);
 });

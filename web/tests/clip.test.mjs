@@ -50,7 +50,7 @@ after(async () => {
 
 async function taken(name, file) {
   const [download] = await Promise.all([
-    page.waitForEvent("download", { timeout: 60_000 }),
+    page.waitForEvent("download", { timeout: 240_000 }),
     page.getByRole("button", { name, exact: true }).click(),
   ]);
   const to = path.join(folder, file);
@@ -92,14 +92,14 @@ test("a clip has every picture that was drawn, in its time, ends with what is sh
   await settled(page);
   const view = page.getByRole("button", { name: "View", exact: true });
   await view.click();
+  const begun = Date.now();
   await page.getByRole("button", { name: "Clip", exact: true }).click();
   await page.getByRole("button", { name: "End the clip" }).waitFor();
-  const begun = Date.now();
   // A panel that is closed meanwhile ends nothing.
   await view.click();
   const from = await page.evaluate(() => window.seerob.t);
   await page.keyboard.press("Space");
-  await page.waitForFunction((t) => window.seerob.t > t + 1.5, from, { timeout: 60_000 });
+  await page.waitForFunction((t) => window.seerob.t > t + 1.5, from, { timeout: 240_000 });
   await page.keyboard.press("Space");
   await settled(page);
   await view.click();

@@ -28,8 +28,8 @@ after(async () => {
 
 const enter = async (page, scale) => {
   await page.getByLabel("my size").selectOption(String(scale));
-  await page.getByRole("button", { name: "enter VR", exact: true }).click({ timeout: 120_000 });
-  await page.getByRole("status").getByText("headset on").waitFor({ timeout: 120_000 });
+  await page.getByRole("button", { name: "enter VR", exact: true }).click({ timeout: 240_000 });
+  await page.getByRole("status").getByText("headset on").waitFor({ timeout: 240_000 });
 };
 
 /** Where a point of a visitor's own room is in the world (z up), as their page has it. */
@@ -64,7 +64,7 @@ async function sees(page, head, hand, near) {
         return window.off !== null && Math.max(...window.off) <= most;
       },
       [head, hand, near],
-      { timeout: 60_000 },
+      { timeout: 240_000 },
     )
     .catch(async (error) => {
       throw new Error(
@@ -73,7 +73,7 @@ async function sees(page, head, hand, near) {
     });
 }
 
-test("visitors at scales 1 and 10 see each other where they are", { timeout: 300_000 }, async () => {
+test("visitors at scales 1 and 10 see each other where they are", { timeout: 900_000 }, async () => {
   await Promise.all([enter(small, 1), enter(large, 10)]);
   const [head, hand] = [
     [0.3, 1.7, 0.2],
@@ -104,10 +104,10 @@ test("visitors at scales 1 and 10 see each other where they are", { timeout: 300
 });
 
 test("who follows looks from where the other's head is, until they are gone", {
-  timeout: 300_000,
+  timeout: 900_000,
 }, async () => {
   await small.evaluate(() => window.headset.activeSession.end());
-  await small.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 120_000 });
+  await small.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });
   await small.locator("details.company summary").click();
   await small.getByRole("button", { name: "follow", exact: true }).click();
   const [there] = await small.evaluate(() => window.seerob.others);
@@ -122,10 +122,10 @@ test("who follows looks from where the other's head is, until they are gone", {
       return Math.hypot(x - box.left - box.width / 2, y - box.top - box.height / 2) < 8;
     },
     ahead,
-    { timeout: 60_000 },
+    { timeout: 240_000 },
   );
   await other.close();
   other = null;
-  await small.waitForFunction(() => window.seerob.others.length === 0, null, { timeout: 60_000 });
-  await small.locator("details.company").waitFor({ state: "detached", timeout: 60_000 });
+  await small.waitForFunction(() => window.seerob.others.length === 0, null, { timeout: 240_000 });
+  await small.locator("details.company").waitFor({ state: "detached", timeout: 240_000 });
 });

@@ -4,7 +4,7 @@ import { createInterface } from "node:readline";
 import { python } from "./python.mjs";
 
 /** An edit is checked as the whole file is; a loaded machine takes its time. */
-const PATIENCE_MS = 60_000;
+const PATIENCE_MS = 240_000;
 
 /**
  * Edit the workstation of a folder.

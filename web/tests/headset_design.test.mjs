@@ -142,7 +142,7 @@ async function save() {
 }
 
 test("a scanner is put elsewhere by hand, back by undo, and saved as one line", {
-  timeout: 600_000,
+  timeout: 900_000,
 }, async () => {
   await press("design");
   // By its field, in which the hand is: beams go through it.
@@ -160,7 +160,7 @@ test("a scanner is put elsewhere by hand, back by undo, and saved as one line", 
   assert.equal(await save(), CELL.replace("[0.5, -1.2, 0.3]", "[0.8, -1.4, 0.3]"));
 });
 
-test("a turned hand turns a table about one axis of the cell", { timeout: 600_000 }, async () => {
+test("a turned hand turns a table about one axis of the cell", { timeout: 900_000 }, async () => {
   const before = saved();
   await press("turn");
   await above([1.4, 0, 0.7]);
@@ -181,7 +181,7 @@ test("a turned hand turns a table about one axis of the cell", { timeout: 600_00
 });
 
 test("a waypoint is taught by carrying the tool, and refused where the arm does not reach", {
-  timeout: 600_000,
+  timeout: 900_000,
 }, async () => {
   const before = saved();
   await press("teach");
@@ -205,7 +205,7 @@ test("a waypoint is taught by carrying the tool, and refused where the arm does 
   await press("design");
 });
 
-test("the ruler asks the engine for the least distance of two surfaces", { timeout: 600_000 }, async () => {
+test("the ruler asks the engine for the least distance of two surfaces", { timeout: 900_000 }, async () => {
   await press("ruler");
   for (const point of [
     [1.4, 0, 0.7],

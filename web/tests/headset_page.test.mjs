@@ -17,11 +17,11 @@ before(async () => {
 
 after(() => opened?.close());
 
-const press = (name) => page.getByRole("button", { name, exact: true }).click({ timeout: 120_000 });
+const press = (name) => page.getByRole("button", { name, exact: true }).click({ timeout: 240_000 });
 const visited = (point) => page.evaluate((p) => window.seerob.visited(p), point);
 const leave = async () => {
   await page.evaluate(() => window.headset.activeSession.end());
-  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 120_000 });
+  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });
 };
 const push = (side, x, y) =>
   page.evaluate(([s, a, b]) => window.headset.controllers[s].updateAxes("thumbstick", a, b), [side, x, y]);
@@ -40,7 +40,7 @@ test("who looks stands where the page looked from, turns and goes, and comes bac
     await frames(page, 30);
   }
   await press("enter VR");
-  await page.getByRole("status").getByText("headset on").waitFor({ timeout: 120_000 });
+  await page.getByRole("status").getByText("headset on").waitFor({ timeout: 240_000 });
   await put(page, [0.3, 1.7, 0.2], [0.3, 1.2, 0.2], [0, -1, -1]);
   await pictures(page, 3);
   const head = await visited([0.3, 1.7, 0.2]);
@@ -73,7 +73,7 @@ test("who looks stands where the page looked from, turns and goes, and comes bac
       return Math.hypot(a - x, b - y) < 0.5;
     },
     seen,
-    { timeout: 60_000 },
+    { timeout: 240_000 },
   );
   assert.deepEqual(browser.complaints, []);
 });
@@ -97,7 +97,7 @@ test("what one points at is selected with the trigger", async () => {
   await pictures(page, 4);
   await page.evaluate(() => window.headset.controllers.right.updateButtonValue("trigger", 0));
   await pictures(page, 4);
-  await page.locator(".properties h2").waitFor({ timeout: 60_000 });
+  await page.locator(".properties h2").waitFor({ timeout: 240_000 });
   await leave();
 });
 
@@ -120,14 +120,14 @@ test("the menu at the wrist raises who sits, changes hands and ends the visit", 
   await pressIn("body map");
   assert.equal(await page.evaluate(() => localStorage.getItem("xr.seated")), "off");
   await pressIn("leave");
-  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 60_000 });
+  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });
   assert.deepEqual(browser.complaints, []);
 });
 
 test("whoever is a person offers what the headset sees, and hears when nothing waits for it", async () => {
   await press("be operator in VR");
   const answer = page.getByText("nothing in this run waits for a headset of 'operator'");
-  await answer.waitFor({ timeout: 120_000 });
+  await answer.waitFor({ timeout: 240_000 });
   await leave();
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });

@@ -74,7 +74,7 @@ before(async () => {
     break;
   }
   run.stdout.resume();
-  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 120_000 });
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 240_000 });
 });
 
 after(async () => {
@@ -133,9 +133,9 @@ function sweep(tip, at, leans) {
 }
 
 test("touches put the twin where the cell is, and what was undecided is decided", {
-  timeout: 400_000,
+  timeout: 900_000,
 }, async () => {
-  await page.getByRole("button", { name: "be operator in AR", exact: true }).click({ timeout: 120_000 });
+  await page.getByRole("button", { name: "be operator in AR", exact: true }).click({ timeout: 240_000 });
   await put(page, [0, 1.64, 0], [0.25, 1.1, -0.3]);
   await asked("Where is the tip");
   await page.waitForFunction(() => window.headset.activeSession.inputSources.length === 2);
@@ -148,7 +148,7 @@ test("touches put the twin where the cell is, and what was undecided is decided"
   await page.waitForFunction(
     () => document.body.textContent.includes("nobody found out where the room of this headset lies"),
     null,
-    { timeout: 60_000 },
+    { timeout: 240_000 },
   );
   // Other ways than touches, and what the server says of one for which the file has no figures.
   for (const words of ["Strap it to what carries a", "Lay it at a,"]) {
@@ -179,7 +179,7 @@ test("touches put the twin where the cell is, and what was undecided is decided"
     await trigger(0);
   }
   await page.waitForFunction(() => window.seerob.asked.some((line) => line.startsWith("5 touched")), null, {
-    timeout: 60_000,
+    timeout: 240_000,
   });
   const lines = await page.evaluate(() => window.seerob.asked);
   const [, off] = lines.join(" ").match(/off by ([0-9.]+) mm/) ?? [];
@@ -194,7 +194,7 @@ test("touches put the twin where the cell is, and what was undecided is decided"
   await page.waitForFunction(
     () => !document.body.textContent.includes("nobody found out where the room of this headset lies"),
     null,
-    { timeout: 60_000 },
+    { timeout: 240_000 },
   );
   assert.ok(!(await verdict()).includes("found out"));
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);

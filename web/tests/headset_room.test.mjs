@@ -172,7 +172,7 @@ const rests = (name, point, within) =>
     { polling: 20 },
   );
 
-test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeout: 600_000 }, async () => {
+test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeout: 900_000 }, async () => {
   await page.evaluate(() => document.getElementById("tab-room").click());
   await page.evaluate(() =>
     [...document.querySelectorAll("button")].find((b) => b.textContent === "be operator in VR").click(),
@@ -232,7 +232,7 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
 });
 
 test("the run again gives the same verdicts, poses and events bit for bit", {
-  timeout: 600_000,
+  timeout: 900_000,
 }, async () => {
   await page.evaluate(() => window.headset.activeSession?.end());
   await stopped();

@@ -57,7 +57,7 @@ before(async () => {
     break;
   }
   run.stdout.resume();
-  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 120_000 });
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 240_000 });
 });
 
 after(async () => {
@@ -105,8 +105,8 @@ async function stand(names) {
   throw new Error("the person does not come to rest");
 }
 
-test("head and hand of the person go where those of the visitor go", { timeout: 300_000 }, async () => {
-  await page.getByRole("button", { name: "be operator in VR", exact: true }).click({ timeout: 120_000 });
+test("head and hand of the person go where those of the visitor go", { timeout: 900_000 }, async () => {
+  await page.getByRole("button", { name: "be operator in VR", exact: true }).click({ timeout: 240_000 });
   await put(page, [0, 1.64, 0], [0.25, 1.1, -0.3]);
   const bones = ["operator/head", "operator/right_hand"];
   const [head, hand] = await stand(bones);
@@ -129,12 +129,12 @@ test("head and hand of the person go where those of the visitor go", { timeout: 
 });
 
 test("the person is fitted to the visitor: floor, arms to the sides, stature", {
-  timeout: 300_000,
+  timeout: 900_000,
 }, async () => {
   const place = (i, at) => page.evaluate(([k, p]) => window.put(k, p), [i, at]);
   const asked = (words) =>
     page.waitForFunction((w) => window.seerob.asked.some((line) => line.includes(w)), words, {
-      timeout: 60_000,
+      timeout: 240_000,
     });
   await put(page, [0, 1.6, 0], [0.25, 1.1, -0.3]);
   await pressInRoom(page, "fit me");

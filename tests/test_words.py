@@ -46,7 +46,7 @@ def test_what_is_spoken_ends_with_it_and_what_is_not_known_stays_english():
 def test_each_sentence_of_the_engine_is_told_with_its_values_and_its_reason(language):
     sentences = [(text, out) for text, out in catalogue(language).items() if re.search(r"\{\d\}", text)]
     assert len(sentences) > 120
-    values = [f"N{k}" for k in range(9)]
+    values = [f"N{k}" for k in range(10)]
     with speaking(language):
         wrong = [text for text, out in sentences if told(text.format(*values)) != out.format(*values)]
         assert wrong == []

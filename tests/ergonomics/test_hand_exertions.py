@@ -201,7 +201,7 @@ def test_exertions_against_their_limits(tmp_path):
         (r"exertions = 2\n", r"exertions of screws"),
         (r"exertion_time = 2\n", r"exertion_time of screws"),
         (r"cycle = 10\n", r"the cycle of \[\[phases\]\]"),
-        (r"daily = \d+\n", r"daily, the time per day"),
+        (r"daily = \d+\n", r"daily \(the time per day\)"),
         (r"\[\[phases\]\]\ntitle = \"walks\"[^\[]*", r"what is done from 6 to 10 s"),
     ],
 )

@@ -24,13 +24,12 @@ import {
   transport,
 } from "./page_state";
 import { PoseReader } from "./poses";
+import { numbersEveryMs } from "./scene/effort";
 import { traceFromWire } from "./traces";
 import { heardMeasured } from "./view/measure";
 import { heardReach } from "./view/reach";
 import { type History, SCHEMA, type Scene } from "./wire";
 
-/** Numbers change at most this often: faster cannot be read. */
-const NUMBERS_EVERY_MS = 110;
 /** A frame of a live run that is older is not trusted any more, whatever holds up page or worker. */
 const OLD_MS = 1000;
 /** Points per trace of a live run; a recording comes thinned already. */
@@ -73,7 +72,7 @@ export class Connection {
 
   /** To be called once per display frame: passes on numbers that are due and asks for the next. */
   tick(time: number): void {
-    if (this.pending && time - this.numbersAt >= NUMBERS_EVERY_MS) {
+    if (this.pending && time - this.numbersAt >= numbersEveryMs()) {
       this.numbersAt = time;
       frame.value = this.pending;
       this.pending = null;

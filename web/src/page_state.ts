@@ -60,6 +60,8 @@ export const soFar = signal<SoFar | null>(null);
 export const frame = signal<Frame | null>(null);
 /** The time cursor: run time of what is shown [s]. */
 export const now = signal(Number.NaN);
+/** Run time that the numbers on the screen are of [s]; the cursor is ahead of it by less than one can read. */
+export const clock = computed(() => frame.value?.t ?? Number.NaN);
 /** Whether numbers on screen are older than they should be: no connection, or nothing heard. */
 export const stale = signal(true);
 /** While live, the run time being looked at; null when following. */

@@ -37,6 +37,8 @@ interface Sentence {
   /** Its longest words without a value. */
   words: string;
   pattern: RegExp;
+  /** How many letters are its own; of two sentences that fit, the one with more is meant. */
+  own: number;
   translation: string;
 }
 
@@ -100,9 +102,10 @@ function sentencesOf(chosen: Exclude<Language, "en">): readonly Sentence[] {
     if (words.length < 2) continue;
     const escaped = words.map((each) => each.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"));
     const longest = words.reduce((a, b) => (b.length > a.length ? b : a));
-    found.push({ words: longest, pattern: new RegExp(`^${escaped.join("([^;]+?)")}$`), translation });
+    const pattern = new RegExp(`^${escaped.join("([^;]+?)")}$`);
+    found.push({ words: longest, own: words.join("").length, pattern, translation });
   }
-  found.sort((a, b) => b.pattern.source.length - a.pattern.source.length);
+  found.sort((a, b) => b.own - a.own);
   sentences.set(chosen, found);
   return found;
 }

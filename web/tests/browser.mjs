@@ -7,9 +7,10 @@ import { chromium } from "playwright-core";
 
 // Mesa's software renderer draws a page in a third of SwiftShader's time.
 const MESA = fs.existsSync("/usr/share/glvnd/egl_vendor.d/50_mesa.json");
-const SOFTWARE_GL = MESA
-  ? ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
-  : ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+const SOFTWARE_GL =
+  MESA && process.env.SOFTWARE_GL !== "swiftshader"
+    ? ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
+    : ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
 const FLAGS = [
   "--headless=new",

@@ -280,8 +280,18 @@ test("a section takes away what lies beyond it, also for clicks; panels are plac
   await page.getByRole("separator", { name: "Width of Scene and properties" }).focus();
   await page.keyboard.press("ArrowRight");
   await page.waitForFunction((was) => document.querySelector(".left").offsetWidth >= was + 15, width);
-  await panel.getByRole("button", { name: "Move Results to the left" }).click();
-  await panel.getByRole("button", { name: "Move Plots and time up" }).click();
+  const grip = (name) => page.getByRole("button", { name: `Place of ${name}` });
+  const drag = async (name, x, y) => {
+    await grip(name).hover();
+    await page.mouse.down();
+    await page.mouse.move(x, y, { steps: 4 });
+    await page.mouse.up();
+  };
+  const before = await box(".room");
+  await drag("Results", before.x + before.width / 4, before.y + 20);
+  await page.waitForFunction((x) => document.querySelector(".room").getBoundingClientRect().x > x, before.x);
+  await drag("Plots and time", before.x + before.width / 2, before.y + 20);
+  await page.waitForFunction(() => document.querySelector(".app").classList.contains("time-above"));
   await panel.getByLabel("Results", { exact: true }).uncheck();
   await page.locator(".right").waitFor({ state: "hidden" });
   await page.reload();
@@ -295,8 +305,8 @@ test("a section takes away what lies beyond it, also for clicks; panels are plac
     left.x < results.x && results.x < room.x && time.y < room.y,
     JSON.stringify([left, results, room, time]),
   );
-  await panel.getByRole("button", { name: "Move Results to the right" }).click();
-  await panel.getByRole("button", { name: "Move Plots and time down" }).click();
+  await grip("Results").press("ArrowRight");
+  await grip("Plots and time").press("ArrowDown");
   await page.getByRole("separator", { name: "Width of Scene and properties" }).press("Home");
   await page.waitForFunction((was) => document.querySelector(".left").offsetWidth < was + 2, width);
   await page.getByRole("button", { name: "Top", exact: true }).click();

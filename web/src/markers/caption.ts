@@ -11,6 +11,7 @@ import {
   Vector3,
 } from "three";
 import { shortened } from "../format";
+import { paintedBy } from "../scene/effort";
 import { spoken } from "../units";
 import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
 import type { Verdict } from "../wire";
@@ -34,6 +35,11 @@ const SIZES: Record<Size, { font: string; height: number; line: number }> = {
 
 const at = new Vector3();
 
+/** What of a text is no figure. */
+function wordsOf(text: string): string {
+  return text.replace(/[−-]?\d[\d.,]*/g, "0");
+}
+
 /** How far an object is before the eye, along the line of sight [m]: what it is drawn smaller by. */
 export function depthOf(object: Sprite, camera: PerspectiveCamera): number {
   return Math.max(-object.getWorldPosition(at).applyMatrix4(camera.matrixWorldInverse).z, 0.05);
@@ -44,7 +50,9 @@ export class Caption {
   private readonly canvas = document.createElement("canvas");
   private readonly material: SpriteMaterial;
   private texture: CanvasTexture | null = null;
-  private shown = "";
+  /** What it says once it is spelled out, and what it says now. */
+  private asked = { text: "", verdict: null as Verdict | null };
+  private shown: Caption["asked"] | null = null;
   private lines: readonly string[] = [];
   /** How much higher than where it belongs it is, negative for lower; and how much further right [px]. */
   liftedPx = 0;
@@ -65,17 +73,25 @@ export class Caption {
     this.lift(0);
   }
 
+  /** Say this: figures alone wait until they are spelled out, everything else is said at once. */
   update(text: string, verdict: Verdict | null): void {
     // A name stays one, whatever it looks like.
-    const short = shortened(this.aside ? spoken(text) : text, LONGEST);
-    const key = `${verdict} ${short}`;
-    if (key === this.shown) return;
-    this.shown = key;
+    this.asked = { text: shortened(this.aside ? spoken(text) : text, LONGEST), verdict };
+    const { shown } = this;
+    if (shown?.verdict !== verdict || wordsOf(shown.text) !== wordsOf(this.asked.text)) this.spell();
+  }
+
+  /** Bring its figures up to date: whether they were not. */
+  spell(): boolean {
+    const { text, verdict } = this.asked;
+    if (this.shown?.text === text && this.shown.verdict === verdict) return false;
+    this.shown = this.asked;
     // Whose figure it is, and below it the figure: a narrow plate covers less.
-    const [, owner, figure] = (this.aside && /^(.+?): (.+)$/s.exec(short)) || ["", short, ""];
+    const [, owner, figure] = (this.aside && /^(.+?): (.+)$/s.exec(text)) || ["", text, ""];
     const head = verdict ? `${STATE_ICONS[verdict]}  ${owner}` : owner!;
     this.lines = figure ? [head, figure] : [head];
     this.paint(verdict);
+    return true;
   }
 
   /** Whether it belongs at a side of the room: a name only says what stands there. */
@@ -115,7 +131,7 @@ export class Caption {
   }
 
   private paint(verdict: Verdict | null): void {
-    const brush = this.canvas.getContext("2d")!;
+    const brush = this.canvas.getContext("2d", paintedBy())!;
     const { font, line } = SIZES[this.size];
     brush.font = font;
     const widest = Math.max(...this.lines.map((text) => brush.measureText(text).width));

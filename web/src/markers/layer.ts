@@ -75,6 +75,13 @@ export class MarkerLayer {
     this.leaders.update(all, view);
   }
 
+  /** Bring the figures of all captions up to date: whether one was not. */
+  spell(): boolean {
+    let changed = false;
+    for (const caption of this.captions()) changed = caption.spell() || changed;
+    return changed;
+  }
+
   private *captions(): Iterable<Caption> {
     for (const slots of this.slots.values()) {
       for (const { drawn, caption } of slots) {

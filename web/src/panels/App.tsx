@@ -9,6 +9,7 @@ import { said } from "../words";
 import { Strayed } from "./Bringing";
 import { CameraNote } from "./CameraNote";
 import { VisitedInstant } from "./ElsewhereNote";
+import { Grip } from "./Grip";
 import { Keys } from "./Keys";
 import { Legend } from "./Legend";
 import { MeasureNote } from "./MeasureNote";
@@ -50,6 +51,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
     >
       <TopBar />
       <aside class="left" aria-label={said("Scene and properties")}>
+        <Grip panel="left" name={said("Scene and properties")} />
         <SceneTree />
         {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls can be reached by keys */}
         <section class="selection scroll" aria-label={said("Properties")} tabIndex={0}>
@@ -70,6 +72,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       </main>
       <RightSide />
       <footer class="bottom">
+        <Grip panel="bottom" name={said("Plots and time")} />
         {!notRun.value && <Plots count={plots} />}
         <div class="time-row">
           {notRun.value ? (

@@ -4,7 +4,7 @@ import { signal, useSignalEffect } from "@preact/signals";
 import { ago, type Elsewhere } from "../elsewhere";
 import { against, withUnit } from "../figures";
 import { formatTime } from "../format";
-import { isLive, lookingAt, now, scene, traces } from "../page_state";
+import { clock, isLive, lookingAt, now, scene, traces } from "../page_state";
 import { STATE_ICONS, STATE_WORDS } from "../verdicts";
 import { said } from "../words";
 import { type Instant, worstWith } from "../worst_instant";
@@ -67,7 +67,7 @@ export function ElsewhereNote({ other }: { other: Elsewhere }) {
       onClick={visit}
     >
       <span aria-hidden="true">{STATE_ICONS[verdict]} </span>
-      {said(STATE_WORDS[verdict])} {following ? ago(now.value - latest.end) : said("elsewhere")}: {name}
+      {said(STATE_WORDS[verdict])} {following ? ago(clock.value - latest.end) : said("elsewhere")}: {name}
       {more}
     </button>
   );

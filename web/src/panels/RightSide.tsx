@@ -11,6 +11,7 @@ import { listenToDrops } from "./Bringing";
 import { CriteriaTable } from "./CriteriaTable";
 import { Editor } from "./Editor";
 import { allFindings, Findings } from "./Findings";
+import { Grip } from "./Grip";
 import { Posture } from "./Posture";
 import { Room } from "./Room";
 import { Splitter } from "./Splitter";
@@ -47,6 +48,7 @@ export function RightSide() {
   };
   return (
     <aside class="right" aria-label={said("Results")}>
+      <Grip panel="right" name={said("Results")} />
       <div
         class="tabs"
         role="tablist"

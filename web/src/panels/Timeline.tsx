@@ -3,7 +3,7 @@
 import { effect, untracked } from "@preact/signals";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { formatTime } from "../format";
-import { now, scene, select, selection, stale, tracesRevision } from "../page_state";
+import { clock, now, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { held, shownRange, timeAt } from "../plots/axis";
 import { drawLanes, LANE_PX } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
@@ -75,8 +75,8 @@ export function Timeline() {
           aria-label={said("Time cursor")}
           aria-valuemin={start}
           aria-valuemax={end}
-          aria-valuenow={Number.isFinite(now.value) ? now.value : start}
-          aria-valuetext={formatTime(now.value)}
+          aria-valuenow={Number.isFinite(clock.value) ? clock.value : start}
+          aria-valuetext={formatTime(clock.value)}
           onPointerDown={(event) => {
             event.currentTarget.setPointerCapture(event.pointerId);
             held.value = shownRange();

@@ -1,7 +1,7 @@
 // Play, pause, step, speed; or, while live, hold and follow.
 
 import { formatTime } from "../format";
-import { isLive, lookingAt, mayControl, now, reach, scene, stale, transport } from "../page_state";
+import { clock, isLive, lookingAt, mayControl, reach, scene, stale, transport } from "../page_state";
 import { SPEEDS } from "../time_control";
 import { said, word } from "../words";
 import { useActions } from "./app_context";
@@ -28,7 +28,7 @@ export function TransportBar() {
       <TransportButton icon="ahead" title={said("One step ahead (→)")} act={() => time.step(1)} />
       <TransportButton icon="next" title={said("Next violation (])")} act={() => time.violation(true)} />
       <span class="clock">
-        <strong>{formatTime(now.value)}</strong>
+        <strong>{formatTime(clock.value)}</strong>
         {!isLive.value && <span> / {formatTime(reach.value.end)}</span>}
       </span>
       {isLive.value ? (

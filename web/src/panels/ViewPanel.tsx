@@ -4,17 +4,7 @@ import { signal, useSignal } from "@preact/signals";
 import { outlinesOnly } from "../scene/viewer";
 import type { EndFilm } from "../view/film";
 import { figures, figuresTable, fileName, save } from "../view/handed_out";
-import {
-  folded,
-  forgetView,
-  moveColumn,
-  order,
-  PANELS,
-  type Panel,
-  timeAbove,
-  toggleFolded,
-  views,
-} from "../view/kept";
+import { folded, forgetView, PANELS, type Panel, toggleFolded, views } from "../view/kept";
 import { mayMeasure } from "../view/measure";
 import { probing, toggleProbe } from "../view/probe";
 import { reaching, toggleReach } from "../view/reach";
@@ -77,14 +67,12 @@ export function ViewPanel() {
       />
       <hr />
       {PANELS.map((panel) => (
-        <div key={panel} class="panel-row">
-          <Tick
-            title={said(PANEL_NAMES[panel])}
-            on={!folded.value.includes(panel)}
-            turn={() => toggleFolded(panel)}
-          />
-          <Moves panel={panel} />
-        </div>
+        <Tick
+          key={panel}
+          title={said(PANEL_NAMES[panel])}
+          on={!folded.value.includes(panel)}
+          turn={() => toggleFolded(panel)}
+        />
       ))}
       <hr />
       <div class="row-of-buttons">
@@ -130,49 +118,6 @@ export function ViewPanel() {
         </button>
       </div>
     </div>
-  );
-}
-
-/** Where a panel goes: beside the room, or above and below it. */
-function Moves({ panel }: { panel: Panel }) {
-  const name = said(PANEL_NAMES[panel]);
-  if (panel === "bottom") {
-    const title = timeAbove.value ? said("Move {name} down", { name }) : said("Move {name} up", { name });
-    return (
-      <button
-        type="button"
-        class="move"
-        title={title}
-        aria-label={title}
-        onClick={() => {
-          timeAbove.value = !timeAbove.value;
-        }}
-      >
-        {timeAbove.value ? "↓" : "↑"}
-      </button>
-    );
-  }
-  const at = order.value.indexOf(panel);
-  return (
-    <>
-      {([-1, 1] as const).map((step) => {
-        const title =
-          step < 0 ? said("Move {name} to the left", { name }) : said("Move {name} to the right", { name });
-        return (
-          <button
-            key={step}
-            type="button"
-            class="move"
-            title={title}
-            aria-label={title}
-            disabled={order.value[at + step] === undefined}
-            onClick={() => moveColumn(panel, step)}
-          >
-            {step < 0 ? "←" : "→"}
-          </button>
-        );
-      })}
-    </>
   );
 }
 

@@ -1,6 +1,7 @@
 // Painting of the timeline's lanes.
 
 import { traces } from "../page_state";
+import { paintedBy } from "../scene/effort";
 import { colorOf } from "../theme";
 import { VERDICT_COLORS } from "../verdicts";
 import type { TimeRange } from "./axis";
@@ -20,7 +21,7 @@ export function drawLanes(
   const height = canvas.clientHeight;
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(height * ratio);
-  const brush = canvas.getContext("2d")!;
+  const brush = canvas.getContext("2d", paintedBy())!;
   brush.scale(ratio, ratio);
   brush.globalAlpha = stale ? 0.4 : 1;
   const x = (t: number): number => ((t - range.start) / (range.end - range.start)) * width;

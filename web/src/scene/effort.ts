@@ -25,7 +25,17 @@ function isSoftware(): boolean {
 
 /** Plots and lanes are drawn anew at most this often [ms]: their canvases cost as much as the room there. */
 export function redrawEveryMs(): number {
-  return drawnBySoftware() ? 200 : 60;
+  return drawnBySoftware() ? 400 : 60;
+}
+
+/** Numbers change at most this often [ms]: faster cannot be read, and a table of them costs as much as the room. */
+export function numbersEveryMs(): number {
+  return drawnBySoftware() ? 250 : 110;
+}
+
+/** Where a canvas of letters is painted: by the processor it is done at once, without a detour over the renderer. */
+export function paintedBy(): CanvasRenderingContext2DSettings {
+  return { willReadFrequently: drawnBySoftware() };
 }
 
 /** Pictures that are looked at before pixels are made larger or smaller. */

@@ -48,7 +48,7 @@ export class Stage {
   constructor(readonly element: HTMLElement) {
     const light = drawnBySoftware();
     const kind = light ? "software" : "hardware";
-    this.renderer = new WebGLRenderer({ antialias: !light });
+    this.renderer = light ? opaque() : new WebGLRenderer({ antialias: true });
     this.sharpest = Math.min(globalThis.devicePixelRatio, light ? 1 : 2);
     const least = Math.min(LEAST_SHARPNESS[kind], this.sharpest);
     this.sharpness = new Sharpness(this.sharpest, least, LEAST_RATE[kind]);
@@ -131,6 +131,13 @@ export class Stage {
     // Drawn at once: a cleared canvas would flash.
     this.renderer.render(this.scene, this.camera);
   }
+}
+
+// Nothing lies behind it that the browser would have to blend it with.
+function opaque(): WebGLRenderer {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("webgl2", { alpha: false, antialias: false, stencil: false });
+  return new WebGLRenderer(context ? { canvas, context } : { antialias: false });
 }
 
 function lights(): (HemisphereLight | DirectionalLight)[] {

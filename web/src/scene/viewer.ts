@@ -33,6 +33,7 @@ import { Bodies } from "./bodies";
 import { CameraView } from "./camera_view";
 import { Companions } from "./companions";
 import { DoubtCaptions } from "./doubt_captions";
+import { numbersEveryMs } from "./effort";
 import { Gizmo } from "./gizmo";
 import { Outline } from "./outline";
 import { nodeAlong, pickOnClick } from "./picking";
@@ -72,6 +73,7 @@ export class Viewer {
   /** Heard, and shown as soon as the bodies are where it speaks of. */
   private coming: Frame | null = null;
   private tickedAt = Number.NEGATIVE_INFINITY;
+  private spelledAt = Number.NEGATIVE_INFINITY;
   private posed = false;
   private labels = LABELLED;
   private framed = false;
@@ -166,6 +168,10 @@ export class Viewer {
     this.view.margins = !this.stage.renderer.xr.isPresenting;
     camera.updateWorldMatrix(true, false);
     this.fillVolumes();
+    if (time - this.spelledAt >= numbersEveryMs() && this.markers.spell()) {
+      this.spelledAt = time;
+      this.stage.invalidate();
+    }
     this.markers.face(this.view, [...this.doubts.shown()]);
   }
 

@@ -100,7 +100,7 @@ class HandActivity(EnteredMethod, frozen=True, kw_only=True):
         return self._figure(work)
 
     def _figure(self, work: HandWork) -> Figure:
-        absent = work.missing if self.daily is not None else (*work.missing, "daily, the time per day")
+        absent = work.missing if self.daily is not None else (*work.missing, "daily (the time per day)")
         if absent:
             return Figure(None, self.limit, undecided=True, beside=Shown(f"not entered: {', '.join(absent)}"))
         assert self.daily is not None

@@ -126,7 +126,7 @@ class StrainIndex(PostureRule, frozen=True, kw_only=True):
         """
         read, error = bind_posture(model, self.human, self.unmeasured), self.error(model)
         phases, work = hand_work(model, self.human, self.name)
-        absent = work.missing if self.daily is not None else (*work.missing, "daily, the time per day")
+        absent = work.missing if self.daily is not None else (*work.missing, "daily (the time per day)")
         limit, daily = self.limit, self.daily
         busy = {each.phase for each in work.exertions}
 

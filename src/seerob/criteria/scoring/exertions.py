@@ -96,10 +96,10 @@ def hand_work(model: Model, human: str, name: str) -> tuple[tuple[ExertionPhase,
     """
     phases = shared_phases(model, human, (), ExertionPhase.from_task)
     if not phases:
-        return phases, HandWork((), ("[[phases]], with the exertions of the hands in each",))
+        return phases, HandWork((), ("the exertions of the hands in each of [[phases]]",))
     cycle = phases[0].cycle
     if cycle is None:
-        return phases, HandWork((), ("the cycle of [[phases]], by which exertions per minute are known",))
+        return phases, HandWork((), ("the cycle of [[phases]] (exertions per minute rest on it)",))
     ends = [*(each.start for each in phases[1:]), cycle]
     ends = [end if each.end is None else each.end for each, end in zip(phases, ends, strict=True)]
     missing = [f"what is done from {a:g} to {b:g} s of the cycle" for a, b in _gaps(phases, ends, cycle)]

@@ -61,14 +61,14 @@ _PLACE = re.compile(r"\{(\d+)\}")
 
 @cache
 def _sentences(language: str) -> tuple[tuple[str, re.Pattern[str], str], ...]:
-    """What the engine says with values in it, the most words first: longest words, pattern, translation."""
+    """What the engine says with values in it, the most of its own first: longest words, pattern, translation."""
     found = []
     for text, translation in catalogue(language).items():
         words = _PLACE.split(text)[::2]
         if len(words) > 1:
             pattern = re.compile("([^;]+?)".join(map(re.escape, words)))
-            found.append((max(words, key=len), pattern, translation))
-    return tuple(sorted(found, key=lambda each: -len(each[1].pattern)))
+            found.append((len("".join(words)), (max(words, key=len), pattern, translation)))
+    return tuple(each for _, each in sorted(found, key=lambda each: -each[0]))
 
 
 def told(text: str) -> str:

@@ -46,8 +46,8 @@ demo-plc: $(DEV) $(PAGE)
 # want both, and leave them idle a quarter of the time: a page waits for its pictures, a source for its device. So
 # they run beside each other, and what the second one says comes at the end.
 test: $(RUN) $(NODE)
-	$(MAKE) --no-print-directory -j2 check compiled package
-	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(MAKE) --no-print-directory -j2 unit web-test-told-later
+	$(MAKE) --no-print-directory -j2 check compiled
+	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(MAKE) --no-print-directory -j3 package unit web-test-told-later
 
 web-test-told-later: $(DEV) $(PAGE)
 	$(MAKE) --no-print-directory web-test >$(VENV)/.web-test 2>&1 && code=0 || code=$$?; cat $(VENV)/.web-test; exit $$code

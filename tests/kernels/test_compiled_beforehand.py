@@ -44,13 +44,15 @@ print(json.dumps([{name: found for name, found in asked.items() if found}, sorte
 
 
 def test_a_run_compiles_no_loop_but_those_that_are_listed(tmp_path):
-    """Of what is loaded from Numba's cache, only what Python calls has types: so this runs twice."""
+    """Of what is loaded from Numba's cache, only what Python calls has types: what compiled is run again."""
     cell = Path(__file__).parents[2] / "workstations" / "ur10_assembly"
     command = [sys.executable, "-P", "-c", SCRIPT, str(cell)]
-    for turn in ("compiled", "loaded"):
+    for turn in ("perhaps compiled", "loaded"):
         done = subprocess.run([*command, str(tmp_path / turn)], check=True, capture_output=True, text=True)
+        asked, imported, ready = json.loads(done.stdout.splitlines()[-1])
+        if not ready:
+            break
     listed = {name: [str(normalize_signature(types)[0])] for name, types in LOOPS.items() if types}
-    asked, imported, ready = json.loads(done.stdout.splitlines()[-1])
     assert {name: types for name, types in asked.items() if types != listed.get(name)} == {}
     assert "nearest nearest" in asked
     assert {name.split()[0] for name in LOOPS}.issuperset(imported)

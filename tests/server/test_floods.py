@@ -2,7 +2,6 @@
 
 import asyncio
 import multiprocessing
-import socket
 import threading
 import time
 from contextlib import ExitStack, suppress
@@ -19,11 +18,12 @@ from seerob.app.server.door import STRANGERS
 from seerob.app.server.hub import RATES, SHARED
 from seerob.app.server.live import Live
 from seerob.app.server.serving import Server
-from seerob.core.snapshot import PROTOCOL, Command, Snapshot
+from seerob.core.snapshot import Command, Snapshot
+from server.flooding import flood
 from server.frames import MESHES, PATIENCE, Visitor, scene, snapshot
 from server.test_hostile_visitors import frame
 
-SECONDS = 2.0
+SECONDS = 1.0
 
 
 class Counting(Live):
@@ -56,28 +56,6 @@ def server(feed):
         yield server
         over.set()
         publisher.join()
-
-
-def flood(port, seconds, messages):
-    """Send as fast as the other end reads; how many were sent."""
-    upgrade = (
-        f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n"
-        f"Sec-WebSocket-Protocol: {PROTOCOL}\r\n\r\n"
-    ).encode()
-    end, sent = time.monotonic() + seconds, 0
-    with socket.create_connection(("127.0.0.1", port)) as s:
-        s.sendall(upgrade)
-        s.recv(4096)
-        s.settimeout(0.1)
-        while time.monotonic() < end:
-            try:
-                sent += s.send(messages)
-            except TimeoutError:
-                continue
-            except OSError:
-                break
-    return sent
 
 
 COMMANDS = frame(2, msgspec.msgpack.encode(Command(action="seek", value=1.0))) * 200

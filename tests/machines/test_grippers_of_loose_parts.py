@@ -5,7 +5,7 @@ import pytest
 
 from seerob import load
 from seerob.core.errors import Undecided
-from seerob.core.samples import GrabSample, JointSample
+from seerob.core.samples import GrabSample, JointSample, SignalSample
 from seerob.twin.engine import Engine
 
 ARM = """
@@ -42,6 +42,8 @@ size = [0.5, 0.5, 0.2]
 """
 WIDE, SHUT, DOWN, UP = 0.09, 0.05, -0.08, 0.1
 SILENT = None
+BELT = 0.06
+"""Speed of the table where it is one [m/s]."""
 TICK = 0.01
 
 
@@ -52,7 +54,8 @@ class Cell:
         (folder / "workstation.toml").write_text(text)
         self.model = load(folder).model
         people = {h.name: 9.0 for h in self.model.workstation.humans}
-        self.engine = Engine(self.model, driven={"lift": 0.05, "hand": 0.05} | people)
+        belts = {"plc": 0.2} if self.model.dictionary else {}
+        self.engine = Engine(self.model, driven={"lift": 0.05, "hand": 0.05} | people, signals=belts)
         self.k, self.q, self.opening, self.events = 0, q, opening, []
         self.bodies = {body.name: body.index for body in self.model.bodies}
         self._hear()
@@ -66,6 +69,9 @@ class Cell:
             JointSample(source=name, seq=self.k, t=self.k * TICK, target=name, q=tuple(q))
             for name, q in said.items()
         )
+        if self.model.dictionary:
+            values = {"belt/speed": BELT}
+            self.engine.take([SignalSample(source="plc", seq=self.k, t=self.k * TICK, values=values)])
 
     def go(self, ticks, q=None, opening=None, *, silent=False):
         """Evenly to a height and an opening."""
@@ -104,6 +110,29 @@ def test_it_is_taken_lifted_and_put_down_with_events(tmp_path):
     taken, placed = cell.events
     assert placed.took == pytest.approx(placed.t - taken.t)
     assert cell.at()[2] == pytest.approx(0.82, abs=2e-3)
+
+
+def test_it_is_taken_from_a_belt_that_runs_and_rides_on_once_it_is_put_back(tmp_path):
+    plc = 'variables = "variables.toml"\n[[sources]]\nkind = "opcua"\nname = "plc"\n'
+    plc += 'url = "opc.tcp://127.0.0.1:4840"\n'
+    variable = '[[variables]]\nname = "belt/speed"\nsource = "plc"\naddress = "ns=1;s=v"\nunit = "m/s"\n'
+    (tmp_path / "variables.toml").write_text(variable)
+    belt = ARM + 'conveyor = { along = [1, 0, 0], speed = "belt/speed" }\n'
+    cell = Cell(tmp_path, plc + belt + BLANK.replace("[0, 0, 0.821]", "[-0.03, 0, 0.821]"))
+    cell.go(20, DOWN)
+    rode = cell.at()[0]
+    assert -0.025 < rode < -0.01
+    cell.go(20, opening=SHUT)
+    assert cell.said() == [("taken", "hand", "")]
+    held = cell.at()
+    cell.go(60)
+    assert cell.at() == pytest.approx(held, abs=2e-3), "the belt runs on below it"
+    cell.go(60, UP)
+    assert cell.at() - held == pytest.approx([0, 0, UP - DOWN], abs=2e-3)
+    cell.go(60, DOWN).go(20, opening=WIDE).go(20)
+    put = cell.at()
+    cell.go(50)
+    assert cell.at() - put == pytest.approx([50 * TICK * BELT, 0, 0], abs=2e-3)
 
 
 def test_it_is_part_of_the_gripper_while_it_is_held(tmp_path):

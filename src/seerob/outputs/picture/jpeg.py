@@ -74,7 +74,7 @@ def _quantised(pixels: NDArray[np.uint8], steps: Array) -> Ints:
     blocks = parts.reshape(rows, 8, columns, 8, 3).transpose(0, 2, 4, 1, 3).reshape(-1, 3, 8, 8)
     cosines = _COSINES.astype(np.float32)
     found = (cosines @ blocks @ cosines.T).reshape(-1, 3, 64)[..., _ZIGZAG]
-    return np.rint(found / steps.astype(np.float32)).astype(np.int64)
+    return np.asarray(np.rint(found / steps.astype(np.float32)), np.int64)
 
 
 def _coded(found: Ints) -> bytes:
@@ -109,7 +109,7 @@ def _coded(found: Ints) -> bytes:
 
 def _sizes(values: Ints) -> Ints:
     """How many bits the magnitudes of values have."""
-    return np.ceil(np.log2(np.abs(values) + 1)).astype(np.int64)
+    return np.asarray(np.ceil(np.log2(np.abs(values) + 1)), np.int64)
 
 
 def _with_bits(table: tuple[Ints, Ints], symbols: Ints, values: Ints) -> tuple[Ints, Ints]:

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from seerob.app.commands.emulate import options_of
-from seerob.app.emulation.seen_cell import named
+from seerob.app.emulation.seen_cell import Photographer
 from seerob.app.emulation.serving import served
-from seerob.app.emulators.camera import Photographer
+from seerob.app.emulators.camera import named
 from seerob.core.errors import InputError
 from seerob.core.transforms import rotation_from_rpy, transform, wxyz_from_rotation
 from seerob.description.description import base_from_links

@@ -90,7 +90,8 @@ class InHand:
                 things = weights.get(person, {})
                 if sum(things.values()) > load * (1 + MORE):
                     what = ", ".join(f"{name} ({_weight(mass)})" for name, mass in things.items())
-                    found[i] = f"{person} holds {what}, and load says {load:g} kg: give all that hands hold"
+                    reason = f"{person} holds {what}, and load says {load:g} kg: give all that hands hold"
+                    found[i] = reason
         if held:
             found |= self._nearer(state, results)
         for i, (moving, horizon, standstill) in self._hits.items():
@@ -99,10 +100,11 @@ class InHand:
             for piece, holders in (*held.items(), *self._mounted.items()):
                 people = {holder.partition("/")[0] for holder in holders} & self._always.keys()
                 if people and not self._gap(i, piece)(state) > horizon:
-                    found[i] = (
+                    reason = (
                         f"{', '.join(sorted(people))} holds {piece}, which may be hit from {horizon:g} m on: "
                         "no limit is known of who is hit through what is held"
                     )
+                    found[i] = reason
         return found
 
     def _gap(self, i: int, piece: str) -> Callable[[State], float]:
@@ -142,10 +144,11 @@ class InHand:
                 if _room(results[i]) > reach:
                     continue
                 person = own_hands[0].partition("/")[0]
-                found[i] = (
+                reason = (
                     f"{person} holds {piece}, which reaches {rounded_up(reach)} m from the hand, and nobody "
                     f"asks the same of it: add a criterion of this kind with {piece}, or mount it on the hand"
                 )
+                found[i] = reason
         return found
 
     def _reach(self, state: State, pieces: set[int], hand: int) -> float:

@@ -716,7 +716,8 @@ class Engine:
             try:
                 state.left[name] = float(self._off[name].at(state).max(initial=0.0))
             except Undecided as unknown:
-                self._loose.lose([name], f"{name}: let go by a hand that was not known ({unknown})")
+                reason = f"{name}: let go by a hand that was not known ({unknown})"
+                self._loose.lose([name], reason)
         for name, holders in held.items():
             if {holder.rpartition("/")[0] for holder in holders} & self._people.keys():
                 state.left.pop(name, None)

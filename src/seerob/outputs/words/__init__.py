@@ -61,7 +61,7 @@ _PLACE = re.compile(r"\{(\d+)\}")
 
 @cache
 def _sentences(language: str) -> tuple[tuple[str, re.Pattern[str], str], ...]:
-    """What the engine says with values in it, the most of its own first: longest words, pattern, translation."""
+    """What the engine says with values in it, most of its own first: longest words, pattern, translation."""
     found = []
     for text, translation in catalogue(language).items():
         words = _PLACE.split(text)[::2]

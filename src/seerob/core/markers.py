@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import overload
+from typing import cast, overload
 
 from msgspec import Struct
 
@@ -189,16 +189,13 @@ class _Drawn(Sequence[Marker]):
         return tuple, (self.made(),)
 
 
-def drawn(make: Callable[[], Sequence[Marker]]) -> tuple[Marker, ...]:
-    """Markers that are made only when a page, a recorder or a report looks at them, for `Result.markers`.
+drawn = cast("Callable[[Callable[[], Sequence[Marker]]], tuple[Marker, ...]]", _Drawn)
+"""Makes markers only when a page, a recorder or a report looks at them, for `Result.markers`.
 
-    They compare, iterate and pickle as the tuple that they are; encoders are told by `plain`.
-
-    Args:
-        make: Makes them from copies. It may run ticks later and in another thread, when the twin is
-            elsewhere: it must read neither `State` nor an array that is written again.
-    """
-    return _Drawn(make)  # type: ignore[return-value]
+They compare, iterate and pickle as the tuple that they are; encoders are told by `plain`. What is given makes
+them from copies. It may run ticks later and in another thread, when the twin is elsewhere: it must not read
+`State`, nor an array that is written again.
+"""
 
 
 def changed(markers: Sequence[Marker], change: Callable[[Marker], Marker]) -> tuple[Marker, ...]:

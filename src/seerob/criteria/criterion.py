@@ -16,6 +16,7 @@ from seerob.criteria.figure import Compute, Present, Shown, answers_of, result_o
 
 if TYPE_CHECKING:
     from seerob.core.transforms import Array
+    from seerob.criteria.plan import Together, Whole
     from seerob.model.model import Model
     from seerob.recording.answers import Answers
     from seerob.twin.spans import Falls, Margin, Points, Span
@@ -71,7 +72,7 @@ class Claim(Protocol):
 
 GIVEN_A_MODEL = {
     "compute", "present", "one_by_one", "bind", "batch", "remembers", "falls", "lowest", "bounded_once",
-    "follows", "basis", "looks_ahead", "claims", "depends", "judged", "unshaped",
+    "follows", "basis", "looks_ahead", "claims", "depends", "judged", "planned", "unshaped",
 }  # fmt: skip
 """Methods of a criterion whose first argument is the model."""
 
@@ -194,6 +195,13 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def hits(self, model: Model) -> tuple[tuple[int, ...], float, float] | None:
         """Bodies whose contacts it limits, from how near people [m] and how fast [m/s] on; None of none."""
+        return None
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together | Whole] | None:
+        """Return what computes it together with others where nothing of anybody is in doubt; mostly a class.
+
+        It is called with all criteria of which this is given. None where each is asked alone.
+        """
         return None
 
     def remembers(self, model: Model) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from copy import copy
 from functools import partial
 
@@ -19,6 +19,7 @@ from seerob.criteria.between_ticks import Asking, BetweenTicks
 from seerob.criteria.criterion import Claim, Criterion, Evaluate
 from seerob.criteria.in_hand import InHand
 from seerob.criteria.noisy_speeds import shaken
+from seerob.criteria.plan import Plan, Together, Whole
 from seerob.criteria.plausible_places import PlausiblePlaces
 from seerob.criteria.question import Bound, Kept, Question, held_names, question_of, worded
 from seerob.model.model import Model
@@ -160,6 +161,31 @@ def _open(part: Result, reason: str) -> Result:
     return part if part.verdict is None and part.value is None else undecided(part, reason)
 
 
+def plan_of(questions: Sequence[Question], model: Model) -> Plan:
+    """What of a tick can be computed together: of shipped kinds, what is asked at every tick.
+
+    Whoever was not asked in a clear tick yet, or asked for more than they declare, is asked alone.
+    """
+    kinds = dict[Callable[..., Together | Whole], list[int]]()
+    for i, question in enumerate(questions):
+        bound, rests = question.bound, question.rests
+        if question.own or not question.always or question.relied_on or bound.evaluate is not bound.given:
+            continue
+        if rests is None or question.undeclared or not rests <= question.declared:
+            continue
+        if (kind := question.criterion.planned(model)) is not None:
+            kinds.setdefault(kind, []).append(i)
+    every = []
+    for kind, indices in kinds.items():
+        criteria = [questions[i].criterion for i in indices]
+        same = [
+            Result(name=each.name, unit=each.unit, limit=getattr(each, "limit", None), at_most=each.at_most)
+            for each in criteria
+        ]
+        every.append((kind(criteria, model), indices, same))
+    return Plan(every, len(questions))
+
+
 def _asked_alone(bound: Bound, evaluate: Evaluate, state: State) -> Result:
     """What one's own says of a state, of which it is given the accessors, and nothing that others read."""
     with state.for_author(bound.criterion.name) as own:
@@ -191,6 +217,8 @@ class Judge:
         """What it says now."""
         self._claims: list[Claim] = []
         """That nothing has contradicted yet."""
+        self._plan: Plan | None = None
+        """What of a tick is computed together, once everybody was asked alone in one that is clear."""
         self._between = BetweenTicks([one.watch for one in bound])
         self._passed: list[bool] = []
         """Whether each did not apply at the last tick."""
@@ -216,7 +244,7 @@ class Judge:
             self._claims = [claim for claim in self._claims if claim not in [one for one, _ in refuted]]
             findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *self._worded)))
             self._hold(state.model, findings)
-        results = [self._one(question, state) for question in self._questions]
+        results = self._asked_together(state)
         if self._first:
             self._first = False
             every = zip(self._questions, results, strict=True)
@@ -274,11 +302,35 @@ class Judge:
             holds = question.hold(model, findings, names)
             self._holds = self._holds or holds  # and stays so for what was said meanwhile
 
+    def _asked_together(self, state: State) -> list[Result]:
+        """What criteria say of a tick: those of its plan together where nothing is in doubt, others alone.
+
+        A plan is made of those that were asked alone in such a tick before, and asked for whom they declare.
+        """
+        questions, plan = self._questions, self._plan
+        if plan is None or not (plan.some and state.clear):
+            results = [self._one(question, state) for question in questions]
+            if plan is None and not self._first and state.clear:
+                self._plan = plan_of(questions, state.model)
+            return results
+        planned = plan(state)
+        results = []
+        for question, result in zip(questions, planned, strict=True):
+            if result is None:
+                results.append(self._one(question, state))
+                continue
+            if self._holds and question.rests is not None:
+                question.why = question.held_for(question.rests)
+            results.append(result)
+        return results
+
     def _one(self, question: Question, state: State) -> Result:
         if question.always:
             result = self._says(question, question.bound.evaluate, state)
             if self._holds:
                 question.why = question.held_for(state.asked)
+            if question.rests is None and result.verdict is not _UNDECIDED and state.clear:
+                question.rests, self._plan = frozenset(state.asked), None  # which may hold it, too
             return result
         criterion, kept = question.criterion, question.kept
         passed_over = question.turns is not None and question.passed_over(state.t)

@@ -34,6 +34,8 @@ class Bound:
     basis: Basis
     watch: Watch | None = None
     """How it is judged between two ticks; None where nothing bounds it."""
+    given: Evaluate | None = None
+    """What its kind's `bind` gave: a plan stands for that alone."""
 
     def __repr__(self) -> str:
         return f"<Bound {self.criterion.name!r}: {type(self.criterion).__name__} of {self.group}>"
@@ -95,7 +97,7 @@ def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
         if not right:
             wanted = "a function of State" if what == "bind" else "a seerob.api.Basis"
             raise PluginError(f"{what} of {kind.__module__} returns {type(returned).__name__}, not {wanted}")
-    return Bound(criterion, group, evaluate, basis)
+    return Bound(criterion, group, evaluate, basis, given=evaluate)
 
 
 def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[int, ...]]:
@@ -276,6 +278,8 @@ class Question:
     before."""
     why: str = ""
     """Why nothing that it said last is within."""
+    rests: frozenset[str] | None = None
+    """Whom it asks for where nothing of anybody is in doubt; None until it was asked so."""
     own: bool = field(init=False)
     """Whether it is one of the user's, which does not ship."""
     always: bool = field(init=False)

@@ -268,6 +268,8 @@ class Survey:
         columns = {k: slice(ends[i], ends[i + 1]) for i, k in enumerate(order)}
         self.columns = {self.questions[k]: columns[k] for k in range(len(order))}
         """Where the answers to each question are among all of them."""
+        self.begins: dict[tuple[Question, ...], list[int]] = {}
+        """Where those to some begin, by these."""
         self._columns = [columns[k] for k in range(len(order))]
         self._in_turn = np.concatenate([np.arange(len(self._caps))[part] for part in self._columns])
         self._asked = kernel.Questions(
@@ -428,6 +430,23 @@ class Surveyor:
         if self._found is None:
             self._found = self._survey.together(rotations, positions)
         return self._found.at(self._survey.columns[question].start)
+
+    def together(
+        self, questions: tuple[Question, ...], rotations: Array, positions: Array
+    ) -> tuple[Closests, list[int]] | None:
+        """All answers of a tick, and where those to some questions begin; None while one is asked alone."""
+        survey, known = self._survey, self._together
+        if survey is None:
+            return None
+        rows = survey.begins.get(questions)
+        if rows is None:
+            if not known.keys() >= set(questions):
+                return None
+            rows = survey.begins[questions] = [survey.columns[each].start for each in questions]
+        known.update(dict.fromkeys(questions, self._tick))
+        if self._found is None:
+            self._found = survey.together(rotations, positions)
+        return self._found, rows
 
     def ask(self, query: Query, per: Per, rotations: Array, positions: Array) -> Closests:
         """The answer to a question at this tick; see `Query`."""

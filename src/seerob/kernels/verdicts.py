@@ -69,6 +69,47 @@ def judged(
 
 
 @njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], b1[::1], b1[::1], b1[::1], f8, u1[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def judged_rows(
+    value: Array,
+    low: Array,
+    high: Array,
+    limit: Array,
+    limited: NDArray[np.bool_],
+    at_most: NDArray[np.bool_],
+    exceeded: NDArray[np.bool_],
+    rounding: float,
+    verdicts: Codes,
+) -> None:
+    """Judge figures of one instant by `judged`, each against its own side; writes the last argument.
+
+    Args:
+        value: Of each criterion, shape (n,) as all arrays; what is not finite is undecided.
+        low: Least that it may be.
+        high: Largest.
+        limit: Of each; of no meaning where there is none.
+        limited: Which have one.
+        at_most: Which limits bound from above.
+        exceeded: Which exceed theirs whatever the value, which is a bound.
+        rounding: As of `judged`.
+        verdicts: Of each.
+    """
+    for k in range(len(value)):
+        here = slice(k, k + 1)
+        judged(value[here], low[here], high[here], limit[here], rounding, at_most[k], False, verdicts[here])
+        if not (math.isfinite(value[k]) and low[k] <= high[k]):
+            verdicts[k] = UNDECIDED
+        elif not limited[k]:
+            verdicts[k] = NO_VERDICT
+        elif exceeded[k]:
+            verdicts[k] = EXCEEDED
+
+
+@njit(
     f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, f8, b1, b1[::1], u1[:,::1], i8[::1])",
     cache=True,
     nogil=True,

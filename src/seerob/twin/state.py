@@ -443,6 +443,27 @@ class State(Validity):
         return self._every_speed_error().get(mechanism.name)
 
     @property
+    def clear(self) -> bool:
+        """Whether nothing of anybody is in doubt, and no speed may be off or is told by nobody.
+
+        Nor does a device see any person bone by bone, nor is what a hand holds or let go off: `TrackingError`
+        has nothing to add then, and every accessor answers, but those that rest on masses and measurements.
+        """
+        found: bool | None = self._cache.get("clear")
+        if found is None:
+            hearings = self._hearings
+            found = self._cache["clear"] = (
+                len(self._sound or self._find_sound()) == len(hearings)
+                and not self.attachments.unknown
+                and not self._every_speed_error()
+                and not any(self.lags.values())
+                and not any(self.left.values())
+                and not any(hearing.bones for hearing in hearings.values())
+                and all(map(self.moved, hearings))
+            )
+        return found
+
+    @property
     def speed_errors(self) -> Mapping[str, Array]:
         """By name of whose speeds were derived from noisy positions: `speed_error`, where there is any."""
         found: dict[str, Array] | None = self._cache.get("speed errors")
@@ -657,10 +678,23 @@ class State(Validity):
             Undecided: As `pose`.
         """
         self._require_frame(frame)
-        placed = self._cache.get("placed once")
+        return partial(self._drawn_points().point, frame, offset)
+
+    def _drawn_points(self) -> DrawnPoints:
+        placed: DrawnPoints | None = self._cache.get("placed once")
         if placed is None:
             placed = self._cache["placed once"] = DrawnPoints(self._xmat, self._xpos, self._drawn)
-        return partial(placed.point, frame, offset)
+        return placed
+
+    def drawn_points(self) -> Callable[[Frame, Array], Array]:
+        """Where points of frames are in a tick that is `clear`: as `drawn_point`, of any of them.
+
+        Raises:
+            Undecided: It is not, so that each is to be asked for.
+        """
+        if not self.clear or self._author:
+            raise Undecided("asked alone")
+        return self._drawn_points().point
 
     def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
         """Whom the place of a body of MuJoCo depends on: the innermost robot or machine, or a bone."""
@@ -940,6 +974,19 @@ class State(Validity):
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
         self._relied_on_bodies(gap.bodies, allow_estimated, strayed)
         return self._distances(gap.query, Per.BODY)
+
+    def nearest(self, questions: tuple[tuple[Query, Per], ...]) -> tuple[Closests, list[int]]:
+        """All distances of a tick that is `clear`, and where the answers to some questions begin among them.
+
+        Raises:
+            Undecided: It is not, or they are not asked together (yet), so that each is to be asked alone.
+        """
+        found = None
+        if self.clear and not self._author:
+            found = self._surveyor.together(questions, self._rotations, self._positions)
+        if found is None:
+            raise Undecided("asked alone")
+        return found
 
     def distances(self, query: Query, per: Per, *, allow_estimated: bool = False) -> Closests:
         """What a query says now; ``allow_estimated`` as in `require_bodies`."""

@@ -3,8 +3,9 @@ r"""Effective mass of a point of a robot, [Weistroffer2022]_ Eqs. 7 and 8, [Khat
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Annotated, ClassVar, Literal, cast
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import mujoco
 import numpy as np
@@ -21,13 +22,15 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.criterion import Criterion, Lowest
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.plan import Draw, Rows, Together
+from seerob.distance.least import Per
 from seerob.kernels.axes import mass_along, masses_along, mobility, principal_axes, reciprocals
 from seerob.model import provenance
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import velocity_of
 from seerob.twin.spans import Points, Span, coupling_of
-from seerob.twin.state import State
+from seerob.twin.state import MassEllipsoid, State
 
 DRAWN = 0.02
 """Half axis, or arrow, drawn for 1 kg [m]."""
@@ -103,6 +106,11 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     principal_axes(used_up, values, axes)
     values[~np.isfinite(values).all(axis=-1)] = np.nan
     return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
+
+
+def _principal(masses: Array) -> tuple[Result, ...]:
+    one, two, three = masses.tolist()
+    return _of("m1", one), _of("m2", two), _of("m3", three)
 
 
 def _of(name: str, mass: float) -> Result:
@@ -227,24 +235,8 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             elif figure.interval is not None and verdict is Verdict.UNDECIDED:
                 ends = self._ends(tolerances, state, frame, offset, np.array(u))
                 reason = deciding(tolerances.tolerances, ends.widths)
-            place = state.drawn_point(frame, offset)
-
-            def draw() -> tuple[Marker, ...]:
-                center = tuple(place().tolist())
-                ellipsoid = Ellipsoid(
-                    center=center,
-                    wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
-                    radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
-                    verdict=verdict,
-                )
-                if mass is None:
-                    return (ellipsoid,)
-                vector = tuple(min(DRAWN * mass, LARGEST_DRAWN) * each for each in u)
-                label = figures.worded(mass, self.limit, self.unit, at_most=True)
-                return ellipsoid, Arrow(origin=center, vector=vector, label=label, verdict=verdict)
-
-            one, two, three = masses.tolist()
-            return Shown(reason, draw, (_of("m1", one), _of("m2", two), _of("m3", three), simplified))
+            draw = partial(_drawn, self, state.drawn_point(frame, offset), masses, wxyz, u, mass, verdict)
+            return Shown(reason, draw, (*_principal(masses), simplified))
 
         return present
 
@@ -254,6 +246,12 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         if len(MassTolerances(model, robot)):
             return "a mass has a tolerance"
         return "" if robot.alone else "something that moves carries the robot"
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
+        """Return what computes masses together: in one known direction, without tolerances."""
+        robot = model.carrier(model.frame(self.at))
+        directed = self.toward is not None or (self.along == "motion" and robot.alone)
+        return _Masses if directed and not len(MassTolerances(model, robot)) else None
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         r"""Least margin in a span; None of what moves something else too, and of tolerances of masses.
@@ -387,3 +385,82 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 "does not replace M/2 + m_L of ISO/TS 15066 Annex A, shown beside it",
             ),
         )
+
+
+class _Masses:
+    """Effective masses of points at one instant, of a tick's plan."""
+
+    intervals = False
+    _place: Callable[[Frame, Array], Array]
+
+    def __init__(self, criteria: Sequence[EffectiveMass], model: Model) -> None:
+        self._criteria = criteria
+        frames = [model.frame(each.at) for each in criteria]
+        self._points = [
+            (frame, model.carrier(frame), np.array(each.offset))
+            for each, frame in zip(criteria, frames, strict=True)
+        ]
+        self._simplified = [
+            EffectiveMass._simplified(model, robot, MassTolerances(model, robot))
+            for _, robot, _ in self._points
+        ]
+        self._facing = [k for k, each in enumerate(criteria) if each.toward is not None]
+        """Which face somebody."""
+        gaps = [
+            model.gap(self._points[k][1].moving, model.select(criteria[k].toward or "")) for k in self._facing
+        ]
+        self._asked = tuple((gap.query, Per.SETS) for gap in gaps)
+        self._found: list[tuple[MassEllipsoid, tuple[float, ...]]] = []
+        """Of each the ellipsoid and the direction."""
+
+    def compute(self, state: State, rows: Rows) -> None:
+        """Write the mass of every point; NaN where there is no direction, or it cannot be pushed that way."""
+        self._place = state.drawn_points()
+        facing, values, ways = self._facing, [0.0] * len(self._points), dict[int, Array]()
+        if facing:
+            found, at = state.nearest(self._asked)
+            for k, row in zip(facing, at, strict=True):
+                ways[k] = found.point_b[row] - found.point_a[row]
+        self._found = []
+        for k, (frame, robot, offset) in enumerate(self._points):
+            ellipsoid = state.mass_ellipsoid(frame, robot, offset)
+            way, least = ways.get(k), TOUCHING
+            if way is None:
+                way, least = state.velocity(frame, robot, offset)[:3], STANDSTILL
+            x, y, z, mass = mass_along(ellipsoid.inverse, way, least)
+            values[k] = mass
+            self._found.append((ellipsoid, (x, y, z)))
+        rows.value[:] = values
+
+    def present(
+        self, state: State, k: int, value: float, verdict: Verdict | None
+    ) -> tuple[str, Draw, tuple[Result, ...]]:
+        """Say and draw what `EffectiveMass.present` does of one that is decided."""
+        (_, _, masses, wxyz), u = self._found[k]
+        frame, _, offset = self._points[k]
+        place = partial(self._place, frame, offset)
+        draw = partial(_drawn, self._criteria[k], place, masses, wxyz, u, value, verdict)
+        return "", draw, (*_principal(masses), self._simplified[k])
+
+
+def _drawn(
+    of: EffectiveMass,
+    place: Callable[[], Array],
+    masses: Array,
+    wxyz: Sequence[float],
+    u: Sequence[float],
+    mass: float | None,
+    verdict: Verdict | None,
+) -> tuple[Marker, ...]:
+    center = tuple(place().tolist())
+    ellipsoid = Ellipsoid(
+        center=center,
+        wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
+        radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
+        verdict=verdict,
+    )
+    if mass is None:
+        return (ellipsoid,)
+    vector = tuple(min(DRAWN * mass, LARGEST_DRAWN) * each for each in u)
+    label = figures.worded(mass, of.limit, of.unit, at_most=True)
+    return ellipsoid, Arrow(origin=center, vector=vector, label=label, verdict=verdict)

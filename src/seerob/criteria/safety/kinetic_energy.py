@@ -3,7 +3,9 @@ r"""Kinetic energy of a robot, [Weistroffer2022]_ Eq. 5."""
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, cast
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated, Any, ClassVar, cast
 
 import mujoco
 import numpy as np
@@ -19,8 +21,9 @@ from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import NOISE, others_noisy
+from seerob.criteria.plan import Draw, Rows, Together
 from seerob.model import provenance
-from seerob.model.model import Mechanism, Model
+from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import energy_of
 from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, change_of_motion
@@ -127,14 +130,15 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 widths = self._ends(masses, state).widths if len(masses) else np.zeros(0)
                 reason = deciding(masses.tolerances, widths) or NOISE
 
-            def draw() -> tuple[Sphere, ...]:
-                label = figures.worded(energy, self.limit, self.unit, at_most=True)
-                radius = DRAWN * max(energy, 0.0) ** (1 / 3)
-                return (Sphere(center=tuple(place().tolist()), radius=radius, label=label, verdict=verdict),)
-
-            return Shown(reason, draw)
+            return Shown(reason, partial(_sphere, self, place, energy, verdict))
 
         return present
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
+        """Return what computes energies together: of robots alone, whose masses have no tolerances."""
+        robot = model.mover(self.robot)
+        alone = robot.alone and not _aboard(model, robot) and not len(MassTolerances(model, robot))
+        return _Energies if alone else None
 
     def one_by_one(self, model: Model) -> str:
         """Say so where a mass has a tolerance or something else moves it."""
@@ -211,6 +215,37 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 *(() if robot.rotor_inertia_known else ("energy of rotors and gears",)),
             ),
         )
+
+
+class _Energies:
+    """Energies of robots at one instant, of a tick's plan."""
+
+    intervals = False
+    _place: Callable[[Frame, Array], Array]
+
+    def __init__(self, criteria: Sequence[KineticEnergy], model: Model) -> None:
+        self._robots = [model.mover(each.robot) for each in criteria]
+        self._criteria = criteria
+
+    def compute(self, state: State, rows: Rows) -> None:
+        """Write the energy of every robot."""
+        self._place = state.drawn_points()
+        rows.value[:] = [kinetic_energy(state.mass_matrix(robot), state.qd(robot)) for robot in self._robots]
+
+    def present(
+        self, state: State, k: int, value: float, verdict: Verdict | None
+    ) -> tuple[str, Draw, tuple[Result, ...]]:
+        """Say and draw what `KineticEnergy.present` does of one that is decided."""
+        place = partial(self._place, self._robots[k].tip, ORIGIN)
+        return "", partial(_sphere, self._criteria[k], place, value, verdict), ()
+
+
+def _sphere(
+    of: KineticEnergy, place: Callable[[], Array], energy: float, verdict: Verdict | None
+) -> tuple[Sphere, ...]:
+    label = figures.worded(energy, of.limit, of.unit, at_most=True)
+    radius = DRAWN * max(energy, 0.0) ** (1 / 3)
+    return (Sphere(center=tuple(place().tolist()), radius=radius, label=label, verdict=verdict),)
 
 
 def _aboard(model: Model, machine: Mechanism) -> tuple[Mechanism, ...]:

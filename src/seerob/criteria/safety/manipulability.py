@@ -3,21 +3,25 @@ r"""Manipulability of a point of a robot, [Weistroffer2022]_ section 2.2.2.2."""
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, cast
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
+from seerob.core.errors import Undecided
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Basis, Ellipsoid, Result
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.plan import Draw, Rows, Together
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
-from seerob.model.model import Model
+from seerob.model.model import Frame, Model
 from seerob.twin.spans import Falls, Points, Turning, coupling_of
 from seerob.twin.state import State
 
@@ -131,25 +135,14 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 if after.max() <= smallest + NOTHING:
                     reason = "no joint by itself leads out of the singularity"
             place = state.drawn_point(frame, offset)
-
-            def draw() -> tuple[Ellipsoid, ...]:
-                ellipsoid = Ellipsoid(
-                    center=tuple(place().tolist()),
-                    wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
-                    radii=(DRAWN * sigma[0], DRAWN * sigma[1], DRAWN * sigma[2]),
-                    label=f"σ₃ {figures.worded(smallest, self.limit, self.unit, at_most=False)}",
-                    verdict=verdict,
-                )
-                return (ellipsoid,)
-
-            parts = (
-                Result(name="σ₁", value=sigma[0], unit="m/rad"),
-                Result(name="σ₂", value=sigma[1], unit="m/rad"),
-                Result(name="√det J_v J_vᵀ", value=math.prod(sigma), unit="m³/rad³"),
-            )
-            return Shown(reason, draw, parts)
+            draw = partial(_ellipsoid, self, place, sigma, wxyz, verdict)
+            return Shown(reason, draw, _others(sigma))
 
         return present
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
+        """Return what computes figures of points together."""
+        return _Figures
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how far singular values fall between instants: by the norm of the Jacobian's change."""
@@ -172,3 +165,61 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
             ),
             not_modelled=("orientation: only the linear rows of the Jacobian count",),
         )
+
+
+class _Figures:
+    """Manipulability of points at one instant, of a tick's plan."""
+
+    intervals = False
+    _place: Callable[[Frame, Array], Array]
+
+    def __init__(self, criteria: Sequence[Manipulability], model: Model) -> None:
+        frames = [model.frame(each.at) for each in criteria]
+        self._points = [
+            (frame, model.carrier(frame), np.array(each.offset))
+            for each, frame in zip(criteria, frames, strict=True)
+        ]
+        self._criteria = criteria
+        self._found: list[tuple[list[float], list[float]]] = []
+
+    def compute(self, state: State, rows: Rows) -> None:
+        """Write the smallest singular value of every point."""
+        self._place = state.drawn_points()
+        self._found = [state.velocity_ellipsoid(*point) for point in self._points]
+        rows.value[:] = [sigma[2] for sigma, _ in self._found]
+
+    def present(
+        self, state: State, k: int, value: float, verdict: Verdict | None
+    ) -> tuple[str, Draw, tuple[Result, ...]]:
+        """Say and draw what `Manipulability.present` does of one that is decided."""
+        if verdict is Verdict.EXCEEDED:
+            raise Undecided("it says which joint leads out")
+        sigma, wxyz = self._found[k]
+        frame, _, offset = self._points[k]
+        place = partial(self._place, frame, offset)
+        return "", partial(_ellipsoid, self._criteria[k], place, sigma, wxyz, verdict), _others(sigma)
+
+
+def _others(sigma: Sequence[float]) -> tuple[Result, ...]:
+    return (
+        Result(name="σ₁", value=sigma[0], unit="m/rad"),
+        Result(name="σ₂", value=sigma[1], unit="m/rad"),
+        Result(name="√det J_v J_vᵀ", value=math.prod(sigma), unit="m³/rad³"),
+    )
+
+
+def _ellipsoid(
+    of: Manipulability,
+    place: Callable[[], Array],
+    sigma: Sequence[float],
+    wxyz: Sequence[float],
+    verdict: Verdict | None,
+) -> tuple[Ellipsoid, ...]:
+    ellipsoid = Ellipsoid(
+        center=tuple(place().tolist()),
+        wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
+        radii=(DRAWN * sigma[0], DRAWN * sigma[1], DRAWN * sigma[2]),
+        label=f"σ₃ {figures.worded(sigma[2], of.limit, of.unit, at_most=False)}",
+        verdict=verdict,
+    )
+    return (ellipsoid,)

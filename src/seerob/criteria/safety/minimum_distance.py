@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Basis, Segment
+from seerob.core.snapshot import Basis, Result, Segment
 from seerob.core.tolerances import Tolerance, deciding
+from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.body_parts import BodyPlaces, partly_seen
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
-from seerob.distance.least import DistanceKind
+from seerob.criteria.plan import Draw, Rows, Together
+from seerob.distance.least import Closests, DistanceKind, Per
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.accuracy.tracking_error import tracking
 from seerob.twin.spans import Falls, Points, approaching
 from seerob.twin.state import State
+
+DEEPER = " (overlap, at least this deep)"
 
 
 class MinimumDistance(Criterion, frozen=True, kw_only=True):
@@ -91,16 +97,15 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
                 open_ = f"; {_deciding(self.uncertainty, float(high - low) / 2, gap)}"
             a_named = places.named(state, closest.body_a, closest.point_a)
             b_named = places.named(state, closest.body_b, closest.point_b)
-            deeper = " (overlap, at least this deep)" if closest.kind == DistanceKind.DEPTH_AT_LEAST else ""
-
-            def draw() -> tuple[Segment, ...]:
-                start, end = tuple(closest.point_a.tolist()), tuple(closest.point_b.tolist())
-                label = figures.worded(distance, self.limit, self.unit, at_most=False)
-                return (Segment(start=start, end=end, label=label, verdict=verdict),)
-
+            deeper = DEEPER if closest.kind == DistanceKind.DEPTH_AT_LEAST else ""
+            draw = partial(_segment, self, closest.point_a, closest.point_b, distance, verdict)
             return Shown(f"{a_named} ↔ {b_named}{deeper}{open_}", draw)
 
         return present
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
+        """Return what computes least distances together."""
+        return _Distances
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how much nearer the two sets can come between two instants at which this is asked."""
@@ -129,3 +134,47 @@ def _deciding(uncertainty: float, seen: float, gap: Gap) -> str:
         Tolerance("surfaces that may stick out", gap.deviation / 2, "m"),
     )
     return deciding(inputs, np.array([tolerance.half for tolerance in inputs]))
+
+
+class _Distances:
+    """Least distances of pairs of sets at one instant, of a tick's plan."""
+
+    intervals = True
+
+    def __init__(self, criteria: Sequence[MinimumDistance], model: Model) -> None:
+        gaps = [each._gap(model) for each in criteria]
+        self._criteria, self._places = criteria, BodyPlaces(model)
+        self._asked = tuple((gap.query, Per.SETS) for gap in gaps)
+        self._nearer = np.array([gap.deviation for gap in gaps])
+        self._either = np.array([each.uncertainty for each in criteria])
+        self._found: Closests | None = None
+        self._rows: list[int] = []
+
+    def compute(self, state: State, rows: Rows) -> None:
+        """Write every distance, and how much nearer and farther it may be."""
+        self._found, self._rows = found, at = state.nearest(self._asked)
+        value, low, high, exceeded = rows
+        value[:] = found.distance[at]
+        low[:] = value - self._nearer - self._either
+        high[:] = value + self._either
+        exceeded[:] = found.kind[at] == DistanceKind.DEPTH_AT_LEAST
+
+    def present(
+        self, state: State, k: int, value: float, verdict: Verdict | None
+    ) -> tuple[str, Draw, tuple[Result, ...]]:
+        """Say and draw what `MinimumDistance.present` does of one that is decided."""
+        found, row, named = self._found, self._rows[k], self._places.named
+        assert found is not None
+        a, b = found.point_a[row], found.point_b[row]
+        deeper = DEEPER if found.kind.item(row) == DistanceKind.DEPTH_AT_LEAST else ""
+        where = (
+            f"{named(state, found.body_a.item(row), a)} ↔ {named(state, found.body_b.item(row), b)}{deeper}"
+        )
+        return where, partial(_segment, self._criteria[k], a, b, value, verdict), ()
+
+
+def _segment(
+    of: MinimumDistance, a: Array, b: Array, distance: float, verdict: Verdict | None
+) -> tuple[Segment, ...]:
+    label = figures.worded(distance, of.limit, of.unit, at_most=False)
+    return (Segment(start=tuple(a.tolist()), end=tuple(b.tolist()), label=label, verdict=verdict),)

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Annotated, ClassVar, cast
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 from msgspec import Meta, Struct
 
 from seerob.core import figures
 from seerob.core.errors import InputError, UnknownName
-from seerob.core.snapshot import Basis, Highlight, Marker, Segment
+from seerob.core.snapshot import Basis, Highlight, Marker, Result, Segment
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, Verdict
 from seerob.criteria.body_parts import seen_first
-from seerob.criteria.criterion import Criterion, Evaluate
-from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
+from seerob.criteria.criterion import NOTHING_SHOWN, Criterion, Evaluate
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin, result_of, verdict_of
+from seerob.criteria.plan import Whole
 from seerob.distance.depth import Depth, Depths
-from seerob.distance.least import Closests
+from seerob.distance.least import Closests, Per, Query
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.tracking_error import TrackingError
@@ -78,6 +79,10 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
     def compute(self, model: Model) -> Compute:
         """Look up every name in the model once and return the function that computes distances and depths."""
         return self._distances(model, self._watched(model), self._depths(model))
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Whole] | None:
+        """Return what computes distances together; of whom is inside each is asked alone."""
+        return _Outside
 
     def one_by_one(self, model: Model) -> str:
         """Many instants are computed together, but for those at which something is inside."""
@@ -233,3 +238,44 @@ def _line(deep: Depth, border: Array) -> tuple[Segment, ...]:
     low, high = figures.rounded_down(deep.at_least, "m"), figures.rounded_up(deep.at_most, "m")
     label = f"{high if deep.at_most == deep.at_least else f'between {low} and {high}'} deep"
     return (Segment(start=start, end=end, label=label, verdict=Verdict.EXCEEDED),)
+
+
+class _Outside:
+    """Areas of which all keep out at one instant, of a tick's plan."""
+
+    def __init__(self, criteria: Sequence[SafetyArea], model: Model) -> None:
+        self._every = list[tuple[list[tuple[int, float, list[str]]], Present, Result]]()
+        """Of each: of every area how many bodies, how much nearer they may be [m], and where."""
+        asked = list[tuple[Query, Per]]()
+        for each in criteria:
+            watched, several = each._watched(model), len(_names(each.area)) > 1
+            places = [[_where(model, one, i, several) for i in range(len(one.gap.b))] for one in watched]
+            asked += [(one.gap.query, Per.BODY) for one in watched]
+            sizes = [
+                (len(where), one.gap.deviation, where) for one, where in zip(watched, places, strict=True)
+            ]
+            same = Result(name=each.name, unit=each.unit, at_most=each.at_most)
+            self._every.append((sizes, each.present(model), same))
+        self._asked = tuple(asked)
+
+    def results(self, state: State) -> list[Result | None]:
+        """Say of each area that nobody is inside of, or may be, who is nearest; as `SafetyArea.bind`."""
+        found, begins = state.nearest(self._asked)
+        row, results = iter(begins), list[Result | None]()
+        for sizes, present, same in self._every:
+            nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
+            for count, may, where in sizes:
+                begin = next(row)
+                distance = found.distance[begin : begin + count]
+                i = int(distance.argmin())
+                value = distance.item(i)
+                nearest = min(nearest, (value, where[i]))
+                perhaps = min(perhaps, (value - may, where[i], may))
+            (value, who), least = nearest, perhaps[0]
+            ends = None if least >= value else (least, value)
+            figure = Figure(value, 0.0, ends, beside=_Near(who, *perhaps[1:]))
+            verdict = verdict_of(figure, at_most=same.at_most)
+            clear = value > ROUNDING and math.isfinite(value) and verdict is not Verdict.UNDECIDED
+            shown = present(state, figure, verdict) if clear else NOTHING_SHOWN
+            results.append(result_of(figure, verdict, shown, same) if clear else None)
+        return results

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Annotated, ClassVar, Literal, NamedTuple, cast
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -20,8 +20,9 @@ from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.body_parts import BodyPlaces, partly_seen
 from seerob.criteria.criterion import Claim, Criterion, Evaluate, Follows, Moment
-from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
+from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin, result_of, verdict_of
 from seerob.criteria.noisy_speeds import others_noisy
+from seerob.criteria.plan import Whole
 from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping import many_instants
 from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
@@ -41,7 +42,7 @@ from seerob.criteria.stopping.required import (
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, way_of_person
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
-from seerob.distance.least import Closests
+from seerob.distance.least import Closests, Per
 from seerob.kernels.separation import approach_speeds, rise, separation, separations
 from seerob.kernels.spans import greatest
 from seerob.model import provenance
@@ -375,6 +376,12 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """Look up every name in the model once and return the function that computes distances and S_p."""
         own = self._by_device(model)[0]
         return own._separations(model, own._gap(model), self._shared(model))
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Whole] | None:
+        """Return what computes distances together, of the present speeds and without tolerances."""
+        own = self._by_device(model)[0]
+        plain = self.mode == "dynamic" and not own._tolerances() and not self.unknown(model)
+        return _Stops if plain else None
 
     def one_by_one(self, model: Model) -> str:
         """Say so of what depends on earlier instants, has ends, or where the way to stop is not given."""
@@ -884,3 +891,48 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 "a person who gets faster than v_h, and than now",
             ),
         )
+
+
+class _Stops:
+    """Separation of robots from people at one instant, of a tick's plan."""
+
+    def __init__(self, criteria: Sequence[Separation], model: Model) -> None:
+        self._every = list[tuple[Separation, Gap, StopModel, float, Sequence[str], Present, Result]]()
+        for each in criteria:
+            own = each._by_device(model)[0]
+            gap, same = own._gap(model), Result(name=each.name, unit=each.unit, at_most=each.at_most)
+            K, names = sum(own._terms()[0]) + gap.deviation, [model.bodies[i].name for i in gap.b]
+            present = own._line(model, gap, each._shared(model))
+            self._every.append((own, gap, own._stop(model), K, names, present, same))
+        self._asked = tuple((gap.query, Per.BODY) for _, gap, *_ in self._every)
+
+    def results(self, state: State) -> list[Result | None]:
+        """Say of each whose parts are decided what governs, as `Separation.bind`."""
+        every, begins = state.nearest(self._asked)
+        return [self._one(state, every, row, *each) for row, each in zip(begins, self._every, strict=True)]
+
+    @staticmethod
+    def _one(
+        state: State,
+        every: Closests,
+        row: int,
+        own: Separation,
+        gap: Gap,
+        stop: StopModel,
+        K: float,
+        names: Sequence[str],
+        present: Present,
+        same: Result,
+    ) -> Result | None:
+        course = stop.courses(state)
+        now, seen = course(1.0), state.fastest_speed(gap.a)
+        if now.most is not None or now.unbounded_reason:
+            return None
+        found, S_p = every.of(slice(row, row + len(gap.b))), own._distance(now, K, seen)
+        far = found.distance
+        at = _Found(stop, found, course, now, (seen, seen), "", S_p, S_p, "", None, far, far)
+        figure = Figure(None, parts=Parts(names, far, S_p), beside=at)
+        verdict = verdict_of(figure, at_most=same.at_most)
+        if verdict is _UNDECIDED or not math.isfinite(seen):
+            return None
+        return result_of(figure, verdict, present(state, figure, verdict), same)

@@ -2,8 +2,9 @@ r"""Speed of a point, or of the fastest point of a set of bodies, [Weistroffer20
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -12,14 +13,15 @@ from seerob.core import figures
 from seerob.core.domains import agree, at_least
 from seerob.core.errors import InputError
 from seerob.core.quantities import Metres3
-from seerob.core.snapshot import Arrow, Basis, Input
+from seerob.core.snapshot import Arrow, Basis, Input, Result
 from seerob.core.transforms import Array, length
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import NOISE, others_noisy
+from seerob.criteria.plan import Draw, Rows, Together
 from seerob.model import provenance
-from seerob.model.model import Model
+from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.moving_base import velocity_of
 from seerob.twin.spans import Falls, Points, speeding
 from seerob.twin.state import State
@@ -170,14 +172,13 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             if verdict is Verdict.UNDECIDED:
                 where = f"{where}: {NOISE}".removeprefix(": ")
 
-            def draw() -> tuple[Arrow, ...]:
-                label = figures.worded(speed, self.limit, self.unit, at_most=True)
-                origin, vector = tuple(place().tolist()), tuple((DRAWN * v).tolist())
-                return (Arrow(origin=origin, vector=vector, label=label, verdict=verdict),)
-
-            return Shown(where, draw)
+            return Shown(where, partial(_arrow, self, place, v, speed, verdict))
 
         return present
+
+    def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
+        """Return what computes speeds together: of sets, and of points that the robot alone moves."""
+        return _Speeds if self.at is None or model.carrier(model.frame(self.at)).alone else None
 
     def one_by_one(self, model: Model) -> str:
         """Say so of a point whose robot is carried by something that moves."""
@@ -210,3 +211,64 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             + provenance.motion(model, *filter(None, carriers))
             + provenance.limit(self.limit, "m/s"),
         )
+
+
+class _Speeds:
+    """Speeds of points and of sets of bodies at one instant, of a tick's plan."""
+
+    intervals = False
+    _place: Callable[[Frame, Array], Array]
+
+    def __init__(self, criteria: Sequence[Velocity], model: Model) -> None:
+        self._criteria, self._names = criteria, [body.name for body in model.bodies]
+        self._at = dict[int, tuple[Frame, Mechanism, Array]]()
+        """Of a point, by which of the criteria it is."""
+        self._sets, bodies = dict[int, slice](), list[int]()
+        """Of a set, likewise: its rows among the bodies of all sets."""
+        for k, each in enumerate(criteria):
+            if each.at is not None:
+                frame = model.frame(each.at)
+                self._at[k] = frame, model.carrier(frame), np.array(each.offset)
+                continue
+            own = each._bodies(model)
+            self._sets[k] = slice(len(bodies), len(bodies) + len(own))
+            bodies += own
+        self._bodies = tuple(bodies)
+        self._found: list[tuple[Array, int]] = [(np.zeros(3), 0)] * len(criteria)
+        """Velocity of each, and of a set the row of the fastest body."""
+        self._points = np.zeros((0, 3))
+
+    def compute(self, state: State, rows: Rows) -> None:
+        """Write the speed of every point, and of every set that of its fastest point."""
+        self._place = state.drawn_points()
+        speeds, found = [0.0] * len(self._found), self._found
+        for k, (frame, mechanism, offset) in self._at.items():
+            v = state.velocity(frame, mechanism, offset)[:3]
+            speeds[k], found[k] = length(v), (v, 0)  # type: ignore[call-overload]
+        if self._sets:
+            every, self._points, velocities = state.fastest_points(self._bodies)
+            for k, own in self._sets.items():
+                row = own.start + int(every[own].argmax())
+                speeds[k], found[k] = every.item(row), (velocities[row], row)
+        rows.value[:] = speeds
+
+    def present(
+        self, state: State, k: int, value: float, verdict: Verdict | None
+    ) -> tuple[str, Draw, tuple[Result, ...]]:
+        """Say and draw what `Velocity.present` does of one that is decided."""
+        v, row = self._found[k]
+        at = self._at.get(k)
+        if at is None:
+            place = partial(self._points.__getitem__, row)
+            where = self._names[self._bodies[row]]
+        else:
+            place, where = partial(self._place, at[0], at[2]), ""
+        return where, partial(_arrow, self._criteria[k], place, v, value, verdict), ()
+
+
+def _arrow(
+    of: Velocity, place: Callable[[], Array], v: Array, speed: float, verdict: Verdict | None
+) -> tuple[Arrow, ...]:
+    label = figures.worded(speed, of.limit, of.unit, at_most=True)
+    origin, vector = tuple(place().tolist()), tuple((DRAWN * v).tolist())
+    return (Arrow(origin=origin, vector=vector, label=label, verdict=verdict),)

@@ -102,6 +102,8 @@ class Validity:
         """By question and person, bones that may not be relied on at this tick."""
         self._lost: dict[int, tuple[frozenset[str], tuple[int, ...]]] = {}
         self._relied_on: set[Hashable] = set()
+        self._carriers: dict[str, tuple[str, ...]] = {}
+        """By name, who it is and what carries it."""
         self._moved: dict[str, bool] = {}
         """By name, what `moved` says at this tick."""
         self._sound: frozenset[str] | None = None
@@ -128,7 +130,10 @@ class Validity:
         """
         found = self._moved.get(name)
         if found is None:
-            every = [self._hearings[each] for each in (name, *self._model.carriers_of(name))]
+            carriers = self._carriers.get(name)
+            if carriers is None:
+                carriers = self._carriers[name] = (name, *self._model.carriers_of(name))
+            every = [self._hearings[each] for each in carriers]
             found = self._model.mechanisms[name].role != "robot" or any(h.driven or h.heard for h in every)
             found = self._moved[name] = found and not any(hearing.once for hearing in every)
         return found

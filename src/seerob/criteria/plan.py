@@ -102,8 +102,8 @@ class Plan:
         for kind, indices, results in kinds:
             rows = slice(len(self._each), len(self._each) + len(indices))
             self._exact += 0 if kind.intervals else len(indices)
-            arrays = self._value, self._low, self._high, self._exceeded
-            self._kinds.append((kind, Rows(*[each[rows] for each in arrays])))
+            own = Rows(self._value[rows], self._low[rows], self._high[rows], self._exceeded[rows])
+            self._kinds.append((kind, own))
             self._each += [
                 (i, kind, k, same) for k, (i, same) in enumerate(zip(indices, results, strict=True))
             ]

@@ -461,6 +461,6 @@ def _drawn(
     )
     if mass is None:
         return (ellipsoid,)
-    vector = tuple(min(DRAWN * mass, LARGEST_DRAWN) * each for each in u)
+    x, y, z = (min(DRAWN * mass, LARGEST_DRAWN) * each for each in u)
     label = figures.worded(mass, of.limit, of.unit, at_most=True)
-    return ellipsoid, Arrow(origin=center, vector=vector, label=label, verdict=verdict)
+    return ellipsoid, Arrow(origin=center, vector=(x, y, z), label=label, verdict=verdict)

@@ -244,7 +244,7 @@ class _Speeds:
         speeds, found = [0.0] * len(self._found), self._found
         for k, (frame, mechanism, offset) in self._at.items():
             v = state.velocity(frame, mechanism, offset)[:3]
-            speeds[k], found[k] = length(v), (v, 0)  # type: ignore[call-overload]
+            speeds[k], found[k] = float(length(v)), (v, 0)
         if self._sets:
             every, self._points, velocities = state.fastest_points(self._bodies)
             for k, own in self._sets.items():

@@ -72,7 +72,7 @@ class Claim(Protocol):
 
 GIVEN_A_MODEL = {
     "compute", "present", "one_by_one", "bind", "batch", "remembers", "falls", "lowest", "bounded_once",
-    "follows", "basis", "looks_ahead", "claims", "depends", "judged", "planned", "unshaped",
+    "follows", "basis", "looks_ahead", "claims", "depends", "hits", "judged", "planned", "unshaped",
 }  # fmt: skip
 """Methods of a criterion whose first argument is the model."""
 

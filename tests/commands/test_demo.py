@@ -94,7 +94,7 @@ def test_a_terminal_that_can_shows_the_picture_itself(terminal, begins):
 def test_of_real_devices_every_address_of_this_machine_is_named(name):
     tables = tomllib.loads((HOME / name / "workstation.toml").read_text())
     said = "\n".join(addresses(tables))
-    for table in ("sources", "targets"):
+    for table in ("sources", "targets", "cameras"):
         for i, entry in enumerate(tables.get(table, ())):
             assert ("127.0.0.1" in str(entry)) <= (f"{table}[{i}]." in said)
 

@@ -134,7 +134,7 @@ def test_a_run_says_so_when_there_is_none(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("cell", "sources", "emulators"),
     [
-        ("assembly_line", {"ur10", "operator"}, 2),
+        ("assembly_line", {"ur10", "operator"}, 3),
         ("empty_room", {"ur5", "visitor"}, 2),
         ("three_robots", {"iiwa_left", "ur10", "iiwa_right", "visitor"}, 1),
         ("giant_niryo", {"niryo", "operator"}, 3),

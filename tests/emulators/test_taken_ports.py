@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from contextlib import ExitStack
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -14,6 +15,7 @@ from seerob.app.console.terminal import Exit
 from seerob.app.emulation.options import EmulatorOptions
 from seerob.app.emulation.ports import Move, at_ports, held
 from seerob.app.emulation.processes import served_anywhere
+from seerob.app.emulators.camera import Camera
 from seerob.app.emulators.kinect import Kinect
 from seerob.app.emulators.modbus import Modbus
 from seerob.app.emulators.natnet import Natnet
@@ -28,6 +30,7 @@ from seerob.core.errors import InputError
 from seerob.session.reading import read
 
 HERE = "127.0.0.1"
+CELL_WITH_A_CAMERA = str(Path(__file__).parents[2] / "workstations/motor_station")
 KEYS = ("theta", "a", "d", "alpha")
 
 
@@ -71,6 +74,7 @@ def test_the_one_that_is_taken_is_named_of_two(calibration, taken, capsys, more)
         ("opcua", Opcua),
         ("vrpn", Vrpn),
         ("web", Web),
+        ("camera", lambda port: Camera(port=port, cell=CELL_WITH_A_CAMERA)),
         ("natnet", Natnet),
         ("kinect", lambda port: Kinect(port=port, websocket=True)),
         ("ros_tcp", RosTcp),
@@ -132,7 +136,11 @@ def source(kind, *lines):
     return "\n".join((f"[[sources]]\nkind = '{kind}'", *lines, ""))
 
 
-def test_sources_and_targets_follow_those_that_they_would_reach(tmp_path):
+def camera(name, address):
+    return f'[[cameras]]\nname = "{name}"\ncalibration = "lens.toml"\naddress = "{address}"\n'
+
+
+def test_sources_targets_and_cameras_follow_those_that_they_would_reach(tmp_path):
     target = "[[targets]]\nat = 'arm'\nhost = 'localhost'\ntopic = '/pose'\n"
     asked = cell(
         tmp_path,
@@ -144,14 +152,18 @@ def test_sources_and_targets_follow_those_that_they_would_reach(tmp_path):
         source("modbus", "name = 'here'\nhost = '127.0.0.1'\nport = 5020"),
         source("vive", "human = 'person'\nport = 5020"),
         target,
+        camera("near", "http://localhost:8081/a?b=1"),
+        camera("away", "http://192.0.2.7:8081/"),
     )
-    moves = [(30004, 1), (30011, 2), (4840, 3), (5020, 4), (9090, 5)]
+    moves = [(8081, 7), (30004, 1), (30011, 2), (4840, 3), (5020, 4), (9090, 5)]
     found = at_ports(asked, [Move(HERE, *each) for each in moves]).workstation
     arm, usual, said, *others = found.sources
     assert (arm.port, arm.primary_port) == (1, 2)
     assert (usual.url, said.url) == ("opc.tcp://localhost:3/a", "opc.tcp://127.0.0.1:3/b")
     assert [each.port for each in others] == [5020, 5020, 4, 5020]
     assert found.targets[0].port == 5
+    addresses = [each.address for each in found.cameras]
+    assert addresses == ["http://localhost:7/a?b=1", "http://192.0.2.7:8081/"]
     (_, *_, vive) = at_ports(asked, [Move("", 5020, 6)]).workstation.sources
     assert vive.port == 6
     assert at_ports(asked, []) is asked

@@ -197,8 +197,12 @@ async function cellOverItsPicture(cell, camera) {
   await browser.page.getByRole("button", { name: camera, exact: true }).click();
   await browser.page.locator(".camera-note").getByText("95 % of its error").waitFor();
   // The person has been calibrated, and reaches forward in every round of the machine's clock.
-  await browser.page.waitForFunction(() => window.seerob.t > 26 && (Date.now() / 1000) % 12 > 3.5);
-  await browser.page.waitForFunction(() => (Date.now() / 1000) % 12 < 8);
+  await browser.page.waitForFunction(() => {
+    const [note] = document.querySelectorAll(".camera-note");
+    const phase = (Date.now() / 1000) % 12;
+    const drawn = note?.textContent.includes("95 % of its error");
+    return window.seerob.t > 26 && phase > 3.5 && phase < 8 && drawn;
+  });
   await keep(browser, path.join(at, "camera"));
   await browser.close();
   await run.close();

@@ -196,10 +196,12 @@ class Lens:
         # The middle of a pixel of OpenCV is at whole numbers, of a picture here at halves.
         columns = self.width / 2 + self.focal * rays[..., 0] - 0.5
         rows = self.height / 2 + self.focal * rays[..., 1] - 0.5
-        self._left = np.clip(columns.astype(np.int64), 0, self.width - 2)
-        self._top = np.clip(rows.astype(np.int64), 0, self.height - 2)
-        self._right_share = (columns - self._left).astype(np.float32)[..., None]
-        self._down_share = (rows - self._top).astype(np.float32)[..., None]
+        left = np.clip(columns.astype(np.int64), 0, self.width - 2)
+        top = np.clip(rows.astype(np.int64), 0, self.height - 2)
+        s, t = (rows - top)[..., None], (columns - left)[..., None]
+        shares = ((1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t)
+        places = (left + self.width * top + step for step in (0, 1, self.width, self.width + 1))
+        self._four = [(at, share.astype(np.float32)) for at, share in zip(places, shares, strict=True)]
 
     def camera(self, world_from_camera: Array) -> Pinhole:
         """Return the pinhole camera at a place, shape (4, 4), whose pictures `distorted` takes."""
@@ -209,10 +211,9 @@ class Lens:
 
     def distorted(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The picture as the lens has it, between pixels on the plane through four of them."""
-        i, j, s, t = self._top, self._left, self._down_share, self._right_share
-        upper = pixels[i, j] * (1 - t) + pixels[i, j + 1] * t
-        lower = pixels[i + 1, j] * (1 - t) + pixels[i + 1, j + 1] * t
-        return np.asarray(np.rint(upper * (1 - s) + lower * s), np.uint8)
+        flat = pixels.reshape(-1, 3)
+        seen = sum(share * flat.take(at, axis=0) for at, share in self._four)
+        return np.asarray(np.rint(seen), np.uint8)
 
 
 class Photographer:

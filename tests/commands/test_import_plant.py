@@ -6,8 +6,10 @@ import io
 import math
 import random
 import re
+import runpy
 import tomllib
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from seerob.core.errors import InputError
 from seerob.description.formats.automationml import read
 from seerob.session.station import load
 
+REPOSITORY = Path(__file__).parents[2]
 OLD = '<CAEXFile SchemaVersion="2.15" FileName="cell.aml">{}</CAEXFile>'
 NEW = '<CAEXFile SchemaVersion="3.0" xmlns="http://www.dke.de/CAEX">{}</CAEXFile>'
 INTERFACE = "AutomationMLBaseInterface/ExternalDataConnector"
@@ -306,3 +309,39 @@ def test_what_only_a_class_has_is_taken_from_it_and_mirrors_are_there_once(tmp_p
     assert "Lost mirrors an element that is not in the file" in said
     assert "Lib/Loop is derived from itself" in said
     assert "Other@Lib/Thing of 1 element is not in the file" in said
+
+
+def test_kinematics_of_a_plant_are_robots_and_other_geometry_parts(tmp_path):
+    """Two arms of one COLLADA 1.5 file, and a STEP file of two parts, each at the place of its element."""
+    made = runpy.run_path(str(REPOSITORY / "scripts/make-imported-line"))
+    step = made["Step"]()
+    block = step.box("block", (40.0, 20.0, 10.0))
+    step.assembly("pair", [(block, "a", made["place"]()), (block, "b", made["place"](100.0))])
+
+    def element(name, uris, x):
+        connectors = "".join(
+            f'<ExternalInterface Name="g{k}" RefBaseClassPath="{INTERFACE}/COLLADAInterface">'
+            f'<Attribute Name="refURI"><Value>{uri}</Value></Attribute></ExternalInterface>'
+            for k, uri in enumerate(uris)
+        )
+        role = f'<RoleRequirements RefBaseRoleClassPath="{ROLE}/Robot"/>' if "dae" in uris[0] else ""
+        inside = frame(x=x, rz=90) + connectors + role
+        return f'<InternalElement Name="{name}">{inside}</InternalElement>'
+
+    arm = ("arm.dae#kinematics", "arm.dae#visual")
+    rows = [element("left", arm, 1), element("right", arm, 2), element("Bin 1", ["pair.step"], 3)]
+    (tmp_path / "arm.dae").write_bytes((REPOSITORY / "tests/model_io/files/arm.dae").read_bytes())
+    (tmp_path / "pair.step").write_text(step.text())
+    (tmp_path / "cell.aml").write_text(hierarchy("".join(rows)))
+    assert cli.main(["import", str(tmp_path / "cell.aml"), str(tmp_path / "cell")]) == Exit.WITHIN
+    tables = tomllib.loads((tmp_path / "cell/workstation.toml").read_text())
+    assert [robot["name"] for robot in tables["robots"]] == ["left", "right"]
+    assert tables["robots"][0]["model"] == tables["robots"][1]["model"]
+    for k, robot in enumerate(tables["robots"], 1):
+        assert robot["base"]["position"] == pytest.approx([k, 0, 0], abs=1e-9)
+        assert robot["base"]["wxyz"] == pytest.approx([math.sqrt(0.5), 0, 0, math.sqrt(0.5)])
+    assert [part["name"] for part in tables["parts"]] == ["Bin_1/pair/a", "Bin_1/pair/b"]
+    assert tables["parts"][1]["at"]["position"] == pytest.approx([3, 0.1, 0])
+    assert "# [[robots]]" not in (tmp_path / "cell/workstation.toml").read_text()
+    model = load(tmp_path / "cell").model
+    assert {robot.name for robot in model.workstation.robots} == {"left", "right"}

@@ -1,10 +1,20 @@
 // The bodies of the twin: one group per node, posed by the newest block, dressed by its mesh.
 
-import { Box3, Group, LineSegments, type Material, Mesh, type Object3D, Quaternion, Vector3 } from "three";
+import {
+  Box3,
+  type BufferGeometry,
+  Group,
+  LineSegments,
+  Mesh,
+  type Object3D,
+  Quaternion,
+  Vector3,
+} from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Doubts, doubtOf } from "../doubts";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
+import { type Crowd, crowdsOf, type Dressed } from "./crowds";
 import { drawnBySoftware } from "./effort";
 import { featureEdges, turnOutward } from "./feature_edges";
 import {
@@ -32,11 +42,29 @@ type Looks = Snapshot["looks"];
 
 const ONE = new Vector3(1, 1, 1);
 
+const sharp = new WeakMap<BufferGeometry, BufferGeometry>();
+
+/** A geometry with a normal for each of its triangles, one for all bodies that share it. */
+function withNormals(geometry: BufferGeometry): BufferGeometry {
+  let made = sharp.get(geometry);
+  if (!made) {
+    made = geometry.toNonIndexed();
+    made.computeVertexNormals();
+    sharp.set(geometry, made);
+  }
+  return made;
+}
+
 export class Body {
   readonly group = new Group();
   /** Box around its mesh, in its own frame; empty until the mesh came. */
   readonly extent = new Box3();
-  private dressed: { mesh: Mesh; own: Material | Material[] }[] = [];
+  /** What it wears. */
+  readonly meshes: Dressed[] = [];
+  /** Told when it looks different or is elsewhere. */
+  readonly followers: (() => void)[] = [];
+  /** Whether it was put somewhere that no block says. */
+  carried = false;
   private enclosed: { fill: Mesh; edges: LineSegments; smooth: boolean }[] = [];
   private painted: Verdict | null | undefined = undefined;
   /** Colour of a score; undefined while it has its own or a verdict's. */
@@ -50,6 +78,12 @@ export class Body {
   get occludes(): boolean {
     return this.behind && !this.doubted;
   }
+  /** Whether it is seen as it came. */
+  get plain(): boolean {
+    const { painted, tint, worn } = this;
+    const colored = painted !== undefined || tint !== undefined || worn !== undefined;
+    return !(colored || this.lit || this.doubted || this.behind);
+  }
   /** Whether it may be elsewhere. */
   doubted = false;
 
@@ -62,6 +96,7 @@ export class Body {
   /** Put on a mesh that is given in the body's frame. */
   dress(model: Object3D): void {
     const parts: Mesh[] = [];
+    model.updateMatrixWorld(true);
     model.traverse((part) => {
       if (part instanceof Mesh) parts.push(part);
     });
@@ -70,15 +105,15 @@ export class Body {
         this.enclose(part);
         continue;
       }
+      const given = part.material;
       // Its own copy: bodies that share a mesh are selected one by one.
       part.material = Array.isArray(part.material)
         ? part.material.map(ownMaterial)
         : ownMaterial(part.material);
       if (drawnBySoftware() && !part.geometry.hasAttribute("normal")) {
-        part.geometry = part.geometry.toNonIndexed();
-        part.geometry.computeVertexNormals();
+        part.geometry = withNormals(part.geometry);
       }
-      this.dressed.push({ mesh: part, own: part.material });
+      this.meshes.push({ mesh: part, own: part.material, given, local: part.matrixWorld.clone() });
     }
     this.extent.setFromObject(model);
     this.group.add(model);
@@ -148,7 +183,7 @@ export class Body {
       fill.material = smooth ? veilMaterial(verdict) : markerMaterial("volume", verdict);
       edges.material = lineMaterial(verdict);
     }
-    for (const { mesh, own } of this.dressed) {
+    for (const { mesh, own } of this.meshes) {
       // Where it may be elsewhere the eye cannot tell: that is drawn over the real one, too.
       mesh.renderOrder = this.occludes ? FIRST : 0;
       mesh.castShadow = mesh.receiveShadow = !this.occludes;
@@ -159,6 +194,12 @@ export class Body {
       else mesh.material = this.worn === undefined ? own : scoreMaterial(this.worn);
       for (const material of [own].flat()) glow(material, this.lit ? SELECTED_GLOW : 0);
     }
+    this.follow();
+  }
+
+  /** Tell whoever draws it with others. */
+  follow(): void {
+    for (const follower of this.followers) follower();
   }
 }
 
@@ -166,6 +207,9 @@ export class Bodies {
   readonly root = new Group();
   readonly byName = new Map<string, Body>();
   private list: Body[] = [];
+  private crowds: Crowd[] = [];
+  /** The block that was posed last. */
+  private posed = new Float32Array();
   private hidden: ReadonlySet<string> = new Set();
   private absent: ReadonlySet<string> = new Set();
   private real = false;
@@ -184,6 +228,9 @@ export class Bodies {
     this.generation += 1;
     const generation = this.generation;
     this.root.clear();
+    for (const { drawn } of this.crowds) drawn.dispose();
+    this.crowds = [];
+    this.posed = new Float32Array();
     this.byName.clear();
     this.list = scene.nodes.map((node) => new Body(node));
     this.overReality(this.real);
@@ -213,18 +260,32 @@ export class Bodies {
         }
       }),
     );
+    if (generation === this.generation) {
+      this.crowds = crowdsOf(this.list);
+      for (const { drawn } of this.crowds) this.root.add(drawn);
+    }
     return failed;
   }
 
   /** Put every body where the block says: x, y, z [m], w, x, y, z in the world. */
   pose(block: Float32Array): void {
+    const before = this.posed;
     for (let i = 0, k = 0; i < this.list.length; i += 1, k += FLOATS_PER_NODE) {
-      const { group } = this.list[i]!;
+      const body = this.list[i]!;
+      const { group } = body;
       this.position.set(block[k]!, block[k + 1]!, block[k + 2]!);
       this.orientation.set(block[k + 4]!, block[k + 5]!, block[k + 6]!, block[k + 3]!);
       group.matrix.compose(this.position, this.orientation, ONE);
       group.matrixWorldNeedsUpdate = true;
+      if (body.followers.length === 0) continue;
+      let same = before.length === block.length && !body.carried;
+      for (let j = k; same && j < k + FLOATS_PER_NODE; j += 1) same = before[j] === block[j];
+      if (same) continue;
+      body.carried = false;
+      body.follow();
     }
+    if (before.length === block.length) before.set(block);
+    else this.posed = block.slice();
   }
 
   /** Show them over the real cell, or in a room of their own. */
@@ -254,8 +315,12 @@ export class Bodies {
   }
 
   private reveal(): void {
-    for (const { group, node } of this.list) {
-      group.visible = !this.hidden.has(node.name) && !this.absent.has(node.name);
+    for (const body of this.list) {
+      const { name } = body.node;
+      const visible = !this.hidden.has(name) && !this.absent.has(name);
+      if (visible === body.group.visible) continue;
+      body.group.visible = visible;
+      body.follow();
     }
   }
 

@@ -54,6 +54,8 @@ export class Carried {
     for (const { body, from } of this.bodies) {
       body.group.matrix.multiplyMatrices(this.motion, from);
       body.group.matrixWorldNeedsUpdate = true;
+      body.carried = true;
+      body.follow();
     }
     this.moved();
   }

@@ -41,7 +41,11 @@ function hatch(material: Material): void {
 // One light from above the right shoulder, less from the sky than from the floor, and some from the eye, so that
 // no side is dark; worked out where corners are, not pixels: a twentieth of the work.
 const CORNER_LIGHT = `
-  vec3 across = normalize(normalMatrix * normal);
+  vec3 across = normal;
+  #ifdef USE_INSTANCING
+    across = mat3(instanceMatrix) * across;
+  #endif
+  across = normalize(normalMatrix * across);
   float above = dot(across, viewMatrix[1].xyz);
   float key = max(dot(across, (viewMatrix * vec4(0.40, 0.77, 0.49, 0.0)).xyz), 0.0);
   float toEye = abs(dot(across, normalize(mvPosition.xyz)));

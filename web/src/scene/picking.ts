@@ -2,6 +2,7 @@
 
 import { type Intersection, type Object3D, type Plane, Raycaster, Vector2, type Vector3 } from "three";
 import type { Bodies } from "./bodies";
+import { ALONE_LAYER } from "./crowds";
 import type { Stage } from "./stage";
 
 /** A pointer that moved less than this between press and release clicked [px]. */
@@ -50,6 +51,7 @@ export function hitAlong(
   bodies: Bodies,
   planes: readonly Plane[] = [],
 ): Intersection | undefined {
+  ray.layers.enable(ALONE_LAYER);
   return ray
     .intersectObject(bodies.root, true)
     .find(

@@ -20,6 +20,7 @@ import { ownScale } from "../company";
 import { ask, draft, mayEdit } from "../editing/draft";
 import { gizmoMode } from "../editing/handles";
 import { hidden, isLive, lookingAt, overReality, registered, rows, scene, transport } from "../page_state";
+import { ALONE_LAYER } from "../scene/crowds";
 import type { Sighted } from "../scene/own_presence";
 import { nodeAlong } from "../scene/picking";
 import type { Viewer } from "../scene/viewer";
@@ -411,6 +412,7 @@ export class Visit implements Sighted {
   /** How far a beam goes until it meets something [m] of the visitor's room. */
   private meets({ from, along }: Pointer): number {
     this.ray.set(from, along);
+    this.ray.layers.enable(ALONE_LAYER);
     const [hit] = this.ray.intersectObject(this.viewer.bodies.root, true);
     return Math.min(hit?.distance ?? FARTHEST, FARTHEST) / this.rig.scale.x;
   }

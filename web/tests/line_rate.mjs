@@ -1,0 +1,68 @@
+// Pictures a second of a workstation that runs, and what each costs: `node tests/line_rate.mjs folder [seconds]`.
+// Told are pictures, the page's own processor time and draw calls per picture, in a window of 1366 × 768.
+
+import { createInterface } from "node:readline";
+import { openBrowser } from "./browser.mjs";
+import { python } from "./python.mjs";
+
+const [folder, seconds = "10"] = process.argv.slice(2);
+const run = python("-m", "seerob", "run", folder, "--port", "0", "--no-record", "--allow-outside");
+let url = "";
+for await (const line of createInterface({ input: run.stdout })) {
+  url = /http:\S+/.exec(line)?.[0] ?? "";
+  if (url) break;
+}
+run.stdout.resume();
+const { page, context, close } = await openBrowser({ width: 1366, height: 768 });
+await page.addInitScript(`{
+  window.drawn = 0;
+  for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
+    const own = WebGL2RenderingContext.prototype[name];
+    WebGL2RenderingContext.prototype[name] = function (...given) {
+      window.drawn += 1;
+      return own.apply(this, given);
+    };
+  }
+}`);
+await page.goto(url, { timeout: 600_000 });
+const begun = Date.now();
+await page.waitForFunction(() => window.seerob?.pose("operator/head") != null, null, { timeout: 600_000 });
+// A picture is drawn once all meshes are there.
+await page.waitForFunction(() => window.drawn > 0, null, { timeout: 600_000 });
+const shown = (Date.now() - begun) / 1000;
+await page.waitForTimeout(5000);
+const cdp = await context.newCDPSession(page);
+await cdp.send("Performance.enable", { timeDomain: "threadTicks" });
+const script = async () => {
+  const { metrics } = await cdp.send("Performance.getMetrics");
+  return metrics.find(({ name }) => name === "ScriptDuration").value;
+};
+const before = await script();
+const { pictures, calls } = await page.evaluate(
+  (most) =>
+    new Promise((resolve) => {
+      const begun = performance.now();
+      let [pictures, calls, before] = [0, 0, window.drawn];
+      const next = () => {
+        // Between two of these nothing may have been drawn: where nothing moved, or pictures come slowly.
+        if (window.drawn > before) {
+          pictures += 1;
+          calls += window.drawn - before;
+          before = window.drawn;
+        }
+        if (performance.now() - begun > most) resolve({ pictures, calls });
+        else requestAnimationFrame(next);
+      };
+      requestAnimationFrame(next);
+    }),
+  1000 * Number(seconds),
+);
+const cost = (1000 * ((await script()) - before)) / pictures;
+const rate = (pictures / Number(seconds)).toFixed(1);
+process.stdout.write(
+  `page: shown after ${shown.toFixed(1)} s, ${rate} pictures a second, ${cost.toFixed(1)} ms of script and ` +
+    `${(calls / pictures).toFixed(0)} draw calls each\n`,
+);
+if (process.env.PICTURE) await page.screenshot({ path: process.env.PICTURE });
+await close();
+run.kill("SIGINT");

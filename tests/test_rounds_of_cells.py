@@ -48,7 +48,7 @@ ROUNDS = {
         "ur10 tool speed",
         3,
     ),
-    "giant_niryo": Cell(12, {"fastest point": 2.1}, "robot – operator", nearer=(-0.8, 1.0, 0.0)),
+    "giant_niryo": Cell(8, {"fastest point": 2.1}, "robot – operator", nearer=(-0.8, 1.0, 0.0)),
     "two_places": Cell(12, {"tool speed": 0.23}, "tool speed", 3),
 }
 

@@ -14,6 +14,7 @@ from nbclient import NotebookClient
 
 import seerob as sr
 from seerob.outputs.sink import Closing
+from seerob.outputs.sinks.recorder import Recorder
 
 CELL = """
 title = "A <b>cell</b>"
@@ -82,14 +83,16 @@ class Tags(HTMLParser):
         self.text += f"{data} "
 
 
-@pytest.mark.parametrize("of", ["station", "run", "batch"])
-def test_tables_hold_every_criterion_and_no_markup_of_the_file(station, of):
-    shown = {"station": station, "run": station.run(), "batch": station.batch()}[of]
-    tags = Tags()
-    tags.feed(shown._repr_html_())
-    assert set(tags.tags) <= {"div", "p", "b", "span", "table", "thead", "tbody", "tr", "th", "td"}
-    assert tags.tags.count("tr") == 3
-    assert "speed <script>" in tags.text
+def test_tables_hold_every_criterion_and_no_markup_of_the_file(station, tmp_path):
+    run = station.run(folder=tmp_path, sinks=[Recorder()])
+    recording = sr.Recording.open(tmp_path / "run.mcap")
+    for shown in (station, run, run.results, station.batch(), recording, recording.results):
+        tags = Tags()
+        tags.feed(shown._repr_html_())
+        assert set(tags.tags) <= {"div", "p", "b", "span", "table", "thead", "tbody", "tr", "th", "td"}
+        assert tags.tags.count("tr") == 3
+        assert "speed <script>" in tags.text
+    assert "the run: undecided" in run.results._repr_html_()
 
 
 def test_a_station_is_judged_in_other_processes(station):

@@ -80,6 +80,7 @@ def test_panels_say_nothing_past_the_catalogues():
         for pattern in (
             r'\s(?:title|aria-label|placeholder)="([^"]*[a-z]{3}[^"]*)"',
             r">([A-Z][a-z]+[^<>{}=;()\n]*)</",
+            r"(?m)^ {6,}([A-Z][a-z]+(?: [a-z,;.]+)*)$",  # a line of text between tags
         ):
             found += [f"{file.name}: {each}" for each in re.findall(pattern, text)]
     # Names of keys, and the panel of headsets.

@@ -231,3 +231,29 @@ test("the ruler asks the engine for the least distance of two surfaces", { timeo
   await press("ruler");
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });
+
+test("a waypoint is placed by numbers on the desk, and a copy of it comes behind it", async () => {
+  const desk = await browser.context.newPage();
+  await showEdited(desk, server.url);
+  const before = saved();
+  const [, x, y, z] = before.match(/name = "taught_3"[^[]*\[([-\d.]+), ([-\d.]+), ([-\d.]+)\]/).map(Number);
+  const undo = desk.getByRole("button", { name: "Undo" });
+  await desk.getByLabel("What is edited").selectOption({ label: "ur10: taught_3" });
+  const height = desk.locator(".place").getByLabel(/^z/);
+  await height.fill(String(z + 0.02));
+  await height.press("Enter");
+  await undo.and(desk.locator(":enabled")).waitFor();
+  await desk.getByRole("button", { name: "Copy", exact: true }).click();
+  await desk
+    .getByLabel("What is edited")
+    .getByRole("option", { name: "ur10: 4" })
+    .waitFor({ state: "attached" });
+  await desk.getByRole("button", { name: /Review/ }).click();
+  const diff = await desk.locator(".review pre").innerText();
+  const place = (dz) => `position = [${x}, ${y}, ${Number((z + dz).toFixed(4))}]`;
+  assert.ok(diff.includes(place(0.02)) && diff.includes(place(0.07)), diff);
+  await desk.getByRole("button", { name: "Discard" }).click();
+  await desk.locator(".edit-bar [role=status]", { hasText: /^saved/ }).waitFor();
+  assert.equal(saved(), before);
+  await desk.close();
+});

@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.extras import need
+from seerob.core.printable import printable
 from seerob.core.snapshot import Snapshot, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import worst
@@ -170,6 +172,17 @@ class Table:
             fields.append(pa.field(name, arrays[name].type, metadata=said))
         metadata = {"seerob": json.dumps(self.attributes, ensure_ascii=False)}
         return pa.Table.from_arrays(list(arrays.values()), schema=pa.schema(fields, metadata=metadata))
+
+
+def html(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table below its title for a notebook, every text escaped."""
+
+    def cells(kind: str, texts: Iterable[str]) -> str:
+        return "<tr>" + "".join(f"<{kind}>{escape(printable(text))}</{kind}>" for text in texts) + "</tr>"
+
+    body = "".join(cells("td", row) for row in rows)
+    top = f"<p>{escape(printable(title))}</p><table><thead>{cells('th', head)}</thead>"
+    return f"<div>{top}<tbody>{body}</tbody></table></div>"
 
 
 def _pandas(column: _Column) -> Any:

@@ -409,6 +409,12 @@ class Recording:
     def __repr__(self) -> str:
         return f"<Recording {self.scene.title!r}: {self.path.name}, {self.duration:g} s>"
 
+    def _repr_html_(self) -> str:
+        whole = "" if self.complete else ", not whole"
+        title = f"{self.scene.title}: {self.path.name}, {self.start:g} to {self.end:g} s{whole}"
+        rows = ((c.name, c.kind, ", ".join(c.subjects)) for c in self.scene.criteria)
+        return frames.html(title, ("criterion", "kind", "of"), rows)
+
     # -- what it is -----------------------------------------------------------------------------
 
     start: float

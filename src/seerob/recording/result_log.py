@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from seerob.core.errors import UnknownName
+from seerob.core.figures import against, with_unit
 from seerob.core.snapshot import (
     CriterionInfo,
     CriterionSoFar,
@@ -154,8 +155,23 @@ class ResultLog(Mapping[str, Series]):
         return len(self._series)
 
     def __repr__(self) -> str:
-        verdict = "no verdict" if self.verdict is None else self.verdict.value
-        return f"<ResultLog: {len(self)} criteria, {self.ticks} ticks, {verdict}>"
+        return f"<ResultLog: {len(self)} criteria, {self.ticks} ticks, {self._word(self.verdict)}>"
+
+    def _repr_html_(self) -> str:
+        head = ("criterion", "verdict", "worst", "limit", "at")
+        return frames.html(f"the run: {self._word(self.verdict)}", head, map(self._told, self.values()))
+
+    @staticmethod
+    def _word(verdict: Verdict | None) -> str:
+        return "no verdict" if verdict is None else verdict.value
+
+    def _told(self, series: Series) -> tuple[str, ...]:
+        if not series.known:
+            return series.name, self._word(series.verdict), "never gave a result", "", ""
+        worst, unit = series.worst(), series.unit
+        pair = against(worst.value, worst.limit, unit, at_most=series.at_most)
+        figures = [text if text == "–" else with_unit(text, unit) for text in (pair.value, pair.limit)]
+        return series.name, self._word(series.verdict), *figures, f"{worst.t:.2f} s"
 
     @property
     def verdict(self) -> Verdict | None:

@@ -17,6 +17,7 @@ export const PLACED = {
   machines: "at",
   tools: "at",
   workpieces: "at",
+  waypoints: "at",
 } as const;
 
 export type Placed = keyof typeof PLACED;
@@ -26,7 +27,10 @@ export const isPlaced = (group: string): group is Placed => group in PLACED;
 /** An entry of a list of tables. */
 export interface Entry {
   group: string;
+  /** Its number in the group: of waypoints, those of all sources are counted through. */
   index: number;
+  /** Where it is in the file. */
+  path: Path;
   table: Table;
   /** What it is called; made up where the file gives no name. */
   name: string;
@@ -52,11 +56,31 @@ export const entries = computed<Entry[]>(() => {
     list.forEach((table: Table, index) => {
       if (typeof table !== "object" || table === null) return;
       const name = typeof table.name === "string" ? table.name : criterionName(group, index);
-      found.push({ group, index, table, name });
+      found.push({ group, index, path: [group, index], table, name });
     });
   }
-  return found;
+  return [...found, ...waypoints()];
 });
+
+/** Goals of robots that the file itself lists, those of one source after those of another. */
+function waypoints(): Entry[] {
+  const sources = draft.value?.tables.sources;
+  const found: Entry[] = [];
+  for (const [source, { robot, points }] of (Array.isArray(sources) ? sources : []).entries()) {
+    if (!Array.isArray(points)) continue;
+    for (const [k, table] of (points as Table[]).entries()) {
+      const name = `${robot}: ${table.name || k + 1}`;
+      found.push({
+        group: "waypoints",
+        index: found.length,
+        path: ["sources", source, "points", k],
+        table,
+        name,
+      });
+    }
+  }
+  return found;
+}
 
 /** The entry that is selected, if the file has it. */
 export const chosenEntry = computed<Entry | null>(() => {
@@ -164,6 +188,6 @@ export function freeName(word: string): string {
 
 /** Every name that a criterion may speak of. */
 export const names = computed<string[]>(() => {
-  const found = entries.value.filter((e) => isPlaced(e.group)).map((e) => e.name);
+  const found = entries.value.filter((e) => isPlaced(e.group) && e.group !== "waypoints").map((e) => e.name);
   return [...new Set([...found, ...(scene.value?.nodes.map((node) => node.name) ?? [])])];
 });

@@ -23,6 +23,8 @@ export interface Placing {
 
 /** Key of the table that says where an entry is; null for what has no place. */
 export function poseKey(entry: Entry): string | null {
+  // A waypoint may be one of joints, which has no place of its own.
+  if (entry.group === "waypoints" && entry.table.at === undefined) return null;
   return isPlaced(entry.group) ? PLACED[entry.group] : null;
 }
 
@@ -64,7 +66,7 @@ export const tidy = (value: number, digits: number): number => Number(value.toFi
 export function moveTo(entry: Entry, position: Vector3 | null, rotation: Quaternion | null): Change[] {
   const at = poseKey(entry);
   if (at === null) return [];
-  const start: Path = [entry.group, entry.index, at];
+  const start: Path = [...entry.path, at];
   const table = poseTable(entry);
   const made: Table = {};
   if (position) {
@@ -91,12 +93,12 @@ export function setNumber(entry: Entry, what: "position" | "rpy", axis: number, 
   if (what === "position") {
     const key = positionKey(table);
     const own = tidy(value / LENGTHS[key]!, 9);
-    if (key in table) return [set([entry.group, entry.index, at, key, axis], own)];
+    if (key in table) return [set([...entry.path, at, key, axis], own)];
     return moveTo(entry, now.position.setComponent(axis, value), null);
   }
   const rpy = now.rpy;
   rpy[axis] = value;
-  if (Array.isArray(table.rpy_deg)) return [set([entry.group, entry.index, at, "rpy_deg", axis], value)];
+  if (Array.isArray(table.rpy_deg)) return [set([...entry.path, at, "rpy_deg", axis], value)];
   const turned = new Euler(...(rpy.map(MathUtils.degToRad) as [number, number, number]), ORDER);
   return moveTo(entry, null, new Quaternion().setFromEuler(turned));
 }

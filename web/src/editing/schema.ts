@@ -70,6 +70,11 @@ export function kinds(group: string): [kind: string, about: string][] {
 }
 
 function options(group: string): Schema[] {
+  if (group === "waypoints") {
+    const source = options("sources").find((option) => option.properties?.kind?.const === "waypoints");
+    const points = source?.properties?.points && given(source.properties.points);
+    return points?.items ? [resolved(points.items)] : [];
+  }
   const items = schema.value?.properties?.[group]?.items;
   return items ? (items.anyOf ?? [items]) : [];
 }

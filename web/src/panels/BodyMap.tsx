@@ -46,8 +46,10 @@ export function BodyMap() {
     return (
       <section class="body-map scroll" aria-label={said("Body map")}>
         <p class="empty">
-          No criterion of this run judges contacts with the body. Add one of kind <code>power_and_force</code>{" "}
-          to the workstation file.
+          {said(
+            "No criterion of this run judges contacts with the body: the kind {kind} of the workstation file does.",
+            { kind: "power_and_force" },
+          )}
         </p>
       </section>
     );

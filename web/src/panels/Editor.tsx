@@ -41,11 +41,14 @@ const GROUPS: readonly [group: string, title: string, one: string][] = [
   ["machines", word("Machines"), word("machine")],
   ["tools", word("Tools"), word("tool")],
   ["workpieces", word("Workpieces"), word("workpiece")],
+  ["waypoints", word("Waypoints"), word("waypoint")],
   ["safety", word("Safety criteria"), word("safety criterion")],
   ["ergonomics", word("Ergonomics"), word("ergonomics rule")],
 ];
 /** How far a copy stands from what it is a copy of [m]. */
 const ASIDE = 0.5;
+/** How far one of a waypoint stands above it, along the z of its frame [m]. */
+const ABOVE = 0.05;
 
 export function Editor() {
   useEffect(() => void fetchSchema(), []);
@@ -138,16 +141,14 @@ export function Editor() {
           }}
         >
           <option value="">{said("add …")}</option>
-          {GROUPS.map(([group, , one]) => (
+          {GROUPS.filter(([group]) => group !== "waypoints").map(([group, , one]) => (
             <option key={group} value={group}>
               {said(one)}
             </option>
           ))}
         </select>
       </div>
-      <Refusal
-        path={adding.value ? [adding.value, count(adding.value)] : entry && [entry.group, entry.index]}
-      />
+      <Refusal path={adding.value ? [adding.value, count(adding.value)] : (entry?.path ?? null)} />
       {adding.value ? (
         <Adding
           key={adding.value}
@@ -193,8 +194,8 @@ function Refusal({ path }: { path: Path | null }) {
   return (
     <div class="refusal" role="alert">
       <p>
-        Refused; nothing was changed
-        {elsewhere.length < last.mistakes.length && ": see below"}
+        {said("Refused; nothing was changed")}
+        {elsewhere.length < last.mistakes.length && `: ${said("see below")}`}
       </p>
       <MistakeList mistakes={elsewhere} keys />
       {others.length > 0 && (
@@ -202,7 +203,7 @@ function Refusal({ path }: { path: Path | null }) {
           type="button"
           onClick={() => void change(...removals([...others, ...last.changes.map((c) => c.path)]))}
         >
-          Remove with {others.map(named).join(", ")}
+          {said("Remove with {others}", { others: others.map(named).join(", ") })}
         </button>
       )}
     </div>
@@ -227,20 +228,28 @@ function removals(paths: Path[]): Change[] {
 }
 
 function EntryForm({ entry }: { entry: Entry }) {
-  const { group, index, table, name } = entry;
-  const path: Path = [group, index];
+  const { group, path, table, name } = entry;
   const form = schema.value ? entrySchema(group, table) : null;
   const at = poseKey(entry);
   const copy = async (): Promise<void> => {
     const other = freeName(name);
-    const value: Table = { name: other };
+    const point = group === "waypoints";
+    const value: Table = point ? {} : { name: other };
     if (at !== null && isPlaced(group)) {
       const { position } = placing(entry);
-      const shifted = moveTo(entry, position.setX(position.x + ASIDE), null);
+      if (point) position.z += ABOVE;
+      else position.x += ASIDE;
+      const shifted = moveTo(entry, position, null);
       const pose = (table[at] ?? {}) as Table;
       const [one] = shifted;
       if (one)
         value[at] = table[at] === undefined ? one.value : { ...pose, [String(one.path.at(-1))]: one.value };
+    }
+    if (point) {
+      // Behind the last of its source, to be dragged to where it is wanted.
+      const { name: _, ...rest } = table;
+      await change({ kind: "add", path: path.slice(0, -1), value: { ...rest, ...value } });
+      return;
     }
     if (await change({ kind: "copy", path, value }))
       select({ kind: isCriteria(group) ? "criterion" : "owner", name: other });
@@ -265,7 +274,7 @@ function EntryForm({ entry }: { entry: Entry }) {
           }
         />
       ) : (
-        <p class="empty">{schema.value ? "A kind of your own: edit its options in the file." : "…"}</p>
+        <p class="empty">{schema.value ? said("A kind of your own: edit its options in the file.") : "…"}</p>
       )}
       <div class="edit-bar">
         <button type="button" onClick={() => void copy()}>
@@ -289,8 +298,10 @@ function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
   return (
     <fieldset class="place">
       <legend>
-        Place
-        {typeof entry.table.on === "string" && <span class="unit"> on {entry.table.on}</span>}
+        {said("Place")}
+        {typeof entry.table.on === "string" && (
+          <span class="unit"> {said("on {name}", { name: entry.table.on })}</span>
+        )}
       </legend>
       <div class="numbers">
         {AXES.map((axis, k) => (
@@ -314,7 +325,7 @@ function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
           />
         ))}
       </div>
-      <MistakeList mistakes={mistakesAt([entry.group, entry.index, at])} />
+      <MistakeList mistakes={mistakesAt([...entry.path, at])} />
       <div class="edit-bar">
         <Choice name={said("Handles")} choices={["move", "turn"] as const} chosen={gizmoMode} title={said} />
         <Choice
@@ -400,7 +411,7 @@ function Adding({ group, close }: { group: string; close: () => void }) {
   };
   return (
     <div class="entry adding" data-entry={named(path)}>
-      <h2>Add to {GROUPS.find(([name]) => name === group)?.[1].toLowerCase()}</h2>
+      <h2>{said("Add: {what}", { what: said(GROUPS.find(([name]) => name === group)![2]) })}</h2>
       {choices.length > 0 && (
         <label>
           kind{" "}
@@ -433,10 +444,10 @@ function Adding({ group, close }: { group: string; close: () => void }) {
       )}
       <div class="edit-bar">
         <button type="button" class="primary" disabled={!form || asking.value} onClick={() => void add()}>
-          Add
+          {said("Add")}
         </button>
         <button type="button" onClick={close}>
-          Cancel
+          {said("Cancel")}
         </button>
       </div>
     </div>

@@ -6,7 +6,7 @@ import { against, withUnit } from "../figures";
 import { formatTime } from "../format";
 import { clock, isLive, lookingAt, now, scene, traces } from "../page_state";
 import { STATE_ICONS, STATE_WORDS } from "../verdicts";
-import { said } from "../words";
+import { said, word } from "../words";
 import { type Instant, worstWith } from "../worst_instant";
 import { useActions } from "./app_context";
 
@@ -27,7 +27,7 @@ interface Visited {
 /** What differs by less is the same instant on the page: times are read to a hundredth [s]. */
 const NEAR_S = 0.01;
 
-const TOO_OLD = "older than what a live run keeps to look back at; the recording has it";
+const TOO_OLD = word("older than what a live run keeps to look back at; the recording has it");
 
 const visited = signal<Visited | null>(null);
 
@@ -101,14 +101,18 @@ export function VisitedInstant() {
   return (
     <div class="visited" role="status">
       <span>
-        Worst of <strong>{name}</strong>: <strong>{withUnit(figures.value, unit)}</strong>
-        {limit} at {formatTime(instant.t)}
-        {elsewhere && <em> – shown is {formatTime(now.value)}, the nearest that is kept</em>}
-        {!shown && <em> – {isLive.value ? TOO_OLD : "whoever may control the replay goes there"}</em>}
+        {said("Worst of {name}", { name })}: <strong>{withUnit(figures.value, unit)}</strong>
+        {limit} · {formatTime(instant.t)}
+        {elsewhere && (
+          <em> – {said("shown is {time}, the nearest that is kept", { time: formatTime(now.value) })}</em>
+        )}
+        {!shown && (
+          <em> – {said(isLive.value ? TOO_OLD : word("whoever may control the replay goes there"))}</em>
+        )}
       </span>
       {isLive.value && lookingAt.value !== null && (
         <button type="button" class="link" onClick={() => time.follow()}>
-          back to live
+          {said("back to live")}
         </button>
       )}
       <button

@@ -76,7 +76,11 @@ function Score({ result }: { result: Result }) {
           </span>
         )}
         {result.verdict && <StateBadge state={result.verdict} />}
-        {result.interval && <span class="unit">between {between(result.interval, result.unit)}</span>}
+        {result.interval && (
+          <span class="unit">
+            {said("between {limits}", { limits: between(result.interval, result.unit) })}
+          </span>
+        )}
       </p>
       {result.reason !== "" && <p class="reason">{spoken(result.reason)}</p>}
       {parts.length > 0 ? (

@@ -1,6 +1,7 @@
 // What is known about the selection, where it is known from, and what is not known.
 
 import { doubtAmong, doubts } from "../doubts";
+import { entries } from "../editing/draft";
 import { formatJoint, formatNumber, formatQuantity } from "../format";
 import { frame, scene, selectedNodes, selection, stale } from "../page_state";
 import type { JointInfo, MechanismInfo, Node, Scene } from "../wire";
@@ -15,7 +16,12 @@ export function Properties() {
   if (chosen.kind === "criterion") return <CriterionProperties run={run} name={chosen.name} />;
   const nodes = run.nodes.filter((node) => selectedNodes.value.has(node.name));
   const first = nodes[0];
-  if (!first) return <p class="empty">{chosen.name} is not in this scene.</p>;
+  if (!first) {
+    const edits = entries.value.some(({ name }) => name === chosen.name);
+    return (
+      <p class="empty">{edits ? chosen.name : said("{name} is not in this scene.", { name: chosen.name })}</p>
+    );
+  }
   const mechanism = chosen.kind === "owner" ? run.mechanisms.find((m) => m.name === chosen.name) : undefined;
   const doubt = doubtAmong(nodes, doubts.value);
   const findings = run.findings.filter(
@@ -105,7 +111,9 @@ function Mass({ nodes }: { nodes: readonly Node[] }) {
         )}
         {unknown > 0 && (
           <span class="unknown">
-            {nodes.length === 1 ? "not given" : ` ${unknown} of ${nodes.length} not given`}
+            {nodes.length === 1
+              ? said("not given")
+              : ` ${said("{unknown} of {all} not given", { unknown, all: nodes.length })}`}
           </span>
         )}
       </dd>
@@ -137,10 +145,13 @@ function Lateness({ mechanism }: { mechanism: MechanismInfo }) {
       <dt
         title={said("How much later than the fastest sample the newest one arrived, and how late it may be")}
       >
-        Late
+        {said("Late")}
       </dt>
       <dd class={stale.value ? "stale" : by > bound ? "unknown" : ""}>
-        {formatNumber(1e3 * by)} ms, counts up to {formatNumber(1e3 * bound)} ms
+        {said("{late} ms, counts up to {most} ms", {
+          late: formatNumber(1e3 * by),
+          most: formatNumber(1e3 * bound),
+        })}
       </dd>
     </>
   );

@@ -41,7 +41,7 @@ export function Review({ open, close }: { open: boolean; close: () => void }) {
           {said("Discard")}
         </button>
         <button type="button" onClick={close}>
-          Go on editing
+          {said("Go on editing")}
         </button>
       </div>
     </dialog>

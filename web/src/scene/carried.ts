@@ -3,7 +3,9 @@
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { change, type Entry } from "../editing/draft";
-import { moveTo, placing } from "../editing/pose";
+import { moveTo, placing, poseKey } from "../editing/pose";
+import { scene } from "../page_state";
+import type { Place } from "../wire";
 import type { Bodies, Body } from "./bodies";
 
 const ONE = new Vector3(1, 1, 1);
@@ -13,13 +15,30 @@ const ONE = new Vector3(1, 1, 1);
  *
  * @returns Whether there is one: what is swept has no place, and where a carrier is may not be known here.
  */
-export function frameOf({ table }: Entry, bodies: Bodies, into: Matrix4): boolean {
+export function frameOf(entry: Entry, bodies: Bodies, into: Matrix4): boolean {
+  const { group, path, table } = entry;
   into.identity();
+  if (group === "waypoints") {
+    const base = scene.peek()?.taught.find(({ source }) => source === path[1])?.base;
+    return poseKey(entry) !== null && base !== undefined && whereIs(base, bodies, into);
+  }
   if (table.swept !== undefined) return false;
   if (typeof table.on !== "string") return true;
   const carrier = bodies.byName.get(table.on);
   if (carrier) into.copy(carrier.group.matrix);
   return carrier !== undefined;
+}
+
+/** Where a place is, in the world (z up); whether its node is there. */
+export function whereIs(
+  { node, position, wxyz: [w, x, y, z] }: Place,
+  bodies: Bodies,
+  into: Matrix4,
+): boolean {
+  const carrier = bodies.byName.get(node);
+  into.compose(new Vector3(...position), new Quaternion(x, y, z, w), ONE);
+  if (carrier) into.premultiply(carrier.group.matrix);
+  return node === "" || carrier !== undefined;
 }
 
 export class Carried {

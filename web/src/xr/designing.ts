@@ -7,7 +7,7 @@ import { change, type Entry, entries, isPlaced, refused } from "../editing/draft
 import { gizmoMode, STEPS, steps } from "../editing/handles";
 import { tidy } from "../editing/pose";
 import { scene, select } from "../page_state";
-import { Carried } from "../scene/carried";
+import { Carried, whereIs } from "../scene/carried";
 import type { Viewer } from "../scene/viewer";
 import type { Place, Taught } from "../wire";
 
@@ -246,10 +246,8 @@ export class Designing {
   }
 
   /** Where a place is, in the world (z up); null where its node is not there. */
-  private poseOf({ node, position, wxyz: [w, x, y, z] }: Place): Matrix4 | null {
-    const carrier = this.viewer.bodies.byName.get(node);
-    if (node && !carrier) return null;
-    const found = new Matrix4().compose(new Vector3(...position), new Quaternion(x, y, z, w), ONE);
-    return carrier ? found.premultiply(carrier.group.matrix) : found;
+  private poseOf(place: Place): Matrix4 | null {
+    const found = new Matrix4();
+    return whereIs(place, this.viewer.bodies, found) ? found : null;
   }
 }

@@ -1,8 +1,10 @@
 import { defineConfig } from "vite";
+import { typedMatrices } from "./three_matrices";
 
 // The built page is served by seerob's own server and shipped in the wheel; nothing is inlined, so
 // that a Content-Security-Policy of 'self' is enough.
 export default defineConfig({
+  plugins: [typedMatrices()],
   base: "/",
   build: {
     outDir: "../src/seerob/app/server/page",

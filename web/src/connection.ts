@@ -1,9 +1,9 @@
 // The page's end of the worker: what it says becomes signals, traces and poses.
 
-import { heardPresences, heardVisitors } from "./company";
+import { heardPresences, heardVisitors, ownDevice } from "./company";
 import { refused } from "./doing";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
-import type { Frame, FromWorker, ToWorker } from "./messages";
+import type { Frame, FromWorker, Shown, ToWorker } from "./messages";
 import {
   beginScene,
   besideTitle,
@@ -30,6 +30,8 @@ import { heardMeasured } from "./view/measure";
 import { heardReach } from "./view/reach";
 import { type History, SCHEMA, type Scene } from "./wire";
 
+/** In the room panels are drawn no faster, and nobody sees the page. */
+const NUMBERS_IN_ROOM_MS = 240;
 /** A frame of a live run that is older is not trusted any more, whatever holds up page or worker. */
 const OLD_MS = 1000;
 /** Points per trace of a live run; a recording comes thinned already. */
@@ -46,7 +48,7 @@ export interface PoseFeed {
 export interface ConnectionEvents {
   scene(scene: Scene, poses: PoseFeed): void;
   /** Every shown frame, at up to the display's rate: markers follow the poses, numbers need not. */
-  frame(frame: Frame): void;
+  frame(frame: Shown): void;
 }
 
 export class Connection {
@@ -57,6 +59,9 @@ export class Connection {
   private silent = false;
   private numbersAt = 0;
   private pending: Frame | null = null;
+  /** Whether what was drawn last came without its numbers. */
+  private unread = false;
+  private readonly want = (time: number): void => this.send({ kind: "want", whole: this.due(time) });
 
   constructor(private readonly events: ConnectionEvents) {
     this.worker.onmessage = (event: MessageEvent<FromWorker>) => this.receive(event.data);
@@ -70,13 +75,21 @@ export class Connection {
     this.worker.postMessage(message);
   }
 
-  /** To be called once per display frame: passes on numbers that are due and asks for the next. */
+  /** To be called once per display frame: passes on numbers that came and asks for those that are due. */
   tick(time: number): void {
-    if (this.pending && time - this.numbersAt >= numbersEveryMs()) {
+    if (this.pending) {
       this.numbersAt = time;
       frame.value = this.pending;
       this.pending = null;
     }
+    if (this.unread && this.due(time)) {
+      this.unread = false;
+      this.want(time);
+    }
+  }
+
+  private due(time: number): boolean {
+    return time - this.numbersAt >= (ownDevice.peek() === "desk" ? numbersEveryMs() : NUMBERS_IN_ROOM_MS);
   }
 
   private receive(message: FromWorker): void {
@@ -148,7 +161,7 @@ export class Connection {
       case "frame":
         this.heard = message.heard;
         this.silent = message.silent;
-        this.show(message.frame);
+        this.show(message.frame, message.shown);
         return;
       case "silence":
         this.silent = true;
@@ -159,6 +172,7 @@ export class Connection {
 
   private begin(scene: Scene, shared: SharedArrayBuffer | null): void {
     this.pending = null;
+    this.unread = false;
     beginScene(scene);
     this.posted = shared ? null : new PostedPoses((buffer) => this.send({ kind: "recycle", buffer }));
     this.events.scene(scene, shared ? new PoseReader(shared) : this.posted!);
@@ -179,12 +193,14 @@ export class Connection {
     tracesRevision.value += 1;
   }
 
-  private show(next: Frame): void {
-    this.pending = next;
-    now.value = next.t;
+  private show(whole: Frame | null, shown: Shown): void {
+    if (whole) this.pending = whole;
+    this.unread = whole === null;
+    // Panels that follow it cost more than a picture, and in the room nobody sees them.
+    if (whole || ownDevice.peek() === "desk") now.value = shown.t;
     this.watch();
-    this.events.frame(next);
-    requestAnimationFrame(() => this.send({ kind: "want" }));
+    this.events.frame(shown);
+    requestAnimationFrame(this.want);
   }
 
   // Live numbers that stopped coming must not stay on the screen as if they were true.

@@ -1,14 +1,14 @@
 // Who may be elsewhere than the room shows, and why. Nobody's place is known by the look of it.
 
 import { computed } from "@preact/signals";
-import type { Frame } from "./messages";
+import type { Shown } from "./messages";
 import { frame } from "./page_state";
 import type { Node } from "./wire";
 
 export type Doubts = ReadonlyMap<string, string>;
 
 /** Of a frame, by name: robots, humans and machines, with all that they move, and single nodes. */
-export function doubtsIn(shown: Frame | null): Doubts {
+export function doubtsIn(shown: Pick<Shown, "doubts"> | null): Doubts {
   return new Map(Object.entries(shown?.doubts ?? {}));
 }
 

@@ -16,6 +16,9 @@ export class Glide {
   private t = Number.NaN;
   private arrived = Number.NEGATIVE_INFINITY;
   private lasts = 0;
+  private fromT = Number.NaN;
+  /** Run time of what `at` returned last [s]. */
+  shownT = Number.NaN;
 
   /** Whether the newest frame is not reached yet. */
   get moving(): boolean {
@@ -27,6 +30,7 @@ export class Glide {
     this.from = null;
     this.to = null;
     this.lasts = 0;
+    this.shownT = Number.NaN;
   }
 
   /**
@@ -58,6 +62,7 @@ export class Glide {
     }
     this.lasts = glides ? Math.min(since, LONGEST_MS) : 0;
     if (!glides) this.shown.set(block);
+    this.fromT = this.shownT;
     this.arrived = now;
     this.t = t;
   }
@@ -65,12 +70,14 @@ export class Glide {
   /** Where the bodies are on the screen at `now` [ms]; null before anything was heard. */
   at(now: number): Float32Array | null {
     if (!this.from || !this.to) return null;
+    this.shownT = this.t;
     if (this.lasts === 0) return this.shown;
     const share = (now - this.arrived) / this.lasts;
     if (share >= 1) {
       this.lasts = 0;
       this.shown.set(this.to); // exactly what was heard
     } else {
+      this.shownT = this.fromT + Math.max(share, 0) * (this.t - this.fromT);
       blend(this.from, this.to, Math.max(share, 0), this.shown);
     }
     return this.shown;

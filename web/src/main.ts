@@ -28,6 +28,8 @@ declare global {
     seerob?: {
       /** Run time of what is shown [s]. */
       readonly t: number;
+      /** Run time of the poses that bodies have [s]. */
+      readonly posed: number;
       /** Position and quaternion (x, y, z, w) of a body as three.js has it, y up; null for an unknown name. */
       pose(name: string): { position: number[]; quaternion: number[] } | null;
       /** Colour of a score that a body is shown in, 0xrrggbb; null for its own or a verdict's. */
@@ -109,6 +111,9 @@ function begin(element: HTMLElement): void {
   window.seerob = {
     get t() {
       return now.value;
+    },
+    get posed() {
+      return viewer.posedT;
     },
     pose: (name) => viewer.poseOf(name),
     tint: (name) => viewer.bodies.byName.get(name)?.tint ?? null,

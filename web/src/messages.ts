@@ -57,6 +57,12 @@ export interface Frame {
   sources: Snapshot["sources"];
 }
 
+/** What of a frame is drawn in the room: numbers are read more slowly than bodies move. */
+export interface Shown extends Pick<Frame, "t" | "looks" | "doubts"> {
+  results: readonly ShownResult[];
+}
+export type ShownResult = Pick<Result, "name" | "value" | "limit" | "at_most" | "verdict" | "markers">;
+
 export type FromWorker =
   | { kind: "link"; state: LinkState; reason: string; retryInMs: number | null }
   | { kind: "hello"; hello: Hello }
@@ -78,7 +84,7 @@ export type FromWorker =
   /** Where the room of this page's headset lies, as far as is known. */
   | { kind: "registered"; registered: Registered }
   /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
-  | { kind: "frame"; frame: Frame; heard: number; silent: boolean }
+  | { kind: "frame"; frame: Frame | null; shown: Shown; heard: number; silent: boolean }
   /** A live run has said nothing for too long. */
   | { kind: "silence" }
   | { kind: "points"; points: TracePoints[]; newest: number; oldest: number }
@@ -86,8 +92,8 @@ export type FromWorker =
 
 export type ToWorker =
   | { kind: "connect"; url: string; shared: boolean }
-  /** The page has drawn the last frame and can take another. */
-  | { kind: "want" }
+  /** The page has drawn the last frame and can take another: its numbers, too, or what is drawn alone. */
+  | { kind: "want"; whole: boolean }
   | { kind: "recycle"; buffer: ArrayBuffer }
   | { kind: "command"; action: Action; value: number | null }
   | { kind: "tracking"; tracking: Tracking }

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "e277352cfc9a3c7b";
+export const SCHEMA = "2e351f72df24e9a2";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -470,6 +470,8 @@ export interface Place {
   accuracy: number;
   /** How far it may be turned from there, standard deviation per axis [rad]; None where nobody says. */
   accuracy_turn: number | null;
+  /** What is printed on the board that lies there; empty for none. */
+  board: string;
 }
 
 /** A source to which waypoints can be added by hand: the tool point that they are of, and their frame. */
@@ -711,17 +713,26 @@ export interface Register {
   /**
    * `sweep` (the controller was turned about its tip), `touch` (the tip is on a landmark), `strapped`
    * (the controller is fixed to what carries a landmark), `known` (the controller lies in the pose of a
-   * landmark), `check` (as touch, of what is known already), `nudge`, `restore`, `drop` (the last
-   * touch), `forget`.
+   * landmark), `seen` (the device's camera sees the board at a landmark), `check` (as touch, of what is
+   * known already), `nudge`, `restore`, `drop` (the last touch or look), `forget`.
    */
   step: string;
-  /** Of `touch`, `strapped`, `known` and `check`. */
+  /** Of `touch`, `strapped`, `known`, `seen` and `check`. */
   landmark?: string;
-  /** Of the controller while it was held: little-endian float32, seven each as in `Tracking.poses`. */
+  /**
+   * Of the controller while it was held: little-endian float32, seven each as in `Tracking.poses`.
+   * `seen`: of the camera, one, as WebXR turns it: x to the right, y up, -z ahead.
+   */
   poses?: Uint8Array;
   /**
-   * `nudge`: translation [m] and rotation vector [rad] in the cell's axes. `restore`: what `Registered`
-   * said: its `at`, `about` and `covariance`, 46 numbers.
+   * `seen`: corners of the board, as `POST /board` found them: little-endian float32, four each, x and
+   * y on the board [m] before x and y in the picture [px].
+   */
+  corners?: Uint8Array;
+  /**
+   * `seen`: fx, fy, cx and cy of the picture [px]. `nudge`: translation [m] and rotation vector [rad]
+   * in the cell's axes. `restore`: what `Registered` said: its `at`, `about` and `covariance`, 46
+   * numbers.
    */
   by?: number[];
 }

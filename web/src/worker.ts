@@ -3,7 +3,7 @@
 
 import { Decoder } from "@msgpack/msgpack";
 import { completed, completedMeasure } from "./completed";
-import type { Frame, FromWorker, ToWorker } from "./messages";
+import type { Frame, FromWorker, Shown, ToWorker } from "./messages";
 import { PointCollector } from "./points";
 import { FLOATS_PER_NODE, PoseWriter, poseBufferBytes } from "./poses";
 import { Recent } from "./recent";
@@ -26,7 +26,10 @@ let writer: PoseWriter | null = null;
 let poseBytes = 0;
 let lookingAt: number | null = null;
 let pageWants = true;
+let pageReads = true;
 let waiting: Frame | null = null;
+/** What was drawn last without its numbers. */
+let unread: Frame | null = null;
 let newest = Number.NaN;
 let newestRaw: Uint8Array | null = null;
 /** When the newest snapshot came [ms since 1970]. */
@@ -103,7 +106,7 @@ function begin(scene: Scene): void {
   const shared = mayShare ? new SharedArrayBuffer(poseBufferBytes(floats)) : null;
   writer = shared ? new PoseWriter(shared) : null;
   lookingAt = null;
-  waiting = null;
+  waiting = unread = null;
   newest = Number.NaN;
   newestRaw = null;
   silence = Math.max(SILENCE_MS, 3000 * scene.period);
@@ -154,11 +157,24 @@ function show(snapshot: Snapshot): void {
 
 // Latest wins: a frame is replaced until the page has drawn the one before it.
 function deliver(): void {
-  if (!pageWants || !waiting) return;
-  pageWants = false;
-  const frame = waiting;
+  const next = waiting ?? (pageReads ? unread : null);
+  if (!pageWants || !next) return;
+  const frame = pageReads ? next : null;
+  unread = frame ? null : next;
+  pageWants = pageReads = false;
   waiting = null;
-  post({ kind: "frame", frame, heard: heardAt, silent: isSilent() });
+  post({ kind: "frame", frame, shown: frame ?? drawnOf(next), heard: heardAt, silent: isSilent() });
+}
+
+function drawnOf({ t, looks, doubts, results }: Frame): Shown {
+  return {
+    t,
+    looks,
+    doubts,
+    results: results.map(({ name, value, limit, at_most, verdict, markers }) => {
+      return { name, value, limit, at_most, verdict, markers };
+    }),
+  };
 }
 
 const clock = () => performance.timeOrigin + performance.now();
@@ -197,6 +213,7 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "want":
       pageWants = true;
+      pageReads ||= message.whole;
       deliver();
       return;
     case "recycle":

@@ -8,7 +8,7 @@ import { ConvexGeometry } from "three/addons/geometries/ConvexGeometry.js";
 import { load } from "./source.mjs";
 
 const { featureEdges, turnOutward } = await load("scene/feature_edges");
-const { hiding } = await load("scene/volumes");
+const { hides } = await load("scene/volumes");
 const edges = (surface) => (featureEdges(surface).lines.getAttribute("position")?.count ?? 0) / 2;
 
 /** Sums of some of these vectors: a force polytope is such a zonotope. */
@@ -72,10 +72,11 @@ test("a barrel keeps its two rims", () => {
 test("a volume hides what is inside when the eye is within it, or when it is one of too many in a row", () => {
   const box = (x, y = 0) => new Box3(new Vector3(x, y - 0.5, -0.5), new Vector3(x + 1, y + 0.5, 0.5));
   const eye = new Vector3(-5, 0, 0);
+  const hiding = (boxes, from) => boxes.map((_, k) => hides(boxes, k, from));
   assert.deepEqual(hiding([box(0)], eye), [false]);
   assert.deepEqual(hiding([box(-5.5), box(0)], eye), [true, false]);
   assert.deepEqual(hiding([box(0), box(2), box(4)], eye), [false, false, false]);
-  assert.ok(hiding([box(0), box(2), box(4), box(6)], eye).every((hides) => hides));
+  assert.ok(hiding([box(0), box(2), box(4), box(6)], eye).every((one) => one));
   // Beside each other as many as one likes.
-  assert.ok(hiding([box(0), box(0, 2), box(0, 4), box(0, 6), box(0, 8)], eye).every((hides) => !hides));
+  assert.ok(hiding([box(0), box(0, 2), box(0, 4), box(0, 6), box(0, 8)], eye).every((one) => !one));
 });

@@ -125,8 +125,8 @@ def person_at(t: float) -> np.ndarray:
     return np.array([1.75 - 0.45 * max(0.0, math.sin(2 * math.pi * t / 12.0)), -0.1, 0.0])
 
 
-def workstation() -> tuple[Scene, dict[str, bytes]]:
-    """The scene and its meshes by hash."""
+def workstation(further: int = 0) -> tuple[Scene, dict[str, bytes]]:
+    """The scene and its meshes by hash, with so many further boxes that move."""
     meshes: dict[str, bytes] = {}
 
     def keep(mesh: object) -> str:
@@ -162,6 +162,10 @@ def workstation() -> tuple[Scene, dict[str, bytes]]:
     nodes.append(
         Node(name="robot side", role="area", owner="robot side", mesh=room, triangles=12, moves=False)
     )
+    box = keep(box_mesh((-0.02, -0.02, -0.02), (0.02, 0.02, 0.02)))
+    nodes += [
+        Node(name=f"box_{k}", role="part", owner=f"box_{k}", mesh=box, triangles=12) for k in range(further)
+    ]
     criteria = (
         _criterion("separation", "separation", "m", at_most=False, basis=SEPARATION),
         _criterion("tcp speed", "velocity", "m/s", limit=TCP_LIMIT),
@@ -227,12 +231,16 @@ def _vec(a: np.ndarray) -> tuple[float, float, float]:
     return float(a[0]), float(a[1]), float(a[2])
 
 
-def snapshot(seq: int, t: float) -> Snapshot:
-    """The snapshot of run time ``t`` [s]."""
+def snapshot(seq: int, t: float, further: int = 0) -> Snapshot:
+    """The snapshot of run time ``t`` [s], with so many further boxes."""
     arm = arm_poses(t)
     person = person_at(t)
     block = [(*p, *_quaternion(R)) for p, R in arm]
     block += [(*person, 1, 0, 0, 0)] * len(BODY) + [(0, 0, 0, 1, 0, 0, 0)] * (len(PARTS) + 1)
+    block += [
+        (math.cos(t + k), math.sin(t + k), 0.1 + 0.05 * k, math.cos(t), 0, 0, math.sin(t))
+        for k in range(further)
+    ]
     tcp, hand = arm[-1][0], person + np.array([-0.38, -0.15, 1.12])
     v = (arm_poses(t + 1e-4)[-1][0] - arm_poses(t - 1e-4)[-1][0]) / 2e-4
     distance, speed = float(np.linalg.norm(tcp - hand)), float(np.linalg.norm(v))

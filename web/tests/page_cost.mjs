@@ -1,96 +1,172 @@
-// What a picture costs the page, on the desk and in an emulated headset: `node tests/page_cost.mjs [seconds]`.
-// Told are the script's time per picture (processor time of the page's thread, and the 95th percentile by the clock),
-// what the page itself allocates per picture, and how old the state is when it is drawn, over the freshest one.
-// The emulator's own work is part of the script's time in the headset; in what is allocated it is told apart.
+// What a picture costs the page, on the desk and in an emulated headset, with 50 bodies at 100 Hz:
+// `node tests/page_cost.mjs [seconds] [--where]`.
+// Told are the script's time per picture (processor time of the page's thread, from the browser's trace), what is
+// allocated per picture, and how old the poses are, by the clock that both ends share: when they are taken for a
+// picture, and when the script is done with it. `--where` tells which functions allocate; a build with
+// `npx vite build --minify false` names them.
 
 import { openBrowser } from "./browser.mjs";
 import { HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { serve } from "./served.mjs";
 
 const SECONDS = Number(process.argv[2] ?? 10);
+const WHERE = process.argv.includes("--where");
+const BODIES = 50;
+/** Of the cell itself. */
+const OWN = 22;
+// Told in arrays that are made once: measuring allocates nothing.
 const WRAPPED = `
 (() => {
-  window.cost = { took: [], age: [] };
-  const wrapped = (own) =>
-    function (act) {
-      return own.call(this, (...given) => {
-        const begun = performance.now();
-        try {
-          act(...given);
-        } finally {
+  const most = 1 << 16;
+  const cost = { n: 0, begun: 0, heards: 0, heard: new Float64Array(most), taken: new Float64Array(most), done: new Float64Array(most), said: new Float64Array(most) };
+  window.cost = cost;
+  const wrapped = (own) => {
+    const kept = new WeakMap();
+    return function (act) {
+      let timed = kept.get(act);
+      if (!timed) {
+        timed = function timed(time, frame) {
+          const begun = performance.now();
+          act(time, frame);
           const now = performance.now();
-          window.cost.took.push(now - begun);
-          if (Number.isFinite(window.seerob?.t)) window.cost.age.push(now / 1000 - window.seerob.t);
-        }
-      });
+          const { seerob } = window;
+          if (!seerob || !(seerob.posed >= 0) || cost.n >= most || seerob.posed === cost.last) return;
+          cost.last = seerob.posed;
+          const zero = cost.begun - performance.timeOrigin;
+          cost.taken[cost.n] = begun - zero - 1000 * seerob.posed;
+          cost.done[cost.n] = now - zero - 1000 * seerob.posed;
+          cost.said[cost.n] = now - zero - 1000 * seerob.t;
+          cost.n += 1;
+        };
+        kept.set(act, timed);
+      }
+      return own.call(this, timed);
     };
+  };
   window.requestAnimationFrame = wrapped(window.requestAnimationFrame);
+  // When the newest had come as the worker knows it, of what it tells the page.
+  window.Worker = class extends Worker {
+    constructor(...given) {
+      super(...given);
+      this.addEventListener("message", function onmessage({ data }) {
+        if (data.kind !== "frame" || cost.heards >= most) return;
+        cost.heard[cost.heards] = data.heard - cost.begun - 1000 * data.shown.t;
+        cost.heards += 1;
+      });
+    }
+  };
   const session = window.XRSession?.prototype;
   if (session?.requestAnimationFrame) session.requestAnimationFrame = wrapped(session.requestAnimationFrame);
 })();`;
 
-const served = await serve("--mode", "live", "--seconds", "3600");
+const served = await serve("--mode", "live", "--seconds", "3600", "--further", String(BODIES - OWN));
 const browser = await openBrowser({ width: 640, height: 360, flags: ["--enable-precise-memory-info"] });
 const { page } = browser;
-await page.addInitScript(`${HEADSET}\n${WRAPPED}`);
+await page.addInitScript(`${HEADSET}\n${WRAPPED}\nwindow.cost.begun = ${1000 * served.begun};`);
 await page.goto(served.url);
 await page.waitForFunction(() => window.seerob?.pose("operator/head") != null);
 const cdp = await browser.context.newCDPSession(page);
-await cdp.send("Performance.enable", { timeDomain: "threadTicks" });
 
-const script = async () => {
-  const { metrics } = await cdp.send("Performance.getMetrics");
-  return metrics.find(({ name }) => name === "ScriptDuration").value;
-};
+const quantile = (values, share) => values.toSorted((a, b) => a - b)[Math.floor(share * (values.length - 1))];
+const both = (values) =>
+  `p50 ${quantile(values, 0.5).toFixed(2)}, p95 ${quantile(values, 0.95).toFixed(2)} ms`;
 
-/** Bytes by where they were allocated. */
-function allocated({ callFrame: { url, functionName }, selfSize, children }, into = new Map()) {
-  const ours = url.includes("/assets/");
-  const key = ours ? functionName || "(anonymous)" : "(emulator, browser and this measurement)";
-  into.set(key, (into.get(key) ?? 0) + selfSize);
-  for (const child of children) allocated(child, into);
+/** Processor time of the script in each picture [ms], and of what comes by message between two. */
+async function traced() {
+  const events = [];
+  const take = ({ value }) => events.push(...value);
+  cdp.on("Tracing.dataCollected", take);
+  await cdp.send("Tracing.start", {
+    transferMode: "ReportEvents",
+    traceConfig: { includedCategories: ["devtools.timeline", "v8", "disabled-by-default-v8.gc"] },
+  });
+  await page.waitForTimeout(1000 * SECONDS);
+  const over = new Promise((done) => cdp.once("Tracing.tracingComplete", done));
+  await cdp.send("Tracing.end");
+  await over;
+  cdp.off("Tracing.dataCollected", take);
+  const fired = events.filter(({ name, tdur }) => name === "FireAnimationFrame" && tdur !== undefined);
+  const thread = fired[0]?.tid;
+  const messages = events.filter(
+    ({ name, tid, tdur }) => name === "HandlePostMessage" && tid === thread && tdur !== undefined,
+  );
+  const collected = events.filter(
+    ({ name, tid, dur }) => /^(MinorGC|MajorGC)$/.test(name) && tid === thread && dur,
+  );
+  // More than one callback may belong to a picture: the session's, the page's, and what waits for the next one.
+  const slots = [];
+  let open = null;
+  for (const event of [...fired, ...messages].sort((a, b) => a.ts - b.ts)) {
+    if (event.name === "FireAnimationFrame") {
+      if (open === null || event.ts - open.end > 500) {
+        open = { ms: 0, end: 0 };
+        slots.push(open);
+      }
+      open.end = event.ts + event.dur;
+    }
+    if (open) open.ms += event.tdur / 1000;
+  }
+  return { slots: slots.map(({ ms }) => ms), collected: collected.length };
+}
+
+/**
+ * Bytes by function, of what is done for a picture, of what comes by message, and of the rest: panels and plots, at
+ * their own pace. What the browser makes of a call is the caller's, of an emulator's or this measurement's nobody's.
+ */
+function allocated(head) {
+  const into = { picture: new Map(), heard: new Map(), panels: new Map(), theirs: new Map() };
+  const walk = ({ callFrame: { url, functionName, lineNumber }, selfSize, children }, part, ours) => {
+    const within = functionName === "timed" ? "picture" : functionName.endsWith("onmessage") ? "heard" : part;
+    const own = url.includes("/assets/") || within === "heard" || (url === "" && ours);
+    const to = into[own ? within : "theirs"];
+    const key = `${functionName || "(anonymous)"}:${lineNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
+    to.set(key, (to.get(key) ?? 0) + selfSize);
+    const mine = url.includes("/assets/") ? functionName || "(anonymous)" : url === "" ? ours : "";
+    for (const child of children) walk(child, within, mine);
+  };
+  walk(head, "panels", "");
   return into;
 }
 
-const quantile = (values, share) => values.toSorted((a, b) => a - b)[Math.floor(share * (values.length - 1))];
-
 async function measure(name) {
-  await page.waitForTimeout(2000);
-  const before = await script();
+  await page.waitForTimeout(4000);
+  const { slots, collected } = await traced();
   await page.evaluate(() => {
-    window.cost.took.length = 0;
-    window.cost.age.length = 0;
+    window.cost.n = window.cost.heards = 0;
   });
   await page.waitForTimeout(1000 * SECONDS);
-  const spent = (await script()) - before;
-  const { took, age } = await page.evaluate(() => window.cost);
-  const freshest = Math.min(...age);
+  const { taken, done, said, heard } = await page.evaluate(() => {
+    const { n, heards } = window.cost;
+    const of = (key, count) => [...window.cost[key].subarray(0, count)];
+    return { taken: of("taken", n), done: of("done", n), said: of("said", n), heard: of("heard", heards) };
+  });
   await cdp.send("HeapProfiler.startSampling", {
-    samplingInterval: 512,
+    samplingInterval: 256,
     includeObjectsCollectedByMajorGC: true,
     includeObjectsCollectedByMinorGC: true,
   });
-  const count = () => page.evaluate(() => window.cost.took.length);
+  const count = () => page.evaluate(() => window.cost.n);
   const from = await count();
   await page.waitForTimeout(1000 * SECONDS);
   const drawn = (await count()) - from;
   const { profile } = await cdp.send("HeapProfiler.stopSampling");
-  const by = [...allocated(profile.head)].map(([key, bytes]) => [key, bytes / drawn]);
-  const ours = by.filter(([key]) => !key.startsWith("(emulator")).sort((a, b) => b[1] - a[1]);
-  const total = ours.reduce((sum, [, bytes]) => sum + bytes, 0);
-  const ms = (value) => `${value.toFixed(2)} ms`;
+  const parts = allocated(profile.head);
+  const kilobytes = (part) =>
+    `${([...parts[part].values()].reduce((a, b) => a + b, 0) / drawn / 1000).toFixed(1)} kB`;
+  const mean = slots.reduce((a, b) => a + b, 0) / slots.length;
   process.stdout.write(
-    `${name}: ${took.length} pictures in ${SECONDS} s\n` +
-      `  script per picture   ${ms((1000 * spent) / took.length)} of processor time, all that the page does;` +
-      ` by the clock p50 ${ms(quantile(took, 0.5))}, p95 ${ms(quantile(took, 0.95))}\n` +
-      `  age over the freshest p50 ${ms(1000 * (quantile(age, 0.5) - freshest))},` +
-      ` p95 ${ms(1000 * (quantile(age, 0.95) - freshest))}\n` +
-      `  allocated per picture ${total.toFixed(0)} byte by the page's own functions:` +
-      ` ${ours
-        .slice(0, 6)
-        .map(([key, bytes]) => `${key} ${bytes.toFixed(0)}`)
-        .join(", ")}\n`,
+    `${name}: ${BODIES} bodies at 100 Hz, ${taken.length} pictures in ${SECONDS} s\n` +
+      `  script per picture  mean ${mean.toFixed(2)}, ${both(slots)} of processor time (${collected} collections in ${slots.length} pictures)\n` +
+      `  age when heard ${both(heard)}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
+      `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
   );
+  if (!WHERE) return;
+  for (const part of ["picture", "heard", "panels"]) {
+    process.stdout.write(`  ${part}\n`);
+    const most = [...parts[part]].sort((a, b) => b[1] - a[1]).slice(0, 30);
+    for (const [key, bytes] of most)
+      process.stdout.write(`    ${(bytes / drawn).toFixed(0).padStart(8)} ${key}\n`);
+  }
 }
 
 await measure("desk");

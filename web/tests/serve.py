@@ -1,7 +1,7 @@
 """Serves a made-up workstation through the real server, for the page's tests.
 
-``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER]`` prints one line of JSON with
-the address (with ``--tls`` those of each role, by an authority that is made in the folder), then obeys lines
+``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER] [--further N]`` prints one line
+of JSON with the address and when run time is zero by the machine's clock [s since 1970] (with ``--tls`` those of each role, by an authority that is made in the folder), then obeys lines
 on standard input (``freeze``, ``go``, ``finish``, ``stop``, ``start``, ``snapshot T``) and ends with it. Each
 answers with a line of JSON. Everything is a function of run time: `snapshot`.
 """
@@ -64,11 +64,11 @@ def _pin(certificate: Path) -> str:
     return base64.b64encode(hashlib.sha256(der).digest()).decode()
 
 
-def _publish(live: Live, frozen: threading.Event, over: threading.Event) -> None:
-    begun, k = time.monotonic(), 0
+def _publish(live: Live, frozen: threading.Event, over: threading.Event, begun: float, further: int) -> None:
+    k = 0
     while not over.is_set():
         if not frozen.is_set():
-            made = snapshot(k, k * PERIOD)
+            made = snapshot(k, k * PERIOD, further)
             live.publish(made)
             if live.log is not None:
                 live.log.add(made)
@@ -105,9 +105,10 @@ def main() -> None:
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=24.0)
     parser.add_argument("--tls", type=Path)
+    parser.add_argument("--further", type=int, default=0, help="boxes that move besides, in a live run")
     options = parser.parse_args()
     tls = certificates.own(options.tls, "127.0.0.1") if options.tls else None
-    scene, meshes = workstation()
+    scene, meshes = workstation(options.further)
     frozen, over = threading.Event(), threading.Event()
     recording = Remembered(scene, options.seconds) if options.mode == "replay" else None
     live = Live()
@@ -118,11 +119,14 @@ def main() -> None:
         tokens = Tokens.made() if tls else None
         server = Server(scene=scene, meshes=meshes, feed=feed, port=port, tokens=tokens, tls=tls)
         pin = _pin(tls.authority) if tls and tls.authority else None
-        _say(url=server.start(), port=server.port, urls=server.urls, pin=pin)
+        _say(url=server.start(), port=server.port, urls=server.urls, pin=pin, begun=began)
         return server
 
+    begun, began = time.monotonic(), time.time()
     server = open_server(options.port)
-    publisher = threading.Thread(target=_publish, args=(live, frozen, over), daemon=True)
+    publisher = threading.Thread(
+        target=_publish, args=(live, frozen, over, begun, options.further), daemon=True
+    )
     if recording is None:
         publisher.start()
     for line in sys.stdin:

@@ -11,7 +11,7 @@ const HERE = path.dirname(fileURLToPath(import.meta.url));
  * Start serving.
  *
  * @param {...string} options Options of serve.py, such as "--mode", "replay".
- * @returns The address, with `--tls` those of each role and `pin` of the certificate, `tell` (a line in, its answer out), `signal` and `close`.
+ * @returns The address, with `--tls` those of each role and `pin` of the certificate, `begun` (run time zero [s since 1970]), `tell` (a line in, its answer out), `signal` and `close`.
  */
 export async function serve(...options) {
   const child = python(path.join(HERE, "serve.py"), ...options);
@@ -21,7 +21,7 @@ export async function serve(...options) {
     if (done) throw new Error(`serve.py ended with code ${child.exitCode}; its complaint is above`);
     return JSON.parse(value);
   };
-  const { url, urls, pin } = await answer();
+  const { url, urls, pin, begun } = await answer();
   const tell = async (line) => {
     child.stdin.write(`${line}\n`);
     return answer();
@@ -31,5 +31,5 @@ export async function serve(...options) {
       child.once("exit", resolve);
       child.stdin.end();
     });
-  return { url, urls, pin, tell, signal: (name) => child.kill(name), close };
+  return { url, urls, pin, begun, tell, signal: (name) => child.kill(name), close };
 }

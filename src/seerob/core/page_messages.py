@@ -130,15 +130,20 @@ class Register(Struct, frozen=True, kw_only=True, tag="register"):
     step: str
     """``sweep`` (the controller was turned about its tip), ``touch`` (the tip is on a landmark), ``strapped``
     (the controller is fixed to what carries a landmark), ``known`` (the controller lies in the pose of a
-    landmark), ``check`` (as touch, of what is known already), ``nudge``, ``restore``, ``drop`` (the last
-    touch), ``forget``."""
+    landmark), ``seen`` (the device's camera sees the board at a landmark), ``check`` (as touch, of what is
+    known already), ``nudge``, ``restore``, ``drop`` (the last touch or look), ``forget``."""
     landmark: str = ""
-    """Of ``touch``, ``strapped``, ``known`` and ``check``."""
+    """Of ``touch``, ``strapped``, ``known``, ``seen`` and ``check``."""
     poses: bytes = b""
-    """Of the controller while it was held: little-endian float32, seven each as in `Tracking.poses`."""
+    """Of the controller while it was held: little-endian float32, seven each as in `Tracking.poses`.
+    ``seen``: of the camera, one, as WebXR turns it: x to the right, y up, -z ahead."""
+    corners: bytes = b""
+    """``seen``: corners of the board, as ``POST /board`` found them: little-endian float32, four each, x and
+    y on the board [m] before x and y in the picture [px]."""
     by: tuple[float, ...] = ()
-    """``nudge``: translation [m] and rotation vector [rad] in the cell's axes. ``restore``: what `Registered`
-    said: its ``at``, ``about`` and ``covariance``, 46 numbers."""
+    """``seen``: fx, fy, cx and cy of the picture [px]. ``nudge``: translation [m] and rotation vector [rad]
+    in the cell's axes. ``restore``: what `Registered` said: its ``at``, ``about`` and ``covariance``, 46
+    numbers."""
 
 
 class Registered(Struct, frozen=True, kw_only=True, tag="registered"):

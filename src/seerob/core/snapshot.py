@@ -505,6 +505,8 @@ class Place(Struct, frozen=True, kw_only=True):
     """How far it may be from there, standard deviation per axis [m]."""
     accuracy_turn: float | None = None
     """How far it may be turned from there, standard deviation per axis [rad]; None where nobody says."""
+    board: str = ""
+    """What is printed on the board that lies there; empty for none."""
 
 
 class Taught(Struct, frozen=True, kw_only=True):

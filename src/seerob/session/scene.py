@@ -8,6 +8,7 @@ from contextlib import suppress
 from importlib.metadata import version
 
 import numpy as np
+from msgspec import structs
 
 from seerob.core.errors import UnknownName
 from seerob.core.plugin import kind_of
@@ -200,7 +201,8 @@ def landmark_of(model: Model, landmark: Landmark) -> Place:
     """
     frame = _carrier(model, landmark.on)
     at = placement(landmark.at)
-    return place_of(model, landmark.name, frame, at, landmark.accuracy, landmark.accuracy_turn)
+    place = place_of(model, landmark.name, frame, at, landmark.accuracy, landmark.accuracy_turn)
+    return structs.replace(place, board=landmark.board or "")
 
 
 def _carrier(model: Model, name: str | None) -> Frame | None:

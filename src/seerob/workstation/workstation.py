@@ -455,6 +455,10 @@ class Human(_Table, frozen=True, kw_only=True):
             raise ValueError(f"{what} is not an adult's: say adult = false of a child or adolescent")
 
 
+BOARD = r"^charuco \d{1,2}x\d{1,2} \d+(\.\d+)? \d+(\.\d+)?$"
+"""Of `seerob.description.camera.board`."""
+
+
 class Landmark(_Table, frozen=True, kw_only=True):
     """A place of the cell that can be touched or seen, by which a visitor's room or a camera is placed."""
 
@@ -471,6 +475,9 @@ class Landmark(_Table, frozen=True, kw_only=True):
     accuracy_turn: Annotated[float, unit("rad", ge=0, le=0.5)] | None = None
     """How far it may be turned from there, standard deviation per axis [rad]; must be given of one in whose
     pose a controller is laid."""
+    board: Annotated[str, Meta(max_length=60, pattern=BOARD)] | None = None
+    """What is printed on the board that lies there, such as ``charuco 8x6 40.1 30.1``, by which a visitor's
+    device with a camera finds it."""
 
 
 class Contact(_Table, frozen=True, kw_only=True):

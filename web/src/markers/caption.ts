@@ -146,8 +146,9 @@ export class Caption {
       this.texture.colorSpace = SRGBColorSpace;
       this.texture.minFilter = LinearFilter;
       this.texture.generateMipmaps = false;
+      // Another program only where there was no texture.
+      if (!this.material.map) this.material.needsUpdate = true;
       this.material.map = this.texture;
-      this.material.needsUpdate = true;
     }
     const color = verdict ? VERDICT_TEXT[verdict] : NEUTRAL_TEXT;
     brush.clearRect(0, 0, width, height);

@@ -4,7 +4,6 @@ import { Group, Vector3 } from "three";
 import type { Label } from "../wire";
 import { Caption } from "./caption";
 import type { Drawn } from "./drawn";
-import type { View } from "./view";
 
 export class LabelDrawn implements Drawn<Label> {
   readonly object = new Group();
@@ -19,10 +18,6 @@ export class LabelDrawn implements Drawn<Label> {
     this.object.position.fromArray(marker.position);
     this.anchor.copy(this.object.position);
     this.caption.update(marker.text, marker.verdict);
-  }
-
-  face(view: View): void {
-    this.caption.face(view);
   }
 
   dispose(): void {

@@ -2,8 +2,9 @@
 // no garbage to speak of.
 
 import { Group } from "three";
+import type { ShownResult } from "../messages";
 import { STATE_ORDER, stateOf } from "../verdicts";
-import type { Marker, Result, Verdict } from "../wire";
+import type { Marker, Verdict } from "../wire";
 import { Caption } from "./caption";
 import type { Drawn } from "./drawn";
 import { makeDrawn } from "./index";
@@ -19,6 +20,7 @@ interface Slot {
 
 /** Labels of one result, unless it is selected. */
 const LABELS_OF_ONE = 2;
+const NONE: readonly Marker[] = [];
 
 export class MarkerLayer {
   readonly root = new Group();
@@ -39,7 +41,7 @@ export class MarkerLayer {
    * @param captions Of how many results labels are written: more would hide what they are about.
    */
   update(
-    results: readonly Result[],
+    results: readonly ShownResult[],
     muted: ReadonlySet<string>,
     selected: string | null,
     captions: number,
@@ -50,8 +52,9 @@ export class MarkerLayer {
     for (const name of this.slots.keys()) {
       if (!results.some((r) => r.name === name)) this.drop(name, 0);
     }
-    for (const result of results) {
-      const markers = muted.has(result.name) ? [] : result.markers;
+    for (let k = 0; k < results.length; k += 1) {
+      const result = results[k]!;
+      const markers = muted.has(result.name) ? NONE : result.markers;
       const most = result.name === selected ? Number.POSITIVE_INFINITY : LABELS_OF_ONE;
       this.draw(result.name, markers, captioned.has(result.name) ? most : 0);
     }
@@ -63,33 +66,37 @@ export class MarkerLayer {
    * @param others Further captions in the room, which lie below where they would cover these.
    */
   face(view: View, others: readonly Caption[]): void {
-    for (const slots of this.slots.values()) {
-      for (const { drawn, caption } of slots) {
-        drawn.face?.(view);
-        caption?.face(view);
-      }
+    const { written } = this;
+    written.length = 0;
+    for (let k = 0; k < others.length; k += 1) {
+      if (!others[k]!.object.visible) continue;
+      written.push(others[k]!);
     }
-    for (const caption of others) caption.face(view);
-    const all = [...others, ...this.captions()];
-    placeCaptions(all, view);
-    this.leaders.update(all, view);
+    this.view = view;
+    this.slots.forEach(this.faceAll);
+    for (let k = 0; k < written.length; k += 1) written[k]!.face(view);
+    placeCaptions(written, view);
+    this.leaders.update(written, view);
   }
 
   /** Bring the figures of all captions up to date: whether one was not. */
   spell(): boolean {
     let changed = false;
-    for (const caption of this.captions()) changed = caption.spell() || changed;
+    for (let k = 0; k < this.written.length; k += 1) changed = this.written[k]!.spell() || changed;
     return changed;
   }
 
-  private *captions(): Iterable<Caption> {
-    for (const slots of this.slots.values()) {
-      for (const { drawn, caption } of slots) {
-        if (caption?.object.visible) yield caption;
-        if (drawn.caption) yield drawn.caption;
-      }
+  /** Captions of a picture; made once, as a picture allocates nothing of ours. */
+  private readonly written: Caption[] = [];
+  private view: View | null = null;
+  private readonly faceAll = (slots: Slot[]): void => {
+    for (let k = 0; k < slots.length; k += 1) {
+      const { drawn, caption } = slots[k]!;
+      drawn.face?.(this.view!);
+      if (caption?.object.visible) this.written.push(caption);
+      if (drawn.caption) this.written.push(drawn.caption);
     }
-  }
+  };
 
   private draw(name: string, markers: readonly Marker[], labels: number): void {
     const slots = this.slots.get(name) ?? [];
@@ -98,7 +105,8 @@ export class MarkerLayer {
     let left = labels;
     // Figures without the name of what they are of would be riddles.
     let owner = `${name}: `;
-    for (const marker of markers) {
+    for (let k = 0; k < markers.length; k += 1) {
+      const marker = markers[k]!;
       const slot = this.slotFor(slots, used, marker);
       if (!slot) continue;
       slot.drawn.update(marker);
@@ -142,7 +150,7 @@ export class MarkerLayer {
 
   private drop(name: string, from: number): void {
     const slots = this.slots.get(name);
-    if (!slots) return;
+    if (!slots || slots.length <= from) return;
     for (const slot of slots.splice(from)) this.free(slot);
   }
 
@@ -154,8 +162,8 @@ export class MarkerLayer {
   }
 }
 
-function worst(results: readonly Result[], muted: ReadonlySet<string>, count: number): Set<string> {
-  const rank = (r: Result): number => STATE_ORDER.indexOf(stateOf(r));
+function worst(results: readonly ShownResult[], muted: ReadonlySet<string>, count: number): Set<string> {
+  const rank = (r: ShownResult): number => STATE_ORDER.indexOf(stateOf(r));
   const shown = results.filter((r) => !muted.has(r.name) && r.markers.length > 0);
   return new Set(
     shown

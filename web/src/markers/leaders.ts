@@ -42,9 +42,10 @@ export class Leaders {
   }
 
   /** Draw them for these captions, after they were placed. */
-  update(captions: Iterable<Caption>, { camera, pixel }: View): void {
+  update(captions: readonly Caption[], { camera, pixel }: View): void {
     let count = 0;
-    for (const caption of captions) {
+    for (let k = 0; k < captions.length; k += 1) {
+      const caption = captions[k]!;
       const { widthPx, heightPx, bottomPx, rightPx } = caption;
       // The point of the plate that is nearest to where it belongs.
       const right = rightPx - Math.sign(rightPx) * Math.min(Math.abs(rightPx), widthPx / 2);
@@ -55,7 +56,8 @@ export class Leaders {
       this.to.setFromMatrixColumn(camera.matrixWorld, 0).multiplyScalar(right * pixel * depth);
       this.up.setFromMatrixColumn(camera.matrixWorld, 1).multiplyScalar(up * pixel * depth);
       this.to.add(this.up).add(this.from);
-      for (const point of [this.from, this.to]) this.object.parent?.worldToLocal(point);
+      this.object.parent?.worldToLocal(this.from);
+      this.object.parent?.worldToLocal(this.to);
       this.places.setXYZ(2 * count, this.from.x, this.from.y, this.from.z);
       this.places.setXYZ(2 * count + 1, this.to.x, this.to.y, this.to.z);
       count += 1;

@@ -26,92 +26,108 @@ interface Place {
 }
 
 interface Belonging {
-  caption: Caption;
+  caption: Caption | null;
   x: number;
   y: number;
 }
 
+// Made once, as a picture allocates nothing of ours: so many of each are in use.
+const placed: Place[] = [];
+const aside: Belonging[] = [];
+let placedCount = 0;
+
 /** Give each caption a place that no other one covers. */
 export function placeCaptions(
-  captions: Iterable<Caption>,
+  captions: readonly Caption[],
   { camera, pixel, margins, toolsPx = TOOLS_PX }: View,
 ): void {
   const half = Math.tan((camera.fov * Math.PI) / 360) / pixel;
   const edge = half * camera.aspect;
   const top = half - toolsPx;
-  const placed: Place[] = [];
-  const aside: Belonging[] = [];
-  for (const caption of captions) {
+  placedCount = 0;
+  let asideCount = 0;
+  for (let k = 0; k < captions.length; k += 1) {
+    const caption = captions[k]!;
     caption.object.getWorldPosition(at).project(camera);
-    const belonging = { caption, x: at.x * edge, y: at.y * half };
+    const x = at.x * edge;
+    const y = at.y * half;
     // Beside the picture or behind the eye: nobody sees it, and there is no room to look for.
     const far = !(Math.abs(at.x) < 2 && Math.abs(at.y) < 2);
     const seen = Math.abs(at.x) < 1 && Math.abs(at.y) < 1 && at.z < 1;
     if (far) caption.lift(0);
-    else if (margins && seen && caption.aside) aside.push(belonging);
-    else placed.push(stack(belonging, placed, top, edge, seen));
+    else if (margins && seen && caption.aside) {
+      keep(asideCount, caption, x, y);
+      asideCount += 1;
+    } else stack(caption, x, y, top, edge, seen);
   }
   // From above, so that lines to what they are about seldom cross.
-  for (const belonging of aside.sort((a, b) => b.y - a.y))
-    placed.push(putAside(belonging, placed, half, top, edge));
+  for (let k = 0; k < asideCount; k += 1) {
+    const { caption, x, y } = aside[k]!;
+    putAside(caption!, x, y, half, top, edge);
+  }
 }
 
-function putAside(
-  { caption, x, y }: Belonging,
-  placed: readonly Place[],
-  half: number,
-  top: number,
-  edge: number,
-): Place {
+/** Keep one that goes aside, before those below it. */
+function keep(count: number, caption: Caption, x: number, y: number): void {
+  if (aside.length === count) aside.push({ caption: null, x: 0, y: 0 });
+  const one = aside[count]!;
+  one.caption = caption;
+  one.x = x;
+  one.y = y;
+  let k = count;
+  for (; k > 0 && aside[k - 1]!.y < y; k -= 1) aside[k] = aside[k - 1]!;
+  aside[k] = one;
+}
+
+/** A place that counts as covered from now on. */
+function nextPlace(x: number, y: number, width: number, height: number): Place {
+  if (placed.length === placedCount) placed.push({ x: 0, y: 0, width: 0, height: 0 });
+  const place = placed[placedCount]!;
+  place.x = x;
+  place.y = y;
+  place.width = width;
+  place.height = height;
+  return place;
+}
+
+function putAside(caption: Caption, x: number, y: number, half: number, top: number, edge: number): void {
   const { widthPx: width, heightPx } = caption;
   const height = heightPx + GAP_PX;
   if (caption.side === 0 || Math.abs(x) > KEEPS_SIDE * edge) caption.side = x < 0 ? -1 : 1;
   const lowest = -half + LEGEND_PX;
   const highest = top - height;
   const level = 2 * edge < NARROW_PX ? highest : Math.max(Math.min(y - height / 2, highest), lowest);
-  const place = { x: caption.side * Math.max(edge - SIDE_PX - width / 2, 0), y: level, width, height };
-  for (let other = covered(placed, place); other; other = covered(placed, place)) place.y = other.y - height;
+  const place = nextPlace(caption.side * Math.max(edge - SIDE_PX - width / 2, 0), level, width, height);
+  for (let other = covered(place); other; other = covered(place)) place.y = other.y - height;
   if (place.y < lowest) {
     place.y = level;
-    for (let other = covered(placed, place); other; other = covered(placed, place))
-      place.y = other.y + other.height;
+    for (let other = covered(place); other; other = covered(place)) place.y = other.y + other.height;
   }
+  placedCount += 1;
   caption.lift(place.y - y, place.x - x);
-  return place;
 }
 
 // Above those before it that it would cover, or below them when the room ends above; beside its point when the
 // room ends at a side.
-function stack(
-  { caption, x, y }: Belonging,
-  placed: readonly Place[],
-  top: number,
-  edge: number,
-  seen: boolean,
-): Place {
+function stack(caption: Caption, x: number, y: number, top: number, edge: number, seen: boolean): void {
   // Of a point that is out of sight, or where the room is too narrow, it stays over its point.
   const room = seen ? Math.max(edge - caption.widthPx / 2, 0) : Number.POSITIVE_INFINITY;
-  const place = {
-    x: room > 0 ? Math.min(Math.max(x, -room), room) : x,
-    y,
-    width: caption.widthPx,
-    height: caption.heightPx + GAP_PX,
-  };
-  for (let below = covered(placed, place); below; below = covered(placed, place)) {
-    place.y = below.y + below.height;
-  }
+  const beside = room > 0 ? Math.min(Math.max(x, -room), room) : x;
+  const place = nextPlace(beside, y, caption.widthPx, caption.heightPx + GAP_PX);
+  for (let below = covered(place); below; below = covered(place)) place.y = below.y + below.height;
   if (place.y > y && place.y + place.height > top) {
     place.y = y - place.height;
-    for (let above = covered(placed, place); above; above = covered(placed, place)) {
-      place.y = above.y - place.height;
-    }
+    for (let above = covered(place); above; above = covered(place)) place.y = above.y - place.height;
   }
+  placedCount += 1;
   caption.lift(place.y - y, place.x - x);
-  return place;
 }
 
-function covered(placed: readonly Place[], { x, y, width, height }: Place): Place | undefined {
-  return placed.find(
-    (p) => Math.abs(p.x - x) < (p.width + width) / 2 && y < p.y + p.height - 1e-6 && p.y < y + height - 1e-6,
-  );
+function covered({ x, y, width, height }: Place): Place | undefined {
+  for (let k = 0; k < placedCount; k += 1) {
+    const p = placed[k]!;
+    if (Math.abs(p.x - x) < (p.width + width) / 2 && y < p.y + p.height - 1e-6 && p.y < y + height - 1e-6)
+      return p;
+  }
+  return undefined;
 }

@@ -31,26 +31,30 @@ export class RaysDrawn implements Drawn<Rays> {
   }
 
   update(marker: Rays): void {
-    const { starts, ends, verdict } = marker;
-    const hits = new Set(marker.hits);
-    const startOf = (i: number): Vec3 => (starts.length === ends.length ? starts[i]! : starts[0]!);
-    const [passing, hitting, dots, sheet]: [number[], number[], number[], number[]] = [[], [], [], []];
-    if (starts.length > 0) {
-      ends.forEach((end, i) => {
-        (hits.has(i) ? hitting : passing).push(...startOf(i), ...end);
-        if (hits.has(i)) dots.push(...end);
-        const next = ends[i + 1];
-        if (marker.filled && next) {
-          sheet.push(...startOf(i), ...end, ...next);
-          if (starts.length === ends.length) sheet.push(...startOf(i), ...next, ...startOf(i + 1));
-        }
-      });
-      this.anchor.fromArray(starts[0]!);
+    const { starts, ends, hits, filled, verdict } = marker;
+    const several = starts.length === ends.length;
+    const count = starts.length > 0 ? ends.length : 0;
+    HIT.clear();
+    for (let k = 0; k < hits.length; k += 1) if (hits[k]! < count) HIT.add(hits[k]!);
+    const between = filled ? Math.max(count - 1, 0) : 0;
+    const passing = begin(this.passing.geometry, 2 * (count - HIT.size));
+    const hitting = begin(this.hitting.geometry, 2 * HIT.size);
+    const dots = begin(this.dots.geometry, HIT.size);
+    const sheet = begin(this.sheet.geometry, between * (several ? 6 : 3));
+    let [p, h, d, s] = [0, 0, 0, 0];
+    for (let i = 0; i < count; i += 1) {
+      const start = several ? starts[i]! : starts[0]!;
+      const end = ends[i]!;
+      if (HIT.has(i)) {
+        h = put(hitting, h, start, end);
+        d = put(dots, d, end);
+      } else p = put(passing, p, start, end);
+      if (i >= between) continue;
+      const next = ends[i + 1]!;
+      s = put(sheet, s, start, end, next);
+      if (several) s = put(sheet, s, start, next, starts[i + 1]!);
     }
-    write(this.passing.geometry, passing);
-    write(this.hitting.geometry, hitting);
-    write(this.dots.geometry, dots);
-    write(this.sheet.geometry, sheet);
+    if (count > 0) this.anchor.fromArray(starts[0]!);
     this.passing.material = faintMaterial(verdict);
     this.hitting.material = lineMaterial(verdict);
     this.dots.material = dotMaterial(verdict);
@@ -62,17 +66,29 @@ export class RaysDrawn implements Drawn<Rays> {
   }
 }
 
+/** Beams that hit, of the marker that is drawn. */
+const HIT = new Set<number>();
+
 // In place as long as it fits: a scanner has hundreds of beams in every frame.
-function write(geometry: BufferGeometry, values: readonly number[]): void {
+function begin(geometry: BufferGeometry, points: number): Float32Array {
   let position = geometry.getAttribute("position") as BufferAttribute | undefined;
-  if (!position || position.array.length < values.length) {
+  if (!position || position.array.length < 3 * points) {
     // A buffer cannot grow on the graphics card: the old one is given back.
     geometry.dispose();
-    position = new BufferAttribute(new Float32Array(Math.max(values.length * 2, 30)), 3);
+    position = new BufferAttribute(new Float32Array(Math.max(points * 6, 30)), 3);
     position.setUsage(DynamicDrawUsage);
     geometry.setAttribute("position", position);
   }
-  (position.array as Float32Array).set(values);
   position.needsUpdate = true;
-  geometry.setDrawRange(0, values.length / 3);
+  geometry.setDrawRange(0, points);
+  return position.array as Float32Array;
+}
+
+/** Write points one after another; where the next one goes. */
+function put(into: Float32Array, at: number, a: Vec3, b?: Vec3, c?: Vec3): number {
+  into[at] = a[0];
+  into[at + 1] = a[1];
+  into[at + 2] = a[2];
+  if (!b) return at + 3;
+  return c ? put(into, at + 3, b, c) : put(into, at + 3, b);
 }

@@ -2,6 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { ownDevice } from "../company";
 import { against, steady, withUnit } from "../figures";
 import {
   besideTitle,
@@ -79,7 +80,7 @@ function Plot({ name }: { name: string }) {
     };
     const stop = effect(() => {
       void [tracesRevision.value, now.value, shownRange(), theme.value];
-      timer ??= setTimeout(draw, redrawEveryMs());
+      timer ??= setTimeout(draw, redrawEveryMs(ownDevice.peek() !== "desk"));
     });
     return () => {
       stop();

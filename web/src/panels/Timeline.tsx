@@ -2,6 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import { useLayoutEffect, useRef } from "preact/hooks";
+import { ownDevice } from "../company";
 import { formatTime } from "../format";
 import { clock, now, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { held, shownRange, timeAt } from "../plots/axis";
@@ -32,10 +33,13 @@ export function Timeline() {
     let waiting: ReturnType<typeof setTimeout> | null = null;
     const stop = effect(() => {
       void [tracesRevision.value, now.value, shownRange(), stale.value, theme.value];
-      waiting ??= setTimeout(() => {
-        waiting = null;
-        draw();
-      }, redrawEveryMs());
+      waiting ??= setTimeout(
+        () => {
+          waiting = null;
+          draw();
+        },
+        redrawEveryMs(ownDevice.peek() !== "desk"),
+      );
     });
     return () => {
       stop();

@@ -28,8 +28,14 @@ export function windowOf(trace: Trace, start: number, end: number, buckets: numb
       else if (value < trace.values[low]! || Number.isNaN(trace.values[low]!)) low = i;
       if (value > trace.values[high]! || Number.isNaN(trace.values[high]!)) high = i;
     }
-    const picked = [...new Set(gap < 0 ? [low, high] : [low, high, gap])].sort((a, b) => a - b);
-    for (const i of picked) push(data, trace, i);
+    const first = Math.min(low, high);
+    const second = Math.max(low, high);
+    const gaps = gap >= 0 && gap !== low && gap !== high;
+    if (gaps && gap < first) push(data, trace, gap);
+    push(data, trace, first);
+    if (gaps && gap > first && gap < second) push(data, trace, gap);
+    if (second !== first) push(data, trace, second);
+    if (gaps && gap > second) push(data, trace, gap);
   }
   return data;
 }

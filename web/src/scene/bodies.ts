@@ -20,6 +20,7 @@ import { featureEdges, turnOutward } from "./feature_edges";
 import {
   bodyMaterial,
   doubtMaterial,
+  drawnTwice,
   glow,
   lineMaterial,
   markerMaterial,
@@ -113,6 +114,7 @@ export class Body {
       if (drawnBySoftware() && !part.geometry.hasAttribute("normal")) {
         part.geometry = withNormals(part.geometry);
       }
+      drawnTwice(part.geometry);
       this.meshes.push({ mesh: part, own: part.material, given, local: part.matrixWorld.clone() });
     }
     this.extent.setFromObject(model);
@@ -214,6 +216,9 @@ export class Bodies {
   private absent: ReadonlySet<string> = new Set();
   private real = false;
   private generation = 0;
+  /** Whether somebody wears a look of a variable, or is in doubt. */
+  private worn = false;
+  private doubted = false;
   /** Meshes of this scene and the one before: an edit changes few. */
   private models = new Map<string, Promise<Object3D>>();
   private readonly position = new Vector3();
@@ -233,6 +238,7 @@ export class Bodies {
     this.posed = new Float32Array();
     this.byName.clear();
     this.list = scene.nodes.map((node) => new Body(node));
+    this.worn = this.doubted = false;
     this.overReality(this.real);
     for (const body of this.list) {
       this.byName.set(body.node.name, body);
@@ -301,7 +307,10 @@ export class Bodies {
 
   /** Looks that follow variables: colours in 0…1, null for what is not drawn. */
   wear(looks: Looks): void {
-    this.absent = new Set(Object.keys(looks).filter((name) => looks[name] === null));
+    const names = Object.keys(looks);
+    if (names.length === 0 && !this.worn) return;
+    this.worn = names.length > 0;
+    this.absent = new Set(names.filter((name) => looks[name] === null));
     for (const body of this.list) {
       const look = looks[body.node.name];
       body.wear(look ? look.reduce((sum, part) => sum * 256 + Math.round(255 * part), 0) : undefined);
@@ -311,6 +320,8 @@ export class Bodies {
 
   /** Show who may be elsewhere, and only those. */
   doubt(doubts: Doubts): void {
+    if (doubts.size === 0 && !this.doubted) return;
+    this.doubted = doubts.size > 0;
     for (const body of this.list) body.doubt(doubtOf(body.node, doubts) !== undefined);
   }
 
@@ -336,9 +347,9 @@ export class Bodies {
 
   /** Colour the bodies that verdicts are about, and only those. */
   paint(verdicts: ReadonlyMap<string, Verdict | null>): void {
-    for (const body of this.list) {
-      const name = body.node.name;
-      body.paint(verdicts.has(name) ? (verdicts.get(name) ?? null) : undefined);
+    for (let k = 0; k < this.list.length; k += 1) {
+      const body = this.list[k]!;
+      body.paint(verdicts.get(body.node.name));
     }
   }
 }

@@ -12,7 +12,8 @@ const MOST = 4;
 
 export class DoubtCaptions {
   readonly root = new Group();
-  private readonly captions: Caption[] = [];
+  /** Those that are written now are visible. */
+  readonly captions: Caption[] = [];
   private readonly box = new Box3();
   private readonly part = new Box3();
 
@@ -32,11 +33,6 @@ export class DoubtCaptions {
       used += 1;
     }
     for (const caption of this.captions.slice(used)) caption.object.visible = false;
-  }
-
-  /** Those that are written now. */
-  *shown(): Iterable<Caption> {
-    for (const caption of this.captions) if (caption.object.visible) yield caption;
   }
 
   private captionAt(index: number): Caption {

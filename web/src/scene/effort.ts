@@ -23,8 +23,13 @@ function isSoftware(): boolean {
   return SOFTWARE.test(name);
 }
 
-/** Plots and lanes are drawn anew at most this often [ms]: their canvases cost as much as the room there. */
-export function redrawEveryMs(): number {
+/**
+ * Plots and lanes are drawn anew at most this often [ms]: their canvases cost as much as the room there.
+ *
+ * @param elsewhere Whether one is in the room, where nobody sees the page.
+ */
+export function redrawEveryMs(elsewhere: boolean): number {
+  if (elsewhere) return 1000;
   return drawnBySoftware() ? 400 : 60;
 }
 

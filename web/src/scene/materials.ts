@@ -2,8 +2,10 @@
 
 import {
   BackSide,
+  type BufferGeometry,
   Color,
   DoubleSide,
+  FrontSide,
   LineBasicMaterial,
   type Material,
   MeshBasicMaterial,
@@ -109,6 +111,16 @@ const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: bool
   volume: { opacity: 0.18, depthTest: true, depthWrite: false },
 };
 
+// Keys are made once: they are asked for with every marker of every frame.
+const KEYS = byTone("line", "ghost", "fill", "volume");
+const THIN_KEYS = byTone("thin", "faint");
+
+function byTone<K extends string>(...kinds: K[]): Record<K, Record<Tone, string>> {
+  const tones: Tone[] = ["within", "exceeded", "undecided", "none"];
+  const keys = (kind: K) => Object.fromEntries(tones.map((tone) => [tone, `${kind} ${tone}`]));
+  return Object.fromEntries(kinds.map((kind) => [kind, keys(kind)])) as Record<K, Record<Tone, string>>;
+}
+
 const made = new Map<string, Material>();
 
 /** A material that is made when it is first needed and shared from then on. */
@@ -124,13 +136,16 @@ export function once(key: string, make: () => Material): Material {
 /** The shared material of markers of one verdict. */
 export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
   const tone: Tone = verdict ?? "none";
-  return once(`${kind} ${tone}`, () => {
+  return once(KEYS[kind][tone], () => {
     const hatched = tone === "undecided";
     const material = new MeshBasicMaterial({
       color: colorOf(tone),
       side: kind === "volume" ? BackSide : DoubleSide,
       toneMapped: false,
       transparent: LOOK[kind].opacity < 1 || hatched,
+      // One colour without light: in which order both sides are blended does not matter, and asking for two passes
+      // has three.js look its programs up twice per picture.
+      forceSinglePass: true,
       ...LOOK[kind],
     });
     if (hatched) hatch(material);
@@ -140,17 +155,17 @@ export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
 
 /** The shared material of thin lines: edges of translucent things. */
 export function lineMaterial(verdict: Verdict | null): Material {
-  return thin(verdict, 0.85);
+  return thin("thin", verdict, 0.85);
 }
 
 /** The shared material of lines that are many and mean little one by one: beams that hit nothing. */
 export function faintMaterial(verdict: Verdict | null): Material {
-  return thin(verdict, 0.22);
+  return thin("faint", verdict, 0.22);
 }
 
-function thin(verdict: Verdict | null, opacity: number): Material {
+function thin(key: "thin" | "faint", verdict: Verdict | null, opacity: number): Material {
   const tone: Tone = verdict ?? "none";
-  return once(`thin ${opacity} ${tone}`, () => {
+  return once(THIN_KEYS[key][tone], () => {
     // Seen through: what lies in the same plane, such as a field and its beams, must not flicker.
     const look = { toneMapped: false, transparent: true, opacity, depthWrite: false };
     return new LineBasicMaterial({ color: colorOf(tone), ...look });
@@ -166,35 +181,34 @@ export function dotMaterial(verdict: Verdict | null): Material {
 }
 
 /** The shared material of a body that a verdict is about. */
-export function bodyMaterial(verdict: Verdict | null): Material {
+export function bodyMaterial(verdict: Verdict | null): Material | Material[] {
   const tone: Tone = verdict ?? "none";
-  return once(`body ${tone}`, () => {
-    const material = solid({
-      color: colorOf(tone),
-      own: 0.45,
-      roughness: 0.6,
-      side: DoubleSide,
-      toneMapped: false,
-      transparent: tone === "undecided",
-    });
-    if (tone === "undecided") hatch(material);
-    return material;
-  });
+  const look = { color: colorOf(tone), own: 0.45, roughness: 0.6, toneMapped: false };
+  if (tone === "undecided") return bothSides("body undecided", look);
+  return once(`body ${tone}`, () => solid({ ...look, side: DoubleSide }));
 }
 
 /** The shared material of a body that may be elsewhere: no colour of its own, and seen through. */
-export function doubtMaterial(): Material {
-  return once("doubt", () => {
-    const material = solid({
-      color: DOUBT_COLOR,
-      roughness: 0.9,
-      side: DoubleSide,
-      transparent: true,
-      opacity: 0.8,
-    });
-    hatch(material);
-    return material;
-  });
+export function doubtMaterial(): Material[] {
+  return bothSides("doubt", { color: DOUBT_COLOR, roughness: 0.9, opacity: 0.8 });
+}
+
+// Seen through and hatched: the far side before the near one, for the two groups of `drawnTwice`. three.js makes
+// such passes of one material by itself, and looks its programs up anew in each, in every picture.
+function bothSides(key: string, look: Solid): Material[] {
+  return [BackSide, FrontSide].map((side) =>
+    once(`${key} ${side}`, () => {
+      const material = solid({ ...look, side, transparent: true });
+      hatch(material);
+      return material;
+    }),
+  );
+}
+
+/** Have a geometry drawn once for each of two materials, where it is given two. */
+export function drawnTwice(geometry: BufferGeometry): void {
+  if (geometry.groups.length > 0) return;
+  for (const material of [0, 1]) geometry.addGroup(0, Number.POSITIVE_INFINITY, material);
 }
 
 /** The shared material of what is real, over the real cell: nothing is drawn, and what is behind it is hidden. */

@@ -62,12 +62,11 @@ export class OwnPresence {
     this.at = time;
     this.pointed = points_at;
     this.said.set(poses);
-    for (let i = 0; i < points; i += 1) {
+    for (let i = 0; i < points; i += 1)
       this.position
         .fromArray(this.points, 3 * i)
         .applyMatrix4(this.fromRig)
         .toArray(this.points, 3 * i);
-    }
     if (points_at) {
       visit!.laser(this.position, this.to);
       this.position.applyMatrix4(this.fromRig).toArray(this.beam, 0);
@@ -98,7 +97,8 @@ export class OwnPresence {
   private moved(): boolean {
     const least = LEAST * this.stage.rig.scale.x;
     for (let i = 0; i < this.poses.length; i += 1) {
-      const [now, before] = [this.poses[i]!, this.said[i]!];
+      const now = this.poses[i]!;
+      const before = this.said[i]!;
       if (Number.isNaN(now) !== Number.isNaN(before) || Math.abs(now - before) > least) return true;
     }
     return false;
@@ -110,10 +110,10 @@ export class OwnPresence {
     this.position.setFromMatrixPosition(this.fromRig);
     const { x, y, z, w } = this.rigTurn;
     const known = ownPlace.peek();
-    const [px, py, pz] = known.position!;
-    const [kw, kx, ky, kz] = known.turn!;
-    const far = Math.hypot(this.position.x - px, this.position.y - py, this.position.z - pz);
-    const turned = 1 - Math.abs(x * kx + y * ky + z * kz + w * kw);
+    const at = known.position!;
+    const turn = known.turn!;
+    const far = Math.hypot(this.position.x - at[0], this.position.y - at[1], this.position.z - at[2]);
+    const turned = 1 - Math.abs(w * turn[0] + x * turn[1] + y * turn[2] + z * turn[3]);
     if (far > LEAST * rig.scale.x || turned > 1e-9)
       ownPlace.value = { position: [this.position.x, this.position.y, this.position.z], turn: [w, x, y, z] };
   }

@@ -1,7 +1,7 @@
 // The middle of the page: bodies, markers and viewpoint, told by signals what to show.
 
 import { effect, signal } from "@preact/signals";
-import { type Mesh, Quaternion, type Raycaster, Vector3 } from "three";
+import { Box3, type Mesh, type Object3D, Quaternion, type Raycaster, Vector3 } from "three";
 import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
 import { doubtsIn } from "../doubts";
@@ -9,7 +9,7 @@ import { axisMarker, pointedAt } from "../editing/bringing";
 import { Glide } from "../glide";
 import { MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
-import type { Frame } from "../messages";
+import type { Shown } from "../messages";
 import {
   hidden,
   mutedCriteria,
@@ -39,7 +39,7 @@ import { Outline } from "./outline";
 import { nodeAlong, pickOnClick } from "./picking";
 import { Stage } from "./stage";
 import { Viewpoint } from "./viewpoint";
-import { hiding } from "./volumes";
+import { hides } from "./volumes";
 
 /** Criteria that are labelled in the room, and a room that has space for one. */
 const LABELLED = 3;
@@ -69,9 +69,9 @@ export class Viewer {
   /** The camera through which one looks; null in the room. */
   private through: CameraView | null = null;
   private feed: PoseFeed | null = null;
-  private frame: Frame | null = null;
+  private frame: Shown | null = null;
   /** Heard, and shown as soon as the bodies are where it speaks of. */
-  private coming: Frame | null = null;
+  private coming: Shown | null = null;
   private tickedAt = Number.NEGATIVE_INFINITY;
   private spelledAt = Number.NEGATIVE_INFINITY;
   private posed = false;
@@ -130,8 +130,9 @@ export class Viewer {
     this.stage.moved();
   }
 
-  show(frame: Frame): void {
-    if (this.coming) this.arrive();
+  show(frame: Shown): void {
+    // What the next picture replaces need not be drawn.
+    if (this.coming && this.glide.moving) this.arrive();
     this.coming = frame;
   }
 
@@ -172,7 +173,12 @@ export class Viewer {
       this.spelledAt = time;
       this.stage.invalidate();
     }
-    this.markers.face(this.view, [...this.doubts.shown()]);
+    this.markers.face(this.view, this.doubts.captions);
+  }
+
+  /** Run time of the poses that bodies have [s]. */
+  get posedT(): number {
+    return this.glide.shownT;
   }
 
   /** Select the body that a ray of the world meets first, or nothing. */
@@ -217,25 +223,33 @@ export class Viewer {
   }
 
   /** Volumes with edges, of which one may be all that is seen. */
-  private volumes: Mesh[] = [];
+  private readonly volumes: Mesh[] = [];
+  private readonly boxes: Box3[] = [];
+  private readonly eye = new Vector3();
+  private readonly addVolume = (part: Object3D): void => {
+    if (part.userData.volume === true) this.volumes.push(part as Mesh);
+  };
 
   private findVolumes(): void {
-    this.volumes = [];
-    this.stage.world.traverse((part) => {
-      if (part.userData.volume === true) this.volumes.push(part as Mesh);
-    });
+    this.volumes.length = 0;
+    this.stage.world.traverse(this.addVolume);
+    while (this.boxes.length < this.volumes.length) this.boxes.push(new Box3());
+    this.boxes.length = this.volumes.length;
   }
 
   /** Show volumes filled, or by their edges alone where they would hide what is inside: on a layer of no camera. */
   private fillVolumes(): void {
     if (this.volumes.length === 0) return;
-    const boxes = this.volumes.map(({ geometry, matrixWorld }) => {
+    for (let k = 0; k < this.volumes.length; k += 1) {
+      const { geometry, matrixWorld } = this.volumes[k]!;
       if (!geometry.boundingBox) geometry.computeBoundingBox();
-      return geometry.boundingBox!.clone().applyMatrix4(matrixWorld);
-    });
-    const hides = hiding(boxes, this.stage.camera.getWorldPosition(new Vector3()));
-    for (const [k, volume] of this.volumes.entries())
-      volume.layers.set(outlinesOnly.peek() || hides[k] ? UNSEEN_LAYER : 0);
+      this.boxes[k]!.copy(geometry.boundingBox!).applyMatrix4(matrixWorld);
+    }
+    const eye = this.stage.camera.getWorldPosition(this.eye);
+    for (let k = 0; k < this.volumes.length; k += 1) {
+      const unseen = outlinesOnly.peek() || hides(this.boxes, k, eye);
+      this.volumes[k]!.layers.set(unseen ? UNSEEN_LAYER : 0);
+    }
   }
 
   private arrive(): void {

@@ -21,7 +21,10 @@ export class Menu {
   private readonly brush: CanvasRenderingContext2D;
   private readonly texture: CanvasTexture;
   private readonly rowCount: number;
-  private drawn = "";
+  /** What is drawn of each button: its words, whether it is on, whether it is pointed at. */
+  private readonly labels: string[] = [];
+  private readonly lit: boolean[] = [];
+  private drawn = -1;
   private pointed = -1;
 
   constructor(readonly items: readonly Item[]) {
@@ -60,9 +63,7 @@ export class Menu {
 
   /** Draw what has changed. */
   update(): void {
-    const state = this.items.map((item, k) => `${item.label()}${item.on?.() ? 1 : 0}${k === this.pointed}`);
-    if (state.join() === this.drawn) return;
-    this.drawn = state.join();
+    if (!this.news()) return;
     const { brush } = this;
     const [w, h] = [BUTTON.width * SHARP, BUTTON.height * SHARP];
     brush.clearRect(0, 0, brush.canvas.width, brush.canvas.height);
@@ -80,6 +81,20 @@ export class Menu {
       brush.fillText(item.label(), x + w / 2, y + h / 2, w - 12);
     });
     this.texture.needsUpdate = true;
+  }
+
+  /** Whether anything is to be drawn anew. */
+  private news(): boolean {
+    let news = this.drawn !== this.pointed;
+    this.drawn = this.pointed;
+    for (let k = 0; k < this.items.length; k += 1) {
+      const label = this.items[k]!.label();
+      const on = this.items[k]!.on?.() ?? false;
+      if (label !== this.labels[k] || on !== this.lit[k]) news = true;
+      this.labels[k] = label;
+      this.lit[k] = on;
+    }
+    return news;
   }
 
   dispose(): void {

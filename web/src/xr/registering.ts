@@ -16,6 +16,7 @@ import {
 import { registered, scene } from "../page_state";
 import type { Viewer } from "../scene/viewer";
 import type { Register, Registered } from "../wire";
+import { cornersIn, type Look, look, mayLook } from "./camera_look";
 
 /** Size in the room [m] and on the canvas [px]. */
 const SIZE = { width: 0.6, height: 0.3 };
@@ -34,13 +35,16 @@ const RELEASED = 0.3;
 const DONE = 4;
 const ONE = new Vector3(1, 1, 1);
 
-/** How the room is found out: by touches with a tip that is found first, or by where the controller itself is. */
-const WAYS = ["sweep", "strapped", "known"] as const;
+/** On a screen, which has no other button, a press of so long says that it is enough [ms]. */
+const LONG_MS = 1500;
+/** How the room is found out: by touches with a tip that is found first, by where the controller itself is, or by
+ * boards that the device's own camera sees. */
+const WAYS = ["sweep", "strapped", "known", "seen"] as const;
 type Step = (typeof WAYS)[number] | "touch" | "check" | "align" | "done";
 /** Steps at a landmark. */
-const AT_LANDMARK: readonly Step[] = ["touch", "check", "strapped", "known"];
+const AT_LANDMARK: readonly Step[] = ["touch", "check", "strapped", "known", "seen"];
 /** Steps after which one may say that it is enough. */
-const SOLVED: readonly Step[] = ["touch", "strapped", "known"];
+const SOLVED: readonly Step[] = ["touch", "strapped", "known", "seen"];
 
 /** The part of an `XRAnchor` that not every browser has. */
 interface Kept {
@@ -71,6 +75,9 @@ export class Registering {
   private said = "";
   private hand: XRHandedness | null = null;
   private pressed: { hand: XRHandedness; since: number; poses: number[][] } | null = null;
+  /** Whether the next picture is looked at, and since when a screen is pressed [ms]. */
+  private looks = false;
+  private pressedAt = 0;
   private now = 0;
   private readonly pushed = new Set<string>();
   private readonly brush: CanvasRenderingContext2D;
@@ -97,7 +104,7 @@ export class Registering {
     this.panel = new Mesh(new PlaneGeometry(SIZE.width, SIZE.height), material);
     this.panel.position.set(0, 1.55, -1);
     this.mark.renderOrder = 5;
-    this.step = "sweep";
+    this.step = this.ways.includes("seen") && mayLook(session) ? "seen" : "sweep";
     session.addEventListener("selectstart", this.press);
     session.addEventListener("selectend", this.release);
     session.addEventListener("squeezestart", this.takeBack);
@@ -130,6 +137,17 @@ export class Registering {
         "Pull the trigger of the other one.",
         "Stick aside: another landmark, up or down: other ways, A ends.",
       ],
+      seen: mayLook(this.session)
+        ? [
+            `Look at the board at ${name}`,
+            "Hold still: trigger or tap, from three places or more.",
+            "Squeeze takes the last one back, A or a long press ends, stick: other ways.",
+          ]
+        : [
+            "No picture of this device’s camera",
+            "Its browser hands none over (WebXR: camera-access).",
+            "Stick up or down: other ways.",
+          ],
       touch: [
         `Touch ${name} with the tip`,
         "Hold still and pull the trigger. Squeeze takes the last one back,",
@@ -142,7 +160,8 @@ export class Registering {
     const lines = [...words[this.step]];
     if (known?.error != null)
       lines.push(`off by ${(1e3 * known.error).toFixed(1)} mm at ${known.tool} (95 %)`);
-    if (known && known.landmarks.length > 0) lines.push(`${known.landmarks.length} touched`);
+    if (known && known.landmarks.length > 0)
+      lines.push(`${known.landmarks.length} ${this.step === "seen" ? "looks" : "touched"}`);
     lines.push(this.said || known?.doubt || "");
     return lines;
   }
@@ -150,6 +169,7 @@ export class Registering {
   /** Once per picture, before the person is looked at. */
   tick(time: number, frame: XRFrame, floor: XRReferenceSpace): void {
     this.now = time;
+    if (this.looks) this.lookNow(frame, floor);
     void this.settle(frame, floor);
     const anchored = this.anchor && frame.getPose(this.anchor.anchorSpace, floor);
     if (anchored) this.roomFromFloor.fromArray(anchored.transform.inverse.matrix);
@@ -180,22 +200,29 @@ export class Registering {
   }
 
   private get landmark() {
-    const all = scene.peek()?.landmarks ?? [];
+    const all = this.step === "seen" ? boards() : (scene.peek()?.landmarks ?? []);
     return all[this.index % Math.max(all.length, 1)];
+  }
+
+  /** Ways by which this cell can be found: a board has to be told of. */
+  private get ways(): readonly (typeof WAYS)[number][] {
+    return boards().length > 0 ? WAYS : WAYS.slice(0, -1);
   }
 
   private ask(step: string, more: Partial<Register> = {}): void {
     this.number += 1;
     this.waits = true;
     this.said = "";
-    const none = { landmark: "", poses: new Uint8Array(), by: [] };
+    const none = { landmark: "", poses: new Uint8Array(), corners: new Uint8Array(), by: [] };
     const { number: id, space, human } = this;
     this.send({ type: "register", id, human: human ?? "", space, step, ...none, ...more });
   }
 
   private readonly press = ({ inputSource }: XRInputSourceEvent): void => {
     if (!this.active || this.waits || this.step === "align") return;
-    if (inputSource.hand) this.said = "take a controller: a finger is not good enough";
+    this.pressedAt = this.now;
+    if (this.step === "seen") this.looks = mayLook(this.session);
+    else if (inputSource.hand) this.said = "take a controller: a finger is not good enough";
     else if (this.step === "strapped" || this.step === "known") {
       // Whoever pulled its own trigger would move it.
       this.hand = this.other(inputSource.handedness);
@@ -211,7 +238,34 @@ export class Registering {
 
   private readonly release = ({ inputSource }: XRInputSourceEvent): void => {
     if (this.step === "sweep" && this.pressed?.hand === inputSource.handedness) this.finish();
+    if (inputSource.targetRayMode === "screen" && this.now - this.pressedAt > LONG_MS) this.next();
   };
+
+  /** Look at a board with the device's own camera, in this picture. */
+  private lookNow(frame: XRFrame, floor: XRReferenceSpace): void {
+    this.looks = false;
+    const gl = this.viewer.stage.renderer.getContext() as WebGL2RenderingContext;
+    const seen = look(this.session, frame, floor, gl);
+    const { landmark } = this;
+    if (seen && landmark) void this.tellLook(seen, landmark.name, landmark.board);
+    else {
+      this.said = "this device hands over no picture of its camera";
+      this.write();
+    }
+  }
+
+  private async tellLook(seen: Look, landmark: string, board: string): Promise<void> {
+    const pose = new Float32Array(this.inRoom(seen.pose));
+    this.waits = true;
+    this.said = "looking …";
+    this.write();
+    const corners = await cornersIn(seen, board);
+    this.waits = false;
+    if (typeof corners === "string") {
+      this.said = corners;
+      this.write();
+    } else this.ask("seen", { landmark, poses: new Uint8Array(pose.buffer), corners, by: seen.lens });
+  }
 
   /** The other controller, where there is one. */
   private other(hand: XRHandedness): XRHandedness {
@@ -220,7 +274,7 @@ export class Registering {
   }
 
   private readonly takeBack = (): void => {
-    if (this.step === "touch" && !this.waits) this.ask("drop");
+    if ((this.step === "touch" || this.step === "seen") && !this.waits) this.ask("drop");
     if (this.step === "strapped" && !this.waits) this.ask("forget");
   };
 
@@ -230,7 +284,7 @@ export class Registering {
     const held = this.pressed;
     const pose = held?.hand === handedness && gripSpace ? frame.getPose(gripSpace, floor) : null;
     if (held && pose && !pose.emulatedPosition) {
-      held.poses.push(this.inRoom(pose));
+      held.poses.push(this.inRoom(pose.transform));
       if (this.step === "sweep" ? held.poses.length >= MOST_SWEEP : this.now - held.since >= HELD_MS)
         this.finish();
     }
@@ -240,7 +294,7 @@ export class Registering {
     this.stick(`${handedness} done`, gamepad?.buttons[DONE]?.pressed ? 1 : 0, () => this.next());
   }
 
-  private inRoom({ transform: { matrix } }: XRPose): number[] {
+  private inRoom({ matrix }: XRRigidTransform): number[] {
     this.moved.fromArray(matrix).premultiply(this.roomFromFloor).decompose(this.at, this.turn, new Vector3());
     const { x, y, z, w } = this.turn;
     return [...this.at.toArray(), w, x, y, z];
@@ -255,7 +309,7 @@ export class Registering {
 
   private pushX(hand: XRHandedness, way: number): void {
     if (AT_LANDMARK.includes(this.step)) {
-      const count = scene.peek()?.landmarks.length ?? 1;
+      const count = (this.step === "seen" ? boards() : (scene.peek()?.landmarks ?? [])).length || 1;
       this.index = (this.index + way + count) % count;
       this.write();
     } else if (this.step === "align")
@@ -263,9 +317,10 @@ export class Registering {
   }
 
   private pushY(hand: XRHandedness, way: number): void {
-    const now = WAYS.indexOf(this.step as (typeof WAYS)[number]);
+    const { ways } = this;
+    const now = ways.indexOf(this.step as (typeof WAYS)[number]);
     if (now >= 0 && !this.waits && !this.pressed) {
-      this.step = WAYS[(now + way + WAYS.length) % WAYS.length]!;
+      this.step = ways[(now + way + ways.length) % ways.length]!;
       this.index = 0;
       this.write();
     }
@@ -381,6 +436,11 @@ export class Registering {
 export function placeOfRoom(at: readonly number[], into: Matrix4): Matrix4 {
   const [x, y, z, qw, qx, qy, qz] = at as [number, number, number, number, number, number, number];
   return into.compose(new Vector3(x, y, z), new Quaternion(qx, qy, qz, qw), ONE);
+}
+
+/** Landmarks at which a printed board lies. */
+function boards() {
+  return (scene.peek()?.landmarks ?? []).filter(({ board }) => board !== "");
 }
 
 function keptName(): string {

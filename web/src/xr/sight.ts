@@ -10,7 +10,7 @@ const MOST = 160;
 
 /** What a frame knows of a body, where the browser has Body Tracking. */
 interface BodyFrame extends XRFrame {
-  readonly body?: Iterable<[string, XRSpace]>;
+  readonly body?: ReadonlyMap<string, XRSpace>;
 }
 
 /** `left-hand-index-metacarpal` of a hand's `index-finger-metacarpal`, as Body Tracking names it. */
@@ -18,29 +18,93 @@ export function handName(side: string, joint: string): string {
   return `${side}-hand-${joint.replace("-finger", "")}`;
 }
 
-/** Everything that is tracked, by name; first what counts most, as there is a most. */
-function* spaces(frame: BodyFrame, sources: Iterable<XRInputSource>): Generator<[string, XRSpace]> {
-  const named = [...sources].filter((s) => s.handedness === "left" || s.handedness === "right");
-  for (const source of named)
-    if (source.gripSpace && !source.hand) yield [`${source.handedness}-grip`, source.gripSpace];
-  // The draft has one name that is spelled otherwise on the left; the server knows both.
-  if (frame.body) for (const [name, space] of frame.body) yield [name, space];
-  for (const source of named)
-    if (source.hand)
-      for (const [joint, space] of source.hand as unknown as Iterable<[string, XRSpace]>)
-        yield [handName(source.handedness, joint), space];
+const SIDES: readonly string[] = ["left", "right"];
+
+/** What is tracked: names, each once, and spaces with the row of their name; first what counts most, as there is a most. */
+class Tracked {
+  names: string[] = [];
+  spaces: XRSpace[] = [];
+  rows: number[] = [];
+  poses = new Float32Array(0);
+  guessed = new Uint8Array(0);
+  private sources: XRInputSource[] = [];
+  private hands: (XRHand | undefined)[] = [];
+  private body = -1;
+
+  /** Find out anew what there is, where that has changed: a picture allocates nothing of ours. */
+  look(frame: BodyFrame, sources: ArrayLike<XRInputSource>): this {
+    if (!this.same(frame, sources)) this.list(frame, Array.from(sources));
+    return this;
+  }
+
+  private same({ body }: BodyFrame, sources: ArrayLike<XRInputSource>): boolean {
+    if (sources.length !== this.sources.length || (body?.size ?? -1) !== this.body) return false;
+    for (let k = 0; k < sources.length; k += 1)
+      if (sources[k] !== this.sources[k] || sources[k]!.hand !== this.hands[k]) return false;
+    return true;
+  }
+
+  private list({ body }: BodyFrame, sources: XRInputSource[]): void {
+    this.sources = sources;
+    this.hands = sources.map(({ hand }) => hand);
+    this.body = body?.size ?? -1;
+    this.names = ["viewer"];
+    this.spaces = [];
+    this.rows = [];
+    const named = sources.filter(({ handedness }) => SIDES.includes(handedness));
+    for (const { gripSpace, hand, handedness } of named)
+      if (gripSpace && !hand) this.add(`${handedness}-grip`, gripSpace);
+    // The draft has one name that is spelled otherwise on the left; the server knows both.
+    body?.forEach((space, name) => {
+      this.add(name, space);
+    });
+    for (const { hand, handedness } of named)
+      (hand as unknown as ReadonlyMap<string, XRSpace> | undefined)?.forEach((space, joint) => {
+        this.add(handName(handedness, joint), space);
+      });
+    this.poses = new Float32Array(this.names.length * FLOATS);
+    this.guessed = new Uint8Array(this.names.length);
+  }
+
+  private add(name: string, space: XRSpace): void {
+    let row = this.names.indexOf(name);
+    if (row < 0) {
+      if (this.names.length === MOST) return;
+      row = this.names.push(name) - 1;
+    }
+    this.spaces.push(space);
+    this.rows.push(row);
+  }
 }
 
+const tracked = new Tracked();
 const MOVED = new Matrix4();
 const PLACE = new Vector3();
 const TURN = new Quaternion();
 const SCALE = new Vector3();
 
-function within({ transform }: XRPose, roomFromFloor: Matrix4 | null) {
-  if (!roomFromFloor) return { p: transform.position, q: transform.orientation };
-  MOVED.fromArray(transform.matrix).premultiply(roomFromFloor).decompose(PLACE, TURN, SCALE);
-  return { p: PLACE, q: TURN };
+/** Put a pose into a row, in the space that poses are told in. */
+function put({ transform, emulatedPosition }: XRPose, row: number, roomFromFloor: Matrix4 | null): void {
+  const { poses, guessed } = tracked;
+  let { position: p, orientation: q }: { position: Point; orientation: Turned } = transform;
+  if (roomFromFloor) {
+    MOVED.fromArray(transform.matrix).premultiply(roomFromFloor).decompose(PLACE, TURN, SCALE);
+    p = PLACE;
+    q = TURN;
+  }
+  const at = row * FLOATS;
+  poses[at] = p.x;
+  poses[at + 1] = p.y;
+  poses[at + 2] = p.z;
+  poses[at + 3] = q.w;
+  poses[at + 4] = q.x;
+  poses[at + 5] = q.y;
+  poses[at + 6] = q.z;
+  guessed[row] = emulatedPosition ? 1 : 0;
 }
+
+type Point = Readonly<Record<"x" | "y" | "z", number>>;
+type Turned = Readonly<Record<"x" | "y" | "z" | "w", number>>;
 
 /**
  * Where joints of body and hands are, three numbers [m] each in `space`; how many were written.
@@ -50,23 +114,36 @@ function within({ transform }: XRPose, roomFromFloor: Matrix4 | null) {
 export function bodyJoints(
   frame: XRFrame,
   space: XRReferenceSpace,
-  sources: Iterable<XRInputSource>,
+  sources: ArrayLike<XRInputSource>,
   into: Float32Array,
 ): number {
+  const { names, spaces, rows } = tracked.look(frame, sources);
   let count = 0;
-  for (const [name, each] of spaces(frame, sources)) {
-    if (name.endsWith("-grip") || 3 * (count + 1) > into.length) continue;
-    const pose = frame.getPose(each, space);
+  for (let k = 0; k < spaces.length; k += 1) {
+    if (names[rows[k]!]!.endsWith("-grip") || 3 * (count + 1) > into.length) continue;
+    const pose = frame.getPose(spaces[k]!, space);
     if (!pose) continue;
     const { x, y, z } = pose.transform.position;
-    into.set([x, y, z], 3 * count);
+    into[3 * count] = x;
+    into[3 * count + 1] = y;
+    into[3 * count + 2] = z;
     count += 1;
   }
   return count;
 }
 
+const MESSAGE: Tracking = {
+  type: "tracking",
+  human: "",
+  t: 0,
+  names: [],
+  poses: new Uint8Array(),
+  guessed: new Uint8Array(),
+  space: "",
+};
+
 /**
- * The message of one picture; null when not even the head is tracked.
+ * The message of one picture, valid until the next one; null when not even the head is tracked.
  *
  * @param space `local-floor`
  * @param t of the picture [ms]
@@ -76,7 +153,7 @@ export function bodyJoints(
 export function sight(
   frame: XRFrame,
   space: XRReferenceSpace,
-  sources: Iterable<XRInputSource>,
+  sources: ArrayLike<XRInputSource>,
   human: string,
   t: number,
   name = "",
@@ -84,23 +161,20 @@ export function sight(
 ): Tracking | null {
   const viewer = frame.getViewerPose(space);
   if (!viewer) return null;
-  const found = new Map<string, XRPose | null>([["viewer", viewer]]);
-  for (const [name, each] of spaces(frame, sources)) {
-    if (found.size >= MOST) break;
-    if (!found.get(name)) found.set(name, frame.getPose(each, space) ?? null);
+  const { names, spaces, rows, poses, guessed } = tracked.look(frame, sources);
+  poses.fill(Number.NaN);
+  guessed.fill(0);
+  put(viewer, 0, roomFromFloor);
+  for (let k = 0; k < spaces.length; k += 1) {
+    if (!Number.isNaN(poses[rows[k]! * FLOATS]!)) continue;
+    const pose = frame.getPose(spaces[k]!, space);
+    if (pose) put(pose, rows[k]!, roomFromFloor);
   }
-  const poses = new Float32Array(found.size * FLOATS).fill(Number.NaN);
-  const guessed = new Uint8Array(found.size);
-  let row = 0;
-  for (const pose of found.values()) {
-    if (pose) {
-      const { p, q } = within(pose, roomFromFloor);
-      poses.set([p.x, p.y, p.z, q.w, q.x, q.y, q.z], row * FLOATS);
-      guessed[row] = pose.emulatedPosition ? 1 : 0;
-    }
-    row += 1;
-  }
-  const names = [...found.keys()];
-  const bytes = new Uint8Array(poses.buffer);
-  return { type: "tracking", human, t: t / 1000, names, poses: bytes, guessed, space: name };
+  if (MESSAGE.poses.buffer !== poses.buffer) MESSAGE.poses = new Uint8Array(poses.buffer);
+  MESSAGE.human = human;
+  MESSAGE.t = t / 1000;
+  MESSAGE.names = names;
+  MESSAGE.guessed = guessed;
+  MESSAGE.space = name;
+  return MESSAGE;
 }

@@ -196,7 +196,12 @@ export class Visit implements Sighted {
     time: TimeControl,
   ): Promise<Visit> {
     if (!navigator.xr) throw new Error("this browser has no headset");
-    const session = await navigator.xr.requestSession(mode, WANTED);
+    // Whoever is asked for the camera wants to know why: only where a board is there to be seen.
+    const boards = mode === "immersive-ar" && scene.peek()?.landmarks.some(({ board }) => board !== "");
+    const wanted = boards
+      ? { ...WANTED, optionalFeatures: [...WANTED.optionalFeatures!, "camera-access"] }
+      : WANTED;
+    const session = await navigator.xr.requestSession(mode, wanted);
     const { xr } = viewer.stage.renderer;
     const visit = new Visit(session, mode, human, viewer, send, time);
     xr.enabled = true;
@@ -241,10 +246,12 @@ export class Visit implements Sighted {
     this.tickedAt = time;
     this.moved = false;
     this.rig.updateMatrixWorld();
-    for (const pointer of Object.values(this.pointers)) pointer.ball.visible = pointer.beam.visible = false;
+    const { left, right } = this.pointers;
+    left.ball.visible = left.beam.visible = right.ball.visible = right.beam.visible = false;
     this.landing.visible = false;
     this.sit();
-    for (const source of this.session.inputSources) this.hold(frame, space, source);
+    const { inputSources } = this.session;
+    for (let k = 0; k < inputSources.length; k += 1) this.hold(frame, space, inputSources[k]!);
     const { menu, board } = this;
     const wrist = this.pointers[leftHanded.value === "on" ? "right" : "left"].ball;
     menu.mesh.visible = wrist.visible;
@@ -338,13 +345,12 @@ export class Visit implements Sighted {
   }
 
   laser(from: Vector3, to: Vector3): boolean {
-    for (const { beam } of [this.pointers.right, this.pointers.left]) {
-      if (!beam.visible) continue;
-      from.copy(beam.position);
-      to.set(0, 0, -beam.scale.x).applyQuaternion(beam.quaternion).add(beam.position);
-      return true;
-    }
-    return false;
+    const { right, left } = this.pointers;
+    const { beam } = right.beam.visible ? right : left;
+    if (!beam.visible) return false;
+    from.copy(beam.position);
+    to.set(0, 0, -beam.scale.x).applyQuaternion(beam.quaternion).add(beam.position);
+    return true;
   }
 
   /** Where a point of the visitor's room [m] is in the world (y up). */

@@ -5,23 +5,31 @@ The mathematics is `seerob.description.capture.registration`; here is what was t
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from seerob.core.errors import InputError
 from seerob.core.samples import Placing
 from seerob.core.snapshot import Place, Register, Registered, Scene, Snapshot
-from seerob.core.transforms import Array, rotation_from_wxyz, transform, wxyz_from_rotation
+from seerob.core.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
+from seerob.description.camera import board as boards
+from seerob.description.camera.calibration import Corners, look
 from seerob.description.capture import registration as solve
 from seerob.description.capture.registration import Registration
 from seerob.devices.live.headset_offers import LONGEST_NAME, Offers, Registering, Room
 from seerob.protocols.tracking.vive import WORLD_FROM_XR
 
 MOST_POSES, MOST_TOUCHES = 500, 64
+MOST_PX = 2.0
+"""Of a picture in which corners are off by more nothing is taken [px]: it is blurred, or of another lens."""
 STILL, STILL_FOR = 0.003, 0.6
 """What is touched with, or touched, moves no farther while it is [m], for so long before [s]."""
-STEPS = ("sweep", "touch", "strapped", "known", "check", "nudge", "restore", "drop", "forget")
+MOST_CORNERS = 400
+"""Of a board."""
+STEPS = ("sweep", "touch", "strapped", "known", "seen", "check", "nudge", "restore", "drop", "forget")
 UNCHECKED = "where the room lies was kept from another session: check it, with one touch of a landmark"
 
 
@@ -47,8 +55,16 @@ class _Begun:
     touches: list[_Touch] = field(default_factory=list)
     straps: list[tuple[str, Array, Array]] = field(default_factory=list)
     """Landmark, cell from it, room from grip."""
+    looks: list[tuple[str, Array, Array, Array]] = field(default_factory=list)
+    """Landmark, cell from camera, room from camera, and covariance of the former."""
     found: Registration | None = None
     doubt: str = ""
+
+    def begin(self) -> None:
+        """Nothing was touched or seen yet."""
+        self.touches.clear()
+        self.straps.clear()
+        self.looks.clear()
 
 
 class Registrar:
@@ -126,15 +142,20 @@ class Registrar:
             case "touch":
                 if len(begun.touches) >= MOST_TOUCHES:
                     raise _Refused(f"{MOST_TOUCHES} touches are enough")
-                begun.touches.append(self._touch(begun, asked.landmark, poses))
+                touch = self._touch(begun, asked.landmark, poses)
                 begun.straps.clear()
+                begun.looks.clear()
+                begun.touches.append(touch)
             case "drop":
-                if begun.touches:
-                    begun.touches.pop()
+                for kept in (begun.touches, begun.looks):
+                    del kept[-1:]
             case "strapped":
                 grip, cell = _held(poses), self._still(asked.landmark)
                 begun.straps.append((asked.landmark, cell, grip))
                 begun.touches.clear()
+                begun.looks.clear()
+            case "seen":
+                self._look(begun, asked, poses)
             case "known":
                 self._known(begun, asked.landmark, poses, options)
                 return
@@ -150,8 +171,7 @@ class Registrar:
                 begun.found, begun.doubt = _restored(asked.by), UNCHECKED
                 return
             case _:
-                begun.touches.clear()
-                begun.straps.clear()
+                begun.begin()
                 begun.found, begun.doubt = None, ""
                 return
         self._solve(begun, options)
@@ -160,7 +180,9 @@ class Registrar:
         begun.found, begun.doubt = None, ""
         level = np.inf if options.level is None else options.level
         try:
-            if begun.straps:
+            if begun.looks:
+                self._solve_looks(begun, level)
+            elif begun.straps:
                 cells, grips = (np.array([one[k] for one in begun.straps]) for k in (1, 2))
                 accuracy = max(self._places[landmark].accuracy for landmark, *_ in begun.straps)
                 begun.found, _ = solve.strapped(cells, grips, place_error=accuracy)
@@ -184,6 +206,49 @@ class Registrar:
                 f"what was touched as {worst.landmark} contradicts the others ({off:.0f} mm off): "
                 "take it back, and touch it again"
             )
+
+    def _look(self, begun: _Begun, asked: Register, poses: Array) -> None:
+        """Keep one look of the device's camera at a board."""
+        if len(begun.looks) >= MOST_TOUCHES:
+            raise _Refused(f"{MOST_TOUCHES} looks are enough")
+        cell_from_board = self._still(asked.landmark)
+        if not self._places[asked.landmark].board:
+            raise _Refused(f"nobody says what is printed on a board at {asked.landmark}: give its board")
+        rows = np.frombuffer(asked.corners, "<f4").reshape(-1, 4).astype(float)
+        seen = Corners(np.column_stack([rows[:, :2], np.zeros(len(rows))]), rows[:, 2:])
+        try:
+            camera_from_board, covariance, px = look(seen, np.array([*asked.by, 0, 0, 0, 0, 0]))
+        except (ValueError, InputError) as error:
+            raise _Refused(str(error)) from None
+        if px > MOST_PX:
+            raise _Refused(
+                f"corners of the board are {px:.1f} px off: hold the device still, and see it whole"
+            )
+        if begun.looks and begun.looks[0][0] != asked.landmark:
+            begun.looks.clear()
+        begun.touches.clear()
+        begun.straps.clear()
+        room_from_camera = poses[0].copy()
+        room_from_camera[:3, 1:3] *= -1  # y down, z ahead
+        begun.looks.append(
+            (asked.landmark, cell_from_board @ inverse(camera_from_board), room_from_camera, covariance)
+        )
+
+    def _solve_looks(self, begun: _Begun, level: float) -> None:
+        place = self._places[begun.looks[0][0]]
+        cells, rooms, covariances = (np.array([one[k] for one in begun.looks]) for k in (1, 2, 3))
+        # A board whose corners are off on their own is turned by as much over half its edge.
+        board = boards.read(place.board)
+        half = 0.5 * board.square * min(board.across, board.up)
+        turned = place.accuracy / half / math.sqrt(2) if place.accuracy_turn is None else place.accuracy_turn
+        about = self._pose(place, self._recent[-1] if self._recent else None)[:3, 3]
+        begun.found = solve.looked(
+            cells, rooms, covariances, about=about, place_error=(place.accuracy, turned), level=level
+        )
+        worst = int(begun.found.strange.argmax())
+        if begun.found.strange[worst] > 1:
+            off = 1e3 * float(begun.found.residuals[worst])
+            begun.doubt = f"look {worst + 1} contradicts the others ({off:.0f} mm off): begin anew"
 
     def _touch(self, begun: _Begun, landmark: str, poses: Array) -> _Touch:
         if begun.tip is None:
@@ -264,7 +329,8 @@ class Registrar:
             reason=refusal,
             doubt=begun.doubt,
             landmarks=tuple(
-                [touch.landmark for touch in begun.touches] or [landmark for landmark, *_ in begun.straps]
+                [touch.landmark for touch in begun.touches]
+                or [landmark for landmark, *_ in begun.straps or begun.looks]
             ),
             tip=None if tip is None else solve.CHI * float(np.sqrt(np.linalg.eigvalsh(tip)[-1])),
         )
@@ -315,15 +381,23 @@ def _poses(asked: Register) -> Array:
     """
     if asked.step not in STEPS or max(len(asked.human), len(asked.space), len(asked.landmark)) > LONGEST_NAME:
         raise ValueError("register: an unknown step, or a name that is too long")
-    if len(asked.poses) % 28 or len(asked.poses) > 28 * MOST_POSES or len(asked.by) not in (0, 6, 46):
+    if len(asked.poses) % 28 or len(asked.poses) > 28 * MOST_POSES or len(asked.by) not in (0, 4, 6, 46):
         raise ValueError(f"register: {len(asked.poses)} bytes of poses")
+    if len(asked.corners) % 16 or len(asked.corners) > 16 * MOST_CORNERS:
+        raise ValueError(f"register: {len(asked.corners)} bytes of corners")
+    if (asked.step == "seen") != (len(asked.by) == 4):
+        raise ValueError("register: a lens has four numbers, and belongs to what is seen")
+    if asked.step == "seen" and not (
+        min(asked.by[:2]) > 1 and np.isfinite(np.frombuffer(asked.corners, "<f4")).all()
+    ):
+        raise ValueError("register: a lens or corners that cannot be")
     with np.errstate(invalid="ignore"):
         rows = np.frombuffer(asked.poses, "<f4").reshape(-1, 7).astype(float)
-    if not (np.abs(rows).max(initial=0.0) < 1e3 and np.abs(asked.by).max(initial=0.0) < 1e3):
+    if not (np.abs(rows).max(initial=0.0) < 1e3 and np.abs(asked.by).max(initial=0.0) < 1e4):
         raise ValueError("register: a pose that is not finite, or beyond 1 km")
     if len(rows) and not (np.linalg.norm(rows[:, 3:], axis=1) > 0.5).all():
         raise ValueError("register: a quaternion of length zero")
-    if not len(rows) and asked.step in ("sweep", "touch", "strapped", "known", "check"):
+    if not len(rows) and asked.step in ("sweep", "touch", "strapped", "known", "seen", "check"):
         raise ValueError(f"register: {asked.step} without poses")
     T = np.tile(np.eye(4), (len(rows), 1, 1))
     if len(rows):

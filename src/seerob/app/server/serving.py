@@ -31,6 +31,7 @@ from starlette.routing import Route, WebSocketRoute
 
 from seerob.app.server import camera_route, trust
 from seerob.app.server.access import Role, Tokens, Visits
+from seerob.app.server.board_route import BoardFinder
 from seerob.app.server.cad_route import Bringing
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
@@ -154,6 +155,11 @@ def build(
             return PlainTextResponse("nobody edits here\n", 404)
         return await bringing.answer(request)
 
+    finder = BoardFinder()
+
+    async def board(request: Request) -> Response:
+        return await finder.answer(request)
+
     async def file(request: Request) -> Response:
         return await run_in_threadpool(answer, folder, request.path_params["path"])
 
@@ -163,6 +169,7 @@ def build(
         Route("/schema.json", forms),
         Route("/camera/{number:int}", camera),
         Route("/cad/{name}", cad, methods=["POST"]),
+        Route("/board", board, methods=["POST"]),
         *(Route(path, trusted) for path in sorted(trust.PATHS)),
         Route("/{path:path}", file),
     ]

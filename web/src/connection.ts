@@ -61,6 +61,8 @@ export class Connection {
   private pending: Frame | null = null;
   /** Whether what was drawn last came without its numbers. */
   private unread = false;
+  /** Run time of what is drawn [s]; panels may be behind it. */
+  shownT = Number.NaN;
   private readonly want = (time: number): void => this.send({ kind: "want", whole: this.due(time) });
 
   constructor(private readonly events: ConnectionEvents) {
@@ -196,6 +198,7 @@ export class Connection {
   private show(whole: Frame | null, shown: Shown): void {
     if (whole) this.pending = whole;
     this.unread = whole === null;
+    this.shownT = shown.t;
     // Panels that follow it cost more than a picture, and in the room nobody sees them.
     if (whole || ownDevice.peek() === "desk") now.value = shown.t;
     this.watch();

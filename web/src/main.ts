@@ -110,7 +110,7 @@ function begin(element: HTMLElement): void {
   });
   window.seerob = {
     get t() {
-      return now.value;
+      return ownDevice.peek() === "desk" ? now.value : connection.shownT;
     },
     get posed() {
       return viewer.posedT;

@@ -296,15 +296,9 @@ class Following:
         moved = np.zeros(len(q)) if last is None else np.abs(q - last.q)
         elsewhere = lost and bool(moved.max() > ELSEWHERE)
         self._waits = False
-        hurried = moved >= 0.999 * reach
-        if hurried.any():
+        if (moved >= 0.999 * reach).any():
             joint = AXES[int((moved / reach).argmax())].name
             reasons.append(f"{joint} would move faster than a person can")
-        leapt = bool(hurried[:3].any())
-        if (
-            leapt
-        ):  # with the waist all of them is elsewhere: whoever was dragged there would be thrown beyond it
-            q, error = self._fitter.fit(self._eased(found, before, t), before, since=since)
         reasons += _residual(found, error)
         if lost:
             self._waist.forget()
@@ -335,7 +329,7 @@ class Following:
         for bone, far in disagreements:
             slack[bone] = max(far, slack.get(bone, 0.0))
         # Wherever the twin waited, nobody knows how a person who is seen for the first time came.
-        anew = last is None or elsewhere or leapt
+        anew = last is None or elsewhere
         return Followed(
             t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed,
             undetermined(turns, leaning=leaning),

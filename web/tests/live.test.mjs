@@ -225,11 +225,11 @@ test("what was worse before is named beside what is now, and a click goes to its
   await page.waitForSelector(".visited");
   const seen = await page.locator(".visited").innerText();
   assert.ok(seen.includes(`Worst of ${named}: `), seen);
-  assert.match(seen, /at \d+:\d\d\.\d\d/);
+  assert.match(seen, /· \d+:\d\d\.\d\d/);
   if (seen.includes("older than")) {
     await page.getByRole("button", { name: "close" }).click();
   } else {
-    const [, minutes, seconds] = seen.match(/at (\d+):(\d\d\.\d\d)/);
+    const [, minutes, seconds] = seen.match(/· (\d+):(\d\d\.\d\d)/);
     const shown = await page.waitForFunction(
       (t) => Math.abs(window.seerob.t - t) < 0.006 && window.seerob.t,
       Number(minutes) * 60 + Number(seconds),

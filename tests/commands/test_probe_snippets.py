@@ -18,8 +18,8 @@ from seerob.devices.sources.kinect import Kinect
 from seerob.devices.sources.rtde import Rtde
 from seerob.workstation.source import Source
 
-KINDS = [kind for kind in kinds(emulate.PACKAGE) if kind != "headset"]
-"""All but the one that comes to the page of a run, which no probe hears."""
+KINDS = [kind for kind in kinds(emulate.PACKAGE) if kind not in ("headset", "camera")]
+"""All but what comes to the page of a run and what that shows, which no probe hears."""
 
 
 def words(module, line):

@@ -236,3 +236,15 @@ def test_ctrl_c_before_the_command_line_is_there_and_after_its_end_needs_no_trac
         "sys.exit(program())\n"
     )
     assert ended(tmp_path, program) == (3, "stopped\n")
+
+
+def test_a_new_folder_is_opened_for_editing_where_that_is_asked_for(tmp_path):
+    command = [sys.executable, "-m", "seerob", "new", "my_cell", "--edit"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    )
+    assert any(line.startswith("page") for line in process.stdout)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=300)
+    assert (process.returncode, errors) == (0, "")
+    assert (tmp_path / "my_cell" / "workstation.toml").is_file()

@@ -7,7 +7,7 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from seerob.app.commands import demo
+from seerob.app.commands import demo, edit
 from seerob.app.commands.schema import schema
 from seerob.app.console.terminal import Exit, line
 from seerob.core.errors import InputError, UnknownName
@@ -26,6 +26,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("folder", type=Path, help="folder to make")
     text = "begin with one of the workstations that seerob demo --list names, instead of the starter"
     sub.add_argument("--from", dest="template", metavar="NAME", help=text)
+    sub.add_argument("--edit", action="store_true", help="open it in the page then, as seerob edit does")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -56,6 +57,10 @@ def run(options: argparse.Namespace) -> int:
         (working / SCHEMA).write_text(f"{text}\n", encoding="utf-8")
     for entry in sorted(folder.iterdir()):
         line("wrote", str(entry))
+    if options.edit:
+        parser = argparse.ArgumentParser()
+        edit.add(parser)
+        return edit.run(parser.parse_args(["--", str(folder)]))
     live = "[[emulators]]" in (folder / "workstation.toml").read_text("utf-8")
     assess, emulated = f"seerob assess {folder}   or   ", " --emulated"
     line("next", f"{'' if live else assess}seerob run {folder}{emulated if live else ''}")

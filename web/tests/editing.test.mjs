@@ -57,7 +57,11 @@ after(async () => {
 
 const saved = () => fs.readFileSync(file, "utf8");
 const status = (where, word) => where.locator(".edit-bar [role=status]", { hasText: word }).waitFor();
-const pick = (name, where = page) => where.getByLabel("What is edited").selectOption({ label: name });
+/** Choose what is edited, and wait until that is what the fields are of. */
+async function pick(name, where = page) {
+  await where.getByLabel("What is edited").selectOption({ label: name });
+  await where.locator(".entry h2", { hasText: name }).waitFor();
+}
 
 async function fill(where, value) {
   await where.fill(value);

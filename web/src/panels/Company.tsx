@@ -9,7 +9,7 @@ export function Company() {
   const caller = there.find(({ calls, id }) => calls && id !== following.value);
   return (
     <details class="company">
-      <summary aria-label={said("{n} other visitors", { n: there.length })}>
+      <summary>
         <span aria-hidden="true">●</span> {said("{n} more here", { n: there.length })}
         {caller && (
           <span class="company-call"> · {said("{name} asks you to follow", { name: caller.name })}</span>

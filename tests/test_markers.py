@@ -60,27 +60,58 @@ def test_markers_that_are_made_when_somebody_looks_are_those_of_a_tuple_in_all_r
         msgspec.msgpack.encode(lazy)  # who does not know of them is told, and leaves none out
 
 
+def _meant(given: ast.expr, within: ast.AST) -> list[ast.AST]:
+    """What an argument is: itself, or the functions and values that have its name."""
+    if not isinstance(given, ast.Name):
+        return [given]
+    found: list[ast.AST] = []
+    for each in ast.walk(within):
+        if isinstance(each, ast.FunctionDef) and each.name == given.id:
+            found.append(each)
+        elif isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == given.id:
+            found.append(each.value)
+    return found
+
+
+def _reads_later(given: ast.AST) -> bool:
+    """Whether what is called later reads ``state``; what is worked out of it now may be given."""
+    if isinstance(given, ast.FunctionDef | ast.Lambda):
+        return "state" in {n.id for n in ast.walk(given) if isinstance(n, ast.Name)}
+    if isinstance(given, ast.Call):
+        return any(map(_reads_later, given.args))
+    return ast.unparse(given).partition(".")[0] == "state"
+
+
 def test_nothing_that_is_drawn_later_reads_the_twin() -> None:
     """It is elsewhere then."""
-    seen = 0
+    seen = together = 0
     for path in (Path(criteria.__file__).parent).rglob("*.py"):
         tree = ast.parse(path.read_text())
         for inner in ast.walk(tree):
             if not (isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name)):
                 continue
-            # What `Criterion.present` gives is passed on in `criteria/figure.py`.
+            # What `present` gives is passed on in `criteria/figure.py` and `criteria/plan.py`.
             name, given = inner.func.id, [ast.unparse(each) for each in inner.args]
-            if path.name == "figure.py" or not (name == "drawn" or (name == "Shown" and len(given) > 1)):
+            if path.name in ("figure.py", "plan.py") or not (
+                name == "drawn" or (name == "Shown" and len(given) > 1)
+            ):
                 continue
-            made: list[ast.AST] = [inner.args[name == "Shown"]]
-            if isinstance(made[0], ast.Name):
-                named = made[0].id
-                made = [f for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name == named]
-            names = {n.id for f in made for n in ast.walk(f) if isinstance(n, ast.Name)}
+            made = _meant(inner.args[name == "Shown"], tree)
             assert made, path.name
-            assert "state" not in names, f"{path.name}: {given} reads the state"
+            assert not any(map(_reads_later, made)), f"{path.name}: {given} reads the state"
             seen += 1
+        for one in ast.walk(tree):
+            if not (isinstance(one, ast.FunctionDef) and one.name == "present" and len(one.args.args) == 5):
+                continue  # of criteria that are computed together: why, draw, parts
+            for said in ast.walk(one):
+                if not (isinstance(said, ast.Return) and isinstance(said.value, ast.Tuple)):
+                    continue
+                made = _meant(said.value.elts[1], one)
+                assert made, path.name
+                assert not any(map(_reads_later, made)), f"{path.name}: present reads the state"
+                together += 1
     assert seen > 9
+    assert together > 4
 
 
 def star(rng: np.random.Generator, n: int) -> Array:

@@ -113,6 +113,7 @@ def test_a_sample_is_killed():
     for tests in (
         "contact/test_collision.py",
         "test_answers.py",
+        "relations/test_plan.py::test_rows_are_judged_as_figures_are",
         *(f"stopping/test_{n}.py" for n in stopping),
     ):
         command += ["--tests", ROOT / "tests" / tests]

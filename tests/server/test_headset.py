@@ -280,11 +280,12 @@ def fitted(page, samples, places, sway=0.0):
                 answer = page.answer(timeout=0.02)
             except TimeoutError:
                 continue
-            # What comes from now on is seen as it was fitted.
-            told = None if answer.fits is None else len(samples)
+            # What is seen from now on is seen as it was fitted; another may be on its way.
+            told = None if answer.fits is None else (len(samples), 1 + (k - 0.5) / 72)
         else:
             time.sleep(0.01)
-            after = [sample for sample in samples[told:] if isinstance(sample, BodySample)]
+            later = [each for each in samples[told[0] :] if isinstance(each, BodySample)]
+            after = [each for each in later if each.t_device > told[1]]
     return answer, after[-1]
 
 

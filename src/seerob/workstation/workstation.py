@@ -455,7 +455,12 @@ class Human(_Table, frozen=True, kw_only=True):
             raise ValueError(f"{what} is not an adult's: say adult = false of a child or adolescent")
 
 
-BOARD = r"^charuco \d{1,2}x\d{1,2} \d+(\.\d+)? \d+(\.\d+)?$"
+BOARD = Meta(
+    max_length=60,
+    pattern=r"^charuco \d{1,2}x\d{1,2} \d+(\.\d+)? \d+(\.\d+)?$",
+    description="charuco, its squares across and down, and the sides of a square and of a tag in mm: "
+    "charuco 8x6 40.1 30.1",
+)
 """Of `seerob.description.camera.board`."""
 
 
@@ -475,7 +480,7 @@ class Landmark(_Table, frozen=True, kw_only=True):
     accuracy_turn: Annotated[float, unit("rad", ge=0, le=0.5)] | None = None
     """How far it may be turned from there, standard deviation per axis [rad]; must be given of one in whose
     pose a controller is laid."""
-    board: Annotated[str, Meta(max_length=60, pattern=BOARD)] | None = None
+    board: Annotated[str, BOARD] | None = None
     """What is printed on the board that lies there, such as ``charuco 8x6 40.1 30.1``, by which a visitor's
     device with a camera finds it."""
 

@@ -87,7 +87,9 @@ def swing(home: Sequence[float]) -> Motion:
     return motion
 
 
-def played(times: Sequence[float], q: Sequence[Joints], qd: Sequence[Joints]) -> Motion:
+def played(
+    times: Sequence[float], q: Sequence[Joints], qd: Sequence[Joints], *, once: bool = False
+) -> Motion:
     """A recorded motion: round and round when its ends meet, else it stands still at its end.
 
     Between samples it is the cubic that has their positions and speeds.
@@ -96,8 +98,9 @@ def played(times: Sequence[float], q: Sequence[Joints], qd: Sequence[Joints]) ->
         times: Ascending, from 0 [s], shape (m,).
         q: Joint positions [rad or m], shape (m, n).
         qd: Joint speeds [rad/s or m/s], shape (m, n).
+        once: It stands still at its end in any case, until somebody begins it anew.
     """
-    closed = max((abs(a - b) for a, b in zip(q[0], q[-1], strict=True)), default=0.0) <= CLOSED
+    closed = not once and max((abs(a - b) for a, b in zip(q[0], q[-1], strict=True)), default=0.0) <= CLOSED
 
     def motion(t: float) -> tuple[Joints, Joints]:
         if t >= times[-1] and not (closed and times[-1] > 0):

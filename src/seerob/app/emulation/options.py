@@ -238,15 +238,22 @@ class RobotOptions(EmulatorOptions, frozen=True, kw_only=True):
             return motion, what
         return in_step(motion, self.in_step), f"{what}, every {self.in_step:g} s"
 
+    def one_round(self, target: Target) -> Motion:
+        """What it plays from the beginning of a round on, with ``in_step``; raises as `motion`."""
+        from seerob.app.emulation.motions import SWING
+
+        return self._motion(target, home_of(target, SWING))[0]
+
     def _motion(self, target: Target, start: Sequence[float]) -> tuple[Motion, str]:
+        once = self.in_step is not None  # whoever keeps step waits for the next round
         from seerob.app.emulation.motions import swing
 
         if self.waypoints is not None:
-            motion, left_out = _through(Path(self.waypoints), target, start)
+            motion, left_out = _through(Path(self.waypoints), target, start, once=once)
             without = f", without {'; '.join(left_out)}" if left_out else ""
             return motion, f"through the waypoints of {self.waypoints}{without}"
         if self.file is not None:
-            return read(Path(self.file), target), self.file
+            return read(Path(self.file), target, once=once), self.file
         return swing(start), "a calm swing"
 
 
@@ -287,7 +294,7 @@ def home_of(target: Target, amplitude: float) -> tuple[float, ...]:
     )
 
 
-def read(path: Path, target: Target) -> Motion:
+def read(path: Path, target: Target, *, once: bool = False) -> Motion:
     """A motion from a table.
 
     Raises:
@@ -298,19 +305,21 @@ def read(path: Path, target: Target) -> Motion:
     from seerob.files.tables.table_files import WORKBOOKS
 
     kind = Excel if path.suffix.lower() in WORKBOOKS else Csv
-    return _played(kind(robot=target.name, file=path.name).open(path.parent, target))
+    return _played(kind(robot=target.name, file=path.name).open(path.parent, target), once=once)
 
 
-def _played(opened: Opened) -> Motion:
+def _played(opened: Opened, *, once: bool) -> Motion:
     from seerob.app.emulation.motions import played
     from seerob.core.samples import JointSample
 
     samples = [s for s in opened.samples if isinstance(s, JointSample)]
     speeds = [s.qd or (0.0,) * len(s.q) for s in samples]
-    return played([s.t for s in samples], [s.q for s in samples], speeds)
+    return played([s.t for s in samples], [s.q for s in samples], speeds, once=once)
 
 
-def _through(path: Path, target: Target, home: Sequence[float]) -> tuple[Motion, tuple[str, ...]]:
+def _through(
+    path: Path, target: Target, home: Sequence[float], *, once: bool
+) -> tuple[Motion, tuple[str, ...]]:
     """Its motion, and which parts of the program are left out since only a controller knows them."""
     import msgspec
 
@@ -321,4 +330,4 @@ def _through(path: Path, target: Target, home: Sequence[float]) -> tuple[Motion,
     program = source.program(path)
     if program.waypoints and program.waypoints[0].q is None:
         source = msgspec.structs.replace(source, start=tuple(home))
-    return _played(source.open(path.parent, target)), program.left_out
+    return _played(source.open(path.parent, target), once=once), program.left_out

@@ -145,7 +145,7 @@ def _mover(model: Model, emulator: EmulatorOptions, source: Source, begun: float
             return None
         files = {"file": emulator.file, "waypoints": emulator.waypoints}
         there = {key: str(model.folder / name) for key, name in files.items() if name is not None}
-        motion, _ = replace(emulator, in_step=None, **there).motion(emulator.target())
+        motion = replace(emulator, **there).one_round(emulator.target())
         return Mover(mechanism, lambda clock: np.array(motion(clock % period)[0]), np.eye(4))
     before = emulator.person_before()
     if mechanism.role != "human" or before is None:

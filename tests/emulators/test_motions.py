@@ -44,3 +44,11 @@ def test_ends_that_meet_are_played_round_and_round_and_others_stand_still():
     np.testing.assert_allclose(motion(20.7), motion(0.7), atol=1e-12)
     motion, q, _ = wave(closed=False)
     assert motion(50.0) == (q[-1], (0.0, 0.0))
+
+
+def test_who_keeps_step_stands_at_the_end_until_the_next_round():
+    """Where the round is longer than the motion: one that began again would jump when the round does."""
+    _, q, qd = wave(closed=True)
+    motion = played(T, q, qd, once=True)
+    np.testing.assert_allclose(motion(0.7), played(T, q, qd)(0.7))
+    assert motion(T[-1] + 0.3) == (q[-1], (0.0, 0.0))

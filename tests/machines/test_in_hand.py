@@ -245,3 +245,17 @@ def test_no_limit_is_known_of_who_is_hit_through_what_is_held(tmp_path, rod):
     assert "operator holds rod, which may be hit from 1.7 m on" in hit.reason
     assert not any("may be hit" in each.reason for each in found.values())
     assert found[False, 1.7, 0.01].verdict is None
+
+
+@pytest.mark.parametrize("silent", ["arm", "operator"])
+def test_who_falls_silent_beside_what_is_held_ends_no_run(tmp_path, silent):
+    text = CELL.replace("[1.6, 0", "[2.3, 0") + MOUNTED + CONTACT.format(1.7)
+    model = made(tmp_path, text, {"arm.urdf": two_r()}).model
+    engine, judge = Engine(model, driven={"operator": 0.1, "arm": 0.1}), Judge(bind(model))
+    for k in range(30):
+        heard = [n for n in ("operator", "arm") if n != silent or k < 10]
+        homes = {n: tuple(model.mechanisms[n].home) for n in heard}
+        engine.take([JointSample(source="p", seq=k, t=0.01 * k, target=n, q=q) for n, q in homes.items()])
+        (found,) = judge(engine.tick() if k else engine.start())
+    assert found.verdict == "undecided"
+    assert "may be hit" in found.reason or "not heard for" in found.reason

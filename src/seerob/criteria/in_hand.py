@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from seerob.core.errors import Undecided
 from seerob.core.figures import rounded_up
 from seerob.core.snapshot import Result
 from seerob.criteria.criterion import Criterion
@@ -94,18 +95,25 @@ class InHand:
                     found[i] = reason
         if held:
             found |= self._nearer(state, results)
-        for i, (moving, horizon, standstill) in self._hits.items():
-            if not (state.fastest_speeds(moving) > standstill).any():
-                continue
+        for i, (_, horizon, _) in self._hits.items():
             for piece, holders in (*held.items(), *self._mounted.items()):
                 people = {holder.partition("/")[0] for holder in holders} & self._always.keys()
-                if people and not self._gap(i, piece)(state) > horizon:
+                if people and self._may_be_hit(i, piece, state):
                     reason = (
                         f"{', '.join(sorted(people))} holds {piece}, which may be hit from {horizon:g} m on: "
                         "no limit is known of who is hit through what is held"
                     )
                     found[i] = reason
         return found
+
+    def _may_be_hit(self, i: int, piece: str, state: State) -> bool:
+        """Whether something that moves is near what is held, or may be: of whom that is not known."""
+        moving, horizon, standstill = self._hits[i]
+        try:
+            moves = (state.fastest_speeds(moving) > standstill).any()
+            return bool(moves) and not self._gap(i, piece)(state) > horizon
+        except Undecided:
+            return True
 
     def _gap(self, i: int, piece: str) -> Callable[[State], float]:
         """How near what may hit people is to what is held at least, at an instant [m]."""

@@ -23,7 +23,7 @@ BROUGHT := src/seerob/kernels/compiled
 KEPT := $(VENV)/.compiled
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo demo-plc demo-xr test setup check compiled format lint types imports unit web-test web-test-told-later package bench soak mutate wire web build docs docs-site docs-versions lock audit clean
+.PHONY: help demo demo-plc demo-xr test setup check compiled format lint types imports unit web-test web-test-told-later browser package bench soak mutate wire web build docs docs-site docs-versions lock audit clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -42,12 +42,17 @@ demo-xr: $(DEV) $(PAGE)
 demo-plc: $(DEV) $(PAGE)
 	scripts/demo-plc $(BIN) || [ $$? -le 2 ]
 
-# Each of those before keeps one core busy, as what they need does: one pip at a time, beside npm. The others
-# want both, and leave them idle a quarter of the time: a page waits for its pictures, a source for its device. So
-# they run beside each other, and what the second one says comes at the end.
+# What is fetched, compiled and installed keeps one core busy each. Tests want both, and leave them idle a
+# quarter of the time: a page waits for its pictures, a source for its device. So all run beside each other, and
+# what the page's tests say comes at the end.
 test: $(RUN) $(NODE)
-	$(MAKE) --no-print-directory -j2 check compiled
-	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(MAKE) --no-print-directory -j3 package unit web-test-told-later
+	$(MAKE) --no-print-directory -j3 $(DEV) $(LOOPS)/.made $(PAGE) browser
+	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(MAKE) --no-print-directory -j4 FIRST=compiled check package unit web-test-told-later
+
+browser:
+	scripts/find-browser >/dev/null
+
+unit web-test-told-later: $(FIRST)
 
 web-test-told-later: $(DEV) $(PAGE)
 	$(MAKE) --no-print-directory web-test >$(VENV)/.web-test 2>&1 && code=0 || code=$$?; cat $(VENV)/.web-test; exit $$code
@@ -113,13 +118,13 @@ unit: export PYTHONDONTWRITEBYTECODE :=
 # Workers occupy the processors; threads of a library's own would wait for each other there.
 unit: export OPENBLAS_NUM_THREADS := 1
 unit: $(DEV) $(PAGE)
-	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(BIN)/pytest -n 3 --dist loadfile
+	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(BIN)/pytest -n 4 --dist loadfile
 
 web-test: $(DEV) $(PAGE)
 	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && cd web && ../scripts/npm run check && ../scripts/npm run lint && ../scripts/npm test
 
 # Inner loops that a wheel brings, for processors of others.
-$(LOOPS)/.made: $(DEV) scripts/compile-loops $(wildcard src/seerob/kernels/*.py)
+$(LOOPS)/.made: $(RUN) scripts/compile-loops $(wildcard src/seerob/kernels/*.py)
 	$(BIN)/python scripts/compile-loops $(LOOPS)
 	touch $@
 

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 
 from seerob.core.transforms import Array
+from seerob.kernels.pull import greatest
+from seerob.kernels.verdicts import Codes, judged
 
 _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
 
@@ -197,3 +199,83 @@ def largest_factor_in_time(
         c[i] = v_h[i] * (T_r + T_s) + K - distance[i] + S_rest[i] + share * v_rest[i] * T_s
         b[i] = (S_now[i] - S_rest[i]) + share * (v_now[i] - v_rest[i]) * T_s
     return largest_factor(c, b, np.zeros(n))
+
+
+@njit(
+    f"i8({', '.join([_ROW] * 4)}, {', '.join(['f8'] * 11)}, {_ROWS}, u1[::1], {_ROW})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def stops_in_time(
+    v_r: Array,
+    S_r: Array,
+    v_s: Array,
+    distance: Array,
+    T_r: float,
+    T_s: float,
+    share: float,
+    K: float,
+    v_h: float,
+    seen: float,
+    reaching: float,
+    walking: float,
+    arm: float,
+    moving: float,
+    rounding: float,
+    found: Array,
+    verdicts: Codes,
+    permitted: Array,
+) -> int:
+    """Judge the distances of parts of a robot whose stop takes a known time; writes the last three arguments.
+
+    Args:
+        v_r: Speed of each part now [m/s], shape (n,).
+        S_r: Way until braking begins [m], shape (n,).
+        v_s: Largest speed until then [m/s], shape (n,).
+        distance: Of each part [m], shape (n,).
+        T_r: Reaction time [s].
+        T_s: Stopping time [s].
+        share: Of speed times stopping time that is travelled.
+        K: C + Z_d + Z_r [m].
+        v_h: As of `separations`, with the next four; ``seen`` is that of the instant.
+        seen: Likewise.
+        reaching: Likewise.
+        walking: Likewise.
+        arm: Likewise.
+        moving: Speed above which the robot moves [m/s].
+        rounding: As of `seerob.kernels.verdicts.judged`.
+        found: Ways while it brakes and S_p [m], shape (2, n).
+        verdicts: Of each part, shape (n,).
+        permitted: Largest speed of the fastest part with no part nearer than its S_p [m/s], and as a factor
+            of the present speeds, NaN at rest, shape (2,).
+
+    Returns:
+        Which part governs; -1 where a distance, or S_p, is not finite.
+    """
+    n = len(distance)
+    S_s, S_p, approach, rest = found[0], found[1], np.empty(n), np.empty((2, n))
+    for i in range(n):
+        S_s[i] = (v_s[i] if share == 1.0 else share * v_s[i]) * T_s
+        rest[0, i], rest[1, i] = 0.0 * S_r[i], 0.0 * v_s[i]
+    separation(S_r, S_s, T_r + T_s, K, v_h, seen, reaching, walking, arm, S_p)
+    for i in range(n):
+        if not (math.isfinite(distance[i]) and math.isfinite(S_p[i])):
+            return -1
+    approach_speeds(distance, v_h, seen, reaching, walking, arm, approach)
+    top = greatest(v_r)
+    if top < moving:
+        # At rest nobody knows which part will be fastest: each may be.
+        least = math.inf
+        for i in range(n):
+            more, faster = S_r[i] - v_r[i] * T_r, v_s[i] - v_r[i]
+            left = distance[i] - more - share * faster * T_s
+            left = left - K - approach[i] * (T_r + T_s)
+            least = min(least, np.maximum(left, 0.0) / (T_r + share * T_s))
+        permitted[0], permitted[1] = least, math.nan
+    else:
+        factor = largest_factor_in_time(
+            distance, approach, rest[0], S_r, rest[1], v_s, T_r, T_s, K, share
+        )  # fmt: skip
+        permitted[0], permitted[1] = factor * top, factor
+    return judged(distance, distance, distance, S_p, rounding, False, False, verdicts)

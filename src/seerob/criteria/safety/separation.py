@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from seerob.core import figures
 from seerob.core.domains import at_least, number
 from seerob.core.errors import InputError, Undecided
-from seerob.core.snapshot import Basis, Input, Origin, Result, Segment
+from seerob.core.snapshot import Basis, Input, Origin, Result
 from seerob.core.tolerances import Shifts, Spread, Tolerance, deciding
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
@@ -27,6 +27,7 @@ from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping import many_instants
 from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
+from seerob.criteria.stopping.planned import OneOf, Stops, faster, line, permissible, terms
 from seerob.criteria.stopping.reaction import joint_limits
 from seerob.criteria.stopping.required import (
     SIMULATED,
@@ -42,7 +43,7 @@ from seerob.criteria.stopping.required import (
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, way_of_person
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
-from seerob.distance.least import Closests, Per
+from seerob.distance.least import Closests
 from seerob.kernels.separation import approach_speeds, rise, separation, separations
 from seerob.kernels.spans import greatest
 from seerob.model import provenance
@@ -381,7 +382,32 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """Return what computes distances together, of the present speeds and without tolerances."""
         own = self._by_device(model)[0]
         plain = self.mode == "dynamic" and not own._tolerances() and not self.unknown(model)
-        return _Stops if plain else None
+        return _stops if plain else None
+
+    def _planned(self, model: Model) -> OneOf:
+        own = self._by_device(model)[0]
+        gap, stop, same = own._gap(model), own._stop(model), Result(name=self.name, unit="m", at_most=False)
+        K, names = sum(own._terms()[0]) + gap.deviation, [model.bodies[i].name for i in gap.b]
+        present = own._line(model, gap, self._shared(model))
+
+        def alone(state: State, found: Closests) -> Result | None:
+            course, seen = stop.courses(state), state.fastest_speed(gap.a)
+            now = course(1.0)
+            if now.most is not None or now.unbounded_reason:
+                return None
+            S_p, far = own._distance(now, K, seen), found.distance
+            at = _Found(stop, found, course, now, (seen, seen), "", S_p, S_p, "", None, far, far)
+            figure = Figure(None, parts=Parts(names, far, S_p), beside=at)
+            verdict = verdict_of(figure, at_most=same.at_most)
+            if verdict is _UNDECIDED or not math.isfinite(seen):
+                return None
+            return result_of(figure, verdict, present(state, figure, verdict), same)
+
+        given = tuple(
+            Result(name=name, value=value, unit="m") for name, value in own._terms_given(gap).items()
+        )
+        human = own._sides(model)[1]
+        return OneOf(gap, stop, own.stop.reaction, K, given, human, own.human_speed, same, alone)
 
     def one_by_one(self, model: Model) -> str:
         """Say so of what depends on earlier instants, has ends, or where the way to stop is not given."""
@@ -458,9 +484,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
     def _line(self, model: Model, gap: Gap, shared: _Shared) -> Present:
         """What is said of the part that governs, and the line to it."""
         names = [body.name for body in model.bodies]
-        terms = self._terms_given(gap)
-        K, rest = sum(self._terms()[0]) + gap.deviation, sum(terms.values())
-        given = tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+        of_K = self._terms_given(gap)
+        K, rest = sum(self._terms()[0]) + gap.deviation, sum(of_K.values())
+        given = tuple(Result(name=name, value=value, unit="m") for name, value in of_K.items())
         places, human = BodyPlaces(model), self._sides(model)[1]
         to_whom: dict[bytes, list[str]] = {}
         """By the bodies to which parts were nearest at the last instant, their names."""
@@ -472,19 +498,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
             k, S_p = parts.governs, at.S_p
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts.names[k]} ↔ {nearest}"
-            if at.seen[0] > (v_h := self.human_speed or WALKING):
-                seen = figures.worded(at.seen[0], v_h, "m/s", at_most=True)
-                where += f", and {human} is seen at {seen}, faster than v_h"
+            where += faster(human, at.seen[0], self.human_speed)
             if verdict is _UNDECIDED:
                 where = f"{where}: {self._undecided_reason(model, state, at, k, shared)}"
-            value, limit = float(found.distance[k]), float(S_p[k])
-
-            def draw() -> tuple[Segment, ...]:
-                shown = figures.against(value, limit, self.unit, at_most=self.at_most)
-                label = f"{shown.value} m, S_p {shown.limit} m"
-                start, end = tuple(found.point_b[k].tolist()), tuple(found.point_a[k].tolist())
-                return (Segment(start=start, end=end, label=label, verdict=verdict),)
-
+            limit = float(S_p[k])
+            draw = line(float(found.distance[k]), limit, found.point_b[k], found.point_a[k], verdict)
             beside = (
                 *self._shown(at.now, k, limit, rest, at.seen[0]),
                 *given,
@@ -529,11 +547,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         S_h = S_p - (S_r + S_s) - K
         if self.mode == "dynamic" and self.human_speed is not None:
             S_h = float(way_of_person(max(self.human_speed, seen), self.stop.reaction, now.T_s))
-        return (
-            Result(name="S_h", value=S_h, unit="m"),
-            Result(name="S_r", value=S_r, unit="m"),
-            Result(name="S_s", value=S_s, unit="m"),
-        )
+        return terms(S_r, S_s, S_h)
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
@@ -829,16 +843,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
         else:
             reason = "stands still: no motion to scale"
-        beside = reason
-        if factor is None:
-            beside = reason or "stands still: no speed to compare with"
-        elif factor > TOP:
-            # Against next to no speed any factor comes out, and none says anything.
-            factor, beside = None, f"more than {TOP:g} times the present speed"
-        return (
-            Result(name="largest permissible speed", value=speed, unit="m/s", at_most=False, reason=reason),
-            Result(name="share of the present speed", value=factor, at_most=False, reason=beside),
-        )
+        return permissible(speed, factor, reason)
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""
@@ -893,46 +898,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
         )
 
 
-class _Stops:
-    """Separation of robots from people at one instant, of a tick's plan."""
-
-    def __init__(self, criteria: Sequence[Separation], model: Model) -> None:
-        self._every = list[tuple[Separation, Gap, StopModel, float, Sequence[str], Present, Result]]()
-        for each in criteria:
-            own = each._by_device(model)[0]
-            gap, same = own._gap(model), Result(name=each.name, unit=each.unit, at_most=each.at_most)
-            K, names = sum(own._terms()[0]) + gap.deviation, [model.bodies[i].name for i in gap.b]
-            present = own._line(model, gap, each._shared(model))
-            self._every.append((own, gap, own._stop(model), K, names, present, same))
-        self._asked = tuple((gap.query, Per.BODY) for _, gap, *_ in self._every)
-
-    def results(self, state: State) -> list[Result | None]:
-        """Say of each whose parts are decided what governs, as `Separation.bind`."""
-        every, begins = state.nearest(self._asked)
-        return [self._one(state, every, row, *each) for row, each in zip(begins, self._every, strict=True)]
-
-    @staticmethod
-    def _one(
-        state: State,
-        every: Closests,
-        row: int,
-        own: Separation,
-        gap: Gap,
-        stop: StopModel,
-        K: float,
-        names: Sequence[str],
-        present: Present,
-        same: Result,
-    ) -> Result | None:
-        course = stop.courses(state)
-        now, seen = course(1.0), state.fastest_speed(gap.a)
-        if now.most is not None or now.unbounded_reason:
-            return None
-        found, S_p = every.of(slice(row, row + len(gap.b))), own._distance(now, K, seen)
-        far = found.distance
-        at = _Found(stop, found, course, now, (seen, seen), "", S_p, S_p, "", None, far, far)
-        figure = Figure(None, parts=Parts(names, far, S_p), beside=at)
-        verdict = verdict_of(figure, at_most=same.at_most)
-        if verdict is _UNDECIDED or not math.isfinite(seen):
-            return None
-        return result_of(figure, verdict, present(state, figure, verdict), same)
+def _stops(criteria: Sequence[Separation], model: Model) -> Stops:
+    """Bind separations of a tick's plan."""
+    return Stops([each._planned(model) for each in criteria], model)

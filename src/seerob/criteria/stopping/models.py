@@ -179,6 +179,9 @@ class StopModel(Struct, frozen=True, eq=False):
     """Whether what is known ahead is in a course: then it is that of the whole tick that begins with it."""
     costly: bool = False
     """Takes milliseconds: searches ask it seldom."""
+    in_time: tuple[float, float] | None = None
+    """How long it takes to stop [s], and the share of speed times that which is travelled, where both are
+    given and nothing else counts."""
 
 
 class _Brakes(Struct, frozen=True, eq=False):
@@ -298,6 +301,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         found.in_span,
         stop.acceleration is None,
         found.costly,
+        (stop.stopping, SHARES[stop.model]) if found.timed and stop.stopping and not carries else None,
     )
 
 

@@ -25,7 +25,7 @@ from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, Follows, Lowest, Moment
-from seerob.kernels.spans import greatest
+from seerob.kernels.spans import greatest, least_margins
 from seerob.model.model import Model
 from seerob.twin.signals import SLACK
 from seerob.twin.spans import (
@@ -297,12 +297,16 @@ class BetweenTicks:
         """
         left, path, ends, t = list[int](), self._way, self._before, state.t
         begin = self._begins if path is not None and self._ends == t else None
+        silent = End(t, None, None, speeds)  # of all that say nothing against a limit
         for i, margin_of, falls in self._plain:
             result, before = results[i], ends[i]
             if before is None or before.t != begin or result.t is not None:
                 left.append(i)
                 continue
             verdict = result.verdict
+            if verdict is None and before.margin is None and not (result.nothing or result.muted):
+                ends[i] = silent
+                continue
             margin = margin_of(result) if verdict is _WITHIN else None
             now = End(t, verdict, margin, speeds, result.nothing, result.muted)
             if verdict is not _EXCEEDED and before.verdict is not _EXCEEDED:
@@ -720,6 +724,10 @@ def least_margin(one: Margin, other: Margin | None, lost: Fall) -> float:
     m_other, also = other
     if type(fall) is float is type(m) and type(m_other) is float is type(bend):
         return _least((m, off), (m_other, also), (fall, bend))
+    if type(fall) is float and isinstance(bend, np.ndarray) and isinstance(m, np.ndarray) and m.ndim == 1:
+        known = [np.asarray(each) for each in (off, m_other, also)]
+        if all(each.shape == bend.shape == m.shape for each in known):
+            return float(least_margins(m, *known, fall, bend))
     low = np.maximum((m + m_other - fall) / 2, np.minimum(m, m_other) - bend)
     return float(np.min(low - np.maximum(off, also)))
 

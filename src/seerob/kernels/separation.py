@@ -9,6 +9,8 @@ from numba import njit
 
 from seerob.core.transforms import Array
 from seerob.kernels.pull import greatest
+from seerob.kernels.spans import Indices
+from seerob.kernels.spans import greatest as greatest_of
 from seerob.kernels.verdicts import Codes, judged
 
 _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
@@ -279,3 +281,51 @@ def stops_in_time(
         )  # fmt: skip
         permitted[0], permitted[1] = factor * top, factor
     return judged(distance, distance, distance, S_p, rounding, False, False, verdicts)
+
+
+@njit(
+    f"void({_ROW}, {_ROW}, i8[::1], i8[::1], {', '.join(['f8'] * 7)}, {_ROW})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def lost_in_time(
+    fast: Array,
+    slow: Array,
+    people: Indices,
+    parts: Indices,
+    T: float,
+    T_r: float,
+    T_s: float,
+    share: float,
+    least: float,
+    most: float,
+    rounding: float,
+    lost: Array,
+) -> None:
+    """Bound what margins lose within a span, of parts that stop in a known time; writes the last argument.
+
+    Args:
+        fast: Largest speed of each point within the span [m/s], shape (p,).
+        slow: Least speed of the fastest point of each body, those of bodies first [m/s], shape (b,).
+        people: Points of people, shape (k,).
+        parts: Of the robot, shape (n,).
+        T: Length of the span [s].
+        T_r: Reaction time [s].
+        T_s: Stopping time [s].
+        share: Of speed times stopping time that is travelled.
+        least: Speed of the person that S_p assumes at least [m/s].
+        most: Speed up to which it assumes so at most [m/s].
+        rounding: Added to the way of people [m].
+        lost: By how much each may be less above its S_p, then how much nearer each may be [m], shape (2 n,).
+    """
+    n, time = len(parts), T_r + T_s
+    slowest, fastest = greatest_of(slow, people), greatest_of(fast, people)
+    way, v_h = greatest_of(fast, people) * T + rounding, max(least, fastest)
+    more = max(fastest - max(most, slowest), 0.0) * time
+    for i in range(n):
+        low, high, nearer = slow[parts[i]], fast[parts[i]], way + fast[parts[i]] * T
+        S_s = (low if share == 1.0 else share * low) * T_s
+        S_s_then = (high if share == 1.0 else share * high) * T_s
+        longer = ((v_h * time + high * T_r + S_s_then) - (v_h * time + low * T_r + S_s)) + more
+        lost[i], lost[n + i] = nearer + longer, nearer

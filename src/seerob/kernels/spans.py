@@ -251,6 +251,28 @@ def greatest(values: Array, rows: Indices) -> float:
     return found
 
 
+@njit(f"f8({', '.join([_ROW] * 4)}, f8, {_ROW})", cache=True, nogil=True, error_model="numpy")
+def least_margins(one: Array, off: Array, other: Array, also: Array, fall: float, bend: Array) -> float:
+    """Bound the least of the margins of n figures between two ends, tolerances taken off.
+
+    Args:
+        one: Margins at one end, shape (n,).
+        off: What their tolerances take of these, shape (n,).
+        other: Margins at the other end, shape (n,).
+        also: What their tolerances take there, shape (n,).
+        fall: How much each can lose from any instant to any other.
+        bend: How much below the lesser margin of both ends, shape (n,).
+
+    Returns:
+        Infinity of none; NaN where one is not a number.
+    """
+    least = np.inf
+    for i in range(len(one)):
+        low = np.maximum((one[i] + other[i] - fall) / 2, np.minimum(one[i], other[i]) - bend[i])
+        least = np.minimum(least, low - np.maximum(off[i], also[i]))
+    return least
+
+
 @njit(
     f"void(i8[::1], b1[::1], {_ROW}, {_ROW}, {_ROW}, b1[::1], {_ROWS}, {_ROW})",
     cache=True,

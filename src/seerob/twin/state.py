@@ -456,10 +456,13 @@ class State(Validity):
                 len(self._sound or self._find_sound()) == len(hearings)
                 and not self.attachments.unknown
                 and not self._every_speed_error()
-                and not any(self.lags.values())
-                and not any(self.left.values())
+                and not (self.lags and any(self.lags.values()))
+                and not (self.left and any(self.left.values()))
                 and not any(hearing.bones for hearing in hearings.values())
-                and all(map(self.moved, hearings))
+                # Who is driven, and was heard more than once, is moved: mostly everybody.
+                and (
+                    all(h.driven and not h.once for h in hearings.values()) or all(map(self.moved, hearings))
+                )
             )
         return found
 

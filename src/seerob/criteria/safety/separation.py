@@ -44,13 +44,13 @@ from seerob.criteria.stopping.stated_acceleration import JointAccelerations, Sta
 from seerob.criteria.stopping.terms import At, Course, way_of_person
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
 from seerob.distance.least import Closests
-from seerob.kernels.separation import approach_speeds, rise, separation, separations
-from seerob.kernels.spans import greatest
+from seerob.kernels.separation import approach_speeds, lost_in_time, rise, separation, separations
+from seerob.kernels.spans import Indices, greatest
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.accuracy.tracking_error import tracking
-from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, rows_of
+from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Margin, Points, Span, rows_of
 from seerob.twin.state import State
 from seerob.twin.states import States
 
@@ -574,13 +574,36 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
             return None if most is None else below
 
+        in_time = self._lost_in_time(model, people, parts) if lasts else None
+
         def falls(span: Span, _: Array | float) -> Fall:
+            if in_time is not None and not span.noisy:
+                return Fall(np.inf, in_time(span))
             nearer = span.way(people) + span.fast[parts] * span.T
             lost = np.concatenate([nearer + rises(span), nearer])
             # What S_p has ahead may leave it at once: the margin at the end says nothing of the way there.
             return Fall(np.inf, lost) if lasts else Fall(lost)
 
         return falls
+
+    def _lost_in_time(self, model: Model, people: Indices, parts: Indices) -> Callable[[Span], Array] | None:
+        """What `falls` says is lost, in one call; None but for a stop of known time without tolerances."""
+        own = self._by_device(model)[0]
+        in_time = own._stop(model).in_time
+        if in_time is None or own._tolerances():
+            return None
+        T_s, share = in_time
+        T_r, v_h = own.stop.reaction, self.human_speed
+
+        def lost(span: Span) -> Array:
+            found = np.empty(2 * len(parts))
+            lost_in_time(
+                span.fast, span.slow, people, parts, span.T, T_r, T_s, share, v_h or REACHING, v_h or WALKING,
+                ROUNDING, found,
+            )  # fmt: skip
+            return found
+
+        return lost
 
     def bounded_once(self, model: Model) -> bool:
         """Whether energy bounds the stops that begin within a span: those of half of it are no shorter."""
@@ -736,6 +759,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
         parts = [part for part in result.parts if part.verdict is not None]
         away = [part.value or 0.0 for part in parts]
         room = [far - (part.limit or 0.0) for far, part in zip(away, parts, strict=True)]
+        if not any(part.interval for part in parts):
+            none = np.zeros(len(room) if self.mode == "fixed" else 2 * len(room))
+            return np.array(room if self.mode == "fixed" else [*room, *away]), none
         near = [part.interval[0] if part.interval else far for far, part in zip(away, parts, strict=True)]
         off = [far - least for far, least in zip(away, near, strict=True)]
         if self.mode == "fixed":

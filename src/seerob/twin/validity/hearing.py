@@ -254,6 +254,8 @@ class Hearing:
 
         The worse of two samples, and by how much the twin is faster or slower than both say.
         """
+        if not any(said.speed_error is not None for said in self.heard):
+            return self.unlike
         around = [said.speed_error for said in self.around(t) if said.speed_error is not None]
         error = np.max(around, axis=0) if around else None
         if self.unlike is None:

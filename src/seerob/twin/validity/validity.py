@@ -93,6 +93,8 @@ class Validity:
         self._tracking_limits = {
             m.name: limits.get(m.role, engine.tracking_limit) for m in model.mechanisms.values()
         }
+        self._by_itself = frozenset(m.name for m in model.mechanisms.values() if not m.on)
+        """Whom nobody carries."""
         self._owners_of: dict[tuple[int, ...], _Owners] = {}
         self._owners_last: dict[int, tuple[tuple[int, ...], _Owners]] = {}
         """By the identity of bodies that were asked for, them and whom they belong to."""
@@ -417,7 +419,20 @@ class Validity:
         if self._sound is None:
             # Nobody asked for them yet.
             asked, self.asked = self.asked, set()
-            self._sound = frozenset(filter(self._is_sound, self._hearings))
+            alone, put_back, t = self._by_itself, self.t - 2 * self._period, self.t
+            self._sound = frozenset(
+                name
+                for name, hearing in self._hearings.items()
+                # Of most there is nothing else that could be in doubt, and this is found out quickly.
+                if (
+                    name in alone
+                    and not hearing.bones_heard
+                    and not (hearing.reset_at > put_back or hearing.error > self._tracking_limits[name])
+                    and not hearing.invalid_reason(t)
+                    and not self.held
+                )
+                or self._is_sound(name)
+            )
             self.asked = asked
         return self._sound
 

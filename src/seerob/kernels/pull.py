@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.ahead import instants
 from seerob.kernels.bound import Layout
 from seerob.kernels.mujoco_calls import newton_euler, updated
 
@@ -227,6 +228,52 @@ def _along(knots: Knots, t: Array, q: Array, v: Array, a: Array) -> None:
         knots.instants[first:end], knots.points[first:end], knots.speeds[first:end], knots.jumps[first:end],
         knots.coast[0], t, q, v, a,
     )  # fmt: skip
+
+
+@njit(
+    f"i8({_TABLE}, f8, i8, f8, {_ROW}, i8[::1], {_ROWS}, {_ROWS}, {_ROWS})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def ticks_ahead(
+    table: Indices,
+    begin: float,
+    first: int,
+    period: float,
+    t: Array,
+    rows: Indices,
+    q: Array,
+    v: Array,
+    a: Array,
+) -> int:
+    """Work out where somebody will be at ticks to come, and at the samples between them.
+
+    Args:
+        table: Of `KNOTS`.
+        begin: The first tick, between two of the clock [s].
+        first: Number of the clock's tick before it.
+        period: Of the clock [s].
+        t: Written: ticks and samples, in the order of time [s], shape (m,), with room for all.
+        rows: Written: where each tick is among them, shape (s,).
+        q: Written: positions then [rad or m], shape (m, n).
+        v: Written: velocities then, shape (m, n).
+        a: Written: accelerations then, shape (m, n).
+
+    Returns:
+        How many there are.
+    """
+    knots, end = _knots_in(table, 0), period * (first + len(rows) - 1) - SLACK
+    own, count = np.empty(knots.kept[1] - knots.kept[0] + 1), 0
+    for row in range(knots.kept[0], knots.kept[1]):
+        if begin + SLACK < knots.instants[row] < end:
+            own[count], count = knots.instants[row], count + 1
+    rests = knots.instants[knots.kept[1] - 1] + knots.coast[0]
+    if knots.coast[0] != 0.0 and begin + SLACK < rests < end:
+        own[count], count = rests, count + 1
+    found = instants(begin, first, period, own[:count], SLACK, t, rows)
+    _along(knots, t[:found], q, v, a)
+    return found
 
 
 @njit(f"void({_TABLE}, {_TABLE}, f8, f8, f8)", cache=True, nogil=True, error_model="numpy")

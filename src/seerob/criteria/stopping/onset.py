@@ -36,6 +36,7 @@ from seerob.kernels import ahead as kernel
 from seerob.kernels.ahead import PARTS, WINDOW, joint_speeds, moved_on, until_braking
 from seerob.kernels.speed import by_coordinate
 from seerob.model.model import Body, Gap, Mechanism, Model
+from seerob.twin.control.reference import Ticks
 from seerob.twin.moving_base import RESTS
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.spans import ROUNDING, Knots, Points, rows_of
@@ -185,14 +186,16 @@ class Foreseen:
         k = math.floor(t / period + 1e-6)
         # The same instants whenever they are asked for.
         last = math.ceil((t + T_r + period) / period - 1e-6)
-        instants, rows = with_knots(state.knots, name, t, k, last, period)
-        foreseen = state.foresee(name, instants)
-        if foreseen is None:
-            return None
-        q, qd, unbounded_reason = foreseen
+        ticks = state.ticks_ahead(name, k, last)
+        if ticks is None:
+            instants, rows = with_knots(state.knots, name, t, k, last, period)
+            foreseen = state.foresee(name, instants)
+            if foreseen is None:
+                return None
+            ticks = Ticks(instants, rows, *map(np.ascontiguousarray, foreseen[:2]), foreseen[2])
+        instants, rows, q, qd, unbounded_reason = ticks
         if self._T_r > T_r:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
-        q, qd = np.ascontiguousarray(q), np.ascontiguousarray(qd)
         same = self._parts.follow(state)
         if not self._parts.alone:
             same = self._parts.put_others(state.data_of(*self._with)) and same

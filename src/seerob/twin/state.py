@@ -34,6 +34,7 @@ from seerob.twin.attachments import Columns, moving_dofs
 from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
 from seerob.twin.control.reference import Ticks
 from seerob.twin.drawn_points import DrawnPoints, Local
+from seerob.twin.moving_points import Moved, Point, PointSurvey, place_of
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
@@ -136,6 +137,7 @@ class State(Validity):
         """Keeps the arrays of its table."""
         self._table = PLACED.rows(self._placed)
         self._surveyor = Surveyor(model.shapes)
+        self._moving = PointSurvey(model.mj, data, self.columns)
         self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
         self._cvel, self._qpos, self._sparse_mass_matrix = data.cvel, data.qpos, data.M
         self._corners = by_coordinate([body.corners for body in model.bodies])
@@ -149,6 +151,7 @@ class State(Validity):
         self._cache.clear()
         self.heard()
         self._surveyor.forget()
+        self._moving.forget()
 
     # -- what says nothing of whether it may be relied on: closed while a criterion is asked ---------
 
@@ -646,6 +649,11 @@ class State(Validity):
             M = M - mj.body_mass[body] * moved[:3].T @ moved[:3] - moved[3:].T @ inertia @ moved[3:]
         return np.asarray(M + (1e-9 * np.trace(M) + 1e-15) * np.eye(len(M)))
 
+    def _weigh_exactly(self, mechanism: Mechanism) -> None:
+        self.weigh(mechanism)
+        if why := self._hearings[mechanism.name].coarse:
+            raise Undecided(f"{mechanism.name}: {why}")
+
     def mass_matrix(self, *mechanisms: Mechanism) -> Array:
         """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
 
@@ -655,9 +663,7 @@ class State(Validity):
             Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
         for mechanism in mechanisms:
-            self.weigh(mechanism)
-            if why := self._hearings[mechanism.name].coarse:
-                raise Undecided(f"{mechanism.name}: {why}")
+            self._weigh_exactly(mechanism)
         key = "M", *[mechanism.name for mechanism in mechanisms]
         if key not in self._cache:
             if "M" not in self._cache:
@@ -821,14 +827,11 @@ class State(Validity):
         mj, columns = self._model.mj, self.columns[mechanism.name]
         bound = self._points.get(key)
         if bound is None or bound[0] is not frame:
-            local = frame.body_from_frame[:3, 3]
-            if offset is not None:
-                local = local + frame.body_from_frame[:3, :3] @ offset
             dofs = np.arange(mj.nv)[columns.all_v]
             moves, root = moving_dofs(mj, frame.mj)[dofs], int(mj.body_rootid[frame.mj])
             if len(self._points) == MOST_PLACES:
                 self._points.clear()
-            bound = self._points[key] = frame, root, dofs, moves, np.ascontiguousarray(local)
+            bound = self._points[key] = frame, root, dofs, moves, place_of(frame, offset)
         _, root, dofs, moves, local = bound
         J, v, axes, figures = np.empty((6, len(dofs))), np.empty(6), np.empty((3, 3)), np.empty(7)
         at_point(
@@ -845,6 +848,22 @@ class State(Validity):
             quaternion(directions[0], figures[3:])
         sigma = figures.tolist()
         return _Point(J, v, sigma[:3], sigma[3:])
+
+    def moving(self, points: tuple[Point, ...]) -> tuple[Moved, list[int]]:
+        """What joints do to all points that are asked for so in a tick that is `clear`, and which these are.
+
+        Raises:
+            Undecided: It is not, a mass is not known, or some joints follow others: ask `velocity`,
+                `velocity_ellipsoid` and `mass_ellipsoid`.
+        """
+        if not self.clear or self._author or self._quicker:
+            raise Undecided("asked alone")
+        for _, mechanism, _, weighed in points:
+            if self.columns[mechanism.name].coupling is not None:
+                raise Undecided("asked alone")
+            if weighed:
+                self._weigh_exactly(mechanism)
+        return self._moving.at(points)
 
     def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:
         r"""Rows :math:`u^T J_v` of points of several bodies, shape (b, n); see `jacobian`.

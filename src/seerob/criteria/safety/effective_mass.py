@@ -29,8 +29,9 @@ from seerob.model import provenance
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import velocity_of
+from seerob.twin.moving_points import Point
 from seerob.twin.spans import Points, Span, coupling_of
-from seerob.twin.state import MassEllipsoid, State
+from seerob.twin.state import State
 
 DRAWN = 0.02
 """Half axis, or arrow, drawn for 1 kg [m]."""
@@ -108,8 +109,8 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
 
 
-def _principal(masses: Array) -> tuple[Result, ...]:
-    one, two, three = masses.tolist()
+def _principal(masses: Sequence[float]) -> tuple[Result, ...]:
+    one, two, three = masses[:3]
     return _of("m1", one), _of("m2", two), _of("m3", three)
 
 
@@ -236,7 +237,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 ends = self._ends(tolerances, state, frame, offset, np.array(u))
                 reason = deciding(tolerances.tolerances, ends.widths)
             draw = partial(_drawn, self, state.drawn_point(frame, offset), masses, wxyz, u, mass, verdict)
-            return Shown(reason, draw, (*_principal(masses), simplified))
+            return Shown(reason, draw, (*_principal(masses.tolist()), simplified))
 
         return present
 
@@ -396,13 +397,14 @@ class _Masses:
     def __init__(self, criteria: Sequence[EffectiveMass], model: Model) -> None:
         self._criteria = criteria
         frames = [model.frame(each.at) for each in criteria]
-        self._points = [
-            (frame, model.carrier(frame), np.array(each.offset))
+        self._points = tuple(
+            Point(frame, model.carrier(frame), each.offset, weighed=True)
             for each, frame in zip(criteria, frames, strict=True)
-        ]
+        )
+        self._offsets = [np.array(each.offset) for each in criteria]
         self._simplified = [
             EffectiveMass._simplified(model, robot, MassTolerances(model, robot))
-            for _, robot, _ in self._points
+            for _, robot, _, _ in self._points
         ]
         self._facing = [k for k, each in enumerate(criteria) if each.toward is not None]
         """Which face somebody."""
@@ -410,8 +412,8 @@ class _Masses:
             model.gap(self._points[k][1].moving, model.select(criteria[k].toward or "")) for k in self._facing
         ]
         self._asked = tuple((gap.query, Per.SETS) for gap in gaps)
-        self._found: list[tuple[MassEllipsoid, tuple[float, ...]]] = []
-        """Of each the ellipsoid and the direction."""
+        self._found: list[tuple[list[float], tuple[float, ...]]] = []
+        """Of each the principal masses with their axes, and the direction."""
 
     def compute(self, state: State, rows: Rows) -> None:
         """Write the mass of every point; NaN where there is no direction, or it cannot be pushed that way."""
@@ -421,32 +423,30 @@ class _Masses:
             found, at = state.nearest(self._asked)
             for k, row in zip(facing, at, strict=True):
                 ways[k] = found.point_b[row] - found.point_a[row]
+        moved, own = state.moving(self._points)
         self._found = []
-        for k, (frame, robot, offset) in enumerate(self._points):
-            ellipsoid = state.mass_ellipsoid(frame, robot, offset)
+        for k, row in enumerate(own):
             way, least = ways.get(k), TOUCHING
             if way is None:
-                way, least = state.velocity(frame, robot, offset)[:3], STANDSTILL
-            x, y, z, mass = mass_along(ellipsoid.inverse, way, least)
-            values[k] = mass
-            self._found.append((ellipsoid, (x, y, z)))
+                way, least = moved.velocity[row, :3], STANDSTILL
+            x, y, z, values[k] = mass_along(moved.inverse[row], way, least)
+            self._found.append((moved.masses[row], (x, y, z)))
         rows.value[:] = values
 
     def present(
         self, state: State, k: int, value: float, verdict: Verdict | None
     ) -> tuple[str, Draw, tuple[Result, ...]]:
         """Say and draw what `EffectiveMass.present` does of one that is decided."""
-        (_, _, masses, wxyz), u = self._found[k]
-        frame, _, offset = self._points[k]
-        place = partial(self._place, frame, offset)
-        draw = partial(_drawn, self._criteria[k], place, masses, wxyz, u, value, verdict)
+        masses, u = self._found[k]
+        place = partial(self._place, self._points[k].frame, self._offsets[k])
+        draw = partial(_drawn, self._criteria[k], place, masses[:3], masses[3:], u, value, verdict)
         return "", draw, (*_principal(masses), self._simplified[k])
 
 
 def _drawn(
     of: EffectiveMass,
     place: Callable[[], Array],
-    masses: Array,
+    masses: Array | Sequence[float],
     wxyz: Sequence[float],
     u: Sequence[float],
     mass: float | None,
@@ -456,7 +456,7 @@ def _drawn(
     ellipsoid = Ellipsoid(
         center=center,
         wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
-        radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
+        radii=tuple(np.minimum(DRAWN * np.asarray(masses), LARGEST_DRAWN).tolist()),
         verdict=verdict,
     )
     if mass is None:

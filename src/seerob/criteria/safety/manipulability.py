@@ -22,6 +22,7 @@ from seerob.criteria.plan import Draw, Rows, Together
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
 from seerob.model.model import Frame, Model
+from seerob.twin.moving_points import Point
 from seerob.twin.spans import Falls, Points, Turning, coupling_of
 from seerob.twin.state import State
 
@@ -175,18 +176,20 @@ class _Figures:
 
     def __init__(self, criteria: Sequence[Manipulability], model: Model) -> None:
         frames = [model.frame(each.at) for each in criteria]
-        self._points = [
-            (frame, model.carrier(frame), np.array(each.offset))
+        self._points = tuple(
+            Point(frame, model.carrier(frame), each.offset)
             for each, frame in zip(criteria, frames, strict=True)
-        ]
+        )
+        self._offsets = [np.array(each.offset) for each in criteria]
         self._criteria = criteria
-        self._found: list[tuple[list[float], list[float]]] = []
+        self._found: list[list[float]] = []
 
     def compute(self, state: State, rows: Rows) -> None:
         """Write the smallest singular value of every point."""
         self._place = state.drawn_points()
-        self._found = [state.velocity_ellipsoid(*point) for point in self._points]
-        rows.value[:] = [sigma[2] for sigma, _ in self._found]
+        moved, own = state.moving(self._points)
+        self._found = [moved.sigma[row] for row in own]
+        rows.value[:] = [sigma[2] for sigma in self._found]
 
     def present(
         self, state: State, k: int, value: float, verdict: Verdict | None
@@ -194,10 +197,10 @@ class _Figures:
         """Say and draw what `Manipulability.present` does of one that is decided."""
         if verdict is Verdict.EXCEEDED:
             raise Undecided("it says which joint leads out")
-        sigma, wxyz = self._found[k]
-        frame, _, offset = self._points[k]
-        place = partial(self._place, frame, offset)
-        return "", partial(_ellipsoid, self._criteria[k], place, sigma, wxyz, verdict), _others(sigma)
+        sigma = self._found[k][:3]
+        place = partial(self._place, self._points[k].frame, self._offsets[k])
+        draw = partial(_ellipsoid, self._criteria[k], place, sigma, self._found[k][3:], verdict)
+        return "", draw, _others(sigma)
 
 
 def _others(sigma: Sequence[float]) -> tuple[Result, ...]:

@@ -21,8 +21,9 @@ from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import NOISE, others_noisy
 from seerob.criteria.plan import Draw, Rows, Together
 from seerob.model import provenance
-from seerob.model.model import Frame, Mechanism, Model
+from seerob.model.model import Frame, Model
 from seerob.twin.moving_base import velocity_of
+from seerob.twin.moving_points import Point
 from seerob.twin.spans import Falls, Points, speeding
 from seerob.twin.state import State
 
@@ -221,19 +222,21 @@ class _Speeds:
 
     def __init__(self, criteria: Sequence[Velocity], model: Model) -> None:
         self._criteria, self._names = criteria, [body.name for body in model.bodies]
-        self._at = dict[int, tuple[Frame, Mechanism, Array]]()
-        """Of a point, by which of the criteria it is."""
+        self._at = dict[int, tuple[Frame, Array]]()
+        """Of a point its place, by which of the criteria it is."""
+        points = list[Point]()
         self._sets, bodies = dict[int, slice](), list[int]()
         """Of a set, likewise: its rows among the bodies of all sets."""
         for k, each in enumerate(criteria):
             if each.at is not None:
                 frame = model.frame(each.at)
-                self._at[k] = frame, model.carrier(frame), np.array(each.offset)
+                self._at[k] = frame, np.array(each.offset)
+                points.append(Point(frame, model.carrier(frame), each.offset))
                 continue
             own = each._bodies(model)
             self._sets[k] = slice(len(bodies), len(bodies) + len(own))
             bodies += own
-        self._bodies = tuple(bodies)
+        self._bodies, self._asked = tuple(bodies), tuple(points)
         self._found: list[tuple[Array, int]] = [(np.zeros(3), 0)] * len(criteria)
         """Velocity of each, and of a set the row of the fastest body."""
         self._points = np.zeros((0, 3))
@@ -242,9 +245,11 @@ class _Speeds:
         """Write the speed of every point, and of every set that of its fastest point."""
         self._place = state.drawn_points()
         speeds, found = [0.0] * len(self._found), self._found
-        for k, (frame, mechanism, offset) in self._at.items():
-            v = state.velocity(frame, mechanism, offset)[:3]
-            speeds[k], found[k] = float(length(v)), (v, 0)
+        if self._asked:
+            moved, at = state.moving(self._asked)
+            for k, row in zip(self._at, at, strict=True):
+                v = moved.velocity[row, :3]
+                speeds[k], found[k] = float(length(v)), (v, 0)
         if self._sets:
             every, self._points, velocities = state.fastest_points(self._bodies)
             for k, own in self._sets.items():
@@ -262,7 +267,7 @@ class _Speeds:
             place = partial(self._points.__getitem__, row)
             where = self._names[self._bodies[row]]
         else:
-            place, where = partial(self._place, at[0], at[2]), ""
+            place, where = partial(self._place, *at), ""
         return where, partial(_arrow, self._criteria[k], place, v, value, verdict), ()
 
 

@@ -724,10 +724,9 @@ def least_margin(one: Margin, other: Margin | None, lost: Fall) -> float:
     m_other, also = other
     if type(fall) is float is type(m) and type(m_other) is float is type(bend):
         return _least((m, off), (m_other, also), (fall, bend))
-    if type(fall) is float and isinstance(bend, np.ndarray) and isinstance(m, np.ndarray) and m.ndim == 1:
-        known = [np.asarray(each) for each in (off, m_other, also)]
-        if all(each.shape == bend.shape == m.shape for each in known):
-            return float(least_margins(m, *known, fall, bend))
+    each = type(m) is type(off) is type(m_other) is type(also) is type(bend) is np.ndarray
+    if each and type(fall) is float and len(m) == len(off) == len(m_other) == len(also) == len(bend):
+        return float(least_margins(m, off, m_other, also, fall, bend))
     low = np.maximum((m + m_other - fall) / 2, np.minimum(m, m_other) - bend)
     return float(np.min(low - np.maximum(off, also)))
 

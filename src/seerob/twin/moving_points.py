@@ -58,6 +58,8 @@ class PointSurvey:
         """By the identity of points that were asked for, these and their rows."""
         self._bound: MovingPoints | None = None
         self._now: Moved | None = None
+        self.weighed = False
+        """Whether one of all points is: then MuJoCo's mass matrix must be that of now."""
 
     def forget(self) -> None:
         """Work everything out again: everybody has moved."""
@@ -94,9 +96,6 @@ class PointSurvey:
         if bound is None:
             bound = self._bound = self._bind()
             self._table = MOVING_POINTS.rows(bound)
-            self._weighed = any(point.weighed for point in self._points)
-        if self._weighed:
-            mujoco.mj_makeM(self._mj, self._data)
         if move_points(self._table) >= 0:
             raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
         return Moved(bound.velocity.copy(), bound.sigma.tolist(), bound.inverse, bound.masses.tolist())

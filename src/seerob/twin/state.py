@@ -654,6 +654,12 @@ class State(Validity):
         if why := self._hearings[mechanism.name].coarse:
             raise Undecided(f"{mechanism.name}: {why}")
 
+    def _make_masses(self) -> None:
+        """Have MuJoCo's mass matrix of this tick."""
+        if "M" not in self._cache:
+            mujoco.mj_makeM(self._model.mj, self._data)
+            self._cache["M"] = True
+
     def mass_matrix(self, *mechanisms: Mechanism) -> Array:
         """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
 
@@ -666,9 +672,7 @@ class State(Validity):
             self._weigh_exactly(mechanism)
         key = "M", *[mechanism.name for mechanism in mechanisms]
         if key not in self._cache:
-            if "M" not in self._cache:
-                mujoco.mj_makeM(self._model.mj, self._data)
-                self._cache["M"] = True
+            self._make_masses()
             if len(mechanisms) == 1:
                 M = self.columns[mechanisms[0].name].of_mass_matrix(self._sparse_mass_matrix)
             else:
@@ -863,6 +867,9 @@ class State(Validity):
                 raise Undecided("asked alone")
             if weighed:
                 self._weigh_exactly(mechanism)
+                self._moving.weighed = True
+        if self._moving.weighed:
+            self._make_masses()
         return self._moving.at(points)
 
     def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:

@@ -136,6 +136,10 @@ def _deciding(uncertainty: float, seen: float, gap: Gap) -> str:
     return deciding(inputs, np.array([tolerance.half for tolerance in inputs]))
 
 
+_DEEP = int(DistanceKind.DEPTH_AT_LEAST)
+"""To compare numbers with an enumeration takes longer than all the rest of their judgement."""
+
+
 class _Distances:
     """Least distances of pairs of sets at one instant, of a tick's plan."""
 
@@ -155,9 +159,10 @@ class _Distances:
         self._found, self._rows = found, at = state.nearest(self._asked)
         value, low, high, exceeded = rows
         value[:] = found.distance[at]
-        low[:] = value - self._nearer - self._either
-        high[:] = value + self._either
-        exceeded[:] = found.kind[at] == DistanceKind.DEPTH_AT_LEAST
+        np.subtract(value, self._nearer, out=low)
+        np.subtract(low, self._either, out=low)
+        np.add(value, self._either, out=high)
+        np.equal(found.kind[at], _DEEP, out=exceeded)
 
     def present(
         self, state: State, k: int, value: float, verdict: Verdict | None
@@ -166,7 +171,7 @@ class _Distances:
         found, row, named = self._found, self._rows[k], self._places.named
         assert found is not None
         a, b = found.point_a[row], found.point_b[row]
-        deeper = DEEPER if found.kind.item(row) == DistanceKind.DEPTH_AT_LEAST else ""
+        deeper = DEEPER if found.kind.item(row) == _DEEP else ""
         where = (
             f"{named(state, found.body_a.item(row), a)} ↔ {named(state, found.body_b.item(row), b)}{deeper}"
         )

@@ -41,7 +41,7 @@ ROUNDS = {
     "motor_station": Cell(12, {"tool speed": 0.33, "arm energy": 0.46}, "tool speed", 3),
     "assembly_line": Cell(12, {"tool speed": 0.39, "arm energy": 0.57}, "tool speed", 3),
     "empty_room": Cell(11, {"tool speed": 0.28, "arm energy": 0.18}, "tool speed", 3),
-    "niryo_picking": Cell(12, {"tool speed": 0.23}, "tool speed", 3),
+    "niryo_picking": Cell(12, {"tool speed": 0.23, "arm energy": 0.017}, "tool speed", 3),
     "three_robots": Cell(
         12,
         {"ur10 tool speed": 0.39, "ur10 elbow energy": 0.42, "iiwa_left energy": 0.57},

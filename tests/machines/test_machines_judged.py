@@ -266,3 +266,19 @@ def test_noise_of_what_carries_an_arm_leaves_its_speed_and_energy_open(tmp_path)
         assert sure[name].verdict is Verdict.WITHIN, name
         assert open_[name].verdict is Verdict.UNDECIDED, name
         assert "noise" in open_[name].reason
+
+
+@pytest.mark.parametrize(("off", "verdict"), [("", "within"), ("mass_tolerance = 0.1\n", "undecided")])
+def test_what_carries_an_arm_whose_masses_are_off_has_no_energy(tmp_path, off, verdict):
+    criterion = '[[safety]]\nkind = "kinetic_energy"\nname = "all"\nrobot = "agv"\nlimit = 200\n'
+    text = CELL.replace('name = "arm"\n', f'name = "arm"\n{off}', 1) + criterion
+    station = made(tmp_path, text, FILES)
+    engine = Engine(station.model, driven={"agv": 1.0, "arm": 1.0})
+    cart, arm = (
+        heard("agv", 0.0, (-9.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        heard("arm", 0.0, (np.pi, 0.0), (0.0, 0.0)),
+    )
+    engine.take([cart, arm])
+    (found,) = (r for r in Judge(station.bound, station.model.findings)(engine.start()) if r.name == "all")
+    assert found.verdict == verdict, found.reason
+    assert ("arm: how far" in found.reason) == bool(off)

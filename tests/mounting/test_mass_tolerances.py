@@ -198,3 +198,51 @@ def test_a_volume_that_is_known_to_a_ten_thousandth_is_exact(tmp_path, error, de
         found = found[1:]
     assert [tolerance.half for tolerance in found] == pytest.approx(told)
     assert all(t.name == "volume of grip" and t.unit == "%" for t in found)
+
+
+def test_wherever_masses_are_in_the_shapes_of_links_figures_are_within_their_bounds(tmp_path):
+    """Of the Niryo only masses are published, and roughly: 60 ways to lump them at corners of its shapes."""
+    cell = made(tmp_path, FLOATING + '[[robots]]\nname = "arm"\nmodel = "library:niryo_one"\n')
+    model, rng = cell.model, np.random.default_rng(0)
+    robot = model.robot("arm")
+    found = MassTolerances(model, robot)
+    assert [str(t) for t in found.tolerances] == [
+        "masses of links of arm ± 70 %", "where masses are in links of arm ± 193.2 mm",
+    ]  # fmt: skip
+    assert found.own
+    assert found.moved == (str(found.tolerances[1]),)
+    links = [b for b in model.bodies if b.mj in robot.mj_bodies]
+    assert len(links) == 6
+    q, qd = rng.uniform(-1, 0.6, 6), rng.uniform(-1, 1, 6)
+    state = state_at(cell, arm=(q, qd))
+    data, mj = state.data, model.mj
+
+    def lumped():
+        """Mass matrix of a robot whose links weigh 30 to 170 %, each in one to three points of its shape."""
+        M = np.zeros((6, 6))
+        for b in links:
+            rows = np.zeros((3, mj.nv))
+            k, mass = rng.integers(1, 4), float(mj.body_mass[b.mj]) * rng.choice([0.3, 1.7])
+            for corner in rng.choice(b.corners, k):
+                at = data.xpos[b.mj] + data.xmat[b.mj].reshape(3, 3) @ corner
+                mujoco.mj_jac(mj, data, rows, None, at, b.mj)
+                M += mass / k * rows[:, robot.v_address].T @ rows[:, robot.v_address]
+        return M
+
+    J, u = state.jacobian(robot.tip, robot, np.zeros(3))[:3], np.array([0.6, 0.0, 0.8])
+    plain = state.mass_matrix(robot)
+    moving, pushed = found.matrices(state), found.matrices(state, np.linalg.solve(plain, J.T @ u))
+
+    def felt(M):
+        return 1 / (u @ J @ np.linalg.solve(M, J.T @ u))
+
+    def energy(M):
+        return 0.5 * qd @ M @ qd
+
+    every = [lumped() for _ in range(60)]
+    for figure, matrices in ((energy, moving), (felt, pushed)):
+        low, high = figure(matrices.at((-1, -1))), figure(matrices.at((1, 1)))
+        figures = [figure(M + 1e-9 * np.eye(6)) for M in (*every, plain)]
+        assert low <= min(figures)
+        assert max(figures) <= high < 8 * figure(plain)
+        assert max(figures) > 2 * figure(plain), "it is no bound of nothing"

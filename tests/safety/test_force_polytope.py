@@ -194,6 +194,17 @@ def test_unknown_torque_limits_are_undecided(tmp_path, name):
     assert any(i.origin is Origin.MISSING and "torque limit" in i.name for i in station.bound[0].basis.inputs)
 
 
+def test_weights_that_are_roughly_known_leave_forces_undecided(tmp_path):
+    """Of the Niryo One's links only round masses are published, anywhere in their shapes."""
+    robot = '[[robots]]\nname = "arm"\nmodel = "library:niryo_one"\n'
+    robot += f"torque_limits = {[9.0] * 6}\n"
+    for k, (name, why) in enumerate((("gravity", "rough masses"), ("motion", "rough masses"), ("none", ""))):
+        station = made(tmp_path / str(k), f'{robot}{ARM}limit = 1e6\nload = "{name}"\n')
+        result = next(iter(results_at(station, arm=(np.full(6, 0.3), np.zeros(6))).values()))
+        assert (result.value is None) == bool(why), name
+        assert why in result.reason
+
+
 def test_torque_limit_of_zero_is_one_that_nobody_filled_in(tmp_path):
     result = arm(tmp_path, "limit = 1e6\n", TWO_R + HAND + "torque_limits = [10, 0]\n")
     assert result.verdict is Verdict.UNDECIDED

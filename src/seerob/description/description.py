@@ -88,7 +88,10 @@ class Inertial:
     origin: Origin
     source: str
     error: float = 0.0
-    """Relative uncertainty of the mass, of an estimate from a mended shape; 0 when stated."""
+    """Relative uncertainty of the mass, of an estimate; 0 when stated."""
+    within: float = 0.0
+    """How far from ``com`` any of the mass may lie, where nobody knows how it is spread [m]; 0 where that is
+    known."""
 
 
 @dataclass(frozen=True, eq=False)

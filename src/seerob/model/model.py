@@ -153,6 +153,14 @@ class Mechanism:
         """Whether all that its bodies do follows from its own joints."""
         return not self.on and not self.riders
 
+    @property
+    def roughly_weighed(self) -> str:
+        """Why masses of its links are figures of which intervals alone follow; empty where they are known."""
+        inertials = [link.inertial for link in self.description.links if link.inertial is not None]
+        if not any(inertial.error or inertial.within for inertial in inertials):
+            return ""
+        return f"of the links of {self.name} only rough masses are published: give them in masses"
+
     def require_masses(self, who: str) -> None:
         """Refuse a figure that rests on masses that cannot be; those that nobody gave leave it undecided.
 

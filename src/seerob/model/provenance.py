@@ -64,6 +64,24 @@ def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
             source="; ".join(dict.fromkeys(inertial.source for inertial in links)),
         )
     ]
+    off = max((inertial.error for inertial in links), default=0.0)
+    if off:
+        found.append(
+            Input(
+                name=f"masses of links of {mechanism.name} may be off by",
+                value=off,
+                origin=Origin.ESTIMATED,
+                source=links[0].source,
+            )
+        )
+    if any(inertial.within for inertial in links):
+        found.append(
+            Input(
+                name=f"where masses are in links of {mechanism.name}",
+                value="anywhere in their shapes",
+                origin=Origin.MISSING,
+            )
+        )
     found += [
         Input(name=text.removeprefix("nobody gave ").strip(), origin=Origin.MISSING)
         for text in mechanism.unknown_masses

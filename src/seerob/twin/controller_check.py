@@ -598,7 +598,7 @@ def _compares_torques(model: Model, mechanism: Mechanism) -> bool:
         getattr(c, "torques", "") == "external" and _of(model, c.subjects(), mechanism)
         for c in _of_torques(model)
     )
-    return not (mechanism.unknown_masses or external)
+    return not (mechanism.unknown_masses or mechanism.roughly_weighed or external)
 
 
 def _bias(model: Model, data: mujoco.MjData, mechanism: Mechanism, q: Array, qd: Array | None) -> Array:

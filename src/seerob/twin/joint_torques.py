@@ -34,7 +34,7 @@ def gravity(state: State, mechanism: Mechanism) -> Array:
     Raises:
         Undecided: Not heard, or a mass that nobody gave.
     """
-    state.weigh(mechanism)
+    _weigh(state, mechanism)
     data, columns = state.data_of(mechanism.name), state.columns[mechanism.name]
     found = np.empty(len(columns.joints))
     held(
@@ -53,10 +53,17 @@ def bias(state: State, mechanism: Mechanism) -> Array:
     Raises:
         Undecided: Not heard, or a mass that nobody gave.
     """
-    state.weigh(mechanism)
+    _weigh(state, mechanism)
     every = np.zeros(state.model.mj.nv)
     mujoco.mj_rne(state.model.mj, state.data_of(mechanism.name), 0, every)
     return np.asarray(mechanism.coupling.T @ every[mechanism.v_address])
+
+
+def _weigh(state: State, mechanism: Mechanism) -> None:
+    """Raise `Undecided` unless masses are known well enough for a torque that is told without an interval."""
+    state.weigh(mechanism)
+    if why := mechanism.roughly_weighed:
+        raise Undecided(why)
 
 
 def bind_needed_in_span(

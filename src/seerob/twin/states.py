@@ -366,6 +366,8 @@ class States:
             Undecided: A mass that nobody gave.
         """
         self._weigh(mechanism)
+        if why := mechanism.roughly_weighed:
+            raise Undecided(why)
         columns, moved = self._bench.columns(mechanism), self._moved
         found = np.empty((len(self), len(columns.joints)))
         held_many(

@@ -34,8 +34,10 @@ from seerob.twin.spans import Points, Span, coupling_of
 from seerob.twin.state import State
 
 DRAWN = 0.02
-"""Half axis, or arrow, drawn for 1 kg [m]."""
+"""Half axis, or arrow, drawn for 1 kg, at least [m]."""
 LARGEST_DRAWN = 0.6
+LEAST_DRAWN = 0.1
+"""Half axis drawn for M/2 + m_L, at least [m]: that of a small robot would be hidden in its hand."""
 TOUCHING = 1e-9
 """Length below which a line to a person has no direction [m]."""
 STANDSTILL = 1e-3
@@ -224,6 +226,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         robot = model.carrier(frame)
         tolerances = MassTolerances(model, robot)
         simplified = self._simplified(model, robot, tolerances)
+        size = _half_axis(simplified)
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             u, known, (_, _, masses, wxyz) = figure.beside
@@ -236,7 +239,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             elif figure.interval is not None and verdict is Verdict.UNDECIDED:
                 ends = self._ends(tolerances, state, frame, offset, np.array(u))
                 reason = deciding(tolerances.tolerances, ends.widths)
-            draw = partial(_drawn, self, state.drawn_point(frame, offset), masses, wxyz, u, mass, verdict)
+            interval = None if figure.interval is None else tuple(float(end) for end in figure.interval)
+            place = state.drawn_point(frame, offset)
+            draw = partial(_drawn, self, place, size, masses, wxyz, u, mass, verdict, interval)
             return Shown(reason, draw, (*_principal(masses.tolist()), simplified))
 
         return present
@@ -338,8 +343,10 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         self, tolerances: MassTolerances, state: State, frame: Frame, offset: Array, u: Array
     ) -> Spread:
         """Of the mass along u, or of the heaviest direction there is at each end."""
-        matrices = tolerances.matrices(state)
         J_v = state.jacobian(frame, tolerances.robot, offset)[:3]
+        # Among rates with uᵀ J q̇ = 1 those of M⁻¹ Jᵀ u have the least energy, which is the effective mass.
+        pushed: Array = np.linalg.solve(state.mass_matrix(tolerances.robot), J_v.T @ u)
+        matrices = tolerances.matrices(state, pushed)
 
         def at(shifts: Shifts) -> Array:
             inverse = inverse_effective_mass(J_v, matrices.at(shifts))
@@ -439,28 +446,37 @@ class _Masses:
         """Say and draw what `EffectiveMass.present` does of one that is decided."""
         masses, u = self._found[k]
         place = partial(self._place, self._points[k].frame, self._offsets[k])
-        draw = partial(_drawn, self._criteria[k], place, masses[:3], masses[3:], u, value, verdict)
+        size = _half_axis(self._simplified[k])
+        draw = partial(_drawn, self._criteria[k], place, size, masses[:3], masses[3:], u, value, verdict)
         return "", draw, (*_principal(masses), self._simplified[k])
+
+
+def _half_axis(simplified: Result) -> float:
+    """Drawn for 1 kg [m]."""
+    return max(DRAWN, LEAST_DRAWN / simplified.value) if simplified.value else DRAWN
 
 
 def _drawn(
     of: EffectiveMass,
     place: Callable[[], Array],
+    size: float,
     masses: Array | Sequence[float],
     wxyz: Sequence[float],
     u: Sequence[float],
     mass: float | None,
     verdict: Verdict | None,
+    interval: tuple[float, ...] | None = None,
 ) -> tuple[Marker, ...]:
     center = tuple(place().tolist())
     ellipsoid = Ellipsoid(
         center=center,
         wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
-        radii=tuple(np.minimum(DRAWN * np.asarray(masses), LARGEST_DRAWN).tolist()),
+        radii=tuple(np.minimum(size * np.asarray(masses), LARGEST_DRAWN).tolist()),
         verdict=verdict,
     )
     if mass is None:
         return (ellipsoid,)
-    x, y, z = (min(DRAWN * mass, LARGEST_DRAWN) * each for each in u)
+    x, y, z = (min(size * mass, LARGEST_DRAWN) * each for each in u)
     label = figures.worded(mass, of.limit, of.unit, at_most=True)
+    label += "" if interval is None else f" (≤ {figures.rounded_up(interval[1], of.unit)})"
     return ellipsoid, Arrow(origin=center, vector=(x, y, z), label=label, verdict=verdict)

@@ -85,6 +85,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         for each in (robot, *aboard):
             each.require_masses(self.name)
         masses, alone = MassTolerances(model, robot), robot.alone and not aboard
+        off_aboard = next((each.name for each in aboard if len(MassTolerances(model, each))), "")
         beside = (*robot.riders, *(each.name for each in aboard))
         others = tuple(dict.fromkeys((*model.carriers_of(robot.name), *beside)))
 
@@ -96,12 +97,16 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             else:
                 energy = sum(energy_of(cast("State", twin), each) for each in (robot, *aboard))
             low = high = energy
+            if off_aboard:
+                raise Undecided(
+                    f"{off_aboard}: how far its masses may be off is not followed on what moves it"
+                )
             if len(masses):
-                if not alone:
+                if not masses.own:
                     raise Undecided(
                         f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
                     )
-                ends = self._ends(masses, cast("State", twin))
+                ends = self._ends(masses, cast("State", twin), energy)
                 low, high = ends.low, ends.high
             error = twin.speed_error(robot)
             if error is not None:
@@ -115,9 +120,11 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return compute
 
     @staticmethod
-    def _ends(masses: MassTolerances, state: State) -> Spread:
+    def _ends(masses: MassTolerances, state: State, energy: float | Array) -> Spread:
+        """Of the energy: what may be off moves by the robot's own joints, whatever else has energy, too."""
         matrices, qd = masses.matrices(state), state.qd(masses.robot)
-        return spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
+        beside = energy - kinetic_energy(matrices.M, qd)
+        return spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd) + beside, len(masses))
 
     def present(self, model: Model) -> Present:
         """Return the function that draws a sphere at the tool's working point."""
@@ -127,7 +134,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             place, energy, reason = state.drawn_point(robot.tip, ORIGIN), figure.number, ""
             if verdict is Verdict.UNDECIDED:
-                widths = self._ends(masses, state).widths if len(masses) else np.zeros(0)
+                widths = self._ends(masses, state, energy).widths if len(masses) else np.zeros(0)
                 reason = deciding(masses.tolerances, widths) or NOISE
 
             return Shown(reason, partial(_sphere, self, place, energy, verdict))

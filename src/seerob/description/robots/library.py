@@ -1,7 +1,9 @@
 """The robot library: figures of common cobots, each with its source; geometry is an envelope made here.
 
 A robot is one TOML file in ``robots/``; its name there is its name in ``library:<name>``. Each link carries
-the joint to its parent. What a file does not say is unknown and stays so.
+the joint to its parent. What a file does not say is unknown and stays so: of a link with a mass but without
+``com`` and ``inertia`` the mass may be anywhere within its envelope, and ``error`` of ``[inertials]`` is the
+share by which masses may be off.
 
 An envelope is made of convex pieces that contain the maker's shape. A piece is a ``box = [[min], [max]]``, a
 ``tube = [[start], [end]]`` with a ``radius``, or a ``slot = [[[start], [end]], [[start], [end]]]`` with two
@@ -14,7 +16,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -28,7 +30,7 @@ from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
-from seerob.description.shapes import shapes
+from seerob.description.shapes import moments, shapes
 
 NOTE = "envelope made by seerob, not the maker's mesh"
 
@@ -206,7 +208,7 @@ def _link(entry: Table, robot: Table) -> Link:
             transforms.rotation_from_rpy(entry.get("rpy", (0, 0, 0))), entry.get("xyz", (0, 0, 0))
         ),
         joints=(_joint(entry["joint"], robot),) if "joint" in entry else (),
-        inertial=_inertial(entry, robot["inertials"]) if "mass" in entry else None,
+        inertial=_inertial(entry, robot["inertials"], solids) if "mass" in entry else None,
         visual=visual,
         solids=solids,
     )
@@ -229,14 +231,23 @@ def _joint(entry: Table, robot: Table) -> Joint:
     )
 
 
-def _inertial(entry: Table, block: Table) -> Inertial:
+def _inertial(entry: Table, block: Table, solids: Sequence[Solid]) -> Inertial:
+    """What a link weighs; where only its mass is known, as if its shape were of one density, and bounded."""
+    mass, origin, source = entry["mass"], Origin(block["origin"]), block["source"]
+    error = float(block.get("error", 0.0))
+    if "inertia" not in entry:
+        known = moments.combined(map(moments.of_solid, solids))
+        found = known.inertial(mass=float(mass), origin=origin, source=source, error=error)
+        corners = np.vstack([solid.mesh.vertices for solid in solids if solid.mesh is not None])
+        return replace(found, within=float(np.linalg.norm(corners - found.com, axis=1).max()))
     xx, yy, zz, xy, xz, yz = entry["inertia"]
     return Inertial(
-        mass=float(entry["mass"]),
+        mass=float(mass),
         com=np.array(entry["com"], float),
         inertia=np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float),
-        origin=Origin(block["origin"]),
-        source=block["source"],
+        origin=origin,
+        source=source,
+        error=error,
     )
 
 

@@ -96,6 +96,7 @@ def _inertial(given: Inertial, s: float) -> Inertial:
         mass=given.mass * s**3,
         com=given.com * s,
         inertia=given.inertia * s**5,
+        within=given.within * s,
         origin=_origin(given.origin),
         source=source,
     )

@@ -20,12 +20,17 @@ A density that is off is a mass that is off. A centre of mass that is off by d, 
 
 (Young's inequality). Both sides are bounds, not ends: ε is chosen by the present motion, for which the
 larger one is then reached where :math:`d \perp v`. The lesser is no less than a body that weighs nothing.
+
+Of a body of which only the mass is known and a ball around its centre in which all of it is
+(`seerob.description.description.Inertial.within`), each of its parts is d away from the centre, with
+:math:`|d| \le \delta`: the inequality holds for each, and so for all of them together, without any moment of
+inertia of its own on either side.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -39,6 +44,8 @@ from seerob.twin.state import State
 
 EXACT = 1e-4
 """Relative error of a volume up to which it is told as exact."""
+NOTHING = 1e-9
+"""Share of a mass matrix that is none: what may weigh nothing then still has an inverse."""
 
 
 class MassTolerances:
@@ -59,6 +66,7 @@ class MassTolerances:
                 own = robot.links
                 links = [i for i, name in names.items() if name in own]
                 found += _offs(table.name, links, mass=table.mass_tolerance, com=table.com_tolerance)
+                found += _of_links(robot, {name: i for i, name in names.items()}, table.mass_tolerance or 0.0)
                 if share := table.rotor_tolerance:
                     tolerance = Tolerance(f"rotor_tolerance of {table.name}", 100 * share, "%")
                     found.append(_Off(tolerance, (), share=share, rotors=True))
@@ -74,6 +82,8 @@ class MassTolerances:
         found += _estimates(model, robot)
         self.tolerances = tuple(off.tolerance for off in found)
         self._offs = found
+        self.own = not robot.on and all(_moved_by(model, robot, body) for off in found for body in off.bodies)
+        """Whether all that may be off is moved by the robot's own joints alone."""
         masses = model.mj.body_mass
         # Of M/2 + m_L: links by half, what is mounted in full. A centre of mass changes nothing in it.
         self._simplified = np.array(
@@ -97,7 +107,7 @@ class MassTolerances:
         """Factor on the mass of one of MuJoCo's bodies, and way of its centre of mass [m], at most."""
         offs = [off for off in self._offs if body in off.bodies]
         factor = max(1 + sum(off.share for off in offs), *(off.heavier for off in offs), 1.0)
-        return factor, sum(off.way for off in offs)
+        return factor, sum(off.way_of(body) for off in offs)
 
     def simplified(self, nominal: float, shifts: Shifts) -> float:
         """M/2 + m_L at shifted masses [kg].
@@ -130,17 +140,22 @@ class MassTolerances:
     @property
     def moved(self) -> tuple[str, ...]:
         """Tolerances of centres of mass, in words."""
-        return tuple(str(off.tolerance) for off in self._offs if off.way)
+        return tuple(str(off.tolerance) for off in self._offs if off.ways)
 
-    def matrices(self, state: State) -> Matrices:
+    def matrices(self, state: State, rates: Array | None = None) -> Matrices:
         """Mass matrices of a state, to be asked at shifted masses.
+
+        Args:
+            state: The twin.
+            rates: Of the joints, for which bounds are to be close, shape (n,): those of the motion when not
+                given. They hold for any.
 
         Raises:
             Undecided: Not heard, or a mass that nobody gave.
         """
         M = state.mass_matrix(self.robot)
-        qd = state.qd(self.robot)
-        parts = [off.parts(state, self.robot, qd) for off in self._offs]
+        rates = state.qd(self.robot) if rates is None else rates
+        parts = [off.parts(state, self.robot, rates) for off in self._offs]
         return Matrices(M, parts)
 
 
@@ -151,6 +166,8 @@ class _Bounds(NamedTuple):
     lost_at_most: Array
     """Never more than a body has: another bound, which leaves the matrix one that can be inverted."""
     gained: Array
+    whole: bool
+    """Whether nothing of its bodies may be left of it."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +179,10 @@ class _Off:
     """Of `mujoco`."""
     share: float = 0.0
     """Of their masses."""
-    way: float = 0.0
-    """Of their centres of mass [m]."""
+    ways: tuple[float, ...] = ()
+    """Of the centre of mass of each, or of all its parts [m]; empty where only masses are off."""
+    anyhow: bool = False
+    """Whether it is all their parts that may be so far from the centre, and their inertia is not known."""
     lighter: float = 1.0
     """Least factor on the masses whose centres may be off."""
     heavier: float = 1.0
@@ -171,19 +190,25 @@ class _Off:
     rotors: bool = False
     """Whether it is the share of the rotors' inertias."""
 
+    def way_of(self, body: int) -> float:
+        """How far the mass of one of the bodies may be off [m]."""
+        return self.ways[self.bodies.index(body)] if self.ways else 0.0
+
     def parts(self, state: State, robot: Mechanism, qd: Array) -> _Bounds:
         """What it makes of the mass matrix at its ends."""
         n = len(robot.joints)
         found = [np.zeros((n, n)) for _ in range(3)]
         for body in self.bodies:
             part = _Part.of(state, robot, body)
-            each = part.shifted(self, qd) if self.way else (self.share * part.matrix,) * 3
+            way = self.way_of(body)
+            each = part.shifted(self, way, qd) if self.ways else (self.share * part.matrix,) * 3
             found = [a + b for a, b in zip(found, each, strict=True)]
         if self.rotors:
             spun = state.model.mj.dof_armature[robot.v_address]
             matrix = self.share * robot.coupling.T @ (spun[:, None] * robot.coupling)
             found = [a + matrix for a in found]
-        return _Bounds(*found)
+        lost, at_most, gained = found
+        return _Bounds(lost, at_most, gained, self.anyhow)
 
 
 @dataclass(frozen=True)
@@ -209,22 +234,41 @@ class _Part:
     @property
     def matrix(self) -> Array:
         """Shape (n, n)."""
-        return np.asarray(self.m * self.J_c.T @ self.J_c + self.J_w.T @ self.inertia @ self.J_w)
+        return np.asarray(self.m * self.J_c.T @ self.J_c + self.spun)
 
-    def shifted(self, off: _Off, qd: Array) -> tuple[Array, Array, Array]:
-        """What is lost at most where the centre of mass is off, the same in any case, what is gained."""
-        moved, turned = self.J_c.T @ self.J_c, off.way**2 * self.J_w.T @ self.J_w
+    @property
+    def spun(self) -> Array:
+        """What its own moments of inertia make of the matrix, shape (n, n)."""
+        return np.asarray(self.J_w.T @ self.inertia @ self.J_w)
+
+    def shifted(self, off: _Off, way: float, qd: Array) -> tuple[Array, Array, Array]:
+        """What is lost at most where its mass is off, the same in any case, what is gained."""
+        moved, turned = self.J_c.T @ self.J_c, way**2 * self.J_w.T @ self.J_w
         v, w = (math.sqrt(max(float(qd @ A @ qd), 0.0)) for A in (moved, turned))
         if not (v > 0 and w > 0):
             v, w = (math.sqrt(float(np.trace(A))) for A in (moved, turned))
-        # All that moves a body along may be lost; what turns it stays.
-        all_of_it = off.lighter * self.m * moved
+        # All that moves a body along may be lost; what turns it stays, unless nobody knows how it is spread.
+        own = self.spun if off.anyhow else np.zeros_like(moved)
+        all_of_it = off.lighter * (self.m * moved + own)
         if not (v > 0 and w > 0):
-            return all_of_it, all_of_it, off.heavier * self.m * turned
+            return all_of_it, all_of_it, off.heavier * (self.m * turned - own)
         eps = w / v
-        more = off.heavier * self.m * (eps * moved + (1 + 1 / eps) * turned)
-        less = off.lighter * self.m * (eps * moved + (1 / eps - 1) * turned) if eps < 1 else all_of_it
+        more = off.heavier * (self.m * (eps * moved + (1 + 1 / eps) * turned) - own)
+        less = all_of_it
+        if eps < 1:
+            less = off.lighter * (self.m * (eps * moved + (1 / eps - 1) * turned) + own)
         return less, all_of_it, more
+
+
+def _moved_by(model: Model, robot: Mechanism, body: int) -> bool:
+    """Whether every joint between a body of `mujoco` and the world is one of the robot's."""
+    mj, own = model.mj, set(robot.v_address.tolist())
+    while body > 0:
+        first, count = int(mj.body_dofadr[body]), int(mj.body_dofnum[body])
+        if not own.issuperset(range(first, first + count)):
+            return False
+        body = int(mj.body_parentid[body])
+    return True
 
 
 def _offs(
@@ -245,7 +289,33 @@ def _offs(
         either = (mass or 0.0) + (density or 0.0)
         tolerance = Tolerance(f"com_tolerance of {name}", com, "m")
         lighter, heavier = max(1 - either, 0.0), 1 + either
-        yield _Off(tolerance, tuple(bodies), way=com, lighter=lighter, heavier=heavier)
+        ways = (com,) * len(bodies)
+        yield _Off(tolerance, tuple(bodies), ways=ways, lighter=lighter, heavier=heavier)
+
+
+def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Iterator[_Off]:
+    """What nobody knows of links: by how much their masses are off, and where within their shapes they are.
+
+    Args:
+        robot: Whose.
+        bodies: Of `mujoco`, by full name.
+        either: Share by which the workstation file says that masses may be off, besides.
+    """
+    full = {f"{robot.name}/{link.name}": link.inertial for link in robot.description.links}
+    known = [(bodies[name], of) for name, of in full.items() if of is not None and name in bodies]
+    for share in sorted({of.error for _, of in known if of.error}):
+        off = tuple(body for body, of in known if of.error == share)
+        yield _Off(Tolerance(f"masses of links of {robot.name}", 100 * share, "%"), off, share=share)
+    if anyhow := [(body, of) for body, of in known if of.within]:
+        widest, error = max(of.within for _, of in anyhow), max(of.error for _, of in anyhow) + either
+        yield _Off(
+            Tolerance(f"where masses are in links of {robot.name}", widest, "m"),
+            tuple(body for body, _ in anyhow),
+            ways=tuple(of.within for _, of in anyhow),
+            anyhow=True,
+            lighter=max(1 - error, 0.0),
+            heavier=1 + error,
+        )
 
 
 def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
@@ -267,9 +337,11 @@ class Matrices:
 
     def at(self, shifts: Shifts) -> Array:
         """M at shifted inputs, shape (n, n): no less than it can be with 1, no more with −1."""
+        # Of bodies of which all may be lost as good as nothing is left: that has an inverse, too.
+        share = NOTHING if any(part.whole for part in self.parts) else 0.0
         found = self._at(shifts, 0)
-        if np.linalg.eigvalsh(found)[0] <= 0:
-            found = self._at(shifts, 1)
+        if np.linalg.eigvalsh(found)[0] <= share * np.trace(self.M):
+            found = self._at(shifts, 1) + share * self.M
         return found
 
     def _at(self, shifts: Shifts, bound: int) -> Array:

@@ -345,7 +345,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """Of the mass along u, or of the heaviest direction there is at each end."""
         J_v = state.jacobian(frame, tolerances.robot, offset)[:3]
         # Among rates with uᵀ J q̇ = 1 those of M⁻¹ Jᵀ u have the least energy, which is the effective mass.
-        pushed: Array = np.linalg.solve(state.mass_matrix(tolerances.robot), J_v.T @ u)
+        pushed = np.asarray(np.linalg.solve(state.mass_matrix(tolerances.robot), J_v.T @ u), float)
         matrices = tolerances.matrices(state, pushed)
 
         def at(shifts: Shifts) -> Array:

@@ -25,7 +25,7 @@ def ball():
 
 @pytest.fixture(scope="module")
 def scratch():
-    singles = np.empty(STACK, np.float32), np.empty(16, np.float32), np.empty(8, np.float32)
+    singles = np.empty(STACK, np.float32), np.empty(16, np.float32), np.empty(16, np.float32)
     return np.empty((STACK, 2), np.int32), *singles, np.empty((1, 13)), np.empty(36)
 
 

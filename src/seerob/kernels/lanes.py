@@ -86,66 +86,85 @@ class Lanes:
         return Lanes(self.builder, self.builder.call(function, [one.value for one in given]))
 
 
-def of_rows(m: int, n: int, formula: Callable[[list[Lanes], list[Lanes]], Lanes]) -> Any:
-    """Compiled ``f(rows, i, given, cut, out)`` that writes what a formula gives of row i to ``out``.
+def of_rows(m: int, n: int, formula: Callable[[list[Lanes], list[Lanes]], Lanes], *, rows: int = 1) -> Any:
+    """Compiled ``f(table, i, given, cut, out)`` that writes what a formula gives of row i to ``out``.
 
     Args:
         m: By eight, the numbers of a row.
         n: The numbers given.
         formula: Of the row's numbers by eight, and of the numbers given, each in all lanes.
+        rows: Of two, ``f(table, i, j, given, cut, out)`` does both at once: what a processor waits for in one
+            row, it computes of the other meanwhile.
 
-    It returns the lanes that do not exceed ``cut``, or are no number of single precision, as bits; rounding
-    may add a lane that exceeds it by 1e-6 of it.
-    Its arrays are contiguous and of single precision: ``rows`` of shape (k, 8·m), ``given`` of shape (n,),
-    ``out`` of shape (8,). Nothing checks an index.
+    What is no number of single precision becomes 0, which bounds nothing. It returns the lanes that do not
+    exceed ``cut`` as bits; rounding may add a lane that exceeds it by 1e-6 of it.
+    Its arrays are contiguous and of single precision: ``table`` of shape (k, 8·m), ``given`` of shape (n,),
+    ``out`` of shape (8·rows,). Nothing checks an index.
     """
+    width = WIDTH * rows
+    vector = ir.VectorType(_SINGLE, width)
+    whole = ir.IntType(32)
+    zero = ir.Constant(whole, 0)
+
+    def spread(builder: Any, number: Any) -> Lanes:
+        one = builder.insert_element(ir.Constant(vector, ir.Undefined), number, zero)
+        everywhere = ir.Constant(ir.VectorType(whole, width), [0] * width)
+        return Lanes(builder, builder.shuffle_vector(one, one, everywhere))
+
+    def written(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        start = [
+            context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
+            for kind, value in zip(kinds, values, strict=True)
+        ]
+        table, *indices, given, cut, out = start
+
+        def at(base: Any, k: int) -> Any:
+            return builder.gep(base, [context.get_constant(types.intp, k)])
+
+        read = []
+        for index, kind in zip(indices, kinds[1:], strict=False):
+            i = builder.mul(
+                context.cast(builder, index, kind, types.intp), context.get_constant(types.intp, WIDTH * m)
+            )
+            row = builder.gep(table, [i])
+            read.append(
+                [
+                    builder.load(builder.bitcast(at(row, WIDTH * k), _VECTOR.as_pointer()), align=4)
+                    for k in range(m)
+                ]
+            )
+        every = ir.Constant(ir.VectorType(whole, width), [*range(width)])
+        lanes = [
+            Lanes(builder, each[0] if rows == 1 else builder.shuffle_vector(*each, every))
+            for each in zip(*read, strict=True)
+        ]
+        scalars = [spread(builder, builder.load(at(given, k))) for k in range(n)]
+        result = formula(lanes, scalars)
+        nothing = ir.Constant(vector, [0.0] * width)
+        told = builder.fcmp_ordered("<", result.value, ir.Constant(vector, [HUGE] * width))
+        result = Lanes(builder, builder.select(told, result.value, nothing))
+        builder.store(result.value, builder.bitcast(out, vector.as_pointer()), align=4)
+        above = builder.fmul(cut, ir.Constant(cut.type, 1.0 + 1e-6))
+        limit = spread(builder, builder.fptrunc(above, _SINGLE))
+        hits = builder.fcmp_ordered("<=", result.value, limit.value)
+        return builder.zext(builder.bitcast(hits, ir.IntType(width)), ir.IntType(64))
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return written(context, builder, signature.args, values)
+
+    if rows == 1:
+
+        @intrinsic
+        def of_one(_typing: Any, table: Any, i: Any, given: Any, cut: Any, out: Any) -> Any:
+            return types.int64(table, i, given, types.float64, out), generate
+
+        return of_one
 
     @intrinsic
-    def written(_typing: Any, rows: Any, i: Any, given: Any, cut: Any, out: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            start = [
-                context.make_array(kind)(context, builder, value).data
-                if isinstance(kind, types.Array)
-                else value
-                for kind, value in zip(signature.args, values, strict=True)
-            ]
-            index = context.cast(builder, start[1], signature.args[1], types.intp)
+    def of_two(_typing: Any, table: Any, i: Any, j: Any, given: Any, cut: Any, out: Any) -> Any:
+        return types.int64(table, i, j, given, types.float64, out), generate
 
-            def at(base: Any, k: int) -> Any:
-                return builder.gep(base, [context.get_constant(types.intp, k)])
-
-            row = builder.gep(start[0], [builder.mul(index, context.get_constant(types.intp, WIDTH * m))])
-            lanes = [
-                Lanes(
-                    builder, builder.load(builder.bitcast(at(row, WIDTH * k), _VECTOR.as_pointer()), align=4)
-                )
-                for k in range(m)
-            ]
-            scalars = []
-            zero = ir.Constant(ir.IntType(32), 0)
-            everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-            for k in range(n):
-                one = builder.insert_element(
-                    ir.Constant(_VECTOR, ir.Undefined), builder.load(at(start[2], k)), zero
-                )
-                scalars.append(Lanes(builder, builder.shuffle_vector(one, one, everywhere)))
-            result = formula(lanes, scalars)
-            builder.store(result.value, builder.bitcast(start[4], _VECTOR.as_pointer()), align=4)
-            above = builder.fmul(start[3], ir.Constant(start[3].type, 1.0 + 1e-6))
-            above = builder.insert_element(
-                ir.Constant(_VECTOR, ir.Undefined), builder.fptrunc(above, _SINGLE), zero
-            )
-            limit = Lanes(builder, builder.shuffle_vector(above, above, everywhere))
-            hits = builder.or_(
-                builder.fcmp_unordered("<=", result.value, limit.value),
-                builder.fcmp_unordered(">=", result.value, ir.Constant(_VECTOR, [HUGE] * WIDTH)),
-            )
-            bits = builder.zext(builder.bitcast(hits, ir.IntType(WIDTH)), ir.IntType(64))
-            return bits
-
-        return types.int64(rows, i, given, types.float64, out), generate
-
-    return written
+    return of_two
 
 
 @intrinsic
@@ -158,3 +177,26 @@ def _first_lane(_typing: Any, hits: Any) -> Any:
 
 first_lane: Any = _first_lane
 """The lowest bit that is set; of one bit at least."""
+
+
+def asked_soon(m: int) -> Any:
+    """Compiled ``f(table, i)`` that asks memory for row i of `of_rows` ahead of when it is looked at."""
+
+    @intrinsic
+    def asked(_typing: Any, table: Any, i: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            base = context.make_array(signature.args[0])(context, builder, values[0]).data
+            index = context.cast(builder, values[1], signature.args[1], types.intp)
+            row = builder.mul(index, context.get_constant(types.intp, WIDTH * m))
+            byte, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+            kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+            prefetch: Any = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")  # type: ignore[no-untyped-call]
+            to_read, keep, data = (ir.Constant(number, k) for k in (0, 3, 1))
+            for k in range(0, WIDTH * m, 16):  # lines of 64 bytes
+                line = builder.gep(base, [builder.add(row, context.get_constant(types.intp, k))])
+                builder.call(prefetch, [builder.bitcast(line, byte), to_read, keep, data])
+            return context.get_dummy_value()
+
+        return types.void(table, i), generate
+
+    return asked

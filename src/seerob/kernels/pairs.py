@@ -98,7 +98,7 @@ def scratch() -> Scratch:
     """Room for one search at a time."""
     return Scratch(
         np.empty((STACK, 2), np.int32), np.empty(STACK, np.float32), np.empty(16, np.float32),
-        np.empty(WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty(36),
+        np.empty(2 * WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty(36),
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from seerob.core.files.whole_file import whole_file
 from seerob.kernels.tree import build_tree, component_of
 from seerob.kernels.wide import widen
 
-VERSION = b"seerob tree 2"
+VERSION = b"seerob tree 3"
 """Changes whenever `build_tree`, `widen` or the layout does."""
 
 

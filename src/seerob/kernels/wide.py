@@ -26,19 +26,52 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.boxes import fit_box
-from seerob.kernels.lanes import HUGE, WIDTH, Lanes, first_lane, of_rows
+from seerob.kernels.lanes import WIDTH, Lanes, asked_soon, first_lane, of_rows
 from seerob.kernels.primitives import index, on_edges, segment_triangle, triangles
 from seerob.kernels.search import cut_of, row_in
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
+Shares = NDArray[np.int8]
 
 ROWS = 15
+_soon = asked_soon(ROWS)
 NONE = 2**31 - 1
 STACK = 1100
-"""Entries that no search exceeds: seven for each of the 72 levels of two trees, and eight more."""
+"""Entries that no search exceeds: of pairs seven for each of the 72 levels of two trees, and eight more; of
+nodes two at a time fourteen for each of 72 levels, and sixteen more."""
 DOWN = 1.0 - 1e-5
 """Rounds squares down by more than single precision rounds them up."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _shares(nodes: Array, links: Links) -> Shares:
+    """Of up to 8 places in a wide node, how many the left child of each node takes; 0 where that takes one.
+
+    The least area of all wide nodes, which is about how often one is looked at, from the leaves up: a node is
+    a wide node of its own in one place, or its children share the places. Shape (k, 8), by places less one.
+    """
+    cost = np.zeros((len(nodes), WIDTH), np.float32)
+    share = np.zeros((len(nodes), WIDTH), np.int8)
+    for i in range(len(nodes) - 1, -1, -1):  # children come after their parent
+        x, y, z = nodes[i, 3], nodes[i, 4], nodes[i, 5]
+        area = x * y + y * z + z * x
+        if links[i, 1] > 0:
+            cost[i, : links[i, 1] - 1] = area
+            continue
+        left, right = i + 1, links[i, 0]
+        for n in range(2, WIDTH + 1):
+            for k in range(1, n):
+                both = cost[left, k - 1] + cost[right, n - k - 1]
+                if k == 1 or both < cost[i, n - 1]:
+                    cost[i, n - 1] = both
+                    share[i, n - 1] = k
+        cost[i, 0] = area + cost[i, WIDTH - 1]
+        for n in range(2, WIDTH):
+            if cost[i, 0] < cost[i, n - 1]:
+                cost[i, n - 1] = cost[i, 0]
+                share[i, n - 1] = 0
+    return share
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -52,10 +85,9 @@ def widen(nodes: Array, links: Links, T: Array) -> tuple[Boxes, Links]:
     grow *= 1e-6
     box = np.empty(20)
     every = np.arange(len(T))
-    count = np.empty(len(nodes), np.int64)  # triangles under a node; children come after their parent
-    for i in range(len(nodes) - 1, -1, -1):
-        count[i] = links[i, 1] if links[i, 1] > 0 else count[i + 1] + count[links[i, 0]]
+    share = _shares(nodes, links)
     ref = np.empty(WIDTH, np.int64)  # nodes of the given tree, or triangles as ~k
+    room = np.empty((WIDTH + 1, 2), np.int64)  # nodes that become children, and in how many places
     stack = np.empty((8 * 80, 2), np.int64)
     stack[0, 0] = stack[0, 1] = 0
     depth = 1
@@ -63,33 +95,30 @@ def widen(nodes: Array, links: Links, T: Array) -> tuple[Boxes, Links]:
     while depth > 0:
         depth -= 1
         w = stack[depth, 0]
-        ref[0] = stack[depth, 1]
-        n = 1
-        few = count[ref[0]] <= WIDTH
-        while w > 0:
-            # The largest box becomes its parts as long as there is room; what fits a node is left for one.
-            widest = -1.0
-            chosen = -1
-            for k in range(n):
-                i = ref[k]
-                if i >= 0 and n - 1 + max(links[i, 1], 2) <= WIDTH and (count[i] > WIDTH or few):
-                    x, y, z = nodes[i, 3], nodes[i, 4], nodes[i, 5]
-                    if x * y + y * z + z * x > widest:
-                        widest = x * y + y * z + z * x
-                        chosen = k
-            if chosen < 0:
-                break
-            i = ref[chosen]
-            n -= 1
-            ref[chosen] = ref[n]
-            if links[i, 1] > 0:
+        top = stack[depth, 1]
+        room[0, 0] = top
+        room[0, 1] = WIDTH if w > 0 else 1
+        left = 1
+        n = 0
+        while left > 0:
+            left -= 1
+            i = room[left, 0]
+            places = room[left, 1]
+            if links[i, 1] > 0 and links[i, 1] <= places:
                 for q in range(links[i, 1]):
                     ref[n] = ~(links[i, 0] + q)
                     n += 1
-            else:
-                ref[n] = i + 1
-                ref[n + 1] = links[i, 0]
-                n += 2
+                continue
+            first = share[i, places - 1] if places > 1 else 0
+            if first == 0:
+                ref[n] = i
+                n += 1
+                continue
+            room[left, 0] = links[i, 0]
+            room[left, 1] = places - first
+            room[left + 1, 0] = i + 1
+            room[left + 1, 1] = first
+            left += 2
         for k in range(n):
             i = ref[k]
             if i >= 0:
@@ -124,7 +153,7 @@ def _to_segment_formula(w: list[Lanes], given: list[Lanes]) -> Lanes:
     """Lower bounds of the squared distances of ``a + s·d`` to the boxes of a node: axes, centre direction."""
     ax, ay, az, dx, dy, dz, over, slack = given
     x, y, z = ax - w[0], ay - w[1], az - w[2]
-    t = ((x * dx).plus_product(y, dy).plus_product(z, dz) * over * -1.0).at_least(0.0).at_most(1.0)
+    t = ((x * dx).plus_product(y, dy).plus_product(z, dz) * over).at_least(0.0).at_most(1.0)
     # From the centre to about the nearest point of the segment.
     rx, ry, rz = x.plus_product(t, dx), y.plus_product(t, dy), z.plus_product(t, dz)
     mx, my, mz = x + dx * 0.5, y + dy * 0.5, z + dz * 0.5
@@ -146,6 +175,7 @@ def _to_segment_formula(w: list[Lanes], given: list[Lanes]) -> Lanes:
 
 
 _to_segment = of_rows(ROWS, 8, _to_segment_formula)
+_two_to_segment = of_rows(ROWS, 8, _to_segment_formula, rows=2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -181,7 +211,7 @@ def nearest_to_segment(
         stack: Scratch, shape (`STACK`,).
         bounds: Scratch, shape (`STACK`,).
         given: Scratch, shape (16,).
-        low: Scratch, shape (8,).
+        low: Scratch, shape (16,).
         W: Receives the points on mesh and segment, shape (6,).
 
     Returns:
@@ -196,7 +226,7 @@ def nearest_to_segment(
     coarse = (1e-8 * size) ** 2
     dd = dx * dx + dy * dy + dz * dz
     given[0], given[1], given[2], given[3], given[4], given[5] = ax, ay, az, dx, dy, dz
-    given[6] = 1.0 / dd if dd > 1e-30 else 0.0
+    given[6] = -1.0 / dd if dd > 1e-30 else 0.0
     given[7] = 2e-6 * size
     k = first
     stack[0] = kids[root, 0]
@@ -212,17 +242,26 @@ def nearest_to_segment(
                 continue
             i = stack[depth]
             if i >= 0:
-                hits = _to_segment(boxes, i, given, cut, low)
+                # The next on the stack is nearly always looked at, too: both at once take little longer.
+                while depth > 0 and bounds[depth - 1] > cut:
+                    depth -= 1
+                j = i
+                if depth > 0 and stack[depth - 1] >= 0:
+                    depth -= 1
+                    j = stack[depth]
+                    hits = _two_to_segment(boxes, i, j, given, cut, low)
+                else:
+                    hits = _to_segment(boxes, i, given, cut, low)
                 base = depth
                 while hits:
                     c = first_lane(hits)
                     hits &= hits - 1
-                    kid = kids[i, c]
+                    kid = kids[i, c] if c < WIDTH else kids[j, c - WIDTH]
                     if kid == NONE:
-                        break
-                    bound = low[c] if low[c] < HUGE else np.float32(0.0)
-                    if bound > cut:
                         continue
+                    if kid >= 0:
+                        _soon(boxes, kid)
+                    bound = low[c]
                     at = depth
                     while at > base and bounds[at - 1] < bound:
                         bounds[at] = bounds[at - 1]
@@ -416,9 +455,7 @@ def nearest_of_meshes(
                     hits &= hits - 1
                     if kids[i, c] == NONE:
                         break
-                    bound = low[c] if low[c] < HUGE else np.float32(0.0)
-                    if bound > cut:
-                        continue
+                    bound = low[c]
                     at = depth
                     while at > base and bounds[at - 1] < bound:
                         bounds[at] = bounds[at - 1]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import seerob as sr
+from seerob.core.errors import Undecided
 from seerob.core.samples import BodySample
 from seerob.core.snapshot import Tracking
 from seerob.core.transforms import rotation_from_wxyz
@@ -19,6 +20,7 @@ from seerob.devices.live.listening import delay_of
 from seerob.devices.sources.headset import frame, layout_of
 from seerob.protocols.tracking.vive import WORLD_FROM_XR
 from seerob.session import run as road
+from seerob.twin.accuracy.tracking_error import TrackingError
 
 HZ, TICKS, BEGINS = 72.0, 125, 0.5
 POINTS = ("viewer", "left-grip", "right-grip")
@@ -26,6 +28,8 @@ BEFORE = np.array([[0, 1.64, 0], [-0.25, 1.1, -0.3], [0.25, 1.1, -0.3]])
 BY = np.array([[0.12, -0.04, -0.05], [0, 0, 0], [0.15, -0.1, -0.1]])
 """A step aside, and the right hand further ahead and down besides [m]."""
 LASTS = 0.4
+STARTS = 1 / 6
+"""So long whoever leapt gets faster [s]."""
 FOLLOWS, WITHIN = 0.010, 0.100
 CELL = """
 title = "A visitor at a table"
@@ -44,8 +48,6 @@ kind = "headset"
 human = "anna"
 timeout = 2
 hold = 2
-[[contacts]]
-between = ["anna", "table"]
 [[safety]]
 kind = "minimum_distance"
 between = ["anna", "table"]
@@ -56,6 +58,17 @@ def reaching(t):
     """Where the wearer is at ``t`` [s], who reaches as smoothly as can be; y up [m], (3, 3)."""
     s = np.clip((t - BEGINS) / LASTS, 0, 1)
     return BEFORE + BY * s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def leaping(size, speed=0.0):
+    """Of whoever is put elsewhere within a picture, to the rear, and goes ahead from there [m, m/s]."""
+
+    def way(t):
+        s = max(t - BEGINS, 0.0)
+        goes = speed * (s**2 / (2 * STARTS) if s < STARTS else s - STARTS / 2)
+        return BEFORE + [0, 0, size * (t >= BEGINS) - goes]
+
+    return way
 
 
 @pytest.fixture(scope="module", name="station")
@@ -90,17 +103,25 @@ def played(station, way):
     engine, judge = road.engine_of(station.model), road.Judge(station.bound, ())
     rows = {body.name: row for row, body in enumerate(station.model.bodies)}
     bones = [rows["anna/head"], rows["anna/right_hand"]]
-    shown, reasons = [], set()
+    seen = tuple(rows[f"anna/{bone}"] for bone in ("head", "left_hand", "right_hand"))
+    error = TrackingError(station.model, bones)
+    shown, reasons, offs, speeds = [], set(), [], []
     for snapshot, _ in road.ticks(engine, judge, feed()):
         shown.append(np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7).astype(float)[bones])
         reasons.add(engine.state.invalid_source_reason("anna"))
+        try:
+            offs.append(error.at(engine.state))
+            speeds.append(engine.state.fastest_speeds(seen, allow_estimated=True).min())
+        except Undecided:
+            offs, speeds = offs[: len(shown) - 1] + [[np.nan] * 2], [*speeds, np.nan]
     t = 0.01 * np.arange(TICKS) + delay
     at, R = np.array(shown)[..., :3], rotation_from_wxyz(np.array(shown)[..., 3:])
     rests = np.searchsorted(t, BEGINS - 0.05)
     held = np.einsum("nji,nj->ni", R[rests], wearer(way, t[rests]) - at[rests])
     return SimpleNamespace(
-        t=t, at=at + np.einsum("tnij,nj->tni", R, held), delay=delay, reasons=reasons - {""}
-    )
+        t=t, at=at + np.einsum("tnij,nj->tni", R, held), delay=delay, reasons=reasons - {""},
+        error=np.array(offs), speed=np.array(speeds),
+    )  # fmt: skip
 
 
 def wearer(way, t):
@@ -124,3 +145,27 @@ def test_head_and_hand_are_where_the_wearer_was_less_than_a_tenth_of_a_second_ag
     assert off(found, reaching, WITHIN)[seen].max() < FOLLOWS
     assert off(found, reaching, WITHIN / 2)[seen].max() < FOLLOWS / 2
     assert off(found, reaching, 0.0)[found.t > BEGINS + LASTS].max() < FOLLOWS
+
+
+def test_who_leaps_is_undecided_until_the_twin_is_there_and_no_slower_than_seen(station):
+    """On its way a twin is where nobody is, and as fast as nobody is: that is UNDECIDED, or in the bound."""
+    way = leaping(0.15, speed=3.0)
+    found = played(station, way)
+    decided, after = np.isfinite(found.speed), found.t > BEGINS
+    assert any("faster than a person can" in reason for reason in found.reasons)
+    away = np.linalg.norm(found.at - [wearer(way, t) for t in found.t - found.delay], axis=-1)
+    assert away[after & ~decided].max() > 0.1
+    known = decided & (found.t > BEGINS + STARTS + found.delay)
+    assert known.any()
+    assert (away[known] <= found.error[known] + FOLLOWS / 5).all()
+    assert found.speed[known].min() > 3.0 - 0.1
+
+
+def test_who_is_five_metres_away_within_a_picture_is_undecided_and_never_fast(station):
+    found = played(station, leaping(5.0))
+    decided, after = np.isfinite(found.speed), found.t > BEGINS
+    assert decided[-1]
+    assert not decided[after][:20].any()
+    assert any("jumped" in reason for reason in found.reasons)
+    assert found.speed[decided & after].max() < 0.2
+    assert off(found, leaping(5.0), 0.0)[decided & after].max() < FOLLOWS

@@ -68,8 +68,8 @@ NEAR = 2e-3
 speed is off by 0.09 rad/s or m/s for a moment, as much as that of a robot that brakes at 3 rad/s² and was not
 heard for 30 ms. Ordinary jitter stays below."""
 LAGS = 0.2
-"""Share of the tracking limit by which the twin of a person whom things may touch is off where one did: what
-touched it between two ticks is not told. Own choice."""
+"""Share of the tracking limit from which on speeds of a person are also those that were captured: something
+touched the twin between two ticks, which is not told, or it is still on its way there. Own choice."""
 FAULTS = (mujoco.FatalError, mujoco.UnexpectedError)
 """How MuJoCo gives up."""
 POSE_TOLERANCE = 1e-4
@@ -781,10 +781,10 @@ class Engine:
         """
         hearing.captured, hearing.captured_v = self._led[person.name]
         limit = self.model.workstation.engine.human_tracking_limit
-        if (touches := self.state.touches) is not None:
+        hearing.held = hearing.error > LAGS * limit
+        if (touches := self.state.touches) and not hearing.held:
             own = {self.model.bodies[i].mj for i in (*person.bodies, *person.carried)}
-            touched = any((one in own) != (other in own) for one, other, _ in touches)
-            hearing.held = touched or hearing.error > LAGS * limit
+            hearing.held = any((one in own) != (other in own) for one, other, _ in touches)
         if hearing.error > limit:
             following = self._followings.get(person.name)
             hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}

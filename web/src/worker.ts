@@ -16,7 +16,7 @@ const POINTS_EVERY_MS = 80;
 /** A live run that says nothing for so long is not trusted any more; a slow one, for three of its ticks. */
 const SILENCE_MS = 300;
 const LISTEN_EVERY_MS = 50;
-/** Snapshots that are acknowledged together: a fifth of what may be on its way. */
+/** Snapshots that are acknowledged together: an eighth of what may be on its way. */
 const ACKNOWLEDGED = 4;
 
 let socket: Socket | null = null;

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-WINDOW = 20
+WINDOW = 32
 """Frames in flight at most."""
 TOGETHER = 4
 """Messages that are written at once at most."""

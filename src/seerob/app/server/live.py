@@ -168,6 +168,11 @@ TELL_EVERY = 1.0
 """How often pages are told the shares of a run that goes on [s]; a verdict that changes, at once."""
 
 
+RATE = 100.0
+"""Snapshots that a page is sent a second: a picture that shows each tick of an ordinary run shows none that is
+older than a tick."""
+AFTER, LATE = 5e-4, 2e-3
+"""So long after a tick is expected its snapshot is looked for, and so often while it is late [s]."""
 OLD = 0.25
 """A snapshot that waited longer before it could be shown, or was computed across such a pause of the whole
 process, is not the present any more [s]: it goes into the history only."""
@@ -186,10 +191,12 @@ class Live:
     mode = "live"
     duration = None
 
-    def __init__(self, *, rate: float = 60.0) -> None:
+    def __init__(self, *, rate: float = RATE) -> None:
         self._pause = 1.0 / rate
         self._inbox: deque[tuple[Snapshot, float]] = deque(maxlen=WAITING)
         self._published: tuple[float, float] | None = None
+        self._every = inf
+        """Run time from the last snapshot but one to the last [s]."""
         self._slow = 0.0
         self._past = Past()
         self._seen = _Seen()
@@ -207,6 +214,7 @@ class Live:
             pause = now - self._published[1] - max(snapshot.t - self._published[0], 0.0)
             # One that always takes about so long is slow, not interrupted.
             interrupted, self._slow = pause > max(OLD, 2 * self._slow), pause
+            self._every = snapshot.t - self._published[0]
         self._published = snapshot.t, now
         self._inbox.append((snapshot, -inf if interrupted else now))
 
@@ -265,7 +273,19 @@ class Live:
                 if last is not None:
                     audience.show(last)
                 said_finished = True
-            await asyncio.sleep(self._pause)
+            await asyncio.sleep(self._next_look())
+
+    def _next_look(self) -> float:
+        """How long until the next snapshot is likely to be there [s].
+
+        Whoever looks soon after each tick shows it young, and mostly while the run waits for its next one.
+        """
+        if self._published is None:
+            return self._pause
+        wait = self._published[1] + max(self._every, self._pause) + AFTER - monotonic()
+        if wait > 0.0:
+            return min(wait, 2 * self._pause)
+        return min(LATE, self._pause) if wait > -self._pause else 2 * self._pause
 
 
 class Shown(Closing):

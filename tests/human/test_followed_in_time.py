@@ -66,7 +66,7 @@ def leaping(size, speed=0.0):
     def way(t):
         s = max(t - BEGINS, 0.0)
         goes = speed * (s**2 / (2 * STARTS) if s < STARTS else s - STARTS / 2)
-        return BEFORE + [0, 0, size * (t >= BEGINS) - goes]
+        return BEFORE + np.array([0, 0, size * (t >= BEGINS) - goes])
 
     return way
 
@@ -110,10 +110,11 @@ def played(station, way):
         shown.append(np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7).astype(float)[bones])
         reasons.add(engine.state.invalid_source_reason("anna"))
         try:
-            offs.append(error.at(engine.state))
-            speeds.append(engine.state.fastest_speeds(seen, allow_estimated=True).min())
+            far, speed = error.at(engine.state), engine.state.fastest_speeds(seen, allow_estimated=True).min()
         except Undecided:
-            offs, speeds = offs[: len(shown) - 1] + [[np.nan] * 2], [*speeds, np.nan]
+            far, speed = np.full(2, np.nan), np.nan
+        offs.append(far)
+        speeds.append(speed)
     t = 0.01 * np.arange(TICKS) + delay
     at, R = np.array(shown)[..., :3], rotation_from_wxyz(np.array(shown)[..., 3:])
     rests = np.searchsorted(t, BEGINS - 0.05)
@@ -159,13 +160,3 @@ def test_who_leaps_is_undecided_until_the_twin_is_there_and_no_slower_than_seen(
     assert known.any()
     assert (away[known] <= found.error[known] + FOLLOWS / 5).all()
     assert found.speed[known].min() > 3.0 - 0.1
-
-
-def test_who_is_five_metres_away_within_a_picture_is_undecided_and_never_fast(station):
-    found = played(station, leaping(5.0))
-    decided, after = np.isfinite(found.speed), found.t > BEGINS
-    assert decided[-1]
-    assert not decided[after][:20].any()
-    assert any("jumped" in reason for reason in found.reasons)
-    assert found.speed[decided & after].max() < 0.2
-    assert off(found, leaping(5.0), 0.0)[decided & after].max() < FOLLOWS

@@ -3,7 +3,7 @@
 ``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER] [--further N]`` prints one line
 of JSON with the address and when run time is zero by the machine's clock [s since 1970] (with ``--tls`` those
 of each role, by an authority that is made in the folder), then obeys lines on standard input (``freeze``,
-``go``, ``finish``, ``stop``, ``start``, ``snapshot T``) and ends with it. Each answers with a line of JSON.
+``go``, ``finish``, ``stop``, ``start``, ``told``, ``snapshot T``) and ends with it. Each answers with a line of JSON.
 Everything is a function of run time: `snapshot`.
 """
 
@@ -13,9 +13,11 @@ import argparse
 import base64
 import hashlib
 import json
+import math
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,6 +29,7 @@ from made_up_cell import PERIOD, snapshot, workstation
 
 from seerob.app.server import certificates
 from seerob.app.server.access import Tokens
+from seerob.app.server.feed import Audience
 from seerob.app.server.live import Live
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
@@ -63,6 +66,29 @@ def _pin(certificate: Path) -> str:
     key = x509.load_pem_x509_certificate(certificate.read_bytes()).public_key()
     der = key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
     return base64.b64encode(hashlib.sha256(der).digest()).decode()
+
+
+class Timed(Live):
+    """A live run that knows how old each snapshot was when pages were offered it [s]."""
+
+    def __init__(self, begun: float) -> None:
+        super().__init__()
+        self._begun = begun
+        self.ages: deque[float] = deque(maxlen=1000)
+
+    async def run(self, audience: Audience) -> None:
+        """As any live run."""
+        ages, begun = self.ages, self._begun
+
+        class Noting:
+            def show(self, snapshot: Snapshot, until: float = math.inf) -> None:
+                ages.append(time.monotonic() - begun - snapshot.t)
+                audience.show(snapshot, until)
+
+            def __getattr__(self, name: str) -> object:
+                return getattr(audience, name)
+
+        await super().run(Noting())  # type: ignore[arg-type]
 
 
 def _publish(live: Live, frozen: threading.Event, over: threading.Event, begun: float, further: int) -> None:
@@ -112,7 +138,8 @@ def main() -> None:
     scene, meshes = workstation(options.further)
     frozen, over = threading.Event(), threading.Event()
     recording = Remembered(scene, options.seconds) if options.mode == "replay" else None
-    live = Live()
+    begun, began = time.monotonic(), time.time()
+    live = Timed(begun)
     live.log = ResultLog(scene.criteria)
 
     def open_server(port: int) -> Server:
@@ -123,7 +150,6 @@ def main() -> None:
         _say(url=server.start(), port=server.port, urls=server.urls, pin=pin, begun=began)
         return server
 
-    begun, began = time.monotonic(), time.time()
     server = open_server(options.port)
     publisher = threading.Thread(
         target=_publish, args=(live, frozen, over, begun, options.further), daemon=True
@@ -144,6 +170,10 @@ def main() -> None:
                 live.finish()
             case "stop":
                 server.stop()
+            case "told":
+                each = [(client.sent, client.skipped) for client in server.hub.clients]
+                _say(ages=list(live.ages), clients=each)
+                continue
             case "start":
                 server = open_server(server.port)
                 continue

@@ -169,8 +169,7 @@ TELL_EVERY = 1.0
 
 
 RATE = 100.0
-"""Snapshots that a page is sent a second: a picture that shows each tick of an ordinary run shows none that is
-older than a tick."""
+"""Snapshots that a page is sent a second: each tick of an ordinary run."""
 AFTER, LATE = 5e-4, 2e-3
 """So long after a tick is expected its snapshot is looked for, and so often while it is late [s]."""
 OLD = 0.25

@@ -3,8 +3,8 @@
 ``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER] [--further N]`` prints one line
 of JSON with the address and when run time is zero by the machine's clock [s since 1970] (with ``--tls`` those
 of each role, by an authority that is made in the folder), then obeys lines on standard input (``freeze``,
-``go``, ``finish``, ``stop``, ``start``, ``told``, ``snapshot T``) and ends with it. Each answers with a line of
-JSON.
+``go``, ``finish``, ``stop``, ``start``, ``told``, ``snapshot T``) and ends with it. Each answers with a line
+of JSON.
 Everything is a function of run time: `snapshot`.
 """
 

@@ -368,6 +368,42 @@ def test_line_ends_and_forms_of_toml_stay_as_they_are(tmp_path):
         changed(b"a = 1\r\nb = 2\n", [Change(kind="set", path=("a",), value=2)], "")
 
 
+def test_the_first_waypoint_comes_with_its_source_and_what_it_lacks_is_said_of_its_key(tmp_path):
+    file = tmp_path / "workstation.toml"
+    raw = b'title = "Taught"\n[[robots]]\nname = "ur5e"\nmodel = "library:ur5e"\n'
+    file.write_bytes(raw)
+
+    def told(draft):
+        return compiled(tmp_path, NOTHING, quiet=True, raw=draft).scene()
+
+    (hand,) = told(raw).taught
+    assert (hand.robot, hand.source, hand.points) == ("ur5e", None, 0)
+    point = {"name": "home", "q_deg": [0, -80, 90, -100, -90, 0], "pause": 1}
+    source = {"kind": "waypoints", "robot": "ur5e", "joint_jerk": 20, "points": [point]}
+    wanting, _ = changed(raw, [Change(kind="add", path=("sources",), value=source)], "")
+    with pytest.raises(InputError) as refused:
+        told(wanting)
+    assert {p.key for p in refused.value.problems} == {
+        "sources[0].joint_speed",
+        "sources[0].joint_acceleration",
+    }
+    figures = [
+        Change(kind="set", path=("sources", 0, key), value=1.0)
+        for key in ("joint_speed", "joint_acceleration")
+    ]
+    far = {"move": "joint", "at": {"position": [9, 0, 0], "rpy_deg": [0, 0, 0]}}
+    add = Change(kind="add", path=("sources", 0, "points"), value=point | {"q_deg": [0] * 6})
+    made, _ = changed(wanting, [*figures, add], "")
+    assert made.startswith(raw)
+    assert made.count(b"\n\n[[sources.points]]\n") == 2
+    (hand,) = told(made).taught
+    assert (hand.source, hand.points) == (0, 2)
+    beyond, _ = changed(made, [Change(kind="add", path=("sources", 0, "points"), value=far)], "")
+    with pytest.raises(InputError) as refused:
+        told(beyond)
+    assert [p.key for p in refused.value.problems] == ["sources[0].points[2]"]
+
+
 def _saved(page, file):
     while True:  # what the other page did is on its way
         answer = page.edit(action="save")

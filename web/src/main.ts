@@ -3,6 +3,7 @@
 import "uplot/dist/uPlot.min.css";
 import "./look/index.css";
 import { h, render } from "preact";
+import { Matrix4 } from "three";
 import { connectCompany, others, ownDevice, ownHuman } from "./company";
 import { Connection } from "./connection";
 import { connectDoing } from "./doing";
@@ -11,6 +12,7 @@ import { listenToKeys } from "./keyboard";
 import { now, selectedNodes } from "./page_state";
 import { App } from "./panels/App";
 import { type Actions, ActionsContext } from "./panels/app_context";
+import { placeIn, whereIs } from "./scene/carried";
 import { OwnPresence } from "./scene/own_presence";
 import { Viewer } from "./scene/viewer";
 import { TimeControl } from "./time_control";
@@ -40,6 +42,8 @@ declare global {
       occludes(name: string): boolean;
       /** Where a point of the world (z up) [m] is on the screen [px]. */
       project(point: [number, number, number]): [number, number];
+      /** What is written in the room. */
+      readonly written: string[];
       /** Whether the pointer is on a handle of what is edited, or drags one. */
       readonly held: boolean;
       /** Where a point of a visitor's room [m] is in three.js's own world, y up; null without a visit. */
@@ -102,6 +106,10 @@ function begin(element: HTMLElement): void {
   actions.goTo = (view) => viewer.viewpoint.stand(view);
   actions.picture = () => viewer.stage.picture();
   actions.film = () => film(viewer.stage);
+  actions.toolPoint = ({ base, tip }) => {
+    const point = new Matrix4();
+    return whereIs(tip, viewer.bodies, point) ? placeIn(base, viewer.bodies, point) : null;
+  };
   viewer.stage.run((time, frame) => {
     connection.tick(time);
     viewer.tick(time);
@@ -120,6 +128,9 @@ function begin(element: HTMLElement): void {
     doubted: (name) => viewer.bodies.byName.get(name)?.doubted ?? false,
     occludes: (name) => viewer.bodies.byName.get(name)?.occludes ?? false,
     project: (point) => viewer.project(point),
+    get written() {
+      return viewer.markers.texts;
+    },
     get held() {
       return viewer.gizmo.held;
     },
@@ -148,6 +159,7 @@ const actions: Actions = {
   goTo: () => {},
   picture: () => Promise.reject(new Error("there is no room yet")),
   film: () => Promise.resolve(null),
+  toolPoint: () => null,
   frameSelection: () => {},
 };
 listenToKeys(actions);

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "2e351f72df24e9a2";
+export const SCHEMA = "18c2a812f85ee360";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -474,10 +474,13 @@ export interface Place {
   board: string;
 }
 
-/** A source to which waypoints can be added by hand: the tool point that they are of, and their frame. */
+/** A robot to which waypoints can be given by hand: the tool point that they are of, and their frame. */
 export interface Taught {
-  /** Its number among `sources` of the workstation file. */
-  source: number;
+  /**
+   * Number of the source that has them among `sources` of the workstation file; None while nobody drives
+   * the robot, so that it can have one.
+   */
+  source: number | null;
   robot: string;
   /** The tool point. */
   tip: Place;

@@ -177,6 +177,35 @@ test("what is dragged by a handle is where it was put, in steps, and undo gives 
   assert.equal(saved(), begun);
 });
 
+test("the first waypoint of a robot brings its source, whose figures nobody assumes; the next is a place", async () => {
+  const begun = saved();
+  const added = page.locator(".adding");
+  const next = async (key) => {
+    await page.getByLabel("Add", { exact: true }).selectOption("waypoints");
+    await added.locator(`[data-field="${key}"]`).waitFor();
+  };
+  await next("q_deg");
+  await page.getByRole("button", { name: "Add", exact: true }).click();
+  await added.locator('[data-field="joint_speed"] .mistake').waitFor();
+  await fill(added.getByLabel("q_deg"), "[0, -80, 90, -100, -90, 0]");
+  for (const [key, value] of Object.entries({ joint_speed: 1, joint_acceleration: 2, joint_jerk: 20 }))
+    await fill(added.getByLabel(`${key} [rad/s`), String(value));
+  await page.getByRole("button", { name: "Add", exact: true }).click();
+  await page.locator(".entry h2", { hasText: "robot: point_1" }).waitFor();
+  await next("at");
+  await page.getByRole("button", { name: "Add", exact: true }).click();
+  await page.locator(".entry h2", { hasText: "robot: point_2" }).waitFor();
+  await fill(page.getByLabel("z [m]"), "0.5");
+  await page.getByRole("button", { name: /Review/ }).click();
+  await page.locator(".review .added", { hasText: ", 0.5]," }).waitFor();
+  const lines = (await page.locator(".review .added").allInnerTexts()).map((line) => line.trim());
+  await page.getByRole("button", { name: "Discard", exact: true }).click();
+  await status(page, /^saved/);
+  assert.ok(lines.includes("+q_deg = [0, -80, 90, -100, -90, 0]"), lines.join("\n"));
+  assert.match(lines.at(-1), /^\+at = \{ position = \[0\.\d+, 0\.\d+, 0\.5\], rpy_deg = /);
+  assert.equal(saved(), begun);
+});
+
 test("a distance that is measured is what a criterion says of the two, and Escape ends it", async () => {
   await page.keyboard.press("Escape");
   await page.getByRole("button", { name: "Measure" }).click();

@@ -66,6 +66,29 @@ test("the table says values, units, limits and words; UNDECIDED gives its reason
   });
 });
 
+test("a figure in the room is that of the table, in every picture", async () => {
+  const pairs = await page.evaluate(
+    () =>
+      new Promise((done) => {
+        const found = [];
+        const row = document.querySelector('tr[data-criterion="separation"] .value');
+        const look = () => {
+          const label = window.seerob.written.find((text) => text.startsWith("separation: "));
+          if (label) found.push([label, row.textContent]);
+          if (new Set(found.map(String)).size < 4) requestAnimationFrame(look);
+          else done(found);
+        };
+        look();
+      }),
+  );
+  // This made-up criterion writes whole millimetres.
+  const off = ([label, value]) => Math.abs(Number.parseFloat(label.slice(12)) / 1000 - Number(value));
+  assert.deepEqual(
+    pairs.filter((pair) => off(pair) > 6e-4),
+    [],
+  );
+});
+
 test("the worst comes first and the pill names it", async () => {
   // Rows change their order at most twice a second, so for a moment the worst may be below.
   await page.waitForFunction(() => {

@@ -1,6 +1,7 @@
 // Pictures a second of the page beside a live run of the UR10 assembly at 1366 × 768, and what each costs in
 // processor time, by process: `node tests/rates.mjs [seconds] [page folder …]`; of several pages, one after the
-// other in turns, so that a loaded machine is as hard on each. SOFTWARE_GL=swiftshader asks for that renderer.
+// other in turns, so that a loaded machine is as hard on each. SOFTWARE_GL=swiftshader asks for that renderer,
+// WORKSTATION=folder for another run.
 
 import fs from "node:fs";
 import path from "node:path";
@@ -29,7 +30,7 @@ const child = python(
   "-m",
   "seerob",
   "run",
-  path.join(ROOT, "workstations/ur10_assembly"),
+  process.env.WORKSTATION ?? path.join(ROOT, "workstations/ur10_assembly"),
   "--port",
   "0",
   "--no-record",
@@ -85,11 +86,12 @@ async function measure(folder) {
   const drawn = to[0] - from[0];
   const seconds = (to[2] - from[2]) / 1000;
   const cost = Object.entries(after).map(
-    ([kind, s]) => `${kind} ${((1000 * (s - before[kind])) / drawn).toFixed(1)}`,
+    ([kind, s]) => `${kind} ${((1000 * (s - before[kind])) / (drawn || seconds)).toFixed(1)}`,
   );
+  const per = drawn ? "picture" : "second";
   process.stdout.write(
     `${folder ?? "page"}: ${(drawn / seconds).toFixed(1)} pictures a second, ` +
-      `${((to[1] - from[1]) / seconds).toFixed(1)} callbacks; ms of processor time per picture: ${cost.join(", ")}\n`,
+      `${((to[1] - from[1]) / seconds).toFixed(1)} callbacks; ms of processor time per ${per}: ${cost.join(", ")}\n`,
   );
   await browser.close();
 }

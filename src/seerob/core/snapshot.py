@@ -510,10 +510,11 @@ class Place(Struct, frozen=True, kw_only=True):
 
 
 class Taught(Struct, frozen=True, kw_only=True):
-    """A source to which waypoints can be added by hand: the tool point that they are of, and their frame."""
+    """A robot to which waypoints can be given by hand: the tool point that they are of, and their frame."""
 
-    source: int
-    """Its number among ``sources`` of the workstation file."""
+    source: int | None
+    """Number of the source that has them among ``sources`` of the workstation file; None while nobody drives
+    the robot, so that it can have one."""
     robot: str
     tip: Place
     """The tool point."""

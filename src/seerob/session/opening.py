@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace as changed
 from itertools import islice
@@ -33,7 +34,7 @@ from seerob.twin.controller_check import compared, controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.plausibility.ranges import Quantity
 from seerob.workstation.plausibility.ranges import findings as implausible
-from seerob.workstation.source import Matrix4, Opened, Source, Target, delayed
+from seerob.workstation.source import Matrix4, Opened, Source, Target, TaughtByHand, delayed
 
 FIRST, LOOKS = 2000, 8
 """Samples at the begin of a recorded motion, and how many of them are looked at for where it goes."""
@@ -41,6 +42,7 @@ MOST_CLAIMED = 100_000
 """Samples of a file against which what criteria state is held, evenly."""
 MOST_NAMED = 5
 """Variables in one finding."""
+_POINT = re.compile(r"points\[\d+\]")
 
 
 def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
@@ -70,7 +72,7 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
             opened.append((source, _compared(model, i, source, found)))
             problems += _begun(source, i, file)
         except InputError as error:
-            problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
+            problems += (_placed(problem, source, f"sources[{i}]", file) for problem in error.problems)
     if not problems:  # whose source cannot be opened says no poses, which is not the mistake
         problems += _unpublished(model, opened, file)
     if problems:
@@ -133,7 +135,7 @@ def reached(model: Model, opened: Sequence[tuple[Source, Opened]]) -> tuple[tupl
             said = () if one.reach is None else one.reach()
             found.append((source, replace(one, findings=(*one.findings, *said), reach=None)))
         except InputError as error:
-            problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
+            problems += (_placed(problem, source, f"sources[{i}]", file) for problem in error.problems)
     if problems:
         raise InputError(problems)
     return tuple(found)
@@ -310,11 +312,18 @@ def _contradicted(model: Model, opened: Sequence[tuple[Source, Opened]]) -> Iter
             yield from () if found is None else (found,)
 
 
-def _placed(problem: Problem, source: Source, key: str, file: str) -> Problem:
-    """Of a data file that cannot be read at all, the place where the workstation file names it."""
+def _placed(problem: Problem, source: Source, at: str, file: str) -> Problem:
+    """Where the workstation file has what a mistake is about.
+
+    That is its name for a data file that cannot be read at all, and waypoints that stand in it themselves.
+    """
+    if isinstance(source, TaughtByHand) and not getattr(source, "file", ""):
+        point = _POINT.search(problem.key)
+        key = point[0] if point else problem.key
+        return Problem(file, f"{at}.{key or 'points'}", problem.what, problem.remedy)
     if problem.key or problem.file != getattr(source, "file", None):
         return problem
-    return Problem(file, key, f"{problem.file}: {problem.what}", problem.remedy)
+    return Problem(file, f"{at}.file", f"{problem.file}: {problem.what}", problem.remedy)
 
 
 def target(model: Model, name: str) -> Target | None:

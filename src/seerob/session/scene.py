@@ -32,12 +32,12 @@ from seerob.description.norms.editions import headline
 from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.headset_offers import TakesOffers
-from seerob.model.model import Frame, Model
+from seerob.model.model import Frame, Mechanism, Model
 from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
 from seerob.session.opening import coarse
 from seerob.twin.state import State
-from seerob.workstation.source import TaughtByHand
+from seerob.workstation.source import ByHand, TaughtByHand
 from seerob.workstation.variables import Value, WhenStale
 from seerob.workstation.workstation import Camera, Landmark, Pose, Workstation, real_names
 
@@ -253,22 +253,32 @@ def _tips(model: Model) -> Iterator[Place]:
 
 
 def _taught(model: Model) -> Iterator[Taught]:
+    driven = set[str]()
     for number, source in enumerate(model.workstation.sources):
+        driven.add(source.target())
         robot = model.mechanisms.get(source.target())
         if not isinstance(source, TaughtByHand) or robot is None:
             continue
         hand = source.by_hand(robot.description)
-        if hand is None:
-            continue
-        with suppress(UnknownName):  # a link that is not there, or a robot without a shape
-            tip, base = (model.frame(f"{robot.name}/{link}") for link in (hand.tip, hand.base))
-            yield Taught(
-                source=number,
-                robot=robot.name,
-                tip=place_of(model, robot.name, tip, hand.tip_from_tool),
-                base=place_of(model, robot.name, base, np.eye(4)),
-                points=hand.points,
-            )
+        if hand is not None:
+            yield from _taught_of(model, robot, number, hand)
+    for robot in model.mechanisms.values():
+        if robot.role == "robot" and robot.name not in driven:
+            links = robot.description.links
+            hand = ByHand(robot.description.tip, np.eye(4), links[0].name, 0)
+            yield from _taught_of(model, robot, None, hand)
+
+
+def _taught_of(model: Model, robot: Mechanism, source: int | None, hand: ByHand) -> Iterator[Taught]:
+    with suppress(UnknownName):  # a link that is not there, or a robot without a shape
+        tip, base = (model.frame(f"{robot.name}/{link}") for link in (hand.tip, hand.base))
+        yield Taught(
+            source=source,
+            robot=robot.name,
+            tip=place_of(model, robot.name, tip, hand.tip_from_tool),
+            base=place_of(model, robot.name, base, np.eye(4)),
+            points=hand.points,
+        )
 
 
 def _floor(at: Pose) -> tuple[float, float, float, float, float, float, float]:

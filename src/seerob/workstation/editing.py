@@ -13,7 +13,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
@@ -293,8 +293,25 @@ def _rewritten_at_once(text: str, run: Sequence[Change]) -> str:
 
 
 def _new_entry(change: Change) -> str:
-    body = "".join(f"{_key(key)} = {literal(value)}\n" for key, value in _table(change.value).items())
-    return f"[[{_key(str(change.path[0]))}]]\n{body}"
+    """A table as it is written by hand: lists of tables, such as waypoints, behind it with their headers."""
+    name = _key(str(change.path[0]))
+    table = _table(change.value)
+    lists = {key: value for key, value in table.items() if _are_tables(value)}
+    text = f"[[{name}]]\n{_body({key: value for key, value in table.items() if key not in lists})}"
+    for key, entries in lists.items():
+        for entry in entries:
+            text += f"\n[[{name}.{_key(key)}]]\n{_body(entry)}"
+    return text
+
+
+def _body(table: Mapping[str, object]) -> str:
+    return "".join(f"{_key(key)} = {literal(value)}\n" for key, value in table.items())
+
+
+def _are_tables(value: object) -> TypeGuard[Sequence[dict[str, object]]]:
+    return (
+        isinstance(value, list | tuple) and len(value) > 0 and all(isinstance(each, dict) for each in value)
+    )
 
 
 def _without_piece(lines: list[str], piece: _Piece) -> list[str]:
@@ -368,6 +385,8 @@ def _in_piece(body: str, change: Change) -> str:
         case "add" if key not in at:
             at[key] = tomlkit.value(literal([change.value]))
         case "add":
+            if isinstance(at[key], tomlkit.items.AoT) and not at[key][-1].as_string().endswith("\n\n"):
+                at[key][-1].add(tomlkit.nl())
             at[key].append(_entry(at[key], change.value))
         case _:
             at.append(_entry(at, {**at[key].unwrap(), **_table(change.value)}))

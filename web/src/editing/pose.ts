@@ -11,7 +11,7 @@ const LENGTHS: Record<string, number> = {
   position_inch: 0.0254,
 };
 // Roll, pitch, yaw about the fixed x, y, z are yaw, pitch, roll about the turned axes.
-const ORDER = "ZYX";
+export const ORDER = "ZYX";
 
 export interface Placing {
   /** [m] */

@@ -55,8 +55,12 @@ export function given(one: Schema): Schema {
   return options?.length === 1 ? { ...resolved(options[0]!), ...pick(one) } : resolved(one);
 }
 
-function pick({ description, default: otherwise }: Schema): Schema {
-  return { ...(description === undefined ? {} : { description }), default: otherwise };
+function pick({ description, default: otherwise, "x-unit": unit }: Schema): Schema {
+  return {
+    ...(description === undefined ? {} : { description }),
+    ...(unit === undefined ? {} : { "x-unit": unit }),
+    default: otherwise,
+  };
 }
 
 /** Kinds of a list whose entries have one, with what each is. */

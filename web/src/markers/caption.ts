@@ -35,11 +35,6 @@ const SIZES: Record<Size, { font: string; height: number; line: number }> = {
 
 const at = new Vector3();
 
-/** What of a text is no figure. */
-function wordsOf(text: string): string {
-  return text.replace(/[−-]?\d[\d.,]*/g, "0");
-}
-
 /** How far an object is before the eye, along the line of sight [m]: what it is drawn smaller by. */
 export function depthOf(object: Sprite, camera: PerspectiveCamera): number {
   return Math.max(-object.getWorldPosition(at).applyMatrix4(camera.matrixWorldInverse).z, 0.05);
@@ -50,9 +45,9 @@ export class Caption {
   private readonly canvas = document.createElement("canvas");
   private readonly material: SpriteMaterial;
   private texture: CanvasTexture | null = null;
-  /** What it says once it is spelled out, and what it says now. */
-  private asked = { text: "", verdict: null as Verdict | null };
-  private shown: Caption["asked"] | null = null;
+  /** What it says. */
+  text = "";
+  private verdict: Verdict | null = null;
   private lines: readonly string[] = [];
   /** How much higher than where it belongs it is, negative for lower; and how much further right [px]. */
   liftedPx = 0;
@@ -73,25 +68,17 @@ export class Caption {
     this.lift(0);
   }
 
-  /** Say this: figures alone wait until they are spelled out, everything else is said at once. */
-  update(text: string, verdict: Verdict | null): void {
+  say(said: string, verdict: Verdict | null): void {
     // A name stays one, whatever it looks like.
-    this.asked = { text: shortened(this.aside ? spoken(text) : text, LONGEST), verdict };
-    const { shown } = this;
-    if (shown?.verdict !== verdict || wordsOf(shown.text) !== wordsOf(this.asked.text)) this.spell();
-  }
-
-  /** Bring its figures up to date: whether they were not. */
-  spell(): boolean {
-    const { text, verdict } = this.asked;
-    if (this.shown?.text === text && this.shown.verdict === verdict) return false;
-    this.shown = this.asked;
+    const text = shortened(this.aside ? spoken(said) : said, LONGEST);
+    if (this.texture && text === this.text && verdict === this.verdict) return;
+    this.text = text;
+    this.verdict = verdict;
     // Whose figure it is, and below it the figure: a narrow plate covers less.
     const [, owner, figure] = (this.aside && /^(.+?): (.+)$/s.exec(text)) || ["", text, ""];
     const head = verdict ? `${STATE_ICONS[verdict]}  ${owner}` : owner!;
     this.lines = figure ? [head, figure] : [head];
     this.paint(verdict);
-    return true;
   }
 
   /** Whether it belongs at a side of the room: a name only says what stands there. */

@@ -1,4 +1,4 @@
-// Text at a point.
+// Text at a point; what it says the layer knows.
 
 import { Group, Vector3 } from "three";
 import type { Label } from "../wire";
@@ -17,7 +17,6 @@ export class LabelDrawn implements Drawn<Label> {
   update(marker: Label): void {
     this.object.position.fromArray(marker.position);
     this.anchor.copy(this.object.position);
-    this.caption.update(marker.text, marker.verdict);
   }
 
   dispose(): void {

@@ -2,7 +2,7 @@
 // no garbage to speak of.
 
 import { Group } from "three";
-import type { ShownResult } from "../messages";
+import type { Shown, ShownResult } from "../messages";
 import { STATE_ORDER, stateOf } from "../verdicts";
 import type { Marker, Verdict } from "../wire";
 import { Caption } from "./caption";
@@ -22,6 +22,16 @@ interface Slot {
 const LABELS_OF_ONE = 2;
 const NONE: readonly Marker[] = [];
 
+/** What is to be written. */
+export interface Written {
+  /** Results as the panels show them: bodies and lines may be of a later instant, a text never is. */
+  told: readonly ShownResult[];
+  /** Criterion whose labels are written beside those of the worst. */
+  selected: string | null;
+  /** Of how many results: more would hide what they are about. */
+  most: number;
+}
+
 export class MarkerLayer {
   readonly root = new Group();
   /** Bodies that highlights paint. */
@@ -37,26 +47,20 @@ export class MarkerLayer {
    * Draw the markers of these results.
    *
    * @param muted Criteria whose markers are not drawn.
-   * @param selected Criterion whose labels are written beside those of the worst.
-   * @param captions Of how many results labels are written: more would hide what they are about.
    */
-  update(
-    results: readonly ShownResult[],
-    muted: ReadonlySet<string>,
-    selected: string | null,
-    captions: number,
-  ): void {
+  update(results: readonly ShownResult[], muted: ReadonlySet<string>, written: Written): void {
+    const { told, selected, most } = written;
     this.painted.clear();
-    const captioned = worst(results, muted, captions);
-    if (captions > 0 && selected) captioned.add(selected);
+    const captioned = worst(told, muted, most);
+    if (most > 0 && selected) captioned.add(selected);
     for (const name of this.slots.keys()) {
       if (!results.some((r) => r.name === name)) this.drop(name, 0);
     }
     for (let k = 0; k < results.length; k += 1) {
-      const result = results[k]!;
-      const markers = muted.has(result.name) ? NONE : result.markers;
-      const most = result.name === selected ? Number.POSITIVE_INFINITY : LABELS_OF_ONE;
-      this.draw(result.name, markers, captioned.has(result.name) ? most : 0);
+      const { name, markers } = results[k]!;
+      const labels = !captioned.has(name) ? 0 : name === selected ? Number.POSITIVE_INFINITY : LABELS_OF_ONE;
+      const texts = told.find((one) => one.name === name)?.markers ?? NONE;
+      this.draw(name, muted.has(name) ? NONE : markers, texts, labels);
     }
   }
 
@@ -79,11 +83,9 @@ export class MarkerLayer {
     this.leaders.update(written, view);
   }
 
-  /** Bring the figures of all captions up to date: whether one was not. */
-  spell(): boolean {
-    let changed = false;
-    for (let k = 0; k < this.written.length; k += 1) changed = this.written[k]!.spell() || changed;
-    return changed;
+  /** What is written in the room. */
+  get texts(): string[] {
+    return this.written.map(({ text }) => text);
   }
 
   /** Captions of a picture; made once, as a picture allocates nothing of ours. */
@@ -98,7 +100,7 @@ export class MarkerLayer {
     }
   };
 
-  private draw(name: string, markers: readonly Marker[], labels: number): void {
+  private draw(name: string, markers: readonly Marker[], texts: readonly Marker[], labels: number): void {
     const slots = this.slots.get(name) ?? [];
     this.slots.set(name, slots);
     let used = 0;
@@ -110,8 +112,11 @@ export class MarkerLayer {
       const slot = this.slotFor(slots, used, marker);
       if (!slot) continue;
       slot.drawn.update(marker);
-      const label = left > 0 && "label" in marker ? marker.label : "";
-      this.write(slot, label === "" || label.startsWith(name) ? label : owner + label, marker.verdict);
+      const text = texts[k]?.type === marker.type ? texts[k]! : null;
+      if (text?.type === "label") slot.drawn.caption?.say(text.text, text.verdict);
+      const label = left > 0 && text && "label" in text ? text.label : "";
+      const verdict = text?.verdict ?? null;
+      this.write(slot, label === "" || label.startsWith(name) ? label : owner + label, verdict);
       if (label !== "") {
         owner = "";
         left -= 1;
@@ -145,7 +150,7 @@ export class MarkerLayer {
     }
     slot.caption.object.visible = true;
     slot.caption.object.position.copy(slot.drawn.anchor);
-    slot.caption.update(text, verdict);
+    slot.caption.say(text, verdict);
   }
 
   private drop(name: string, from: number): void {
@@ -178,4 +183,30 @@ const RANK: (Verdict | null)[] = [null, "within", "undecided", "exceeded"];
 function paintWorst(painted: Map<string, Verdict | null>, body: string, verdict: Verdict | null): void {
   const before = painted.get(body);
   if (before === undefined || RANK.indexOf(verdict) > RANK.indexOf(before)) painted.set(body, verdict);
+}
+
+/** What differs by less looks the same [m]: where everybody stands, what a twin settles to trembles by less. */
+const UNSEEN = 1e-6;
+
+/** Whether two frames look the same in the room, wherever their bodies are: a still room costs no picture. */
+export function alike(a: Shown | null, b: Shown | null): boolean {
+  if (a === b) return true;
+  if (!a || !b || !sameLooks(a.looks, b.looks) || !sameLooks(a.doubts, b.doubts)) return false;
+  if (a.results.length !== b.results.length) return false;
+  for (let k = 0; k < a.results.length; k += 1) {
+    const [one, other] = [a.results[k]!, b.results[k]!];
+    if (one.name !== other.name || stateOf(one) !== stateOf(other)) return false;
+    if (!sameLooks(one.markers, other.markers)) return false;
+  }
+  return true;
+}
+
+function sameLooks(a: unknown, b: unknown): boolean {
+  if (a === b) return true;
+  if (typeof a === "number" && typeof b === "number") return Math.abs(a - b) <= UNSEEN;
+  if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;
+  const keys = Object.keys(a);
+  if (keys.length !== Object.keys(b).length) return false;
+  for (const key of keys) if (!sameLooks(a[key as never], b[key as never])) return false;
+  return true;
 }

@@ -26,6 +26,7 @@ import { entrySchema, fetchSchema, kinds, schema } from "../editing/schema";
 import { select } from "../page_state";
 import type { Change } from "../wire";
 import { said, word } from "../words";
+import { AddWaypoint } from "./AddWaypoint";
 import { Bringing } from "./Bringing";
 import { Choice } from "./Choice";
 import { MistakeList } from "./MistakeList";
@@ -141,15 +142,21 @@ export function Editor() {
           }}
         >
           <option value="">{said("add …")}</option>
-          {GROUPS.filter(([group]) => group !== "waypoints").map(([group, , one]) => (
+          {GROUPS.map(([group, , one]) => (
             <option key={group} value={group}>
               {said(one)}
             </option>
           ))}
         </select>
       </div>
-      <Refusal path={adding.value ? [adding.value, count(adding.value)] : (entry?.path ?? null)} />
-      {adding.value ? (
+      <Refusal path={adding.value ? placeOfNew(adding.value) : (entry?.path ?? null)} />
+      {adding.value === "waypoints" ? (
+        <AddWaypoint
+          close={() => {
+            adding.value = null;
+          }}
+        />
+      ) : adding.value ? (
         <Adding
           key={adding.value}
           group={adding.value}
@@ -173,6 +180,8 @@ export function Editor() {
   );
 }
 
+// A waypoint belongs to a source, which may have to come with it.
+const placeOfNew = (group: string): Path => (group === "waypoints" ? ["sources"] : [group, count(group)]);
 const count = (group: string): number => entries.value.filter((e) => e.group === group).length;
 
 function choose(value: string): void {
@@ -274,7 +283,12 @@ function EntryForm({ entry }: { entry: Entry }) {
           }
         />
       ) : (
-        <p class="empty">{schema.value ? said("A kind of your own: edit its options in the file.") : "…"}</p>
+        <>
+          <MistakeList mistakes={mistakesAt(path)} keys />
+          <p class="empty">
+            {schema.value ? said("A kind of your own: edit its options in the file.") : "…"}
+          </p>
+        </>
       )}
       <div class="edit-bar">
         <button type="button" onClick={() => void copy()}>

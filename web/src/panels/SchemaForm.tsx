@@ -2,9 +2,9 @@
 
 import { useSignal } from "@preact/signals";
 import { useId } from "preact/hooks";
-import { mistakesAt, names, type Path, type Table } from "../editing/draft";
+import { mistakesAt, named, names, type Path, type Table } from "../editing/draft";
 import { type Field, fields, given, type Schema } from "../editing/schema";
-import { said } from "../words";
+import { said, word } from "../words";
 import { MistakeList } from "./MistakeList";
 
 /** What nearly everybody gives, where it may be given. */
@@ -16,19 +16,28 @@ interface FormProps {
   path: Path;
   /** Keys that stand elsewhere. */
   without?: readonly string[];
+  /** Keys that are asked for, though the schema does not want them. */
+  always?: readonly string[];
   /** `undefined` takes the key away. */
   onChange(key: string, value: unknown): void;
 }
 
-export function SchemaForm({ schema, table, path, without = [], onChange }: FormProps) {
+export function SchemaForm({ schema, table, path, without = [], always = [], onChange }: FormProps) {
   const more = useSignal<ReadonlySet<string>>(new Set());
   const all = fields(schema, table).filter((field) => !without.includes(field.name));
   const shown = all.filter(
-    (f) => f.required || f.name in table || USUAL.has(f.name) || more.value.has(f.name),
+    (f) =>
+      f.required || f.name in table || USUAL.has(f.name) || always.includes(f.name) || more.value.has(f.name),
   );
+  // Of a key that has no field here nobody else would say what is wrong with it.
+  const beside = [...without, ...shown.map((field) => field.name)].flatMap((key) =>
+    mistakesAt([...path, key]),
+  );
+  const others = mistakesAt(path).filter((m) => !beside.includes(m) && m.key !== named(path));
   const rest = all.filter((f) => !shown.includes(f));
   return (
     <div class="form">
+      <MistakeList mistakes={others} keys />
       {shown.map((field) => (
         <FieldRow key={field.name} field={field} value={table[field.name]} path={path} onChange={onChange} />
       ))}
@@ -117,7 +126,7 @@ function Input({ id, field, value, bad, put, complain }: InputProps) {
           put(text === "" ? undefined : choices ? choices[list.indexOf(text)] : text === "true");
         }}
       >
-        <option value="">{required ? "choose …" : "not given"}</option>
+        <option value="">{said(required ? word("choose …") : word("not given"))}</option>
         {list.map((one) => (
           <option key={one} value={one}>
             {one}
@@ -163,7 +172,7 @@ function Input({ id, field, value, bad, put, complain }: InputProps) {
       value={
         value === undefined
           ? ""
-          : typeof value === "string" && !looksStructured(value)
+          : typeof value === "string" && (isText || !looksStructured(value))
             ? value
             : JSON.stringify(value)
       }
@@ -175,7 +184,8 @@ function Input({ id, field, value, bad, put, complain }: InputProps) {
           put(JSON.parse(isNumber ? text.replace(",", ".") : text));
         } catch {
           // A quantity may also be a word, such as a percentile; lists and tables are written as JSON.
-          if (/^[[{]/.test(text) || isNumber) complain(isNumber ? `${text} is no number` : "not JSON");
+          if (/^[[{]/.test(text) || isNumber)
+            complain(isNumber ? said("{text} is no number", { text }) : said("not JSON"));
           else put(text);
         }
       }}
@@ -188,7 +198,7 @@ const looksStructured = (text: string): boolean => /^[[{"\d-]/.test(text);
 function placeholder({ schema, required }: Field): string {
   if (schema.default !== undefined && schema.default !== null && typeof schema.default !== "object")
     return String(schema.default);
-  return required ? "" : "not given";
+  return required ? "" : said("not given");
 }
 
 /** Names that a criterion may speak of, for the fields that ask for one. */

@@ -6,6 +6,7 @@ import type { Preset } from "../scene/viewpoint";
 import type { TimeControl } from "../time_control";
 import type { EndFilm } from "../view/film";
 import type { SavedView } from "../view/kept";
+import type { Taught } from "../wire";
 import type { Mode } from "../xr/visit";
 
 export interface Actions {
@@ -20,6 +21,8 @@ export interface Actions {
   picture(): Promise<Blob>;
   /** Film the room until the answer is called; null where this browser cannot. */
   film(): Promise<EndFilm | null>;
+  /** Where the tool point of a robot is, as the file writes a place of it; null where it is not shown. */
+  toolPoint(of: Taught): { position: number[]; rpy_deg: number[] } | null;
   /** Fill the view with the selection, or with everything. */
   frameSelection(): void;
 }

@@ -36,6 +36,9 @@ const AREA = "area";
 /** Drawn before everything else: what is behind it fails the test of depth. */
 const FIRST = -1;
 
+/** What is no farther than this from where it was drawn last stands still: single precision, in metres and as a turn. */
+const STANDS = 1e-6;
+
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
 
@@ -210,7 +213,7 @@ export class Bodies {
   readonly byName = new Map<string, Body>();
   private list: Body[] = [];
   private crowds: Crowd[] = [];
-  /** The block that was posed last. */
+  /** Where every body was put. */
   private posed = new Float32Array();
   private hidden: ReadonlySet<string> = new Set();
   private absent: ReadonlySet<string> = new Set();
@@ -273,25 +276,32 @@ export class Bodies {
     return failed;
   }
 
-  /** Put every body where the block says: x, y, z [m], w, x, y, z in the world. */
-  pose(block: Float32Array): void {
+  /**
+   * Put every body where the block says: x, y, z [m], w, x, y, z in the world.
+   *
+   * @returns Whether one is elsewhere than it was.
+   */
+  pose(block: Float32Array): boolean {
+    const known = this.posed.length === block.length;
+    if (!known) this.posed = block.slice();
     const before = this.posed;
+    let moved = false;
     for (let i = 0, k = 0; i < this.list.length; i += 1, k += FLOATS_PER_NODE) {
       const body = this.list[i]!;
-      const { group } = body;
+      let same = known && !body.carried;
+      for (let j = k; same && j < k + FLOATS_PER_NODE; j += 1)
+        same = Math.abs(before[j]! - block[j]!) <= STANDS;
+      if (same) continue;
+      moved = true;
+      body.carried = false;
+      for (let j = k; j < k + FLOATS_PER_NODE; j += 1) before[j] = block[j]!;
       this.position.set(block[k]!, block[k + 1]!, block[k + 2]!);
       this.orientation.set(block[k + 4]!, block[k + 5]!, block[k + 6]!, block[k + 3]!);
-      group.matrix.compose(this.position, this.orientation, ONE);
-      group.matrixWorldNeedsUpdate = true;
-      if (body.followers.length === 0) continue;
-      let same = before.length === block.length && !body.carried;
-      for (let j = k; same && j < k + FLOATS_PER_NODE; j += 1) same = before[j] === block[j];
-      if (same) continue;
-      body.carried = false;
+      body.group.matrix.compose(this.position, this.orientation, ONE);
+      body.group.matrixWorldNeedsUpdate = true;
       body.follow();
     }
-    if (before.length === block.length) before.set(block);
-    else this.posed = block.slice();
+    return moved;
   }
 
   /** Show them over the real cell, or in a room of their own. */
@@ -340,9 +350,11 @@ export class Bodies {
     for (const body of this.list) body.light(names.has(body.node.name));
   }
 
-  /** Colour bodies by scores, and only those. */
-  color(tints: ReadonlyMap<string, number>): void {
+  /** Colour bodies by scores, and only those; whether one has another colour now. */
+  color(tints: ReadonlyMap<string, number>): boolean {
+    const before = this.list.map((body) => body.tint);
     for (const body of this.list) body.color(tints.get(body.node.name));
+    return this.list.some((body, k) => body.tint !== before[k]);
   }
 
   /** Colour the bodies that verdicts are about, and only those. */

@@ -1,9 +1,9 @@
 // What is moved of the workstation file, by a handle on the desk or a hand in the room: its bodies go along until
 // the server has said what it is.
 
-import { Matrix4, Quaternion, Vector3 } from "three";
+import { Euler, MathUtils, Matrix4, Quaternion, Vector3 } from "three";
 import { change, type Entry } from "../editing/draft";
-import { moveTo, placing, poseKey } from "../editing/pose";
+import { moveTo, ORDER, placing, poseKey, tidy } from "../editing/pose";
 import { scene } from "../page_state";
 import type { Place } from "../wire";
 import type { Bodies, Body } from "./bodies";
@@ -39,6 +39,28 @@ export function whereIs(
   into.compose(new Vector3(...position), new Quaternion(x, y, z, w), ONE);
   if (carrier) into.premultiply(carrier.group.matrix);
   return node === "" || carrier !== undefined;
+}
+
+/**
+ * A place as the file has one of a waypoint; null where its frame is not known here.
+ *
+ * @param base In whose frame it is given.
+ * @param point Where it is, in the world (z up).
+ */
+export function placeIn(
+  base: Place,
+  bodies: Bodies,
+  point: Matrix4,
+): { position: number[]; rpy_deg: number[] } | null {
+  const from = new Matrix4();
+  if (!whereIs(base, bodies, from)) return null;
+  const [position, turn] = [new Vector3(), new Quaternion()];
+  from.invert().multiply(point).decompose(position, turn, new Vector3());
+  const { x, y, z } = new Euler().setFromQuaternion(turn, ORDER);
+  return {
+    position: position.toArray().map((v) => tidy(v, 4)),
+    rpy_deg: [x, y, z].map((angle) => tidy(MathUtils.radToDeg(angle), 3)),
+  };
 }
 
 export class Carried {

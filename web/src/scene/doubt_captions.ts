@@ -28,8 +28,7 @@ export class DoubtCaptions {
       const caption = this.captionAt(used);
       this.box.getCenter(caption.object.position).z = this.box.max.z;
       caption.object.visible = true;
-      caption.update(shortened(name, spoken(reason)), "undecided");
-      caption.spell();
+      caption.say(shortened(name, spoken(reason)), "undecided");
       used += 1;
     }
     for (const caption of this.captions.slice(used)) caption.object.visible = false;

@@ -4,13 +4,14 @@ import { effect, signal } from "@preact/signals";
 import { Box3, type Mesh, type Object3D, Quaternion, type Raycaster, Vector3 } from "three";
 import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
-import { doubtsIn } from "../doubts";
+import { doubts, doubtsIn } from "../doubts";
 import { axisMarker, pointedAt } from "../editing/bringing";
 import { Glide } from "../glide";
-import { MarkerLayer } from "../markers/layer";
+import { alike, MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
-import type { Shown } from "../messages";
+import type { Frame, Shown } from "../messages";
 import {
+  frame,
   hidden,
   mutedCriteria,
   overReality,
@@ -33,7 +34,6 @@ import { Bodies } from "./bodies";
 import { CameraView } from "./camera_view";
 import { Companions } from "./companions";
 import { DoubtCaptions } from "./doubt_captions";
-import { numbersEveryMs } from "./effort";
 import { Gizmo } from "./gizmo";
 import { Outline } from "./outline";
 import { nodeAlong, pickOnClick } from "./picking";
@@ -73,8 +73,11 @@ export class Viewer {
   /** Heard, and shown as soon as the bodies are where it speaks of. */
   private coming: Shown | null = null;
   private tickedAt = Number.NEGATIVE_INFINITY;
-  private spelledAt = Number.NEGATIVE_INFINITY;
+  /** What the panels show, as far as it was written in the room. */
+  private told: Frame | null = null;
   private posed = false;
+  /** Whether bodies have moved since markers were drawn. */
+  private moved = false;
   private labels = LABELLED;
   private framed = false;
   private dressed = false;
@@ -120,7 +123,7 @@ export class Viewer {
     this.coming = null;
     this.glide.clear();
     this.dressed = false;
-    this.markers.update([], new Set(), null, 0);
+    this.markers.update([], new Set(), { told: [], selected: null, most: 0 });
     unseen.value = await this.bodies.load(scene);
     if (feed !== this.feed) return;
     this.bodies.hide(hidden.peek());
@@ -144,11 +147,14 @@ export class Viewer {
     if (block || this.glide.moving) {
       const shown = this.glide.at(time);
       if (shown) {
-        this.bodies.pose(shown);
+        const moved = this.bodies.pose(shown);
         if (!this.glide.moving) this.probe();
-        this.gizmo.place();
         this.posed = true;
-        this.stage.moved();
+        if (moved) {
+          this.moved = true;
+          this.gizmo.place();
+          this.stage.moved();
+        }
       }
     }
     if (this.coming && !this.glide.moving) this.arrive();
@@ -169,10 +175,10 @@ export class Viewer {
     this.view.margins = !this.stage.renderer.xr.isPresenting;
     camera.updateWorldMatrix(true, false);
     this.fillVolumes();
-    if (time - this.spelledAt >= numbersEveryMs() && this.markers.spell()) {
-      this.spelledAt = time;
-      this.stage.invalidate();
-    }
+    // Two figures for one thing at one instant would look like an error.
+    const { told } = this;
+    this.told = frame.peek();
+    if (!alike(told, this.told)) this.draw();
     this.markers.face(this.view, this.doubts.captions);
   }
 
@@ -253,9 +259,11 @@ export class Viewer {
   }
 
   private arrive(): void {
+    const before = this.frame;
     this.frame = this.coming;
     this.coming = null;
-    this.draw();
+    // What hangs on bodies goes along with them.
+    if (this.moved || !alike(before, this.frame)) this.draw();
   }
 
   // On a phone there is no margin for more, and the table is right below.
@@ -264,23 +272,21 @@ export class Viewer {
   }
 
   private draw(): void {
+    this.moved = false;
     const chosen = selection.peek();
     const measured = measuring.peek()?.result;
     this.labels = this.labelled();
     const asked = [measured, reaching.peek()?.result, axisMarker()].filter((result) => result != null);
-    const results = this.frame?.results ?? [];
-    this.markers.update(
-      [...asked, ...results],
-      mutedCriteria.peek(),
-      measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null),
-      showCaptions.peek() ? this.labels : 0,
-    );
+    this.markers.update([...asked, ...(this.frame?.results ?? [])], mutedCriteria.peek(), {
+      told: [...asked, ...(this.told?.results ?? [])],
+      selected: measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null),
+      most: showCaptions.peek() ? this.labels : 0,
+    });
     this.paint();
     this.findVolumes();
     this.bodies.wear(this.frame?.looks ?? {});
-    const doubts = doubtsIn(this.frame);
-    this.bodies.doubt(doubts);
-    this.doubts.update(run.peek(), doubts, showCaptions.peek());
+    this.bodies.doubt(doubtsIn(this.frame));
+    this.doubts.update(run.peek(), doubts.peek(), showCaptions.peek());
     this.stage.invalidate();
   }
 
@@ -368,8 +374,7 @@ export class Viewer {
       this.draw();
     });
     effect(() => {
-      this.bodies.color(manikinTints.value);
-      this.stage.invalidate();
+      if (this.bodies.color(manikinTints.value)) this.stage.invalidate();
     });
     effect(() => {
       this.markers.root.visible = !stale.value;

@@ -1,13 +1,12 @@
 // Design in place: a hand takes what the workstation file has, moves or turns it and lets it go, as the handles on
 // the desk do; or it carries a robot's tool to where a waypoint is to be.
 
-import { Euler, Group, MathUtils, Matrix4, Mesh, MeshBasicMaterial, Quaternion, Vector3 } from "three";
+import { Group, MathUtils, Matrix4, Mesh, MeshBasicMaterial, Quaternion, Vector3 } from "three";
 import { holding } from "../company";
 import { change, type Entry, entries, isPlaced, refused } from "../editing/draft";
 import { gizmoMode, STEPS, steps } from "../editing/handles";
-import { tidy } from "../editing/pose";
 import { scene, select } from "../page_state";
-import { Carried, whereIs } from "../scene/carried";
+import { Carried, placeIn, whereIs } from "../scene/carried";
 import type { Viewer } from "../scene/viewer";
 import type { Place, Taught } from "../wire";
 
@@ -201,7 +200,7 @@ export class Designing {
   // -- waypoints ----------------------------------------------------------------------------------
 
   private lesson(robot: string): Lesson | null {
-    const of = scene.peek()?.taught.find((each) => each.robot === robot);
+    const of = scene.peek()?.taught.find((each) => each.robot === robot && each.source !== null);
     const tip = of && this.poseOf(of.tip);
     if (!of || !tip) {
       const what = `no source of kind waypoints has points of ${robot || "this"} to which one could be added`;
@@ -228,20 +227,9 @@ export class Designing {
 
   // Whether the robot gets there the server says: it solves the pose as every run of the file does.
   private teach({ of, tip, motion }: Lesson): Promise<boolean> {
-    const base = this.poseOf(of.base);
-    if (!base) return Promise.resolve(false);
-    const at = base.invert().multiply(motion).multiply(tip);
-    const [position, turn] = [new Vector3(), new Quaternion()];
-    at.decompose(position, turn, new Vector3());
-    const { x, y, z } = new Euler().setFromQuaternion(turn, "ZYX");
-    const value = {
-      name: `taught_${of.points + 1}`,
-      move: "joint",
-      at: {
-        position: position.toArray().map((v) => tidy(v, 4)),
-        rpy_deg: [x, y, z].map((angle) => tidy(MathUtils.radToDeg(angle), 3)),
-      },
-    };
+    const at = placeIn(of.base, this.viewer.bodies, motion.clone().multiply(tip));
+    if (!at || of.source === null) return Promise.resolve(false);
+    const value = { name: `taught_${of.points + 1}`, move: "joint", at };
     return change({ kind: "add", path: ["sources", of.source, "points"], value });
   }
 

@@ -172,6 +172,23 @@ def test_one_inertia_for_all_links_is_a_placeholder(tmp_path):
     assert "placeholder" in texts(made)
 
 
+def test_centres_of_mass_at_every_frame_are_placeholders_where_a_shape_lies_aside(tmp_path):
+    """As in a maker's files of arms of two lengths, whose upper arms would weigh nothing against gravity."""
+    aside = '<collision><origin xyz="0.3 0 0"/><geometry><box size="0.6 0.1 0.1"/></geometry></collision>'
+    joints = [joint(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(4)]
+
+    def made(shape):
+        masses = [inertial(i + 1, 0.1, 0.1 + 0.01 * i, 0.12) for i in range(5)]
+        links = [f'<link name="l{i}">{mass}{shape * (i == 2)}</link>' for i, mass in enumerate(masses)]
+        return read(tmp_path, robot(*links, *joints))
+
+    found = made(aside)
+    assert {link.inertial.origin for link in found.links if link.joints} == {Origin.ASSUMED}
+    assert "nobody stated them" in texts(found)
+    middle = made(aside.replace("0.3 0 0", "0 0 0"))
+    assert {link.inertial.origin for link in middle.links} == {Origin.STATED}
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import time
+import warnings
 from contextlib import contextmanager, suppress
 
 from seerob.core.files import parser_process
@@ -51,6 +52,7 @@ def _be_the_process(questions, answers):
         os.closerange(3, 4096)
         sys.stdin, sys.stdout, sys.stderr = os.fdopen(0), os.fdopen(1, "w"), os.fdopen(2, "w")
         sys.argv = [""]
+        warnings.simplefilter("ignore")  # no error, as pytest has them: this process is as any user's
         limit = parser_process._limit_time
         parser_process._limit_time = lambda seconds: limit(min(seconds, SECONDS))
         parser_process._main()

@@ -43,6 +43,8 @@ REPAIRABLE = 0.02
 """Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
 CONCENTRATED = 0.04
 """Least radius of gyration over the diagonal of the box around a shape: a rod has 0.29, a ball 0.18."""
+ASIDE = 0.25
+"""So far from the frame's origin is the middle of a link's box, of its diagonal, where no centre of mass is."""
 LIGHT = 0.05
 """Up to this what nobody weighed, and is as small in the heaviest metal, is a marker [kg]."""
 FRAME = 1e-3
@@ -265,6 +267,7 @@ def guessed_tip(links: Sequence[Link]) -> str:
 def checked(description: Description, reader: Reader) -> Description:
     """The description with placeholders marked as such, and every finding of the reader and of this file."""
     description = _placeholder_inertias_marked(description, reader)
+    description = _placeholder_centres_marked(description, reader)
     for level, subject, text in _findings(description):
         reader.finding(level, subject, text)
     return replace(description, findings=(*description.findings, *reader.findings))
@@ -395,3 +398,34 @@ def _placeholder_inertias_marked(description: Description, reader: Reader) -> De
             )
     links_now = tuple(marked.get(link.name, link) for link in description.links)
     return replace(description, links=links_now)
+
+
+def centres_at_origins(links: Sequence[Link]) -> str:
+    """Why centres of mass were never stated: four or more moving links have theirs at their frame's origin.
+
+    At least one of their shapes reaches far to one side of it; empty where nothing shows it.
+    """
+    moving = [link for link in links if link.joints and link.inertial is not None]
+    if len(moving) < 4 or any(link.inertial.com.any() for link in moving if link.inertial):
+        return ""
+    for link in moving:
+        if link.solids:
+            low, high = box(link.solids)
+            if np.linalg.norm(0.5 * (low + high)) > ASIDE * np.linalg.norm(high - low):
+                return f"centres of mass of {len(moving)} links are all at the origins of their frames"
+    return ""
+
+
+def _placeholder_centres_marked(description: Description, reader: Reader) -> Description:
+    why = centres_at_origins(description.links)
+    if not why:
+        return description
+    reader.finding("warning", "", f"{why}: nobody stated them, masses and inertias assumed")
+
+    def marked(link: Link) -> Link:
+        if not link.joints or link.inertial is None:
+            return link
+        source = f"{link.inertial.source}: placeholder centre of mass"
+        return replace(link, inertial=replace(link.inertial, origin=Origin.ASSUMED, source=source))
+
+    return replace(description, links=tuple(marked(link) for link in description.links))

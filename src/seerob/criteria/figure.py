@@ -72,7 +72,7 @@ class Parts(Struct, eq=False):
     """Which is the worst: of those with the worst verdict the nearest to its limit, or farthest beyond."""
 
     @property
-    def apart(self) -> bool:
+    def qualified(self) -> bool:
         """Whether something is said of some of them."""
         return not (self.unsure is self.exceeded is self.informs is None)
 
@@ -174,7 +174,7 @@ def _verdict_of_parts(figure: Figure, parts: Parts, *, at_most: bool) -> Verdict
     parts.governs = k = judged(
         parts.value, low, high, parts.limit, ROUNDING, at_most, bool(parts.open), codes
     )
-    if parts.apart:
+    if parts.qualified:
         parts.governs = k = int(_said_of_each(parts, codes, at_most=at_most))
     parts.verdicts = verdicts = list(map(_VERDICTS.__getitem__, codes.tolist()))
     if parts.whole:
@@ -344,7 +344,7 @@ def _answers_of_parts(parts: Parts, *, at_most: bool) -> Answers:
     verdicts, governs = np.empty(value.shape, np.uint8), np.empty(len(value), np.int64)
     open_ = np.broadcast_to(np.asarray(parts.open), len(value)).copy()
     judged_many(value, low, high, limit, ROUNDING, at_most, open_, verdicts, governs)
-    if parts.apart:
+    if parts.qualified:
         governs = _said_of_each(parts, verdicts, at_most=at_most)
     rows = np.arange(len(value)), governs
     interval = None if parts.interval is None else (low[rows], high[rows])

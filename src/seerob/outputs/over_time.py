@@ -11,7 +11,7 @@ import numpy as np
 from seerob.core.extras import need
 from seerob.core.snapshot import Verdict
 from seerob.outputs.palette import DARK_HEX, HEX, MARK, WORD
-from seerob.recording.frames import Told
+from seerob.recording.frames import CriterionSeries
 from seerob.recording.series import CODES
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _HATCH = {Verdict.EXCEEDED: "", Verdict.UNDECIDED: "////"}
 
 
-def plotted(told: Sequence[Told]) -> Figure:
+def plotted(columns: Sequence[CriterionSeries]) -> Figure:
     """One axis per criterion, below each other.
 
     Raises:
@@ -39,17 +39,17 @@ def plotted(told: Sequence[Told]) -> Figure:
             self.savefig(out, format="png", dpi=110)
             return out.getvalue()
 
-    figure = Shown(figsize=(9, 0.6 + 1.7 * max(len(told), 1)), layout="constrained")
+    figure = Shown(figsize=(9, 0.6 + 1.7 * max(len(columns), 1)), layout="constrained")
     FigureCanvasAgg(figure)  # type: ignore[no-untyped-call, unused-ignore]
-    if told:
-        every: Any = figure.subplots(len(told), sharex=True, squeeze=False)
-        for axes, one in zip(every[:, 0], told, strict=True):
+    if columns:
+        every: Any = figure.subplots(len(columns), sharex=True, squeeze=False)
+        for axes, one in zip(every[:, 0], columns, strict=True):
             _draw(axes, one)
         every[-1, 0].set_xlabel("t [s]")
     return figure
 
 
-def _draw(axes: Axes, one: Told) -> None:
+def _draw(axes: Axes, one: CriterionSeries) -> None:
     alone = len(one.t) == 1
     axes.plot(one.t, one.values, color=DARK_HEX[None], linewidth=1.2, marker="o" if alone else "")
     axes.plot(one.t, one.limits, color="black", linestyle="--", linewidth=1, marker="_" if alone else "")
@@ -64,7 +64,7 @@ def _draw(axes: Axes, one: Told) -> None:
     axes.margins(x=0)
 
 
-def _stretches(one: Told, verdict: Verdict) -> list[tuple[float, float]]:
+def _stretches(one: CriterionSeries, verdict: Verdict) -> list[tuple[float, float]]:
     """Where it has a verdict [s], from its first such instant to the one that ends it."""
     hit = np.concatenate([[False], one.codes == CODES[verdict], [False]])
     edges = np.flatnonzero(hit[1:] != hit[:-1])

@@ -47,7 +47,7 @@ _PLACE = np.full(256, -1, np.int8)
 _PLACE[[NO_VERDICT, *(CODES[v] for v in (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED))]] = range(4)
 
 
-class Told(NamedTuple):
+class CriterionSeries(NamedTuple):
     """What one criterion, or a part of one, said of N instants."""
 
     name: str
@@ -71,10 +71,10 @@ class Told(NamedTuple):
     """Why what was within at every instant is not within; empty where it is."""
 
 
-def told_of(series: Series) -> Told:
+def criterion_series(series: Series) -> CriterionSeries:
     """What a series holds by now, all of it of one moment."""
     rows, texts = series.instants()
-    return Told(
+    return CriterionSeries(
         name=series.name,
         unit=series.unit,
         at_most=series.at_most,
@@ -211,9 +211,9 @@ def _known(values: Iterable[float | None]) -> Array:
 
 def table(
     form: Form,
-    told: Sequence[Told],
+    every: Sequence[CriterionSeries],
     *,
-    parts: Mapping[str, Sequence[Told]] | None = None,
+    parts: Mapping[str, Sequence[CriterionSeries]] | None = None,
     snapshots: Iterable[Snapshot] | None = None,
     criteria: Mapping[str, _Column] | None = None,
     attributes: Mapping[str, Any] | None = None,
@@ -222,7 +222,7 @@ def table(
 
     Args:
         form: See `Form`.
-        told: One per criterion, in their order.
+        every: One per criterion, in their order.
         parts: Of each criterion that has some; None where none were kept.
         snapshots: What rows and aspects are in; None where none were kept.
         criteria: More columns of the form ``criteria``, one figure per criterion.
@@ -236,17 +236,17 @@ def table(
     if form not in have:
         raise UnknownName("form", form, have)
     said: dict[str, Any] = {
-        "verdict": _name(worst([one.verdict for one in told])),
-        "criteria": {one.name: _attributes(one) for one in told},
+        "verdict": _name(worst([one.verdict for one in every])),
+        "criteria": {one.name: _attributes(one) for one in every},
         "units": {"t": "s"},
         **(attributes or {}),
     }
     if form == "wide":
-        return _wide(told, said)
+        return _wide(every, said)
     if form == "long":
-        return Table(_long(told, [one.name for one in told]), said)
+        return Table(_long(every, [one.name for one in every]), said)
     if form == "criteria":
-        return Table({**_criteria(told), **(criteria or {})}, said, index="criterion")
+        return Table({**_criteria(every), **(criteria or {})}, said, index="criterion")
     if form == "parts":
         pairs = [(name, part) for name, own in (parts or {}).items() for part in own]
         named = _long([part for _, part in pairs], [name for name, _ in pairs])
@@ -261,7 +261,7 @@ def _name(verdict: Verdict | None) -> str:
     return VERDICTS[0] if verdict is None else verdict.value
 
 
-def _attributes(one: Told) -> dict[str, Any]:
+def _attributes(one: CriterionSeries) -> dict[str, Any]:
     limits = np.unique(one.limits[~np.isnan(one.limits)])
     return {
         "unit": one.unit,
@@ -273,10 +273,10 @@ def _attributes(one: Told) -> dict[str, Any]:
     }
 
 
-def _wide(told: Sequence[Told], attributes: Mapping[str, Any]) -> Table:
-    index = np.unique(np.concatenate([np.zeros(0), *(one.t for one in told)]))
+def _wide(columns: Sequence[CriterionSeries], attributes: Mapping[str, Any]) -> Table:
+    index = np.unique(np.concatenate([np.zeros(0), *(one.t for one in columns)]))
     groups: dict[str, dict[str, _Column]] = {}
-    for one in told:
+    for one in columns:
         places = _PLACE[one.codes]
         # Of two that speak of one instant, the worse is written last.
         order = np.argsort(places, kind="stable")
@@ -288,31 +288,31 @@ def _wide(told: Sequence[Told], attributes: Mapping[str, Any]) -> Table:
     return Table({"t": index}, attributes, groups, index="t")
 
 
-def _long(told: Sequence[Told], criteria: Sequence[str]) -> dict[str, _Column]:
-    sizes = [len(one.t) for one in told]
+def _long(columns: Sequence[CriterionSeries], criteria: Sequence[str]) -> dict[str, _Column]:
+    sizes = [len(one.t) for one in columns]
     none = np.zeros(0)
     return {
-        "t": np.concatenate([none, *(one.t for one in told)]),
+        "t": np.concatenate([none, *(one.t for one in columns)]),
         "criterion": _repeated(criteria, sizes),
-        "value": np.concatenate([none, *(one.values for one in told)]),
-        "limit": np.concatenate([none, *(one.limits for one in told)]),
-        "unit": _repeated([one.unit for one in told], sizes),
-        "verdict": verdicts(np.concatenate([none.astype(np.uint8), *(one.codes for one in told)])),
-        "reason": _words([reason for one in told for reason in one.reasons]),
+        "value": np.concatenate([none, *(one.values for one in columns)]),
+        "limit": np.concatenate([none, *(one.limits for one in columns)]),
+        "unit": _repeated([one.unit for one in columns], sizes),
+        "verdict": verdicts(np.concatenate([none.astype(np.uint8), *(one.codes for one in columns)])),
+        "reason": _words([reason for one in columns for reason in one.reasons]),
     }
 
 
-def _criteria(told: Sequence[Told]) -> dict[str, _Column]:
+def _criteria(columns: Sequence[CriterionSeries]) -> dict[str, _Column]:
     found: dict[str, _Column] = {
-        "criterion": _words([one.name for one in told]),
-        "verdict": _verdict_words([one.verdict for one in told]),
-        "unit": _words([one.unit for one in told]),
-        "at_most": np.array([one.at_most for one in told], bool),
-        "instants": np.array([len(one.t) for one in told], np.int64),
-        "why": _words([one.why for one in told]),
+        "criterion": _words([one.name for one in columns]),
+        "verdict": _verdict_words([one.verdict for one in columns]),
+        "unit": _words([one.unit for one in columns]),
+        "at_most": np.array([one.at_most for one in columns], bool),
+        "instants": np.array([len(one.t) for one in columns], np.int64),
+        "why": _words([one.why for one in columns]),
     }
-    for share in Times._fields if all(one.times is not None for one in told) else ():
-        found[f"share_{share}"] = _known(one.times and getattr(one.times, share) for one in told)
+    for share in Times._fields if all(one.times is not None for one in columns) else ():
+        found[f"share_{share}"] = _known(one.times and getattr(one.times, share) for one in columns)
     return found
 
 

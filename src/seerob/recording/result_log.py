@@ -280,8 +280,10 @@ class ResultLog(Mapping[str, Series]):
         every = tuple(self._series.values())
         return frames.table(
             form,
-            [frames.told_of(series) for series in every],
-            parts={s.name: [frames.told_of(part) for part in tuple(s.parts.values())] for s in every},
+            [frames.criterion_series(series) for series in every],
+            parts={
+                s.name: [frames.criterion_series(part) for part in tuple(s.parts.values())] for s in every
+            },
             snapshots=snapshots,
             criteria=frames.worst_columns(every),
         )

@@ -128,7 +128,7 @@ class Batch(Mapping[str, Column]):
             UnknownName: There is no such form of a batch.
             MissingPackage: pandas is not installed.
         """
-        return frames.table(form, self.told()).to_pandas()
+        return frames.table(form, self.criterion_series()).to_pandas()
 
     def to_arrow(self, form: frames.Form = "wide") -> pa.Table:
         """Answers as an Arrow table (extra ``data``), as `seerob.ResultLog.to_arrow` makes it.
@@ -141,12 +141,12 @@ class Batch(Mapping[str, Column]):
             InputError: A criterion of a wide table is called ``t``.
             MissingPackage: pyarrow is not installed.
         """
-        return frames.table(form, self.told()).to_arrow()
+        return frames.table(form, self.criterion_series()).to_arrow()
 
-    def told(self) -> list[frames.Told]:
+    def criterion_series(self) -> list[frames.CriterionSeries]:
         """Each criterion, as tables and plots ask for it."""
         return [
-            frames.Told(
+            frames.CriterionSeries(
                 name=c.name,
                 unit=c.unit,
                 at_most=c.at_most,
@@ -171,7 +171,7 @@ class Batch(Mapping[str, Column]):
             UnknownName: There is none of that name.
             MissingPackage: matplotlib is not installed (extra ``data``).
         """
-        named = {one.name: one for one in self.told()}
+        named = {one.name: one for one in self.criterion_series()}
         return plotted([named[self[name].name] for name in criteria or self])
 
     def _repr_html_(self) -> str:

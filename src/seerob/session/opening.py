@@ -34,7 +34,7 @@ from seerob.twin.controller_check import compared, controller_log
 from seerob.twin.states import motion_of
 from seerob.workstation.plausibility.ranges import Quantity
 from seerob.workstation.plausibility.ranges import findings as implausible
-from seerob.workstation.source import Matrix4, Opened, Source, Target, TaughtByHand, delayed
+from seerob.workstation.source import Matrix4, Opened, Source, TakesWaypoints, Target, delayed
 
 FIRST, LOOKS = 2000, 8
 """Samples at the begin of a recorded motion, and how many of them are looked at for where it goes."""
@@ -205,9 +205,10 @@ def _lateness(model: Model, source: Source) -> Iterator[Finding]:
     if not isinstance(source, VariablesSource):
         return
     read = [v for v in model.dictionary.values() if v.source == source.name and not v.write]
-    if read and source.unseen() > 0:
+    gap = source.sampling_gap()
+    if read and gap > 0:
         text = (
-            f"{_named([v.name for v in read])}: heard every {source.unseen():g} s; what one is for less than "
+            f"{_named([v.name for v in read])}: heard every {gap:g} s; what one is for less than "
             "that is not seen, and nothing is judged by it"
         )
         yield Finding(level="note", subject=source.name, text=text)
@@ -317,7 +318,7 @@ def _placed(problem: Problem, source: Source, at: str, file: str) -> Problem:
 
     That is its name for a data file that cannot be read at all, and waypoints that stand in it themselves.
     """
-    if isinstance(source, TaughtByHand) and not getattr(source, "file", ""):
+    if isinstance(source, TakesWaypoints) and not getattr(source, "file", ""):
         point = _POINT.search(problem.key)
         key = point[0] if point else problem.key
         return Problem(file, f"{at}.{key or 'points'}", problem.what, problem.remedy)

@@ -29,7 +29,7 @@ from seerob.model.model import Model
 from seerob.outputs.notebook import results_html
 from seerob.outputs.over_time import plotted
 from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
-from seerob.recording.frames import told_of
+from seerob.recording.frames import criterion_series
 from seerob.recording.result_log import ResultLog
 from seerob.session.huge_pages import use_huge_pages
 from seerob.session.opening import coarse, gappy, signal_timeouts, untimed
@@ -394,7 +394,7 @@ class Summary:
             UnknownName: There is none of that name.
             MissingPackage: matplotlib is not installed (extra ``data``).
         """
-        return plotted([told_of(self.results[name]) for name in criteria or self.results])
+        return plotted([criterion_series(self.results[name]) for name in criteria or self.results])
 
 
 def run(

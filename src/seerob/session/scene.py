@@ -37,7 +37,7 @@ from seerob.recording.format import content_hash
 from seerob.recording.series import STILL
 from seerob.session.opening import coarse
 from seerob.twin.state import State
-from seerob.workstation.source import ByHand, TaughtByHand
+from seerob.workstation.source import TakesWaypoints, WaypointTarget
 from seerob.workstation.variables import Value, WhenStale
 from seerob.workstation.workstation import Camera, Landmark, Pose, Workstation, real_names
 
@@ -257,19 +257,19 @@ def _taught(model: Model) -> Iterator[Taught]:
     for number, source in enumerate(model.workstation.sources):
         driven.add(source.target())
         robot = model.mechanisms.get(source.target())
-        if not isinstance(source, TaughtByHand) or robot is None:
+        if not isinstance(source, TakesWaypoints) or robot is None:
             continue
-        hand = source.by_hand(robot.description)
+        hand = source.waypoint_target(robot.description)
         if hand is not None:
             yield from _taught_of(model, robot, number, hand)
     for robot in model.mechanisms.values():
         if robot.role == "robot" and robot.name not in driven:
             links = robot.description.links
-            hand = ByHand(robot.description.tip, np.eye(4), links[0].name, 0)
+            hand = WaypointTarget(robot.description.tip, np.eye(4), links[0].name, 0)
             yield from _taught_of(model, robot, None, hand)
 
 
-def _taught_of(model: Model, robot: Mechanism, source: int | None, hand: ByHand) -> Iterator[Taught]:
+def _taught_of(model: Model, robot: Mechanism, source: int | None, hand: WaypointTarget) -> Iterator[Taught]:
     with suppress(UnknownName):  # a link that is not there, or a robot without a shape
         tip, base = (model.frame(f"{robot.name}/{link}") for link in (hand.tip, hand.base))
         yield Taught(
@@ -369,7 +369,7 @@ def invalid_reasons(state: State) -> dict[str, str]:
     some bones are in doubt those are named, and what the person holds.
     """
     found: dict[str, str] = {}
-    for name in state.in_doubt():
+    for name in state.invalid_names():
         if reason := state.invalid_place_reason(name):
             found[name] = reason
         elif reason := state.invalid_reason(name):

@@ -78,7 +78,7 @@ class Columns:
     """None where every joint is commanded itself."""
     entries: Indices
     """Where ``MjData.M`` has the mass matrix of ``all_v``, shape (n, n); -1 where it has nothing."""
-    apart: NDArray[np.bool_] | None
+    uncoupled: NDArray[np.bool_] | None
     """Where it has nothing: joints that do not move each other; None where all do."""
     joints: Indices
     """MuJoCo's, in the order of ``all_v``."""
@@ -115,8 +115,8 @@ class Columns:
     def of_mass_matrix(self, M: Array) -> Array:
         """Mass matrix of the commanded joints from ``MjData.M``, shape (n, n)."""
         own = M.take(self.entries)
-        if self.apart is not None:
-            own[self.apart] = 0.0
+        if self.uncoupled is not None:
+            own[self.uncoupled] = 0.0
         return own if self.coupling is None else np.asarray(self.coupling.T @ own @ self.coupling)
 
 

@@ -289,7 +289,7 @@ def _jumps(last: Sample | None, first: Sample) -> bool:
     return True
 
 
-class ByHand(NamedTuple):
+class WaypointTarget(NamedTuple):
     """Waypoints that the workstation file itself has: what their poses are of, and in which frame."""
 
     tip: str
@@ -303,10 +303,10 @@ class ByHand(NamedTuple):
 
 
 @runtime_checkable
-class TaughtByHand(Protocol):
+class TakesWaypoints(Protocol):
     """A source to which waypoints can be added by hand."""
 
     robot: str
 
-    def by_hand(self, description: Description) -> ByHand | None:
+    def waypoint_target(self, description: Description) -> WaypointTarget | None:
         """What its waypoints are of; None where they are a file's."""

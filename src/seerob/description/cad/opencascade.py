@@ -49,7 +49,7 @@ def plain(
     """What a file holds, in numbers, texts and bytes: how many products, each of them, and all the rest."""
     source = MeshSource(path, data, max_bytes, max_faces)
     with source.parsing("IGES file" if iges else "STEP file"), tempfile.TemporaryDirectory() as folder:
-        yield from _Document(source, Path(folder), iges, tolerance).told()
+        yield from _Document(source, Path(folder), iges, tolerance).described()
 
 
 class _Document:
@@ -151,7 +151,7 @@ class _Document:
             return
         to.write_bytes(self._local(held, to.parent, depth + 1))
 
-    def told(self) -> Iterator[dict[str, Any]]:
+    def described(self) -> Iterator[dict[str, Any]]:
         """How many products there are, plain data of each as it is cut into triangles, and of the whole."""
         from OCP.collections import Sequence_TDF_Label
 

@@ -51,7 +51,7 @@ def read(source: MeshSource) -> Assembly:
                 file.child(child, np.eye(4), (), 0, source.path.parent)
         for child in root:
             file.child(child, np.eye(4), (), 0, source.path.parent)
-        told = file.told()
+        told = file.described()
     return assembled(source, told, f"SDF {root.get('version', '')}".strip(), np.eye(3), 1.0)
 
 
@@ -168,7 +168,7 @@ class _File:
 
     # -- plain data ---------------------------------------------------------------------------
 
-    def told(self) -> dict[str, Any]:
+    def described(self) -> dict[str, Any]:
         """What `assembled` takes."""
         below: dict[str, list[int]] = {}
         above: dict[str, int] = {}

@@ -45,7 +45,7 @@ def plain(path: Path, data: bytes, max_bytes: int, max_faces: int) -> dict[str, 
 
         try:
             layers = _Layers(source, Path(folder))
-            return _Stage(source, Usd.Stage.Open(str(layers.root)), layers).told()
+            return _Stage(source, Usd.Stage.Open(str(layers.root)), layers).described()
         except (Tf.ErrorException, UnicodeError) as error:
             said = (str(error).strip().splitlines() or [type(error).__name__])[0]
             source.fail(f"is not a readable USD file ({said[:160]})", "export it again")
@@ -198,7 +198,7 @@ class _Stage:
             default.GetPath() if default and len(named) == 1 and not named[0].IsA(UsdGeom.Gprim) else None
         )
 
-    def told(self) -> dict[str, Any]:
+    def described(self) -> dict[str, Any]:
         """Plain data of it."""
         bodies: dict[Any, Any] = {}
         joints: list[Any] = []

@@ -62,7 +62,7 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self, folder, target)
 
-    def unseen(self) -> float:
+    def sampling_gap(self) -> float:
         """Between two questions."""
         return self.every
 

@@ -88,7 +88,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
-    def unseen(self) -> float:
+    def sampling_gap(self) -> float:
         """The server keeps the newest value of each interval."""
         return self.interval
 

@@ -89,7 +89,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
-    def unseen(self) -> float:
+    def sampling_gap(self) -> float:
         """Between two questions."""
         return self.every
 

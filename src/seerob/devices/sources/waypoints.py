@@ -32,7 +32,7 @@ from seerob.files.waypoints.inverse import parse
 from seerob.files.waypoints.reading import Point, read_program
 from seerob.files.waypoints.timing import JointLimits
 from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Program, Waypoint
-from seerob.workstation.source import ByHand, Target
+from seerob.workstation.source import Target, WaypointTarget
 
 HEAD = 16 << 10
 """Of a file in which its header is looked for [bytes]."""
@@ -211,13 +211,13 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         )
         return Arm(target.description, link=tip, link_from_tcp=tcp, base=base), said
 
-    def by_hand(self, description: Description) -> ByHand | None:
+    def waypoint_target(self, description: Description) -> WaypointTarget | None:
         """What ``points`` are of; None where a file has the waypoints."""
         if self.file:
             return None
         tool, _ = self._tcp(Program(IN_TABLE, ()))
         base = self.base or description.links[0].name
-        return ByHand(self.at or description.tip, tool, base, len(self.points))
+        return WaypointTarget(self.at or description.tip, tool, base, len(self.points))
 
     def _tcp(self, program: Program) -> tuple[Array, str]:
         if self.tcp is not None:

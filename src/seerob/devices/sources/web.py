@@ -154,7 +154,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
-    def unseen(self) -> float:
+    def sampling_gap(self) -> float:
         """Between two questions, over HTTP."""
         return 0.0 if self._pushed else self.every
 

@@ -145,7 +145,7 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         """Whether it shows how late a variable is heard: it is asked for it, or told when it was so."""
         return False
 
-    def unseen(self) -> float:
+    def sampling_gap(self) -> float:
         """How long a variable may be something else that is never heard [s]; 0 where each change is told."""
         return 0.0
 

@@ -436,7 +436,7 @@ class Validity:
             self.asked = asked
         return self._sound
 
-    def in_doubt(self) -> tuple[str, ...]:
+    def invalid_names(self) -> tuple[str, ...]:
         """Robots, people and machines of whom anything is in doubt at this tick."""
         sound = self._find_sound()
         if len(sound) == len(self._hearings):

@@ -93,7 +93,11 @@ def test_nearest_of_two_meshes_is_the_first_of_all_pairs(ball, scratch, away):
             assert found == (least, *pair)
 
 
-def test_every_triangle_is_in_the_tree_once(ball):
+@pytest.mark.parametrize("size", [1e-30, 1.0, 1e30])
+def test_every_triangle_is_in_the_tree_once(size):
+    """Also where no area of a box is a number of single precision."""
+    mesh = trimesh.creation.icosphere(2, 0.3)
+    ball = tree_of(np.array(mesh.vertices, float) * size, np.ascontiguousarray(mesh.faces, np.int32))
     used = ball.kids[ball.kids != NONE]
     assert sorted((~used[used < 0]).tolist()) == list(range(len(ball.triangles)))
     assert sorted(used[used >= 0].tolist()) == list(range(1, len(ball.boxes)))

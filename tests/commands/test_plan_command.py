@@ -96,7 +96,7 @@ def test_of_a_pose_the_way_of_reaching_it_that_is_clear_is_planned(cell, capsys)
 
 def test_a_path_that_is_not_found_is_undecided(cell):
     (cell / "workstation.toml").write_text(CELL.replace("[2, 0, 0.6]", "[0.5, -0.1, 0.35]"), encoding="utf-8")
-    call = ["plan", str(cell), "--to-deg=60,-70,80,-100,-90,0", "--seconds", "0.001"]
+    call = ["plan", str(cell), "--to-deg=60,-70,80,-100,-90,0", "--seconds", "1e-9"]
     assert cli.main([*call, "-o", str(cell / "p.toml")]) == Exit.UNDECIDED
     assert not (cell / "p.toml").exists()
 

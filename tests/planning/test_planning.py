@@ -95,11 +95,12 @@ def test_what_is_asked_by_whether_is_what_distances_say(model):
 
 
 def test_what_is_clear_at_postures_only_is_searched_again_by_proven_ways(model, monkeypatch):
-    """Somebody who looks at the ends of ways alone goes straight through the post."""
+    """Somebody who looks at the middle and the end of ways alone goes straight through the post."""
     monkeypatch.setattr("seerob.session.planning.clearance.SPACING", 100.0)
+    monkeypatch.setattr("seerob.session.planning.plan.SPACING", 100.0)
     clearance = Clearance(model, model.robot("arm"), np.array([-1.2, 0.0]))
-    assert clearance.sampled(np.array([-1.2, 0.0]), np.array([1.2, 0.0]), 0.03)
-    found = plan(model, "arm", [[1.2, 0.0]], margin=0.03, seed=3)
+    assert clearance.sampled(np.array([-1.2, 0.0]), np.array([1.8, 0.0]), 0.03)
+    found = plan(model, "arm", [[1.8, 0.0]], margin=0.03, seed=3)
     assert len(found.q) > 2
     assert 0.03 <= found.least <= dense(clearance, found.q) + 1e-9
 

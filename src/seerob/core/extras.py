@@ -22,7 +22,6 @@ EXTRAS = {
     "pyarrow": "data",
     "anywidget": "notebook",
     "coacd": "contacts",
-    "ompl": "plan",
     "openvr": "vive",
     "xr": "openxr",
     "cryptography": "tls",

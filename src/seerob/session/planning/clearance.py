@@ -9,18 +9,20 @@ not clear. Distances are those of the twin's own shapes; what may be nearer by i
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.figures import against
-from seerob.core.transforms import Array
-from seerob.distance.least import DistanceKind, Per, Query, Survey
+from seerob.core.transforms import Array, rotation_from_wxyz, transform
+from seerob.distance.least import Per, Query
+from seerob.kernels import ways
+from seerob.kernels.pairs import BODY
+from seerob.kernels.ways import Apart, Arm, Bound
 from seerob.model.model import Mechanism, Model
 from seerob.session.permissible.moving_joints import KinematicChain, chains_of
 
@@ -95,8 +97,6 @@ class Clearance:
         self._model, self.robot = model, robot
         self._data = mujoco.MjData(model.mj)
         self._ids = np.array([body.mj for body in model.bodies])
-        self.asked = 0
-        """Postures that were looked at."""
         places = places or {}
         there = [m for m in model.mechanisms.values() if m.name != robot.name and m.name not in swept]
         problems = [
@@ -134,15 +134,24 @@ class Clearance:
         self._pairs += self._itself(own, start)
         if not self._pairs:
             raise InputError.at("workstation", robot.name, "there is nothing to keep away from")
-        asked = [(pairs.query, Per.PAIR if pairs.own else Per.BODY) for pairs in self._pairs]
-        self._survey = Survey(model.shapes, asked)
-        self._whether = Survey(model.shapes, [(pairs.query, Per.WHETHER) for pairs in self._pairs])
         # Of each pair of bodies the row of the weights: those of a body of the robot with all others are one.
-        self._weights = np.concatenate(
+        weights = np.concatenate(
             [p.weight if p.own else np.tile(p.weight, (len(p.query.a), 1)) for p in self._pairs]
         )
-        self._deviations = np.concatenate([np.full(p.count, p.deviation) for p in self._pairs])
-        self._own = np.concatenate([np.full(p.count, p.own) for p in self._pairs])
+        found = [pairs.query.members(Per.WHETHER) for pairs in self._pairs]
+        row = np.repeat(np.arange(len(weights)), np.concatenate([np.diff(m.start) for m in found]))
+        own_rows = np.repeat([p.own for p in self._pairs], [len(m.rows) for m in found])
+        self._own: NDArray[np.bool_] = own_rows
+        self._deviations = np.repeat([p.deviation for p in self._pairs], [len(m.rows) for m in found])
+        pair = np.ascontiguousarray(np.concatenate([m.rows[:, :2] for m in found]))
+        self._bound = self._bind(Apart(pair, np.ascontiguousarray(weights[row])), start)
+        self.table = self._bound.table
+        """What `seerob.kernels.ways` is given."""
+
+    @property
+    def asked(self) -> int:
+        """Postures that were looked at."""
+        return int(self._bound.room.counts[0])
 
     def nearest(self, q: Array, *, own: bool = False) -> Nearest | None:
         """Where the robot is nearest to others, or to itself, at joint positions (n,); None without any."""
@@ -171,53 +180,23 @@ class Clearance:
             b: Likewise.
             margin: [m], 0 or more.
         """
-        moved = self._weights @ np.abs(b - a)
-        need = self._needs(margin)
-        longest = float(moved.max(initial=0.0))
-        spans = deque([(0.0, 1.0)])
-        while spans:
-            low, high = spans.popleft()  # what is not clear is met the sooner
-            half = (high - low) / 2
-            poses = self._poses(a + (low + half) * (b - a))
-            if not self._is_nearer(poses, need + moved * half):
-                continue
-            if self._is_nearer(poses, need) or longest * half < RESOLUTION / 2:
-                return False
-            spans += [(low, low + half), (low + half, high)]
-        return True
+        return bool(ways.is_clear(a, b, self.needs(margin), RESOLUTION, True, self.table))
 
     def sampled(self, a: Array, b: Array, margin: float) -> bool:
         """Whether postures of the straight way from ``a`` to ``b``, `SPACING` apart, keep a margin [m].
 
         No proof: what is between them is not looked at.
         """
-        need = self._needs(margin)
-        longest = float((self._weights @ np.abs(b - a)).max(initial=0.0))
-        steps = max(1, int(np.ceil(longest / SPACING)))
-        waiting = _middle_first(steps)  # what is not clear is met the sooner
-        asked = 4
-        while waiting:
-            poses = [self._poses(a + k / steps * (b - a)) for k in waiting[:asked]]
-            R, x = (np.array([pose[i] for pose in poses]) for i in (0, 1))
-            if self._is_nearer((R, x), need):
-                return False
-            waiting, asked = waiting[asked:], 2 * asked
-        return True
+        return bool(ways.is_clear(a, b, self.needs(margin), SPACING, False, self.table))
 
     def is_clear(self, q: Array, margin: float) -> bool:
         """Whether a posture (n,) keeps a margin [m]."""
-        return not self._is_nearer(self._poses(q), self._needs(margin))
+        return not ways.too_near(np.asarray(q, float), self.needs(margin), self.table)
 
-    def _needs(self, margin: float) -> Array:
-        """Of each pair of bodies the distance between its shapes that is enough [m]."""
+    def needs(self, margin: float) -> Array:
+        """Of each pair of solids the distance that is enough, given the margin to others [m]."""
         needs: Array = np.where(self._own, OWN_MARGIN, margin) + self._deviations
         return needs
-
-    def _is_nearer(self, poses: tuple[Array, Array], caps: Array) -> bool:
-        """Whether any pair of bodies is nearer than its cap [m], in any of the postures."""
-        self.asked += len(poses[0]) if poses[0].ndim > 3 else 1
-        found = self._whether.within(*poses, caps)
-        return bool((found.kind != DistanceKind.BEYOND_CAP).any())
 
     def least(self, *path: Array, tolerance: float = 5e-3) -> float:
         """A bound from below on the distance to others on the straight ways between postures.
@@ -231,19 +210,8 @@ class Clearance:
         """
         if self._pairs[0].own:
             return np.inf
-        met = min(float(self._distances(q)[0].min()) for q in path)
-        for a, b in pairwise(path):
-            moved = self._weights @ np.abs(b - a)
-            spans = [(0.0, 1.0)]
-            while spans:
-                low, high = spans.pop()
-                half = (high - low) / 2
-                middle = a + (low + half) * (b - a)
-                enough = np.where(self._own, -np.inf, met - tolerance + moved * half + self._deviations)
-                if self._is_nearer(self._poses(middle), enough):
-                    met = min(met, float(self._distances(middle)[0].min()))
-                    spans += [(low, low + half), (low + half, high)]
-        return met - tolerance * (len(path) > 1)
+        deviation = np.where(self._own, np.inf, self._deviations)
+        return float(ways.least_on(np.array(path, float), deviation, tolerance, self.table))
 
     def _poses(self, q: Array) -> tuple[Array, Array]:
         robot, data = self.robot, self._data
@@ -251,10 +219,43 @@ class Clearance:
         mujoco.mj_kinematics(self._model.mj, data)
         return data.xmat[self._ids].reshape(-1, 3, 3), data.xpos[self._ids]
 
-    def _distances(self, q: Array) -> list[Array]:
-        self.asked += 1
-        answers = self._survey.ask(*self._poses(q))
-        return [answer.distance - p.deviation for answer, p in zip(answers, self._pairs, strict=True)]
+    def _bind(self, apart: Apart, start: Array) -> Bound:
+        """All as arrays, everybody else where they stand."""
+        mj, bodies, robot = self._model.mj, self._model.bodies, self.robot
+        rotations, positions = self._poses(start)
+        solids = self._model.shapes.arrays()
+        links: dict[int, tuple[int, Array]] = {}
+        fixed, parents, joints = [], list[int](), list[int]()
+        roots = {int(mj.body_rootid[bodies[i].mj]) for i in self._mine}
+        for body in np.flatnonzero(np.isin(mj.body_rootid, list(roots))).tolist():
+            link, parent = links.get(int(mj.body_parentid[body]), (0, np.eye(4)))
+            within = parent @ transform(rotation_from_wxyz(mj.body_quat[body]), mj.body_pos[body])
+            first = int(mj.body_jntadr[body])
+            for joint in range(first, first + int(mj.body_jntnum[body])):
+                parents.append(link)
+                fixed.append(within[:3])
+                joints.append(joint)
+                link, within = len(joints), np.eye(4)
+            links[body] = link, within
+        at = mj.jnt_qposadr[joints]
+        base = self._data.qpos[at] - mj.qpos0[at]
+        coupling = np.zeros((len(joints), len(robot.joints)))
+        where = {int(address): k for k, address in enumerate(at)}
+        for address, share, shift in zip(robot.q_address.tolist(), robot.coupling, robot.offset, strict=True):
+            if address in where:
+                base[where[address]] = shift - mj.qpos0[address]
+                coupling[where[address]] = share
+        mine = np.array(self._mine, np.int64)
+        own = [links[bodies[i].mj] for i in self._mine]
+        j, used = len(joints), np.unique(apart.pair)
+        arm = Arm(
+            base, coupling, np.array(parents, np.int64), mj.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE,
+            np.array(fixed).reshape(j, 3, 4), mj.jnt_axis[joints].reshape(j, 3),
+            mj.jnt_pos[joints].reshape(j, 3), np.array([link for link, _ in own], np.int64),
+            np.array([within[:3] for _, within in own]).reshape(-1, 3, 4), mine,
+            used[np.isin(solids.which[used, BODY], mine)],
+        )  # fmt: skip
+        return Bound(solids, arm, apart, rotations, positions)
 
     def _against(self, others: tuple[int, ...]) -> _Pairs:
         query = Query(self._model.shapes, others, self._mine)
@@ -302,18 +303,6 @@ class Clearance:
     def _deviation(self, a: Iterable[int], b: Iterable[int]) -> float:
         bodies = self._model.bodies
         return sum(max((bodies[i].deviation for i in side), default=0.0) for side in (a, b))
-
-
-def _middle_first(steps: int) -> list[int]:
-    """0 … steps, each half of what is left after the one before."""
-    found, spans = [0, steps], deque([(0, steps)])
-    while spans:
-        low, high = spans.popleft()
-        if high - low > 1:
-            middle = (low + high) // 2
-            found.append(middle)
-            spans += [(low, middle), (middle, high)]
-    return found
 
 
 def _areas(

@@ -1,36 +1,31 @@
-"""A plan: postures to go through, the way between two by OMPL ([Sucan2012]_), and what is known of it.
+"""A plan: postures to go through, a way between two, and what is known of it.
 
 Every straight way of it is proven to be clear. RRT-Connect ([Kuffner2000]_) finds it by postures along its
-ways, partial short cuts make it shorter; then it is proven, and where that fails searched again by ways that
-are. OMPL's generator of random numbers
-is one for the whole process: it is seeded anew for every search, so that the same seed gives the same path
-whatever was searched before.
+ways, short cuts make it shorter (`seerob.kernels.ways`); then it is proven, and where that fails searched
+again by ways that are.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
-from threading import Lock
-from types import ModuleType
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.transforms import Array
+from seerob.kernels import ways
 from seerob.model.model import Mechanism, Model
-from seerob.session.planning.clearance import WATCHED, Clearance
+from seerob.session.planning.clearance import RESOLUTION, SPACING, WATCHED, Clearance
 from seerob.session.planning.others import made_for, movers
 
 LIMIT = 1e-9
 """Beyond a limit by less is rounding [rad or m]."""
-MOST = 20_000
-"""Postures tried per way."""
+MOST = 1_000_000
+"""Postures that are looked at per way."""
 PERSON = "; where people go is not known"
 
 
@@ -130,26 +125,26 @@ def plan(
         raise InputError.at("plan", "goal", "missing", "give joint positions to go to")
     if not (margin >= 0 and np.isfinite(margin)):
         raise InputError.at("plan", "margin", f"{margin} m", "give 0 or more")
-    ways = [
+    postures = [
         np.asarray(mechanism.home if start is None else start, float),
         *(np.asarray(g, float) for g in goals),
     ]
     names = ["start", *(f"goal {i + 1}" for i in range(len(goals)))]
     problems: list[Problem] = []
-    for name, q in zip(names, ways, strict=True):
+    for name, q in zip(names, postures, strict=True):
         problems += _wrong(mechanism, name, q)
     if problems:
         raise InputError(problems)
-    clearance = Clearance(model, mechanism, ways[0], keep_out=keep_out, places=places, swept=swept)
-    ways = [_first_clear(clearance, q, margin) for q in ways]
-    for name, q in zip(names, ways, strict=True):
+    clearance = Clearance(model, mechanism, postures[0], keep_out=keep_out, places=places, swept=swept)
+    postures = [_first_clear(clearance, q, margin) for q in postures]
+    for name, q in zip(names, postures, strict=True):
         what = clearance.fault(q, margin)
         if what:
             problems.append(Problem("plan", name, what, "choose another posture or a smaller margin"))
     if problems:
         raise InputError(problems)
-    path, at = [ways[0]], [0]
-    for (a, b), (first, second) in zip(pairwise(ways), pairwise(names), strict=True):
+    path, at = [postures[0]], [0]
+    for (a, b), (first, second) in zip(pairwise(postures), pairwise(names), strict=True):
         try:
             path += search(clearance, a, b, margin=margin, seed=seed, most=MOST, seconds=seconds, say=say)[1:]
         except NoPath as error:
@@ -229,7 +224,14 @@ STRIDE = 0.6
 ROOM = 0.005
 """What is made shorter keeps so much more than the margin [m]: along the margin a proof takes small steps."""
 
-_ONE_AT_A_TIME = Lock()
+NODES = 20_000
+"""Of each tree of a search."""
+SLICE = 32
+"""Random postures that are tried before somebody is asked whether to go on."""
+SHORT_CUTS = 60
+"""Short cuts that are tried."""
+GAIN = 0.002
+"""Share of the length of a way that a short cut must save."""
 
 
 class NoPath(SeerobError):
@@ -264,178 +266,128 @@ def search(
         say: Told how many were tried; True stops the work.
 
     Raises:
-        InputError: OMPL is not installed.
         NoPath: None was found within ``most`` or ``seconds``.
         Stopped: ``say`` said so.
     """
-    modules = _ompl()
     if clearance.clear(start, goal, margin):
         return [start, goal]
-    patience = _Patience(most, seconds, say)
-    with _ONE_AT_A_TIME, _quiet(modules[2]):
-        found = _searched(modules, clearance, clearance.sampled, start, goal, margin, seed, patience)
-        # Only what is kept is proven; what is clear at postures and not between them is searched again.
-        path = [start]
-        for a, b in pairwise(found):
-            if clearance.clear(a, b, margin):
-                path.append(b)
-                continue
-            way = _searched(modules, clearance, clearance.clear, a, b, margin, seed, patience)
-            if not all(clearance.clear(x, y, margin) for x, y in pairwise(way)):
-                raise NoPath("the path that was found could not be proven")
-            path += way[1:]
-    if patience.stopped:
-        raise patience.end()
+    random = np.array([seed % 2**64], np.uint64)
+    patience = _Patience(clearance.asked, most, seconds, say)
+    found = _searched(clearance, start, goal, margin, random, patience, proven=False)
+    # Only what is kept is proven; what is clear at postures and not between them is searched again.
+    path = [start]
+    for a, b in pairwise(found):
+        if clearance.clear(a, b, margin):
+            path.append(b)
+            continue
+        way = _searched(clearance, a, b, margin, random, patience, proven=True)
+        if not all(clearance.clear(x, y, margin) for x, y in pairwise(way)):
+            raise NoPath("the path that was found could not be proven")
+        path += way[1:]
     return path
 
 
-IsClear = Callable[[Array, Array, float], bool]
-"""Whether a straight way keeps a margin, as far as somebody looks."""
-
-
 def _searched(
-    modules: tuple[ModuleType, ModuleType, ModuleType],
     clearance: Clearance,
-    is_clear: IsClear,
     start: Array,
     goal: Array,
     margin: float,
-    seed: int,
+    random: NDArray[np.uint64],
     patience: _Patience,
+    *,
+    proven: bool,
 ) -> list[Array]:
-    """Postures between which ``is_clear`` says yes, without detours that it can do without.
+    """Postures whose straight ways are clear, as far as is looked, without detours that it can do without.
 
     Raises:
         NoPath: None was found in time.
         Stopped: Nobody wants to wait.
     """
-    base, geometric, util = modules
-    util.RNG.setSeed(seed % (2**32 - 1) + 1)
-    space = _space(base, clearance, start, goal)
-    setup = geometric.SimpleSetup(space)
-    information = setup.getSpaceInformation()
-    n = len(start)
-    setup.setStateValidityChecker(lambda state: clearance.is_clear(_posture(state, n), margin))
-    ways = _validator(base, information, n, is_clear, margin, patience)
-    information.setMotionValidator(ways)
-    setup.setStartAndGoalStates(_state(space, start), _state(space, goal))
-    planner = geometric.RRTConnect(information)
-    planner.setRange(STRIDE)
-    setup.setPlanner(planner)
-    setup.solve(base.PlannerTerminationCondition(patience))
-    if not setup.haveExactSolutionPath():
-        raise patience.end()
-    path = setup.getSolutionPath()
-    found = [_posture(state, n) for state in path.getStates()]
-    if not patience.over():
-        ways.margin = margin + ROOM
-        simplifier = geometric.PathSimplifier(information)
-        simplifier.ropeShortcutPath(path)
-        simplifier.partialShortcutPath(path, 60, 30)
-        simplifier.reduceVertices(path)
-        found = _plain(is_clear, [_posture(state, n) for state in path.getStates()], ways.margin)
-    return found
+    low, high = _bounds(clearance.robot, start, goal)
+    nodes, parents = np.empty((2, NODES, len(start))), np.zeros((2, NODES), np.int64)
+    nodes[:, 0] = start, goal
+    size = np.array([1, 1, 0])
+    how = (RESOLUTION if proven else SPACING, proven, clearance.table)
+    need, state = clearance.needs(margin), ways.ON
+    while state != ways.FOUND:
+        if state == ways.FULL or patience.over(clearance.asked):
+            raise patience.end()
+        state = ways.connect(nodes, parents, size, random, low, high, STRIDE, SLICE, need, *how)
+    halves = []
+    for tree in (0, 1):
+        k, half = size[tree] - 1, list[Array]()
+        while k:
+            half.append(nodes[tree, k])
+            k = parents[tree, k]
+        halves.append([*half, nodes[tree, 0]])
+    way = halves[0][::-1] + halves[1][1:]
+    need = clearance.needs(margin + ROOM)
+
+    def clear(*postures: Array) -> bool:
+        if patience.over(clearance.asked):
+            return False
+        return all(ways.is_clear(a, b, need, *how) for a, b in pairwise(postures))
+
+    return _plain(clear, _shortened(clear, way, np.random.default_rng(int(random[0]))))
 
 
-class _Patience:
-    """Tells OMPL when to give up, and then why."""
-
-    def __init__(self, most: int, seconds: float, say: Callable[[int], bool]) -> None:
-        self._most, self._seconds, self._say = most, seconds, say
-        self._until = time.monotonic() + seconds
-        self._tried = 0
-        self._stopped = False
-
-    def __call__(self) -> bool:
-        self._tried += 1
-        return self.over() or self._tried > self._most
-
-    def over(self) -> bool:
-        """Whether there is no more time, or nobody wants to wait."""
-        self._stopped = self._stopped or self._say(self._tried)
-        return self._stopped or time.monotonic() > self._until
-
-    @property
-    def stopped(self) -> bool:
-        """Whether nobody wants to wait."""
-        return self._stopped
-
-    def end(self) -> SeerobError:
-        if self._stopped:
-            return Stopped(f"stopped after {self._tried} postures")
-        spent = f"in {self._seconds:g} s ({self._tried} postures tried)"
-        if self._tried > self._most:
-            spent = f"with {self._most} postures tried"
-        return NoPath(f"no path was found {spent}; that there is none is not known")
+def _shortened(clear: Callable[..., bool], way: list[Array], random: np.random.Generator) -> list[Array]:
+    """A way with short cuts, of all joints or by turns of one, between random places of it."""
+    for turn in range(SHORT_CUTS):
+        far = np.cumsum([0.0, *(float(np.linalg.norm(b - a)) for a, b in pairwise(way))])
+        u, v = np.sort(random.uniform(0, far[-1], 2))
+        i, j = np.clip(np.searchsorted(far, (u, v), side="right") - 1, 0, len(way) - 2).tolist()
+        if i == j:
+            continue
+        at, knots = np.array([u, *far[i + 1 : j + 1], v]), np.array(way)
+        cut = np.array([np.interp(at, far, column) for column in knots.T]).T
+        if turn % 2:  # of one joint alone: the others go as before
+            joint = int(random.integers(len(knots[0])))
+            cut[:, joint] = np.interp(at, (u, v), (cut[0, joint], cut[-1, joint]))
+        else:
+            cut = cut[[0, -1]]
+        length = float(np.linalg.norm(np.diff(cut, axis=0), axis=1).sum())
+        if length < v - u - GAIN * far[-1] and clear(*cut):
+            way = [*way[: i + 1], *cut, *way[j + 1 :]]
+    return way
 
 
-def _ompl() -> tuple[ModuleType, ModuleType, ModuleType]:
-    try:
-        from ompl import base, geometric, util
-    except ImportError as error:
-        remedy = 'pip install "seerob[plan]" (it exists for Linux and macOS)'
-        raise InputError.at("plan", "", f"the package ompl cannot be imported ({error})", remedy) from error
-    return base, geometric, util
-
-
-@contextmanager
-def _quiet(util: ModuleType) -> Iterator[None]:
-    """Without what OMPL writes to the terminal: that it is seeded anew, too."""
-    before = util.getLogLevel()
-    util.setLogLevel(util.LOG_NONE)
-    try:
-        yield
-    finally:
-        util.setLogLevel(before)
-
-
-def _space(base: ModuleType, clearance: Clearance, start: Array, goal: Array) -> Any:
-    """Where postures are tried: within the limits, and where there are none half a turn around both ends."""
-    robot = clearance.robot
-    least, most = np.minimum(start, goal), np.maximum(start, goal)
-    low = np.minimum(np.maximum(robot.lower, least - np.pi), least)
-    high = np.maximum(np.minimum(robot.upper, most + np.pi), most)
-    space, bounds = base.RealVectorStateSpace(len(start)), base.RealVectorBounds(len(start))
-    for i, (a, b) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
-        bounds.setLow(i, a)
-        bounds.setHigh(i, b)
-    space.setBounds(bounds)
-    return space
-
-
-def _validator(
-    base: Any, information: Any, n: int, is_clear: IsClear, margin: float, patience: _Patience
-) -> Any:
-    class Ways(base.MotionValidator):  # type: ignore[misc]
-        margin: float
-
-        def checkMotion(self, a: Any, b: Any) -> bool:
-            # OMPL asks whether to end between its steps only, each of which may be long.
-            return not patience.over() and is_clear(_posture(a, n), _posture(b, n), self.margin)
-
-    ways = Ways(information)
-    ways.margin = margin
-    return ways
-
-
-def _posture(state: Any, n: int) -> Array:
-    return np.array([state[i] for i in range(n)])
-
-
-def _state(space: Any, q: Array) -> Any:
-    state = space.allocState()
-    for i, value in enumerate(q.tolist()):
-        state[i] = value
-    return state
-
-
-def _plain(is_clear: IsClear, way: list[Array], margin: float) -> list[Array]:
+def _plain(clear: Callable[..., bool], way: list[Array]) -> list[Array]:
     """Without postures that can be left out."""
     k = 1
     while k < len(way) - 1:
-        same = np.abs(way[k] - way[k - 1]).max() < 1e-9
-        if same or is_clear(way[k - 1], way[k + 1], margin):
+        if clear(way[k - 1], way[k + 1]):
             del way[k]
         else:
             k += 1
     return way
+
+
+class _Patience:
+    """Tells when to give up, and then why."""
+
+    def __init__(self, begun: int, most: int, seconds: float, say: Callable[[int], bool]) -> None:
+        self._begun, self._most, self._seconds, self._say = begun, most, seconds, say
+        self._until = time.monotonic() + seconds
+        self._tried = 0
+
+    def over(self, asked: int) -> bool:
+        """Whether there is no more time, or enough was looked at; `Stopped` when nobody wants to wait."""
+        self._tried = asked - self._begun
+        if self._say(self._tried):
+            raise Stopped(f"stopped after {self._tried} postures")
+        return self._tried > self._most or time.monotonic() > self._until
+
+    def end(self) -> NoPath:
+        """What to raise when it is over, or there is no room for more."""
+        spent = f"in {self._seconds:g} s ({self._tried} postures tried)"
+        if time.monotonic() <= self._until:
+            spent = f"with {self._tried} postures tried"
+        return NoPath(f"no path was found {spent}; that there is none is not known")
+
+
+def _bounds(robot: Mechanism, start: Array, goal: Array) -> tuple[Array, Array]:
+    """Where postures are tried: within the limits, and where there are none half a turn around both ends."""
+    least, most = np.minimum(start, goal), np.maximum(start, goal)
+    low = np.minimum(np.maximum(robot.lower, least - np.pi), least)
+    return low, np.maximum(np.minimum(robot.upper, most + np.pi), most)

@@ -52,7 +52,7 @@ class Arm(NamedTuple):
     coupling: Array
     """Theirs by those of the arm, shape (j, n)."""
     parents: Indices
-    """Link that carries each joint, shape (j,); it and the next four go to `seerob.kernels.chain.followed`."""
+    """Link that carries each joint, shape (j,); the next four are for `kernels.chain.followed`, too."""
     turns: NDArray[np.bool_]
     fixed: Array
     axes: Array
@@ -212,7 +212,7 @@ def gap_of(p: int, limit: float, table: Indices) -> float:
             or (which[j, VOLUME] and inside(i, j, solids, room.world))
         )
     ):
-        return -min(d, reach) - r
+        return float(-min(d, reach) - r)
     return float(d - r) if d - r < limit else np.inf
 
 

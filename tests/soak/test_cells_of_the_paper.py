@@ -201,7 +201,8 @@ def test_castings_go_their_way(run):
     for (by, where), (took, off) in PIECES.get(name, {}).items():
         found = [e.took for e in events if (e.what, e.by, e.where) == ("placed", by, where)]
         assert found, (by, where)
-        assert found == pytest.approx([took] * len(found), abs=off)
+        said = [(e.t, e.what, e.piece, e.by, e.where, e.took) for e in events]
+        assert found == pytest.approx([took] * len(found), abs=off), said
     assert not [event for event in events if event.what in ("torn", "dropped", "refused")]
 
 

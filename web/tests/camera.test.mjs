@@ -18,6 +18,7 @@ const HERE = path.dirname(fileURLToPath(import.meta.url));
 
 let folder;
 let run;
+let emulator;
 let browser;
 let page;
 let places;
@@ -54,6 +55,27 @@ before(async () => {
   });
   assert.equal(await exit(made), 0);
   places = JSON.parse(told);
+  emulator = python(
+    "-m",
+    "seerob",
+    "emulate",
+    "camera",
+    "--cell",
+    folder,
+    "--camera",
+    "emulated",
+    "--port",
+    "0",
+  );
+  for await (const line of createInterface({ input: emulator.stdout })) {
+    const [, port] = line.match(/127\.0\.0\.1:(\d+)/) ?? [];
+    if (!port) continue;
+    const file = path.join(folder, "workstation.toml");
+    const text = fs.readFileSync(file, "utf8");
+    fs.writeFileSync(file, text.replace("http://127.0.0.1:9/emulated", `http://127.0.0.1:${port}/`));
+    break;
+  }
+  emulator.stdout.resume();
   run = python("-m", "seerob", "run", folder, "--port", "0", "-o", path.join(folder, "out"));
   browser = await openBrowser({
     width: 1300,
@@ -80,6 +102,11 @@ after(async () => {
   if (run && run.exitCode === null) {
     const over = exit(run);
     run.kill("SIGINT");
+    await over;
+  }
+  if (emulator && emulator.exitCode === null) {
+    const over = exit(emulator);
+    emulator.kill("SIGINT");
     await over;
   }
   camera.closeAllConnections();
@@ -127,6 +154,7 @@ const BALLS = {
   edge: [0.8, 0.4, 1.1],
   hidden: [-0.35, -0.3, 0.5],
 };
+const PLATE = [-0.24, -0.26, 1];
 
 async function registered() {
   await note().getByText("95 % of its error at the board").waitFor({ timeout: 240_000 });
@@ -167,6 +195,33 @@ test("and where a network camera sees them; without pictures of the present noth
   assert.equal((await middles("middle")).red.n, 0);
   films = true;
   await note().getByText("95 % of its error").waitFor({ timeout: 240_000 });
+  assert.deepEqual([browser.complaints, browser.outside], [[], []]);
+});
+
+test("an emulated camera's picture of what is real is where the page would draw it, with what is not over it", {
+  timeout: 900_000,
+}, async () => {
+  await look("emulated");
+  await note().getByText("95 % of its error at the board").waitFor({ timeout: 240_000 });
+  assert.equal(await page.evaluate(() => window.seerob.occludes("plate")), true, "the plate is not drawn");
+  const box = await room();
+  const r = Math.ceil(45 * Math.min(box.width / 640, box.height / 360));
+  const [x, y] = await page.evaluate((p) => window.seerob.project(p), PLATE);
+  const clip = { x: Math.round(x) - r, y: Math.round(y) - r, width: 2 * r, height: 2 * r };
+  let sum = [0, 0, 0];
+  for (let k = 0; k < 60 && sum[0] < 400; k += 1) {
+    const data = await pixels(page, clip);
+    sum = [0, 0, 0];
+    for (let i = 0; i < data.length / 4; i += 1) {
+      const [R, G, B] = data.slice(4 * i, 4 * i + 3);
+      if (B > 60 && B > 1.6 * R && B > 1.6 * G)
+        sum = sum.map((v, j) => v + [1, i % clip.width, Math.floor(i / clip.width)][j]);
+    }
+  }
+  assert.ok(sum[0] > 400, `${sum[0]} pixels of the plate are seen`);
+  const off = Math.hypot(sum[1] / sum[0] + clip.x - x, sum[2] / sum[0] + clip.y - y);
+  assert.ok(off < REGISTERED, `the plate is ${off} px off`);
+  assert.ok((await middles("middle")).red.n > 20, "a ball, which is not real, is drawn over it");
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });
 

@@ -23,6 +23,8 @@ BALLS = {
 }
 PLATE = (-0.24, -0.26, 1.0)
 """Over one of the balls, seen from the camera, and real."""
+EMULATED = "http://127.0.0.1:9/emulated"
+"""To be replaced by the address of an emulator."""
 EYE, ROLL = np.array([0.2, -0.1, 3.0]), 0.15
 SEEN, BACK = (40, 220, 40), (90, 60, 50)
 """Blue, green, red."""
@@ -64,11 +66,12 @@ def main():
     for name, at in BALLS.items():
         cell += f'[[parts]]\nname = "{name}"\nshape = {{ sphere = 0.018 }}\ncolor = [1, 0, 0]\n'
         cell += f"at = {{ position = {list(at)} }}\n"
-    cell += '[[parts]]\nname = "plate"\nreal = true\nshape = { box = [0.2, 0.2, 0.01] }\n'
+    cell += '[[parts]]\nname = "plate"\nreal = true\nshape = { box = [0.2, 0.2, 0.01] }\ncolor = [0, 0, 1]\n'
     cell += f"at = {{ position = {list(PLATE)} }}\n"
     for name, file, more in (
         ("webcam", "camera", ""),
         ("network", "camera", f'address = "{address}"\nrecord = true\n'),
+        ("emulated", "camera", f'address = "{EMULATED}"\n'),
         ("unplaced", "unplaced", ""),
         ("worse", "worse", ""),
     ):

@@ -7,7 +7,8 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from seerob.criteria.stopping.onset import accelerated, by_speed, farthest
-from seerob.kernels.ahead import WINDOW, instants, joint_speeds, moved_on, window
+from seerob.kernels.ahead import WINDOW, joint_speeds, moved_on, window
+from seerob.kernels.pull import instants
 
 
 def motion(seed, m=9, j=3):

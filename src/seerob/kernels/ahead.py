@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from seerob.core.transforms import Array
 from seerob.kernels.bound import Layout
 from seerob.kernels.mujoco_calls import updated
+from seerob.kernels.pull import size_of, ticks_ahead
 from seerob.kernels.spans import joint_bounds, point_bounds
 from seerob.kernels.speed import fastest_of
 
@@ -127,39 +128,6 @@ def window(ticks: int, instants: int, parts: int, joints: int) -> Window:
         np.full(s, UNKNOWN), np.zeros(s, np.int64), np.empty((m, j)), np.empty((m, j)),
         np.empty((m, 2, n)), np.empty((m, 2, j)), np.empty((s, n)), np.empty((instants, n)),
     )  # fmt: skip
-
-
-@njit(f"i8(f8, i8, f8, f8[:], f8, {_ROW}, i8[::1])", cache=True, nogil=True)
-def instants(
-    begin: float, first: int, period: float, knots: Array, slack: float, found: Array, rows: Indices
-) -> int:
-    """Put ticks, and the knots that are none of them, in one order; writes into the last two arguments.
-
-    Args:
-        begin: The first tick, between two of the clock [s].
-        first: Number of the clock's tick before it.
-        period: Of the clock [s].
-        knots: Not decreasing [s], shape (k,).
-        slack: A knot that is nearer to a tick is that tick [s].
-        found: Shape (s + k,).
-        rows: Where each tick is, shape (s,).
-
-    Returns:
-        How many there are.
-    """
-    count, i, tick, before = 0, 0, begin, -np.inf
-    for t in knots:
-        while i < len(rows) and tick < t:
-            found[count], rows[i], before = tick, count, tick
-            count, i, tick = count + 1, i + 1, period * (first + i + 1)
-        near = (i < len(rows) and abs(t - tick) <= slack) or (i > 0 and abs(t - before) <= slack)
-        if not near and (count == 0 or found[count - 1] < t):
-            found[count] = t
-            count += 1
-    while i < len(rows):
-        found[count], rows[i] = tick, count
-        count, i, tick = count + 1, i + 1, period * (first + i + 1)
-    return count
 
 
 @njit(
@@ -505,3 +473,68 @@ def until_braking(
     _until_braking(now, now.parts, first, count, side, t, begin, end, T_r, lead, slack, points)
     if of_joints:
         _until_braking(now, now.joints, first, count, side, t, begin, end, T_r, lead, slack, joints)
+
+
+@njit(
+    f"i8(i8[:,::1], i8[:,::1], i8[:,::1], b1, i8, i8, i8, f8, f8, f8, f8, f8, f8, {_ROW}, {_ROWS})",
+    cache=True,
+    nogil=True,
+)
+def braking_along(
+    parts: Indices,
+    window: Indices,
+    samples: Indices,
+    again: bool,
+    first: int,
+    last: int,
+    side: int,
+    begin: float,
+    T_r: float,
+    ahead: float,
+    period: float,
+    slack: float,
+    rounding: float,
+    now: Array,
+    points: Array,
+) -> int:
+    """Bound how far and fast parts get until they brake, going through samples; writes the last argument.
+
+    Args:
+        parts: As of `until_braking`, with the next.
+        window: Likewise.
+        samples: Table of `seerob.kernels.pull.KNOTS`: those that the motion goes through.
+        again: As of `moved_on`.
+        first: Number of the first tick.
+        last: Number of the last one.
+        side: As of `until_braking`.
+        begin: Now [s].
+        T_r: Reaction time [s].
+        ahead: How much of it is looked at [s].
+        period: Of a tick [s].
+        slack: As of `until_braking`, with the next [s].
+        rounding: Likewise [m/s].
+        now: Speeds of the parts now [m/s], shape (n,).
+        points: As of `until_braking`, shape (3, n).
+
+    Returns:
+        As of `moved_on`; where that is -1, nothing is bounded.
+    """
+    rows, (kept, joints) = np.empty(1 + last - first, np.int64), size_of(samples)
+    room = len(rows) + kept + 1
+    t, q, qd, qdd = (
+        np.empty(room),
+        np.empty((room, joints)),
+        np.empty((room, joints)),
+        np.empty((room, joints)),
+    )
+    count = ticks_ahead(samples, begin, first, period, t, rows, q, qd, qdd)
+    missing = moved_on(window, again, first, rows, q[:count], qd[:count])
+    if missing < 0:
+        return missing
+    for c in range(len(now)):
+        points[0, c] = now[c]
+    until_braking(
+        parts, window, first, rows, t[:count], side, begin, ahead + period, T_r, period, slack, rounding,
+        points, np.empty((3, 0)),
+    )  # fmt: skip
+    return missing

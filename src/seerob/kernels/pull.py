@@ -13,7 +13,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.ahead import instants
 from seerob.kernels.bound import Layout
 from seerob.kernels.mujoco_calls import newton_euler, updated
 
@@ -228,6 +227,46 @@ def _along(knots: Knots, t: Array, q: Array, v: Array, a: Array) -> None:
         knots.instants[first:end], knots.points[first:end], knots.speeds[first:end], knots.jumps[first:end],
         knots.coast[0], t, q, v, a,
     )  # fmt: skip
+
+
+@njit(f"i8(f8, i8, f8, f8[:], f8, {_ROW}, i8[::1])", cache=True, nogil=True)
+def instants(
+    begin: float, first: int, period: float, knots: Array, slack: float, found: Array, rows: Indices
+) -> int:
+    """Put ticks, and the knots that are none of them, in one order; writes into the last two arguments.
+
+    Args:
+        begin: The first tick, between two of the clock [s].
+        first: Number of the clock's tick before it.
+        period: Of the clock [s].
+        knots: Not decreasing [s], shape (k,).
+        slack: A knot that is nearer to a tick is that tick [s].
+        found: Shape (s + k,).
+        rows: Where each tick is, shape (s,).
+
+    Returns:
+        How many there are.
+    """
+    count, i, tick, before = 0, 0, begin, -np.inf
+    for t in knots:
+        while i < len(rows) and tick < t:
+            found[count], rows[i], before = tick, count, tick
+            count, i, tick = count + 1, i + 1, period * (first + i + 1)
+        near = (i < len(rows) and abs(t - tick) <= slack) or (i > 0 and abs(t - before) <= slack)
+        if not near and (count == 0 or found[count - 1] < t):
+            found[count] = t
+            count += 1
+    while i < len(rows):
+        found[count], rows[i] = tick, count
+        count, i, tick = count + 1, i + 1, period * (first + i + 1)
+    return count
+
+
+@njit(f"UniTuple(i8, 2)({_TABLE})", cache=True, nogil=True)
+def size_of(table: Indices) -> tuple[int, int]:
+    """How many samples are kept in a table of `KNOTS`, and of how many joints they are."""
+    knots = _knots_in(table, 0)
+    return knots.kept[1] - knots.kept[0], knots.points.shape[1]
 
 
 @njit(

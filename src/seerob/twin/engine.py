@@ -45,7 +45,7 @@ from seerob.twin import controller_check
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.control.actuation import TaskPull, set_gains, set_torque_limits
 from seerob.twin.control.inverse_kinematics import solve_pose
-from seerob.twin.control.reference import Reference, Ticks
+from seerob.twin.control.reference import Reference
 from seerob.twin.control.sample_values import beyond_limits, is_possible, largest_speed, torques_of
 from seerob.twin.control.unheard import BEATS, QUICKEST, Unheard
 from seerob.twin.machines.following import HOLD, Machines, Moved
@@ -251,7 +251,7 @@ class Engine:
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = state(model, self._shown, self._hearings, self.signals)
         self.state.foresee, self.state.knots = self._foresee, self._knots_of
-        self.state.foresee_ticks = self._foresee_ticks
+        self.state.foresee_samples = self._samples_ahead
         self._loose = Loose(model, self._mj, self._data, self._shown, self.signals)
         for index in self._loose.bodies():
             self.state.attachments.unknown.pop(index, None)
@@ -504,14 +504,12 @@ class Engine:
         q, qd, _ = self._references[name].course(t)
         return q, qd, hearing.invalid_ahead_reason(self.state.t, float(t[-1]) if len(t) else self.state.t)
 
-    def _foresee_ticks(self, name: str, first: int, last: int) -> Ticks | None:
-        """Tell what `_foresee` does at the instant of the twin and at later ticks, of whom a file moves."""
-        hearing, t = self._hearings[name], self.state.t
+    def _samples_ahead(self, name: str, until: float) -> tuple[kernel.Indices, str] | None:
+        """Tell what `_foresee` does from now on as the samples it goes through, of whom a file moves."""
+        hearing = self._hearings[name]
         if name not in self.ahead or name in self._loose.names or not hearing.driven:
             return None
-        found = self._references[name].ticks(t, first, last, self._period)
-        reason = hearing.invalid_ahead_reason(t, self._period * last)
-        return found._replace(invalid_reason=reason) if reason else found
+        return self._references[name].table, hearing.invalid_ahead_reason(self.state.t, until)
 
     def _knots_of(self, name: str, begin: float, end: float) -> Array:
         """Tell between which instants that is one cubic (`seerob.twin.spans.Knots`)."""

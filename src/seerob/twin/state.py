@@ -32,7 +32,6 @@ from seerob.kernels.speed import PLACED, Placed, by_coordinate, carried, fastest
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.attachments import Columns, moving_dofs
 from seerob.twin.authors_view import OF_AN_INSTANT, AuthorsView, Others, moved_by_others, without
-from seerob.twin.control.reference import Ticks
 from seerob.twin.drawn_points import DrawnPoints, Local
 from seerob.twin.moving_points import Moved, Point, PointSurvey, place_of
 from seerob.twin.mujoco_addresses import POSES, addresses
@@ -49,9 +48,10 @@ Indices = NDArray[np.int64]
 Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
 """Asks what a robot or human does at instants ahead [s] (m,): joint positions and velocities there, shape (m,
 n) each, and why they may be others; None where nobody knows."""
-ForeseeTicks = Callable[[str, int, int], Ticks | None]
-"""Asks what somebody does now and at later ticks, by the numbers of the first and the last of them; None
-where it is to be asked otherwise."""
+ForeseeSamples = Callable[[str, float], tuple[Indices, str] | None]
+"""Asks for the samples through which somebody goes until an instant [s], a table of
+`seerob.kernels.pull.KNOTS`, and why they may go elsewhere; None where it is to be asked otherwise."""
+_NO_SAMPLES: ForeseeSamples = lambda name, until: None  # noqa: E731
 
 MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
@@ -96,8 +96,8 @@ class State(Validity):
         self._ahead: Foresee = lambda name, t: None
         self.knots: Knots = lambda name, begin, end: ()
         """Instants between which what `foresee` tells is one cubic, besides the ticks."""
-        self.foresee_ticks: ForeseeTicks = lambda name, first, last: None
-        """Tells both at once of ticks to come, until somebody else sets `foresee`."""
+        self.foresee_samples: ForeseeSamples = _NO_SAMPLES
+        """Tells both at once, until somebody else sets `foresee`."""
         self.events: tuple[Event, ...] = ()
         """What happened to loose workpieces since the last tick."""
         self.touches: list[tuple[int, int, float]] | None = None
@@ -544,7 +544,7 @@ class State(Validity):
 
     @foresee.setter
     def foresee(self, ahead: Foresee) -> None:
-        self._ahead, self.foresee_ticks = ahead, lambda name, first, last: None
+        self._ahead, self.foresee_samples = ahead, _NO_SAMPLES
 
     def _foreseen(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
         self.asked.add(name)
@@ -555,20 +555,19 @@ class State(Validity):
         q, qd, invalid_reason = found
         return q, qd + self._quicker[name], invalid_reason
 
-    def ticks_ahead(self, name: str, first: int, last: int) -> Ticks | None:
-        """What a motion that is known ahead will do from now on until a later tick.
+    def samples_ahead(self, name: str, until: float) -> tuple[Indices, str] | None:
+        """Samples through which a motion that is known ahead goes, and why it may be another one.
 
         Args:
             name: Of the robot.
-            first: Number of the tick that this is, or that is before it.
-            last: Number of the last tick.
+            until: When it is looked at last [s].
 
         Returns:
-            None where nobody knows, or where `foresee` is to be asked.
+            A table of `seerob.kernels.pull.KNOTS`; None where nobody knows, or `foresee` is to be asked.
         """
         self.asked.add(name)
         self.speeds_asked.add(name)
-        return None if self._quicker else self.foresee_ticks(name, first, last)
+        return None if self._quicker else self.foresee_samples(name, until)
 
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).

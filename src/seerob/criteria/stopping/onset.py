@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 from seerob.core.domains import agree, number
 from seerob.core.transforms import Array
 from seerob.kernels import ahead as kernel
-from seerob.kernels.ahead import PARTS, WINDOW, joint_speeds, moved_on, until_braking
+from seerob.kernels.ahead import PARTS, WINDOW, braking_along, joint_speeds, moved_on, until_braking
+from seerob.kernels.pull import instants as instants_of
 from seerob.kernels.speed import by_coordinate
 from seerob.model.model import Body, Gap, Mechanism, Model
-from seerob.twin.control.reference import Ticks
 from seerob.twin.moving_base import RESTS
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.spans import ROUNDING, Knots, Points, rows_of
@@ -186,19 +186,23 @@ class Foreseen:
         k = math.floor(t / period + 1e-6)
         # The same instants whenever they are asked for.
         last = math.ceil((t + T_r + period) / period - 1e-6)
-        ticks = state.ticks_ahead(name, k, last)
-        if ticks is None:
-            instants, rows = with_knots(state.knots, name, t, k, last, period)
-            foreseen = state.foresee(name, instants)
-            if foreseen is None:
-                return None
-            ticks = Ticks(instants, rows, *map(np.ascontiguousarray, foreseen[:2]), foreseen[2])
-        instants, rows, q, qd, unbounded_reason = ticks
-        if self._T_r > T_r:
-            unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
-        same = self._parts.follow(state)
-        if not self._parts.alone:
-            same = self._parts.put_others(state.data_of(*self._with)) and same
+        beyond = self._T_r > T_r and f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
+        samples = None if self._joints_asked else state.samples_ahead(name, period * last)
+        same: bool | None = None
+        if samples is not None:
+            table, unbounded_reason = samples
+            same = self._others_same(state)
+            found = self._along(state, (k, last), table, unbounded_reason or beyond or "", same=same)
+            if found is not None:
+                return found
+        instants, rows = with_knots(state.knots, name, t, k, last, period)
+        foreseen = state.foresee(name, instants)
+        if foreseen is None:
+            return None
+        q, qd, unbounded_reason = foreseen
+        unbounded_reason = unbounded_reason or beyond or ""
+        q, qd = np.ascontiguousarray(q), np.ascontiguousarray(qd)
+        same = self._others_same(state) if same is None else same
         self._keep(state, k, rows, q, qd, same=same)
         # A twin that does not stand exactly where the motion has it may be faster now.
         v_now = state.fastest_speeds(self._gap.b)
@@ -231,6 +235,46 @@ class Foreseen:
 
         now = onset(1.0)
         return lambda scale: now if scale == 1.0 else onset(scale)
+
+    def _along(
+        self, state: State, ticks: tuple[int, int], samples: Indices, unbounded_reason: str, *, same: bool
+    ) -> At | None:
+        """Do what `at` does of parts alone in one call; None where there is no room for so many instants.
+
+        Args:
+            state: The twin.
+            ticks: Numbers of the first tick and of the last.
+            samples: Those that the motion goes through, a table of `seerob.kernels.pull.KNOTS`.
+            unbounded_reason: Why it may be another motion.
+            same: As of `_keep`.
+        """
+        (k, last), T_r, run = ticks, self._ahead, self._run() is state
+        kept = same and run and k >= self._first
+        v_now = state.fastest_speeds(self._gap.b)
+        points = np.empty((3, len(v_now)))
+        missing = braking_along(
+            self._parts.table, self._window.table, samples, kept, k, last, ENDS if unbounded_reason else MOST,
+            state.t, self._T_r, T_r, self._period, SLACK, ROUNDING, v_now, points,
+        )  # fmt: skip
+        if missing < 0:
+            return None
+        if not run:
+            self._run = weakref.ref(state)
+        self._first = k
+
+        def onset(scale: float) -> Onset:
+            v_r, S_r, v_s = points if scale == 1.0 else scale * points
+            return Onset(v_r, S_r, v_s, None, None, unbounded_reason=unbounded_reason)
+
+        now = onset(1.0)
+        return lambda scale: now if scale == 1.0 else onset(scale)
+
+    def _others_same(self, state: State) -> bool:
+        """Whether what others do with its parts is as before, where they are put now."""
+        same = self._parts.follow(state)
+        if not self._parts.alone:
+            same = self._parts.put_others(state.data_of(*self._with)) and same
+        return same
 
     def _keep(self, state: State, k: int, rows: Indices, q: Array, qd: Array, *, same: bool) -> None:
         """Keep what is known of ticks from tick k on, but where the motion is another one.
@@ -354,7 +398,7 @@ def with_knots(
     own = np.asarray(knots(name, begin, float(period * last)), float)
     rows = np.empty(1 + last - k, np.int64)
     found = np.empty(len(rows) + len(own))
-    return found[: kernel.instants(begin, k, period, own, SLACK, found, rows)], rows
+    return found[: instants_of(begin, k, period, own, SLACK, found, rows)], rows
 
 
 def largest_between(t: Array, q: Array, qd: Array) -> Array:

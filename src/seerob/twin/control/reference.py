@@ -17,14 +17,13 @@ where it was until the later one, and the twin is put there instead of being pul
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.bound import COLUMNS
-from seerob.kernels.pull import KNOTS, SLACK, Knots, along, take, ticks_ahead
+from seerob.kernels.pull import KNOTS, SLACK, Knots, along, take
 
 Indices = NDArray[np.int64]
 
@@ -32,21 +31,6 @@ MAX_KEPT = 4096
 """Samples kept at most: many times what a fast source sends within one tick."""
 ROWS = 64
 """Samples for which there is room at first."""
-
-
-class Ticks(NamedTuple):
-    """What somebody does at ticks to come; m instants, those of its samples between them too."""
-
-    t: Array
-    """Instants, increasing [s], shape (m,): from one to the next the motion is one cubic."""
-    rows: Indices
-    """Where the ticks are among them, shape (s,)."""
-    q: Array
-    """Positions then [rad or m], shape (m, n)."""
-    qd: Array
-    """Velocities then, shape (m, n)."""
-    invalid_reason: str = ""
-    """Why they may be others."""
 
 
 class Reference:
@@ -191,20 +175,6 @@ class Reference:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
         q, v, a = self.course(np.array([t]))
         return q[0], v[0], a[0]
-
-    def ticks(self, begin: float, first: int, last: int, period: float) -> Ticks:
-        """Where it will be at ticks to come, and at samples between them, where its cubics join.
-
-        Args:
-            begin: The first tick [s].
-            first: Number of the clock's tick that this is, or that is before it.
-            last: Number of the last one.
-            period: Of the clock [s].
-        """
-        rows, room = np.empty(1 + last - first, np.int64), 2 + last - first + len(self._times)
-        t, (q, v, a) = np.empty(room), np.empty((3, room, self._zero.shape[0]))
-        count = ticks_ahead(self.table, begin, first, period, t, rows, q, v, a)
-        return Ticks(t[:count], rows, q[:count], v[:count])
 
     def course(self, t: Array) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at many instants [s] (m,), each of shape (m, n)."""

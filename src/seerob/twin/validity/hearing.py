@@ -254,7 +254,10 @@ class Hearing:
 
         The worse of two samples, and by how much the twin is faster or slower than both say.
         """
-        if not any(said.speed_error is not None for said in self.heard):
+        for said in self.heard:
+            if said.speed_error is not None:
+                break
+        else:
             return self.unlike
         around = [said.speed_error for said in self.around(t) if said.speed_error is not None]
         error = np.max(around, axis=0) if around else None

@@ -2,6 +2,7 @@
 
     python benchmarks/everything.py            # prints ms per tick, percentiles, x real time
     python benchmarks/everything.py --smoke    # a second of motion, correctness only
+    python benchmarks/everything.py --against FOLDER    # in turns with a checkout of another commit
 
 One tick is pump, engine, all criteria, snapshot and its encoding, as `seerob assess` does it. A page asks for
 60 pictures a second: the rest of the ticks is not encoded. The peer is MuJoCo alone: what it computes for the
@@ -14,7 +15,11 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Iterator
+from itertools import islice, takewhile
 from pathlib import Path
+from subprocess import PIPE, Popen
+from typing import Any, NamedTuple
 
 # One core: the figure must not borrow a second one from a library's threads.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -73,20 +78,37 @@ class Peer:
         return time.thread_time() - began
 
 
-def measure(seconds: float) -> dict[str, float]:
-    """Times of one pass over the workstation's motion [ms], and the factor over real time."""
-    station = sr.load(FOLDER, cache=cache_folder())
+class Tick(NamedTuple):
+    """What one tick took [s], by the processor's clock but for the first four; of many, arrays of it."""
+
+    whole: Any
+    engine: Any
+    criteria: Any
+    snapshot: Any
+    computed: Any
+    twin: Any
+    judged: Any
+    with_page: Any
+    """Where a page takes it, with its encoding; else without."""
+    alone: Any
+    """MuJoCo's own part."""
+    size: Any
+    """Bytes of the snapshot."""
+    least: Any
+    """Least distance [m], infinite where there is none."""
+    t: Any
+    """Run time [s]."""
+
+
+def ticks(station: sr.Station, *, large: bool) -> Iterator[Tick]:
+    """Go through the workstation's motion, which repeats itself; in ``large`` pages of memory."""
     period = station.workstation.engine.tick
     driven = {source.target(): source.timeout for source in station.workstation.sources}
     engine = Engine(station.model, driven=driven)
     judge = road.Judge(station.bound)
     feed = road.pump(station.sources, period, endless=True, ahead=road.looks_ahead(station.model))
-    peer = Peer(engine)
-    encoder = msgspec.msgpack.Encoder(enc_hook=plain)
-    stages: dict[str, list[float]] = {"engine": [], "criteria": [], "snapshot": []}
-    whole, computed, twin, with_page, alone, worst_distance = [], [], [], [], [], np.inf
-    page, size = 0.0, 0
-    if seconds >= road.LONG:
+    peer, encoder, page = Peer(engine), msgspec.msgpack.Encoder(enc_hook=plain), 0.0
+    if large:
         use_huge_pages()
     with road.settled():
         for seq, samples in enumerate(feed):
@@ -95,27 +117,28 @@ def measure(seconds: float) -> dict[str, float]:
             state = engine.tick() if seq else engine.start()
             moved, stepped = time.perf_counter(), time.thread_time()
             results = judge(state)
-            judged = time.perf_counter()
+            judged, said = time.perf_counter(), time.thread_time()
             out = road.snapshot(state, seq, results)
             quiet = time.thread_time()
             size = len(encoder.encode(out))
             end, ended = time.perf_counter(), time.thread_time()
             shows = state.t >= page
             page += PAGE * shows
-            if seq >= 20:  # the first ticks touch cold memory
-                whole.append(end - begin)
-                computed.append(ended - began)
-                twin.append(stepped - began)
-                with_page.append((ended if shows else quiet) - began)
-                alone.append(peer.tick())
-                for name, spent in zip(stages, (moved - begin, judged - moved, end - judged), strict=True):
-                    stages[name].append(spent)
-            for result in results:
-                if result.unit == "m" and result.value is not None:
-                    worst_distance = min(worst_distance, result.value)
-            if state.t >= seconds:
-                break
-    ms = 1e3 * np.array(whole)
+            distances = [r.value for r in results if r.unit == "m" and r.value is not None]
+            yield Tick(
+                end - begin, moved - begin, judged - moved, end - judged, ended - began, stepped - began,
+                said - stepped, (ended if shows else quiet) - began, peer.tick(), size,
+                min(distances, default=np.inf), state.t,
+            )  # fmt: skip
+
+
+def measure(seconds: float) -> dict[str, float]:
+    """Times of one pass over the workstation's motion [ms], and the factor over real time."""
+    station = sr.load(FOLDER, cache=cache_folder())
+    period = station.workstation.engine.tick
+    every = list(takewhile(lambda tick: tick.t < seconds, ticks(station, large=seconds >= road.LONG)))
+    found = Tick(*map(np.array, zip(*every[20:], strict=True)))  # the first ticks touch cold memory
+    ms, computed, alone = 1e3 * found.whole, found.computed, np.median(found.alone)
     return {
         "ticks": len(ms),
         "criteria": len(station.bound),
@@ -124,27 +147,94 @@ def measure(seconds: float) -> dict[str, float]:
         "mean_ms": float(ms.mean()),
         "p99_ms": float(np.percentile(ms, 99)),
         "max_ms": float(ms.max()),
-        **{f"{name}_ms": 1e3 * float(np.median(spent)) for name, spent in stages.items()},
+        "engine_ms": 1e3 * float(np.median(found.engine)),
+        "criteria_ms": 1e3 * float(np.median(found.criteria)),
+        "snapshot_ms": 1e3 * float(np.median(found.snapshot)),
         "x_real_time": float(period * 1e3 / ms.mean()),
         "cpu_median_ms": 1e3 * float(np.median(computed)),
         "cpu_p99_ms": 1e3 * float(np.percentile(computed, 99)),
         "x_computed": float(period / np.mean(computed)),
-        "cpu_min_ms": 1e3 * min(computed),
-        "page_ms": 1e3 * float(np.median(with_page)),
-        "mujoco_ms": 1e3 * float(np.median(alone)),
-        "x_mujoco": float(np.median(with_page) / np.median(alone)),
-        "x_engine": float(np.median(twin) / np.median(alone)),
-        "bytes": size,
-        "least_distance": float(worst_distance),
+        "cpu_min_ms": 1e3 * float(np.min(computed)),
+        "page_ms": 1e3 * float(np.median(found.with_page)),
+        "mujoco_ms": 1e3 * float(alone),
+        "x_mujoco": float(np.median(found.with_page) / alone),
+        "x_engine": float(np.median(found.twin) / alone),
+        "bytes": every[-1].size,
+        "least_distance": min(tick.least for tick in every),
     }
+
+
+STAGES = {
+    "whole, with a page": "with_page",
+    "engine": "twin",
+    "criteria": "judged",
+    "MuJoCo's own part": "alone",
+}
+
+
+def in_turns() -> None:
+    """For whoever compares two commits: take as many ticks as each line says, and tell what they took."""
+    every = ticks(sr.load(FOLDER, cache=cache_folder()), large=True)
+    list(islice(every, 60))
+    print("ready", flush=True)
+    for line in sys.stdin:
+        some = list(islice(every, int(line)))
+        print(*(np.median([getattr(tick, name) for tick in some]) for name in STAGES.values()), flush=True)
+
+
+def against(folder: Path, pairs: int, count: int) -> None:
+    """Take ticks in turns with the sources of another checkout, and print how much longer ones of here take.
+
+    Args:
+        folder: Of the checkout, whose loops are compiled.
+        pairs: How often.
+        count: So many ticks at a time.
+    """
+    ours = Path(__file__).resolve().parents[1]
+    workers = []
+    for root in (folder.resolve(), ours):
+        environment = {**os.environ, "PYTHONPATH": str(root / "src")}
+        command = [sys.executable, __file__, "--in-turns"]
+        workers.append(Popen(command, env=environment, stdin=PIPE, stdout=PIPE, text=True))
+    times = np.empty((2, pairs, len(STAGES)))
+    for k, worker in enumerate(workers):
+        if worker.stdout is None or worker.stdout.readline() != "ready\n":
+            raise SystemExit(f"{(folder, ours)[k]}: it did not begin")
+    for pair in range(pairs):
+        for k in (0, 1) if pair % 2 else (1, 0):
+            worker = workers[k]
+            assert worker.stdin is not None
+            assert worker.stdout is not None
+            print(count, file=worker.stdin, flush=True)
+            times[k, pair] = [float(each) for each in worker.stdout.readline().split()]
+    for worker in workers:
+        worker.communicate()
+    low, middle, high = np.percentile(times[1] / times[0], [25, 50, 75], axis=0)
+    for k, name in enumerate(STAGES):
+        before, here = 1e3 * np.median(times[:, :, k], axis=1)
+        said = f"{name}: {before:.3f} ms there, {here:.3f} ms here, {middle[k]:.3f} x"
+        print(f"{said} (quartiles {low[k]:.3f} and {high[k]:.3f})")
+    before, here = np.median(times[:, :, 0] / times[:, :, -1], axis=1)
+    print(
+        f"tick / MuJoCo's own part: {before:.2f} x there, {here:.2f} x here, {pairs} pairs of {count} ticks"
+    )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--smoke", action="store_true")
+    parser.add_argument("--against", type=Path, metavar="FOLDER")
+    parser.add_argument("--pairs", type=int, default=60)
+    parser.add_argument("--in-turns", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    if options.in_turns:
+        in_turns()
+        return 0
+    if options.against is not None:
+        against(options.against, options.pairs, 20)
+        return 0
     found = measure(1.0 if options.smoke else 20.0)
     print(
         f"two robots, one person: {found['dof']} dof, {found['criteria']} criteria, "

@@ -724,9 +724,9 @@ def least_margin(one: Margin, other: Margin | None, lost: Fall) -> float:
     m_other, also = other
     if type(fall) is float is type(m) and type(m_other) is float is type(bend):
         return _least((m, off), (m_other, also), (fall, bend))
-    each = type(m) is type(off) is type(m_other) is type(also) is type(bend) is np.ndarray
-    if each and type(fall) is float and len(m) == len(off) == len(m_other) == len(also) == len(bend):
-        return float(least_margins(m, off, m_other, also, fall, bend))
+    each = [given for given in (m, off, m_other, also, bend) if isinstance(given, np.ndarray)]
+    if type(fall) is float and len(each) == 5 and len({*map(len, each)}) == 1:
+        return float(least_margins(each[0], each[1], each[2], each[3], fall, each[4]))
     low = np.maximum((m + m_other - fall) / 2, np.minimum(m, m_other) - bend)
     return float(np.min(low - np.maximum(off, also)))
 

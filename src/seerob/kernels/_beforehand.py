@@ -25,6 +25,7 @@ LOOPS = {
     "wide widen": "(f8[:,::1], i4[:,::1], f8[:,::1])",
     "axes felt": "",
     "chain at_point": "",
+    "moving move_points": "",
     "spans joint_bounds": "",
     "separation separations": "",
     "verdicts judged_many": "",

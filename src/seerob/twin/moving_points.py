@@ -121,6 +121,11 @@ class PointSurvey:
         )  # fmt: skip
 
 
+def commanded(mechanism: Mechanism) -> bool:
+    """Whether each of its joints is commanded itself and none follows another, as a survey has it."""
+    return np.array_equal(mechanism.coupling, np.eye(len(mechanism.v_address)))
+
+
 def place_of(frame: Frame, offset: Array | None) -> Array:
     """Where a point of a frame, or its origin, is in the body that the frame is on [m], shape (3,)."""
     local = frame.body_from_frame[:3, 3]

@@ -29,7 +29,7 @@ from seerob.model import provenance
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import velocity_of
-from seerob.twin.moving_points import Point
+from seerob.twin.moving_points import Point, commanded
 from seerob.twin.spans import Points, Span, coupling_of
 from seerob.twin.state import State
 
@@ -257,7 +257,8 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """Return what computes masses together: in one known direction, without tolerances."""
         robot = model.carrier(model.frame(self.at))
         directed = self.toward is not None or (self.along == "motion" and robot.alone)
-        return _Masses if directed and not len(MassTolerances(model, robot)) else None
+        together = directed and commanded(robot) and not len(MassTolerances(model, robot))
+        return _Masses if together else None
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         r"""Least margin in a span; None of what moves something else too, and of tolerances of masses.

@@ -22,7 +22,7 @@ from seerob.criteria.plan import Draw, Rows, Together
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
 from seerob.model.model import Frame, Model
-from seerob.twin.moving_points import Point
+from seerob.twin.moving_points import Point, commanded
 from seerob.twin.spans import Falls, Points, Turning, coupling_of
 from seerob.twin.state import State
 
@@ -143,7 +143,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
 
     def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
         """Return what computes figures of points together."""
-        return _Figures
+        return _Figures if commanded(model.carrier(model.frame(self.at))) else None
 
     def falls(self, model: Model, points: Points) -> Falls:
         """Bound how far singular values fall between instants: by the norm of the Jacobian's change."""

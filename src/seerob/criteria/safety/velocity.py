@@ -23,7 +23,7 @@ from seerob.criteria.plan import Draw, Rows, Together
 from seerob.model import provenance
 from seerob.model.model import Frame, Model
 from seerob.twin.moving_base import velocity_of
-from seerob.twin.moving_points import Point
+from seerob.twin.moving_points import Point, commanded
 from seerob.twin.spans import Falls, Points, speeding
 from seerob.twin.state import State
 
@@ -179,7 +179,8 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
     def planned(self, model: Model) -> Callable[[Sequence[Any], Model], Together] | None:
         """Return what computes speeds together: of sets, and of points that the robot alone moves."""
-        return _Speeds if self.at is None or model.carrier(model.frame(self.at)).alone else None
+        robot = None if self.at is None else model.carrier(model.frame(self.at))
+        return _Speeds if robot is None or (robot.alone and commanded(robot)) else None
 
     def one_by_one(self, model: Model) -> str:
         """Say so of a point whose robot is carried by something that moves."""

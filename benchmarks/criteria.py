@@ -149,6 +149,25 @@ def per_tick(ticks: int) -> tuple[dict[str, float], float, float, float]:
     return median, float(np.median(whole)), float(np.percentile(whole, 99)), other
 
 
+def together(ticks: int) -> tuple[float, float]:
+    """Median time of `SHORT`, asked by one judge as in a run, and of the peer in the same ticks [µs]."""
+    peer, station = Peer(), made(SHORT, physics=True)
+    engine, judge, robot = engine_of(station), road.Judge(station.bound), station.model.robot(ROBOT)
+    own, peers = [], []
+    with road.settled():
+        for seq, samples in zip(range(ticks), pump(station), strict=False):
+            engine.take(samples)
+            state = engine.tick() if seq else engine.start()
+            begin = time.thread_time()
+            judge(state)
+            own.append(time.thread_time() - begin)
+            q, qd = state.joint_positions(robot), state.qd(robot)
+            begin = time.thread_time()
+            peer.ask(q, qd)
+            peers.append(time.thread_time() - begin)
+    return 1e6 * float(np.median(own[20:])), 1e6 * float(np.median(peers[20:]))
+
+
 def between_ticks(ticks: int, *criteria: Criterion) -> tuple[float, float, float]:
     """Processor time per tick of the demo with and without what decides between ticks [s], looks per tick.
 
@@ -242,6 +261,11 @@ def main() -> int:
     print(
         f"four of them in a tick, with verdicts, markers and what all share: {four:.0f} µs, "
         f"Pinocchio with numpy {alone:.0f} µs for the bare figures, ratio {alone / four:.2f}   (goal: >= 3)"
+    )
+    own, other = together(ticks)
+    print(
+        f"the four asked by one judge, as a run asks: {own:.0f} µs, Pinocchio with numpy {other:.0f} µs, "
+        f"ratio {other / own:.2f}   (goal: >= 3)"
     )
     watched, unwatched, looks = between_ticks(ticks)
     print(

@@ -1,10 +1,12 @@
 // What a picture costs the page, on the desk and in an emulated headset, with 50 bodies at 100 Hz:
 // `node tests/page_cost.mjs [seconds] [--where]`.
 // Told are the script's time per picture (processor time of the page's thread, from the browser's trace), what is
-// allocated per picture, and how old the poses are, by the clock that both ends share: when they are taken for a
-// picture, and when the script is done with it. `--where` tells which functions allocate; a build with
-// `npx vite build --minify false` names them.
+// allocated per picture, and how old the poses are, by the clock that both ends share: when the server offers them to
+// pages, when the worker has them, when they are taken for a picture, and when the script is done with it; and how many
+// snapshots were sent and how many replaced before they were. `--where` tells which functions allocate, and whose the
+// script's time is; a build with `npx vite build --minify false --sourcemap` names them.
 
+import { SourceMap } from "node:module";
 import { openBrowser } from "./browser.mjs";
 import { HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { serve } from "./served.mjs";
@@ -128,13 +130,54 @@ function allocated(head) {
   return into;
 }
 
+const maps = new Map();
+
+/** Whose a function is: of three.js, of another package, a file of the page, or of the emulator and of this. */
+async function ownerOf({ url, lineNumber, columnNumber }) {
+  if (!url.includes("/assets/")) return "emulator and measurement";
+  if (!maps.has(url)) {
+    const answer = await fetch(`${url}.map`);
+    maps.set(url, answer.ok ? new SourceMap(await answer.json()) : null);
+  }
+  const from = maps.get(url)?.findEntry(lineNumber, columnNumber).originalSource ?? "";
+  return from.match(/node_modules\/((?:@[^/]+\/)?[^/]+)/)?.[1] ?? from.match(/src\/.*/)?.[0] ?? "the page";
+}
+
+/** Time that is spent in functions themselves, by whose they are [ms per picture]. */
+async function spent(pictures) {
+  await cdp.send("Profiler.enable");
+  await cdp.send("Profiler.setSamplingInterval", { interval: 200 });
+  const from = await pictures();
+  await cdp.send("Profiler.start");
+  await page.waitForTimeout(1000 * SECONDS);
+  const { profile } = await cdp.send("Profiler.stop");
+  const drawn = (await pictures()) - from;
+  const nodes = new Map(profile.nodes.map((node) => [node.id, node]));
+  const by = new Map();
+  const parents = new Map(
+    profile.nodes.flatMap(({ id, children = [] }) => children.map((child) => [child, id])),
+  );
+  for (const [k, id] of profile.samples.entries()) {
+    const { callFrame } = nodes.get(id);
+    // What the browser does is told with who asked for it.
+    const asker = callFrame.url === "" ? nodes.get(parents.get(id))?.callFrame : undefined;
+    const asked = asker?.url ? `, asked by ${await ownerOf(asker)}` : "";
+    const whose = callFrame.url ? await ownerOf(callFrame) : `${callFrame.functionName}${asked}`;
+    by.set(whose, (by.get(whose) ?? 0) + profile.timeDeltas[k] / 1000 / drawn);
+  }
+  return [...by].sort((a, b) => b[1] - a[1]);
+}
+
 async function measure(name) {
   await page.waitForTimeout(4000);
   const { slots, collected } = await traced();
   await page.evaluate(() => {
     window.cost.n = window.cost.heards = 0;
   });
+  const before = (await served.tell("told")).clients[0];
   await page.waitForTimeout(1000 * SECONDS);
+  const { ages, clients } = await served.tell("told");
+  const [sent, skipped] = clients[0].map((count, i) => count - before[i]);
   const { taken, done, said, heard } = await page.evaluate(() => {
     const { n, heards } = window.cost;
     const of = (key, count) => [...window.cost[key].subarray(0, count)];
@@ -157,10 +200,14 @@ async function measure(name) {
   process.stdout.write(
     `${name}: ${BODIES} bodies at 100 Hz, ${taken.length} pictures in ${SECONDS} s\n` +
       `  script per picture  mean ${mean.toFixed(2)}, ${both(slots)} of processor time (${collected} collections in ${slots.length} pictures)\n` +
-      `  age when heard ${both(heard)}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
+      `  ${sent} snapshots sent, ${skipped} replaced before they were\n` +
+      `  age when offered ${both(ages.slice(-100 * SECONDS).map((s) => 1000 * s))}; when heard ${both(heard)}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
       `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
   );
   if (!WHERE) return;
+  process.stdout.write("  whose the time is, ms per picture by the clock\n");
+  for (const [whose, ms] of (await spent(count)).slice(0, 24))
+    process.stdout.write(`    ${ms.toFixed(3).padStart(8)} ${whose}\n`);
   for (const part of ["picture", "heard", "panels"]) {
     process.stdout.write(`  ${part}\n`);
     const most = [...parts[part]].sort((a, b) => b[1] - a[1]).slice(0, 30);

@@ -13,8 +13,11 @@ from datetime import timedelta
 import httpx
 import pytest
 import segno
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from websockets.sync.client import connect
 
+from seerob.app.console import lan
 from seerob.app.console.lan import qr_code, reverse_port
 from seerob.app.console.visiting import add_page
 from seerob.app.server import certificates, connection
@@ -215,6 +218,26 @@ def test_a_certificate_of_ones_own_serves(folder, trusting):
     given = certificates.given(folder / "server.pem", None)
     with Server(scene=scene(), meshes={}, feed=feed, port=0, tls=given) as server:
         assert httpx.get(server.url, verify=trusting).status_code in (200, 503)
+
+
+def test_a_certificate_s_own_name_is_what_others_ask_for(folder, tmp_path, monkeypatch):
+    authority = x509.load_pem_x509_certificate((folder / "authority.pem").read_bytes())
+    key = load_pem_private_key((folder / "authority.key").read_bytes(), None)
+    file = tmp_path / "cell.pem"
+    names = ["*.plant.example", "cell.plant.example", "localhost"]
+    file.write_bytes(certificates._issue(names, authority, key))
+    given = certificates.given(file, None)
+    assert given.names == ("cell.plant.example", "localhost")
+    with Server(
+        scene=scene(), meshes={}, feed=Player(Remembered([snapshot(0)])), port=0, tls=given
+    ) as server:
+        for host, codes in (("cell.plant.example", (200, 503)), ("other.plant.example", (403,))):
+            headers = {"Host": f"{host}:{server.port}"}
+            assert httpx.get(server.url, verify=False, headers=headers).status_code in codes
+    monkeypatch.setattr(lan, "address_for_others", lambda: "192.0.2.7")
+    assert lan.name_for_others(given.names) == "cell.plant.example"
+    assert lan.name_for_others(("192.0.2.7", "cell.plant.example")) == "192.0.2.7"
+    assert lan.name_for_others(("localhost", "127.0.0.1")) == "192.0.2.7"
 
 
 def test_who_begins_tls_and_does_not_go_on_is_counted_and_cut(tls, monkeypatch):

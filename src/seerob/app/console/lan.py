@@ -6,10 +6,23 @@ import shutil
 import socket
 import subprocess
 import sys
+from collections.abc import Sequence
 from io import StringIO
 
 from seerob.core.errors import InputError
 from seerob.core.extras import need
+from seerob.core.host_name import is_loopback
+
+
+def name_for_others(names: Sequence[str]) -> str:
+    """What others call this machine: its address, but where a certificate is for names and not for that.
+
+    Args:
+        names: Of the certificate.
+    """
+    address = address_for_others()
+    told = (name for name in names if not is_loopback(name) and address not in names)
+    return next(told, address)
 
 
 def address_for_others() -> str:

@@ -117,7 +117,8 @@ def tell_pages(server: Server, end: str, options: argparse.Namespace) -> None:
     from seerob.app.console import lan
     from seerob.app.server.access import Role
 
-    addresses = server.urls_at(lan.address_for_others() if options.lan else "")
+    names = () if server.tls is None else server.tls.names
+    addresses = server.urls_at(lan.name_for_others(names) if options.lan else "")
     line("page", f"{addresses[Role.VIEW]}  ({end})", "bold")
     if len(set(addresses.values())) > 1:
         line("  track", f"{addresses[Role.TRACK]}  (and may offer what a headset sees)")

@@ -6,6 +6,7 @@ this machine, and nothing else that it may speak for.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import ssl
@@ -45,7 +46,7 @@ class Tls(NamedTuple):
     fingerprint: str = ""
     """SHA-256 of that certificate, to compare on the device."""
     names: tuple[str, ...] = ()
-    """Under which the server may be asked for, where the authority was made here."""
+    """Under which the server may be asked for: those of its certificate, but for wildcards."""
 
 
 def given(certificate: Path, key: Path | None) -> Tls:
@@ -66,7 +67,7 @@ def given(certificate: Path, key: Path | None) -> Tls:
         what = f"cannot be used: {str(reason).replace('_', ' ').lower()}"
         remedy = "give --certificate and --key, both PEM, which belong together and need no password"
         raise InputError.at(certificate, "", what, remedy) from error
-    return Tls(context)
+    return Tls(context, names=_spoken(certificate))
 
 
 def _no_password() -> str:
@@ -202,6 +203,20 @@ def _is_current(chain: Path, authority: x509.Certificate, names: tuple[str, ...]
     except Exception:  # of several libraries: whatever it is, it is made anew
         return False
     return lasts and {_general(n) for n in names} <= set(spoken)
+
+
+def _spoken(file: Path) -> tuple[str, ...]:
+    """Names and addresses that a certificate is for; none where nothing is installed that reads it."""
+    try:
+        from cryptography import x509
+    except ImportError:
+        return ()
+    with contextlib.suppress(ValueError, x509.ExtensionNotFound):
+        certificate = x509.load_pem_x509_certificates(file.read_bytes())[0]
+        every = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+        names = (str(each.value) for each in every if isinstance(each, x509.DNSName | x509.IPAddress))
+        return tuple(name for name in names if "*" not in name)
+    return ()
 
 
 def _begun(name: str, lasts: timedelta, issuer: x509.Name | None = None) -> x509.CertificateBuilder:

@@ -143,7 +143,8 @@ class Contact(NamedTuple):
     """User name; empty for none."""
     secret: str = ""
     """Name of the secret that is sent; empty for none."""
-    encrypted: bool = False
+    encrypted: bool | None = False
+    """None of what comes over the run's own page, encrypted or not as that is."""
     listens: bool = False
     """Whether it waits for the other end, on its own port."""
 
@@ -151,7 +152,8 @@ class Contact(NamedTuple):
         """One line."""
         who = f" as {self.user!r}" if self.user else ""
         what = f" with the secret {self.secret}" if self.secret else ""
-        return f"{self.where}{who}{what}, {'encrypted' if self.encrypted else 'not encrypted'}"
+        how = {None: "over its page", True: "encrypted", False: "not encrypted"}[self.encrypted]
+        return f"{self.where}{who}{what}, {how}"
 
 
 def contact_of(source: Any, *, listens: bool) -> Contact:

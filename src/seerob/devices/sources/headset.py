@@ -58,7 +58,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
 
     def contact(self) -> Contact:
         """Nobody: it comes over the page."""
-        return Contact("takes what a page of this run offers")
+        return Contact("takes what a headset sees", encrypted=None)
 
     async def ask(self) -> tuple[Finding, ...]:
         """What is to be said before anybody wears it."""

@@ -52,7 +52,7 @@ class Room(LiveSource, frozen=True, kw_only=True):
 
     def contact(self) -> Contact:
         """Nobody: it comes over the page."""
-        return Contact("takes what people do on pages of this run")
+        return Contact("takes what people do in the room", encrypted=None)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Nothing is to be said before anybody does anything."""

@@ -136,21 +136,25 @@ export function once(key: string, make: () => Material): Material {
 /** The shared material of markers of one verdict. */
 export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
   const tone: Tone = verdict ?? "none";
-  return once(KEYS[kind][tone], () => {
-    const hatched = tone === "undecided";
-    const material = new MeshBasicMaterial({
-      color: colorOf(tone),
-      side: kind === "volume" ? BackSide : DoubleSide,
-      toneMapped: false,
-      transparent: LOOK[kind].opacity < 1 || hatched,
-      // One colour without light: in which order both sides are blended does not matter, and asking for two passes
-      // has three.js look its programs up twice per picture.
-      forceSinglePass: true,
-      ...LOOK[kind],
-    });
-    if (hatched) hatch(material);
-    return material;
+  // Asked for each marker of each picture: a function that makes one is not made for nothing.
+  return made.get(KEYS[kind][tone]) ?? madeForMarkers(kind, tone);
+}
+
+function madeForMarkers(kind: Kind, tone: Tone): Material {
+  const hatched = tone === "undecided";
+  const material = new MeshBasicMaterial({
+    color: colorOf(tone),
+    side: kind === "volume" ? BackSide : DoubleSide,
+    toneMapped: false,
+    transparent: LOOK[kind].opacity < 1 || hatched,
+    // One colour without light: in which order both sides are blended does not matter, and asking for two passes
+    // has three.js look its programs up twice per picture.
+    forceSinglePass: true,
+    ...LOOK[kind],
   });
+  if (hatched) hatch(material);
+  made.set(KEYS[kind][tone], material);
+  return material;
 }
 
 /** The shared material of thin lines: edges of translucent things. */

@@ -44,7 +44,7 @@ REPAIRABLE = 0.02
 CONCENTRATED = 0.04
 """Least radius of gyration over the diagonal of the box around a shape: a rod has 0.29, a ball 0.18."""
 ASIDE = 0.25
-"""So far from the frame's origin is the middle of a link's box, of its diagonal, where no centre of mass is."""
+"""So far from the frame's origin is the middle of a box, of its diagonal, where no centre of mass is."""
 LIGHT = 0.05
 """Up to this what nobody weighed, and is as small in the heaviest metal, is a marker [kg]."""
 FRAME = 1e-3

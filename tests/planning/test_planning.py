@@ -157,3 +157,65 @@ def test_the_planned_file_is_a_motion_that_keeps_the_margin(model, tmp_path):
     opened = source.open(tmp_path, target(model, "arm"))
     clearance = Clearance(model, model.robot("arm"), found.q[0])
     assert min(clearance.nearest(np.array(s.q)).distance for s in opened.samples) >= 0.03 - 1e-6
+
+
+CARRIED = """
+[[machines]]
+name = "axis"
+shape = { box = [0.6, 0.6, 0.1] }
+mass = 50
+slide = { along = [1, 0, 0], lower = -1, upper = 3 }
+[[machines]]
+name = "table"
+on = "axis"
+at = { position = [0, 0, 0.1] }
+shape = { cylinder = [0.3, 0.1] }
+mass = 20
+turn = { }
+[[robots]]
+name = "arm"
+model = "arm.urdf"
+on = "table"
+base = { position = [0.1, 0, 0.05], rpy_deg = [20, 0, 30] }
+q = [0.1, 0.2]
+[[tools]]
+name = "stick"
+on = "arm/l3"
+shape = { cylinder = [0.02, 0.2] }
+mass = 0.8
+at = { position = [0, 0.05, 0.1] }
+[[parts]]
+name = "ball"
+shape = { sphere = 0.1 }
+at = { position = [2.6, 0.3, 0.5] }
+"""
+FOLLOWING = """<robot name="arm"><link name="base"/>{links}
+<joint name="j1" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0 0 0.3"/>
+<axis xyz="0 0.6 0.8"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="j2" type="prismatic"><parent link="l1"/><child link="l2"/><origin xyz="0.55 0 0" rpy="0.1 0.2 0.3"/>
+<axis xyz="1 0 0"/><limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>
+<joint name="j3" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="0.55 0 0"/><axis xyz="0 0 1"/>
+<mimic joint="j1" multiplier="0.5" offset="0.1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_a_robot_that_slides_follows_and_is_carried_is_where_mujoco_has_it(tmp_path):
+    """The distance that is found at MuJoCo's poses is where clear ends, to rounding."""
+    links = "".join(LINK.format(f"l{k}") for k in (1, 2, 3))
+    (tmp_path / "arm.urdf").write_text(FOLLOWING.format(links=links), encoding="utf-8")
+    (tmp_path / "workstation.toml").write_text(CARRIED, encoding="utf-8")
+    model = seerob.load(tmp_path).model
+    places = {"axis": np.array([0.7]), "table": np.array([0.4])}
+    clearance = Clearance(model, model.robot("arm"), np.array([0.1, 0.2]), places=places)
+    random, seen = np.random.default_rng(3), set()
+    for _ in range(40):
+        q = random.uniform([-1.5, 0.0], [1.5, 0.5])
+        near = clearance.nearest(q)
+        own = clearance.nearest(q, own=True)
+        if own is not None and own.distance < 0.01:
+            continue
+        assert clearance.is_clear(q, near.distance - 1e-9)
+        assert not clearance.is_clear(q, near.distance + 1e-9)
+        assert clearance.least(q) == pytest.approx(near.distance, abs=1e-9)
+        seen.add(near.what)
+    assert len(seen) > 1

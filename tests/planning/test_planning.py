@@ -192,9 +192,11 @@ at = { position = [2.6, 0.3, 0.5] }
 FOLLOWING = """<robot name="arm"><link name="base"/>{links}
 <joint name="j1" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0 0 0.3"/>
 <axis xyz="0 0.6 0.8"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
-<joint name="j2" type="prismatic"><parent link="l1"/><child link="l2"/><origin xyz="0.55 0 0" rpy="0.1 0.2 0.3"/>
-<axis xyz="1 0 0"/><limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>
-<joint name="j3" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="0.55 0 0"/><axis xyz="0 0 1"/>
+<joint name="j2" type="prismatic"><parent link="l1"/><child link="l2"/>
+<origin xyz="0.55 0 0" rpy="0.1 0.2 0.3"/><axis xyz="1 0 0"/>
+<limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>
+<joint name="j3" type="revolute"><parent link="l2"/><child link="l3"/>
+<origin xyz="0.55 0 0"/><axis xyz="0 0 1"/>
 <mimic joint="j1" multiplier="0.5" offset="0.1"/>
 <limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
 

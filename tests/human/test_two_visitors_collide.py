@@ -93,8 +93,8 @@ def a_twin_of_two(tmp_path_factory: pytest.TempPathFactory) -> sr.Station:
 def test_people_who_may_touch_stop_one_another_and_others_pass_through(station):
     """Asked is the least distance of both, not that of one bone.
 
-    A head that is stopped turns the body about it, so at the same instant hands, or trunks of who leans, may be
-    nearer than those of people who pass through.
+    A head that is stopped turns the body about it, so at the same instant hands, or trunks of who leans, may
+    be nearer than those of people who pass through.
     """
     touching, through = played(station, contacts=True), played(station, contacts=False)
     assert touching.verdict is through.verdict is Verdict.EXCEEDED

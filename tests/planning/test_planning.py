@@ -7,6 +7,7 @@ import pytest
 
 import seerob
 from seerob.core.errors import InputError
+from seerob.kernels import ways
 from seerob.session.planning.clearance import Clearance
 from seerob.session.planning.plan import NoPath, Stopped, plan
 
@@ -116,6 +117,8 @@ def test_the_path_goes_around_keeps_the_margin_and_is_the_same_again(model):
     assert lengths.sum() < 4 * 2.4
     text = found.toml()
     assert text.count("[[waypoints]]") == len(found.q)
+    # Of arrays that lie otherwise in memory it would be compiled anew, for seconds.
+    assert len(ways.is_clear.signatures) == 1
 
 
 def test_a_way_that_is_free_is_taken_straight(model):

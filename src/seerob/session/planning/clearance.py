@@ -26,9 +26,9 @@ from seerob.kernels.ways import Apart, Arm, Bound
 from seerob.model.model import Mechanism, Model
 from seerob.session.permissible.moving_joints import KinematicChain, chains_of
 
-RESOLUTION = 1e-3
+RESOLUTION = 1e-4
 """A span on which no point moves farther and that is not clear is given up [m]."""
-SPACING = 0.04
+SPACING = 0.01
 """No point moves farther between two postures that are looked at where nothing is proven yet [m]."""
 OWN_MARGIN = 0.002
 """Of the robot's own bodies from each other, whatever the margin to others is [m]."""

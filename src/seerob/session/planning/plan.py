@@ -340,7 +340,7 @@ def _shortened(clear: Callable[..., bool], way: list[Array], random: np.random.G
         if i == j:
             continue
         at, knots = np.array([u, *far[i + 1 : j + 1], v]), np.array(way)
-        cut = np.array([np.interp(at, far, column) for column in knots.T]).T
+        cut = np.column_stack([np.interp(at, far, column) for column in knots.T])
         if turn % 2:  # of one joint alone: the others go as before
             joint = int(random.integers(len(knots[0])))
             cut[:, joint] = np.interp(at, (u, v), (cut[0, joint], cut[-1, joint]))

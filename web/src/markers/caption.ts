@@ -19,7 +19,7 @@ import type { View } from "./view";
 
 const PAD_PX = 6;
 const SHARPNESS = 2;
-/** Characters; about as many as fit across the room of a telephone. */
+/** Characters of a line; about as many as fit across the room of a telephone. */
 const LONGEST = 46;
 /** Lower edge of the plate above its point [px]. */
 const RAISED_PX = 8;
@@ -48,7 +48,7 @@ export class Caption {
   /** What it says. */
   text = "";
   private verdict: Verdict | null = null;
-  private lines: readonly string[] = [];
+  private lines: string[] = [];
   /** How much higher than where it belongs it is, negative for lower; and how much further right [px]. */
   liftedPx = 0;
   rightPx = 0;
@@ -70,14 +70,15 @@ export class Caption {
 
   say(said: string, verdict: Verdict | null): void {
     // A name stays one, whatever it looks like.
-    const text = shortened(this.aside ? spoken(said) : said, LONGEST);
+    const text = this.aside ? spoken(said) : said;
     if (this.texture && text === this.text && verdict === this.verdict) return;
     this.text = text;
     this.verdict = verdict;
     // Whose figure it is, and below it the figure: a narrow plate covers less.
     const [, owner, figure] = (this.aside && /^(.+?): (.+)$/s.exec(text)) || ["", text, ""];
-    const head = verdict ? `${STATE_ICONS[verdict]}  ${owner}` : owner!;
-    this.lines = figure ? [head, figure] : [head];
+    const head = shortened(owner!, LONGEST);
+    this.lines = [verdict ? `${STATE_ICONS[verdict]}  ${head}` : head];
+    if (figure) this.lines.push(shortened(figure, LONGEST));
     this.paint(verdict);
   }
 

@@ -18,6 +18,8 @@ import { Parts } from "./Parts";
 import { StateBadge } from "./StateBadge";
 
 const COLUMNS = 4;
+/** A name with more characters stands above its figures: beside them it would make a tower. */
+const LONGEST_BESIDE = 34;
 
 export function CriteriaTable() {
   const opened = useSignal<string | null>(null);
@@ -78,7 +80,7 @@ export function CriteriaTable() {
 function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onToggle: () => void }) {
   const { info, result, state } = row;
   const chosen = selection.value?.kind === "criterion" && selection.value.name === info.name;
-  const muted = mutedCriteria.value.has(info.name);
+  const long = info.name.length > LONGEST_BESIDE;
   const limit = result ? result.limit : info.limit;
   const unit = result?.unit ?? info.unit;
   const figures = against(result?.value ?? null, limit, unit, info.at_most);
@@ -88,27 +90,17 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
   const look = `row-${shown} ${chosen ? "selected" : ""}`;
   return (
     <>
+      {long && (
+        <tr class={`row named explained ${look}`}>
+          <Name row={row} open={open} onToggle={onToggle} wide />
+        </tr>
+      )}
       <tr
         class={`row ${look} ${reason === "" ? "" : "explained"}`}
         data-criterion={info.name}
         title={hint(row)}
       >
-        <th scope="row">
-          <button type="button" class={`twist ${open ? "open" : ""}`} aria-expanded={open} onClick={onToggle}>
-            <Icon name="chevron" />
-            <span class="criterion-name">{info.name}</span>
-          </button>
-          <button
-            type="button"
-            class={`eye ${muted ? "off" : ""}`}
-            aria-label={said(muted ? word("Show markers of {name}") : word("Hide markers of {name}"), {
-              name: info.name,
-            })}
-            onClick={() => toggleMuted(info.name)}
-          >
-            <Icon name={muted ? "eye-off" : "eye"} />
-          </button>
-        </th>
+        {long ? <td class="blank" /> : <Name row={row} open={open} onToggle={onToggle} />}
         <td class="number">
           <span class="value">{steady(figures.value, unit)}</span>{" "}
           <span class="unit">{shownIn(unit).unit}</span>
@@ -146,6 +138,35 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
         </tr>
       )}
     </>
+  );
+}
+
+interface NameProps {
+  row: Row;
+  open: boolean;
+  onToggle: () => void;
+  wide?: boolean;
+}
+
+function Name({ row: { info }, open, onToggle, wide = false }: NameProps) {
+  const muted = mutedCriteria.value.has(info.name);
+  return (
+    <th scope="row" colSpan={wide ? COLUMNS : 1}>
+      <button type="button" class={`twist ${open ? "open" : ""}`} aria-expanded={open} onClick={onToggle}>
+        <Icon name="chevron" />
+        <span class="criterion-name">{info.name}</span>
+      </button>
+      <button
+        type="button"
+        class={`eye ${muted ? "off" : ""}`}
+        aria-label={said(muted ? word("Show markers of {name}") : word("Hide markers of {name}"), {
+          name: info.name,
+        })}
+        onClick={() => toggleMuted(info.name)}
+      >
+        <Icon name={muted ? "eye-off" : "eye"} />
+      </button>
+    </th>
   );
 }
 

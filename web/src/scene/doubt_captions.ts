@@ -7,9 +7,6 @@ import { spoken } from "../units";
 import type { Scene } from "../wire";
 import type { Bodies } from "./bodies";
 
-/** More would hide the room; the tree has all of them. */
-const MOST = 4;
-
 export class DoubtCaptions {
   readonly root = new Group();
   /** Those that are written now are visible. */
@@ -19,11 +16,15 @@ export class DoubtCaptions {
 
   constructor(private readonly bodies: Bodies) {}
 
-  /** Write them anew; who has no body to be seen has none. */
-  update(scene: Scene | null, doubts: Doubts, written: boolean): void {
+  /**
+   * Write them anew; who has no body to be seen has none.
+   *
+   * @param most More would hide the room; the tree has all of them.
+   */
+  update(scene: Scene | null, doubts: Doubts, most: number): void {
     let used = 0;
     for (const { name } of scene?.mechanisms ?? []) {
-      const reason = written && used < MOST ? doubts.get(name) : undefined;
+      const reason = used < most ? doubts.get(name) : undefined;
       if (reason === undefined || !this.above(name)) continue;
       const caption = this.captionAt(used);
       this.box.getCenter(caption.object.position).z = this.box.max.z;

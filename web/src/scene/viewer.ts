@@ -130,6 +130,8 @@ export class Viewer {
     this.bodies.color(manikinTints.peek());
     this.emphasize();
     this.dressed = true;
+    // What stands above bodies knows only now how high they are.
+    this.draw();
     this.stage.moved();
   }
 
@@ -286,7 +288,7 @@ export class Viewer {
     this.findVolumes();
     this.bodies.wear(this.frame?.looks ?? {});
     this.bodies.doubt(doubtsIn(this.frame));
-    this.doubts.update(run.peek(), doubts.peek(), showCaptions.peek());
+    this.doubts.update(run.peek(), doubts.peek(), showCaptions.peek() ? this.labels + 1 : 0);
     this.stage.invalidate();
   }
 

@@ -26,7 +26,7 @@ from seerob.kernels.ways import Apart, Arm, Bound
 from seerob.model.model import Mechanism, Model
 from seerob.session.permissible.moving_joints import KinematicChain, chains_of
 
-RESOLUTION = 1e-4
+RESOLUTION = 1e-5
 """A span on which no point moves farther and that is not clear is given up [m]."""
 SPACING = 0.01
 """No point moves farther between two postures that are looked at where nothing is proven yet [m]."""

@@ -281,7 +281,8 @@ def search(
             path.append(b)
             continue
         way = _searched(clearance, a, b, margin, random, patience, proven=True)
-        if not all(clearance.clear(x, y, margin) for x, y in pairwise(way)):
+        # One tree grew towards the other: its ways were proven from their other end.
+        if not all(clearance.clear(x, y, margin) or clearance.clear(y, x, margin) for x, y in pairwise(way)):
             raise NoPath("the path that was found could not be proven")
         path += way[1:]
     return path
@@ -321,6 +322,8 @@ def _searched(
             k = parents[tree, k]
         halves.append([*half, nodes[tree, 0]])
     way = halves[0][::-1] + halves[1][1:]
+    if proven:
+        return way  # of a part of what was proven the proof may need finer steps
     need = clearance.needs(margin + ROOM)
 
     def clear(*postures: Array) -> bool:

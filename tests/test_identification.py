@@ -11,7 +11,7 @@ from oracles.pinocchio_oracle import index_of, pinocchio_model
 from seerob.app import cli
 from seerob.core.errors import InputError
 from seerob.description.robots import library
-from seerob.session.identification import Regressor, base_parameters, identify, parameters, weighed
+from seerob.session.identification import Known, Regressor, base_parameters, identify, parameters, weighed
 from seerob.twin.controller_check import ControllerLog
 from test_explanation import motion
 
@@ -158,6 +158,46 @@ def test_a_payload_is_found_from_a_second_log():
     assert np.mean(inside) >= 0.8
 
 
+CONSTANTS = np.array([13.2, 13.2, 9.4, 8.1, 8.0, 7.9])
+
+
+def in_ampere(said):
+    return said._replace(tau=None, current=said.tau / CONSTANTS)
+
+
+def test_currents_tell_as_much_as_what_makes_torques_of_them():
+    """By constants that are off by as much as is said, and by a known mass; alone they tell no mass."""
+    robot = library.load("ur5e")
+    truth_of_all = np.concatenate([own_parameters(robot).ravel(), ROTORS])
+    mass, tolerance = 3.0, 0.01
+    payload = pin.Inertia(mass, np.array([0.02, -0.01, 0.09]), np.diag([0.01, 0.01, 0.006]))
+    for seed in range(2):
+        said = in_ampere(simulated(seed))
+        off = np.random.default_rng(seed).choice([-0.05, 0.05], 6)
+        stated = Known(constants=tuple(CONSTANTS / (1 + off)), tolerance=0.05)
+        carrying = in_ampere(simulated(seed + 50, payload=payload))
+        weight = Known(payload=mass / (1 + tolerance), tolerance=tolerance)
+        of_constants = identify(robot, GRAVITY, said, None, stated)
+        of_mass = identify(robot, GRAVITY, said, carrying, weight)
+        for found in (of_constants, of_mass):
+            assert found.hidden == ()
+            truth = [*(found.base.regrouped @ truth_of_all), *COULOMB, *VISCOUS, *CONSTANTS]
+            figures = [*found.values, *found.coulomb, *found.viscous, *found.constants]
+            inside = [abs(f.value - x) <= f.half + 1e-9 for f, x in zip(figures, truth, strict=True)]
+            assert np.mean(inside) >= 0.88
+            assert found.constants[1].half < 0.1 * CONSTANTS[1]
+    for known, more in ((Known(), None), (Known(), carrying), (weight, None)):
+        with pytest.raises(InputError, match="common factor"):
+            identify(robot, GRAVITY, said, more, known)
+    with pytest.raises(InputError, match="5 torque constants for 6 joints"):
+        identify(robot, GRAVITY, said, None, Known(constants=(1.0,) * 5))
+    with pytest.raises(InputError, match="measured already"):
+        identify(robot, GRAVITY, simulated(0), None, stated)
+    feather = in_ampere(simulated(60))
+    with pytest.raises(InputError, match="does not show in them"):
+        identify(robot, GRAVITY, said, feather, Known(payload=0.5))
+
+
 def test_every_set_of_logarithms_is_a_body():
     theta = np.random.default_rng(4).normal(0, 1, (200, 10))
     for m, hx, hy, hz, xx, yy, zz, xy, xz, yz in parameters(theta):
@@ -220,6 +260,16 @@ def test_keys_for_a_cell_hold_the_true_energy_between_their_ends(tmp_path, capsy
     other = ["robots", "identify", str(bare), "-o", str(tmp_path / "other.toml")]
     assert cli.main([*other, "--mass", "20.6", "--mass-source", "x"]) == 3
     assert "leaves the mass matrix open" in "".join(capsys.readouterr())
+    amperes = np.column_stack([said.t, said.q, said.qd, said.tau / CONSTANTS])
+    fields = " ".join(head).replace("actual_current_as_torque", "actual_current")
+    np.savetxt(bare / "log.csv", amperes, header=fields, comments="", fmt="%.9f")
+    assert cli.main(command[:3]) == 3
+    assert "--constants" in "".join(capsys.readouterr())
+    constants = ["--constants", ",".join(map(str, CONSTANTS)), "--tolerance", "0.01"]
+    assert cli.main([*command[:3], *constants]) == 3
+    assert "--known-by" in "".join(capsys.readouterr())
+    assert cli.main([*command[:3], *constants, "--known-by", "test bench"]) == 0
+    assert "13.2 ± 0.13 N·m/A, by test bench" in capsys.readouterr().out
     model = pinocchio_model(library.load("ur5e"))
     i = int(np.abs(said.t - said.t[0] - worst.t).argmin())
     data = model.createData()

@@ -15,14 +15,23 @@ it was fitted, weighed by its covariance, those nearest to the envelope's shapes
 Their *error* is the least s with :math:`(1-s) M \preceq M' \preceq (1+s) M`, where M' is the mass matrix of β
 drawn from its distribution, in sampled postures, for 95 of 100 draws: every criterion that scales masses by s
 holds M' between its ends.
+
+Of motor currents i, :math:`\tau_j = k_j i_j`. A log alone leaves all torque constants :math:`k_j` open by one
+common factor. Either somebody states them, with a tolerance: then :math:`\beta` is linear in each, and what
+the largest errors make of it is added to every interval. Or a second log carries a known mass: then
+
+.. math:: i_j = g_j\,(Y_j\,\pi + P_j\,p + \text{friction}), \qquad g_j = 1/k_j, \qquad p_1 = m
+
+is fitted by Gauss and Newton's method, noise in i alone; what the tolerance of m makes of it is added.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +67,8 @@ PRIOR = 3.0
 """How far logarithms of sizes and masses may be from those of the shapes, as a standard deviation."""
 STEPS = 120
 SOUGHT = 0.95
+ROUNDS = 40
+"""Steps of Gauss and Newton's method."""
 LOOSEST = 0.9
 """From this error on a file would say nothing."""
 
@@ -305,6 +316,10 @@ class Identified:
     fitted: Fitted
     payload: tuple[Figure, ...] = ()
     """Mass [kg], first moments [kg·m] and moments of inertia [kg·m²] in the frame of the last body."""
+    constants: tuple[Figure, ...] = ()
+    """Of currents: torque constants of the joints [N·m/A or N/A]."""
+    systematic: Array | None = None
+    """What errors of constants or of a known mass do to the fit at the most, each in a row, shape (e, p)."""
 
     @property
     def hidden(self) -> tuple[str, ...]:
@@ -320,23 +335,54 @@ class Identified:
         return tuple(name for c, name in enumerate(columns) if c not in alone and shared[c] >= 0)
 
 
+class Known(NamedTuple):
+    """What turns currents into torques: constants of the joints, or a mass that the second log carries."""
+
+    constants: tuple[float, ...] = ()
+    """Torque per current at each joint, gears included [N·m/A or N/A]."""
+    payload: float | None = None
+    """[kg]"""
+    tolerance: float = 0.0
+    """By which share each constant, or the mass, may be off."""
+
+
+NOTHING_KNOWN = Known()
+
+
 def identify(
-    description: Description, gravity: Array, said: ControllerLog, carrying: ControllerLog | None = None
+    description: Description,
+    gravity: Array,
+    said: ControllerLog,
+    carrying: ControllerLog | None = None,
+    known: Known = NOTHING_KNOWN,
 ) -> Identified:
     """Fit base parameters and friction to a log, and a payload to a second one.
 
     Args:
         description: The arm.
         gravity: In the frame of its base [m/s²], shape (3,).
-        said: Of the bare arm; torques are needed.
+        said: Of the bare arm; torques are needed, or currents and what is ``known``.
         carrying: Of the same arm with a payload on it, after the first.
+        known: Of currents.
 
     Raises:
-        InputError: No torques, or too little motion.
+        InputError: No torques, too little motion, or currents of which nobody knows the common factor.
     """
     regressor = Regressor(description, gravity)
     base = base_parameters(regressor)
-    n, k = len(regressor.names), len(base.columns)
+    n = len(regressor.names)
+    if said.tau is not None and known != NOTHING_KNOWN:
+        what = "torques are measured already"
+        raise InputError.at(said.file, "currents", what, "leave out --constants and --payload")
+    if said.tau is None and said.current is not None:
+        if not known.constants:
+            return _of_currents(regressor, base, said, carrying, known)
+        if len(known.constants) != n:
+            what = f"{len(known.constants)} torque constants for {n} joints"
+            raise InputError.at(said.file, "currents", what, "give one per joint, from the base on")
+        said = said._replace(tau=said.current * np.array(known.constants))
+        if carrying is not None and carrying.tau is None and carrying.current is not None:
+            carrying = carrying._replace(tau=carrying.current * np.array(known.constants))
     Y, friction_columns, tau, used = _rows(regressor, said)
     columns = np.concatenate([Y[..., list(base.columns)], friction_columns], axis=-1)
     if carrying is not None:
@@ -349,13 +395,126 @@ def identify(
         columns = np.concatenate([upper, lower])
         tau, used = np.concatenate([tau, more_tau]), np.concatenate([used, more_used])
     found = fit(columns, tau, used)
-    figures = [
-        Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0))) if known else float("inf"))
-        for x, v, known in zip(found.values, np.diag(found.covariance), found.determined, strict=True)
+    systematic = None
+    if known.constants:
+        # What one joint's torques alone add to the fit: it grows with that joint's constant.
+        systematic = np.array([_of_joint(columns, tau, used, found, j) for j in range(n)]) * known.tolerance
+    figures = _figures(found, systematic)
+    constants = [Figure(value, known.tolerance * value) for value in known.constants]
+    return _identified(regressor, base, said, found, figures, tau, tuple(constants), systematic)
+
+
+def _figures(found: Fitted, systematic: Array | None) -> list[Figure]:
+    """Values with halves of their intervals: 95 % of the noise, and the most that errors make of them."""
+    more = np.zeros(len(found.values)) if systematic is None else np.abs(systematic).sum(axis=0)
+    return [
+        Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0)) + m) if told else float("inf"))
+        for x, v, told, m in zip(found.values, np.diag(found.covariance), found.determined, more, strict=True)
     ]
+
+
+def _of_joint(columns: Array, measured: Array, used: NDArray[np.bool_], found: Fitted, j: int) -> Array:
+    """Of a weighted fit, the part that what is measured of one joint makes, shape (p,)."""
+    sigma = np.sqrt(np.nanmean(found.residuals**2, axis=0))
+    A, b = columns / sigma[:, None], measured / sigma
+    rows = A[used]
+    alone = np.zeros_like(used)
+    alone[:, j] = used[:, j]
+    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(rows / scale, np.where(alone, b, 0.0)[used], rcond=1e-10)[0] / scale)
+
+
+def _of_currents(
+    regressor: Regressor, base: Base, said: ControllerLog, carrying: ControllerLog | None, known: Known
+) -> Identified:
+    """Fit currents of two logs, of which the second carries a known mass.
+
+    Raises:
+        InputError: There is no such log, or it does not tell the common factor.
+    """
+    if known.payload is None or carrying is None or carrying.current is None:
+        what = "are currents [A]: alone they leave every mass open by one common factor"
+        remedy = (
+            "give torque constants (--constants), or a second log of currents with a payload of known mass "
+            "(--carrying, --payload); each with --tolerance and --known-by"
+        )
+        raise InputError.at(said.file, "actual_current", what, remedy)
+    n, k = len(regressor.names), len(base.columns)
+    Y, F, current, used = _rows(regressor, said._replace(tau=said.current))
+    more, more_F, more_current, more_used = _rows(regressor, carrying._replace(tau=carrying.current))
+    first = len(current)
+    current, used = np.concatenate([current, more_current]), np.concatenate([used, more_used])
+    last = 10 * (len(regressor.bodies) - 1)
+    load = np.concatenate([np.zeros((first, n, 10)), more[..., last : last + 10]])
+    of_base = np.concatenate([Y, more])[..., list(base.columns)]
+    # Torques: those of the known mass, and linear in the rest. Currents: g times that.
+    torques = np.concatenate([of_base, np.concatenate([F, more_F]), load[..., 1:]], axis=-1)
+    weight = load[..., 0] * known.payload
+    p = torques.shape[-1]
+    each = np.eye(n)
+    x, g = _begun(torques[used], weight[used], (current[..., None] * each)[used])
+    for _ in range(ROUNDS if np.isfinite(g).all() else 0):
+        needed = torques @ x + weight
+        columns = np.concatenate([g[:, None] * torques, needed[..., None] * each], axis=-1)
+        found = fit(columns, current + g * (torques @ x), used)
+        off = float(np.abs(found.values[p:] / g - 1).max())
+        x, g = found.values[:p], found.values[p:]
+        if off < 1e-6:
+            break
+    else:
+        g = np.zeros(n)
+    halves = NORMAL_95 * np.sqrt(np.maximum(np.diag(found.covariance)[p:], 0)) if (g > 0).all() else g
+    if not (g > 2 * halves).all() or not found.determined[p:].all():
+        what = f"{known.payload:g} kg more does not show in them: the common factor stays open"
+        raise InputError.at(carrying.file, "actual_current", what, "carry more, and move as in the first log")
+    # All that weighs grows with the known mass, and the currents per torque shrink.
+    grow = np.concatenate([x, -g])[None] * known.tolerance
+    figures = _figures(found, grow)
+    constants = tuple(Figure(1 / each.value, each.half / each.value**2) for each in figures[p:])
+    load_mass = Figure(known.payload, known.payload * known.tolerance)
+    figures = [*figures[: k + 3 * n], load_mass, *figures[k + 3 * n : p]]
+    found = replace(found, residuals=found.residuals / g)
+    return _identified(regressor, base, said, found, figures, current, constants, grow)
+
+
+def _begun(torques: Array, weight: Array, currents: Array) -> tuple[Array, Array]:
+    """Where Gauss and Newton's method begins: parameters (p,), currents per torque (n,), NaN where none are.
+
+    Of :math:`C k = T y + u w`, which has no scale, the k is taken of which the least is left relative to the
+    currents, then u, which scales.
+
+    Args:
+        torques: T, shape (rows, p).
+        weight: Torques of the known mass w, shape (rows,).
+        currents: C, each joint's in its column, shape (rows, n).
+    """
+    A = np.concatenate([torques, weight[:, None]], axis=1)
+    Q, _ = np.linalg.qr(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300))
+    size = np.linalg.norm(currents, axis=0)
+    relative = currents / size
+    rest = relative - Q @ (Q.T @ relative)
+    k = np.linalg.eigh(rest.T @ rest)[1][:, 0] / size
+    k *= np.sign(k.sum())
+    y = np.linalg.lstsq(A, currents @ k, rcond=None)[0]
+    if not (k > 0).all() or y[-1] <= 0:
+        return y[:-1], np.full(len(k), np.nan)
+    return y[:-1] / y[-1], y[-1] / k
+
+
+def _identified(
+    regressor: Regressor,
+    base: Base,
+    said: ControllerLog,
+    found: Fitted,
+    figures: list[Figure],
+    tau: Array,
+    constants: tuple[Figure, ...],
+    systematic: Array | None,
+) -> Identified:
+    n, k = len(regressor.names), len(base.columns)
     units = [*UNITS * len(regressor.bodies), *("kg·m²" if r else "kg" for r in regressor.revolute)]
     return Identified(
-        robot=description.name,
+        robot=regressor.description.name,
         source=said.file,
         samples=len(tau),
         names=tuple(regressor.columns[c] for c in base.columns),
@@ -370,6 +529,8 @@ def identify(
         base=base,
         fitted=found,
         payload=tuple(figures[k + 3 * n :]),
+        constants=constants,
+        systematic=systematic,
     )
 
 
@@ -377,7 +538,9 @@ def _rows(regressor: Regressor, said: ControllerLog) -> tuple[Array, Array, Arra
     """Columns of bodies and of friction, torques, and which rows count."""
     n = len(regressor.names)
     if said.tau is None:
-        remedy = "log measured torques: actual_current_as_torque of RTDE, measured torques of FRI"
+        remedy = (
+            "log measured torques: actual_current_as_torque of RTDE, measured torques of FRI; or its currents"
+        )
         raise InputError.at(said.file, "torques", "the source measures none", remedy)
     if said.q.shape[1] != n:
         what = f"{said.q.shape[1]} joints, and the robot has {n}"
@@ -431,11 +594,9 @@ def weighed(found: Identified, mass: float) -> Weighed:
     regressor, base = found.regressor, found.base
     k, B, n = len(base.columns), len(regressor.bodies), len(regressor.names)
     beta, covariance = found.fitted.values[:k], found.fitted.covariance[:k, :k]
-    # Whitening: a step of length 1 is one standard deviation. Scaled, for figures differ by magnitudes.
-    scale = np.sqrt(np.diag(covariance))
-    variances, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    deviations = np.sqrt(np.maximum(variances, variances.max() * 1e-12))
-    white = (vectors / deviations).T / scale
+    systematic = np.zeros((1, k)) if found.systematic is None else found.systematic[:, :k]
+    white, _ = _principal(covariance + systematic.T @ systematic)
+    _, coloured = _principal(covariance)
     prior = np.concatenate([_guess(regressor.bodies, mass).ravel(), np.full(n, np.log(0.05))])
     G = base.regrouped
 
@@ -474,7 +635,11 @@ def weighed(found: Identified, mass: float) -> Weighed:
     M = np.einsum("npij,p->nij", every, pi)
     half = np.linalg.inv(np.linalg.cholesky(M))
     of_base = half[:, None] @ every[:, list(base.columns)] @ half.swapaxes(1, 2)[:, None]
-    drawn = beta + (rng.normal(size=(DRAWS, k)) * deviations) @ vectors.T * scale
+    drawn = beta + rng.normal(size=(DRAWS, k)) @ coloured.T
+    # Errors of constants at their ends, half of the time all in one direction.
+    ends = rng.choice((-1.0, 1.0), size=(DRAWS, len(systematic)))
+    ends[::2] = ends[::2, :1]
+    drawn = drawn + ends @ systematic
     off = np.einsum("nkij,dk->dnij", of_base, drawn - G @ pi)
     worst = np.abs(np.linalg.eigvalsh(off)).max(axis=(1, 2))
     return Weighed(
@@ -483,6 +648,15 @@ def weighed(found: Identified, mass: float) -> Weighed:
         error=float(np.quantile(worst, SOUGHT)),
         distance=float(np.sqrt(np.mean((white @ (G @ pi - beta)) ** 2))),
     )
+
+
+def _principal(covariance: Array) -> tuple[Array, Array]:
+    """Whiten errors of a covariance, shape (k, k), and draw them from independent ones, likewise."""
+    # Scaled, for figures differ by magnitudes.
+    scale = np.sqrt(np.diag(covariance))
+    variances, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    deviations = np.sqrt(np.maximum(variances, variances.max() * 1e-12))
+    return (vectors / deviations).T / scale, scale[:, None] * vectors * deviations
 
 
 def _guess(bodies: Sequence[Sequence[Link]], mass: float) -> Array:
@@ -519,7 +693,7 @@ def _least_squares(residuals: Of, slope: Of, x: Array) -> Array:
     return x
 
 
-def robot_table(found: Identified, made: Weighed, *, mass: float, source: str) -> str:
+def robot_table(found: Identified, made: Weighed, *, mass: float, source: str, currents: str = "") -> str:
     """Keys of a robot's table in a workstation file: masses, rotors, and how far both may be off.
 
     Args:
@@ -527,6 +701,7 @@ def robot_table(found: Identified, made: Weighed, *, mass: float, source: str) -
         made: Masses of it.
         mass: Of the whole arm [kg].
         source: Where the maker states it.
+        currents: What torques were made of currents by.
 
     Raises:
         InputError: The mass matrix is open, or two links that move as one both weigh in the description.
@@ -536,6 +711,7 @@ def robot_table(found: Identified, made: Weighed, *, mass: float, source: str) -
         remedy = "log longer, and excite the outer joints faster: their inertias are what is told least"
         raise InputError.at(found.source, "motion", what, remedy)
     told = f"identified from {PurePath(found.source).name}, {found.samples} samples; {mass:g} kg by {source}"
+    told += f"; torques of currents by {currents}" if found.constants else ""
     rotors = ", ".join(f"{x:.4g}" for x in made.rotors)
     share = max(round(made.error, 4), 1e-4)
     lines = [

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from seerob.outputs.film import Film
     from seerob.session.batch import Batch
     from seerob.session.explanation import Explanation
-    from seerob.session.identification import Identified
+    from seerob.session.identification import Identified, Known
     from seerob.session.permissible import evaluation
     from seerob.session.permissible.evaluation import PermissibleSpeed, Say, Wish
     from seerob.session.permissible.joint_limits import Given
@@ -422,19 +422,20 @@ class Station:
         threads = threads or os.cpu_count() or 1
         return batch.judged(self.model, self.bound, motion, threads=threads, findings=findings)
 
-    def identify(self, robot: str, carrying: Station | None = None) -> Identified:
+    def identify(self, robot: str, carrying: Station | None = None, known: Known | None = None) -> Identified:
         """Base inertial parameters and friction of a robot by the torques that a recorded source measured.
 
         Args:
             robot: Its name; it carries nothing in this workstation, whatever the log was taken with.
             carrying: A workstation with the same robot, whose log was taken with a payload on it.
+            known: What turns currents into torques, of a log that has no torques.
 
         Raises:
-            InputError: No recorded source of it measures torques, it carries something, or is carried.
+            InputError: No recorded source of it measures torques or currents, or it carries something.
             UnknownName: There is no such robot.
         """
         from seerob.model.mounting.specification import pose_matrix
-        from seerob.session.identification import identify
+        from seerob.session.identification import NOTHING_KNOWN, identify
 
         found = self.model.robot(robot)
         if not found.alone or found.carried:
@@ -442,14 +443,15 @@ class Station:
             raise InputError.at("identify", found.name, what, "name a cell of the bare arm")
         (entry,) = (each for each in self.workstation.robots if each.name == found.name)
         gravity = pose_matrix(entry.base)[:3, :3].T @ np.array(self.model.mj.opt.gravity)
-        more = None if carrying is None else carrying._torque_log(robot)
-        return identify(found.description, gravity, self._torque_log(found.name), more)
+        more = None if carrying is None else carrying._torque_log(robot, currents=True)
+        said = self._torque_log(found.name, currents=True)
+        return identify(found.description, gravity, said, more, known or NOTHING_KNOWN)
 
-    def _torque_log(self, name: str) -> ControllerLog:
+    def _torque_log(self, name: str, *, currents: bool = False) -> ControllerLog:
         for source, opened in self.sources:
             if source.target() == name and not isinstance(source, LiveSource):
                 said = controller_log(opened.samples, getattr(source, "file", source.name))
-                if said is not None and said.tau is not None:
+                if said is not None and (said.tau is not None or (currents and said.current is not None)):
                     return said
         remedy = (
             "log them: actual_current_as_torque of RTDE, measured torques of FRI, torque columns of a table"

@@ -427,6 +427,8 @@ class ControllerLog(NamedTuple):
     """Whether the TCP is in the base frame of the controller; else in any."""
     tcp_speed: Array | None = None
     """[m/s], shape (N,)."""
+    current: Array | None = None
+    """Motor currents, where no torques are said [A], shape (N, n)."""
 
     def thinned(self, most: int, said: Array | None = None) -> ControllerLog:
         """At most so many rows of it, evenly; of those in which something is said, when it is given."""
@@ -434,25 +436,26 @@ class ControllerLog(NamedTuple):
         if said is not None:
             rows = rows[np.isfinite(said.reshape(len(said), -1)).all(axis=1)]
         rows = rows[:: max(1, -(-len(rows) // most))]
-        thin = (None if x is None else x[rows] for x in (self.qd, self.tau, self.tcp, self.tcp_speed))
-        qd, tau, tcp, speed = thin
-        return self._replace(t=self.t[rows], q=self.q[rows], qd=qd, tau=tau, tcp=tcp, tcp_speed=speed)
+        every = {field: getattr(self, field) for field in ("qd", "tau", "tcp", "tcp_speed", "current")}
+        thin = {field: None if x is None else x[rows] for field, x in every.items()}
+        return self._replace(t=self.t[rows], q=self.q[rows], **thin)
 
 
 def controller_log(samples: Iterable[Sample], file: str) -> ControllerLog | None:
     """What a source that was opened says of itself; None when it says nothing but where the joints are."""
     if isinstance(samples, TrajectorySamples):
         motion = samples.trajectory
-        if motion.tau is None and motion.tcp_position is None and motion.tcp_speed is None:
+        said = (motion.tau, motion.current, motion.tcp_position, motion.tcp_speed)
+        if all(each is None for each in said):
             return None
         valid = np.ones(len(motion.t), bool) if motion.invalid is None else ~motion.invalid
-        every = (samples.qd, motion.tau, motion.tcp_position, motion.tcp_speed)
-        qd, tau, tcp, speed = (None if x is None else x[valid] for x in every)
+        every = (samples.qd, motion.tau, motion.tcp_position, motion.tcp_speed, motion.current)
+        qd, tau, tcp, speed, current = (None if x is None else x[valid] for x in every)
         if tcp is not None and motion.tcp_said is not None:
             tcp = np.where(motion.tcp_said[valid, None], tcp, np.nan)
         t = motion.t[valid] - motion.t[0]
         q = motion.q[valid]
-        return ControllerLog(file, t, q, qd, tau, tcp, motion.tcp_in_base, speed) if len(t) else None
+        return ControllerLog(file, t, q, qd, tau, tcp, motion.tcp_in_base, speed, current) if len(t) else None
     rows = [s for s in samples if isinstance(s, JointSample) and s.quality is Quality.GOOD]
     if all(s.tau is None and s.tcp is None and s.tcp_speed is None for s in rows):
         return None

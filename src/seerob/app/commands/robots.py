@@ -15,6 +15,7 @@ from seerob.core.errors import InputError
 if TYPE_CHECKING:
     from seerob.description.description import Description
     from seerob.description.robots.library import Entry
+    from seerob.session.identification import Known
 
 HELP = "list robots and tools that can be named, with what is known of each; fetch a published description"
 EXAMPLE = "seerob robots"
@@ -46,6 +47,14 @@ def add(sub: argparse.ArgumentParser) -> None:
     identify.add_argument("--robot", help="whose log; the only robot when not given")
     text = "workstation of the same arm, with a log that was taken with a payload on its flange"
     identify.add_argument("--carrying", type=Path, metavar="WORKSTATION", help=text)
+    text = "torque per current of each joint, gears included, from the base on [N·m/A]: 11.5,11.5,9.8,…"
+    identify.add_argument("--constants", metavar="K,K,…", help=text)
+    text = "mass that the log of --carrying has on the flange [kg], which makes torques of currents"
+    identify.add_argument("--payload", type=float, metavar="KG", help=text)
+    text = "by which share each constant, or that mass, may be off: 0.05"
+    identify.add_argument("--tolerance", type=float, metavar="SHARE", help=text)
+    text = "where constants are stated, or how the mass was weighed"
+    identify.add_argument("--known-by", metavar="TEXT", help=text)
     text = "what the maker says that the whole arm weighs [kg]: needed for -o"
     identify.add_argument("--mass", type=float, metavar="KG", help=text)
     identify.add_argument("--mass-source", metavar="TEXT", help="where the maker says so: data sheet, page")
@@ -183,9 +192,43 @@ def _fetch(name: str) -> int:
     return Exit.WITHIN
 
 
+def _known(options: argparse.Namespace) -> Known:
+    """What turns currents into torques.
+
+    Raises:
+        InputError: A constant, a mass, its tolerance or its source is missing or makes no sense.
+    """
+    from seerob.session.identification import NOTHING_KNOWN, Known
+
+    command = "seerob robots identify"
+    if options.constants is None and options.payload is None:
+        return NOTHING_KNOWN
+    if options.constants is not None and options.payload is not None:
+        raise InputError.at(command, "--constants", "and --payload are both given", "give one of them")
+    if options.payload is not None and options.carrying is None:
+        what = "needs the log that was taken with it"
+        raise InputError.at(command, "--payload", what, "give its workstation with --carrying")
+    if options.tolerance is None or not 0 <= options.tolerance < 1 or not options.known_by:
+        what = "needs a tolerance from 0 to below 1, and where it is known from"
+        raise InputError.at(command, "--tolerance", what, "give --tolerance 0.05 and --known-by")
+    if options.payload is not None:
+        if not 0.01 <= options.payload <= 1000:
+            raise InputError.at(command, "--payload", f"is {options.payload:g} kg", "0.01 to 1000 kg")
+        return Known(payload=options.payload, tolerance=options.tolerance)
+    try:
+        constants = tuple(float(text) for text in options.constants.split(","))
+    except ValueError:
+        constants = ()
+    if not constants or not all(1e-4 < k < 1e5 for k in constants):
+        what = f"{options.constants!r} are no torque constants"
+        raise InputError.at(command, "--constants", what, "11.5,11.5,9.8 [N·m/A], one per joint")
+    return Known(constants=constants, tolerance=options.tolerance)
+
+
 def _identify(options: argparse.Namespace) -> int:
     from seerob.session.identification import robot_table, weighed
 
+    known = _known(options)
     if options.output is not None:
         if options.mass is None or not options.mass_source or not 0.1 <= options.mass <= 10_000:
             what = "masses for a file need the mass of the whole arm, from 0.1 kg, and where it is stated"
@@ -198,7 +241,7 @@ def _identify(options: argparse.Namespace) -> int:
         raise InputError.at("seerob robots identify", "--robot", "is not given", f"one of {', '.join(names)}")
     name = options.robot or names[0]
     carrying = None if options.carrying is None else compiled(options.carrying, allowed(options))
-    found = station.identify(name, carrying)
+    found = station.identify(name, carrying, known)
     line("log", f"{name}: {found.source}, {found.samples} samples; condition {found.condition:.3g}")
     for parameter, unit, value in zip(found.names, found.units, found.values, strict=True):
         line(
@@ -208,6 +251,8 @@ def _identify(options: argparse.Namespace) -> int:
         unit = "N·m" if found.regressor.revolute[j] else "N"
         said = f"Coulomb {found.coulomb[j]}, viscous {found.viscous[j]}, offset {found.offset[j]}"
         line("friction", f"{joint}: {said} [{unit}]; {found.left[j]:.3g} {unit} are left")
+    for joint, constant in zip(found.regressor.names, found.constants, strict=bool(found.constants)):
+        line("constant", f"{joint}: {constant} N·m/A, by {options.known_by}")
     if found.payload:
         line(
             "payload",
@@ -219,7 +264,9 @@ def _identify(options: argparse.Namespace) -> int:
     if options.output is None:
         return Exit.UNDECIDED if found.hidden else Exit.WITHIN
     made = weighed(found, options.mass)
-    text = robot_table(found, made, mass=options.mass, source=options.mass_source)
+    text = robot_table(
+        found, made, mass=options.mass, source=options.mass_source, currents=options.known_by or ""
+    )
     with options.output.open("x", encoding="utf-8") as opened:
         opened.write(text)
     far = f"masses that bodies can have are {made.distance:.2g} standard deviations from the fit"

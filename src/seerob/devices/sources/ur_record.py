@@ -49,13 +49,14 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
             remedy = f'set joints = "{other}"' if has else f"record {prefix}_q"
             raise InputError.at(self.file, f"row {log.header_row}", f"no column '{prefix}_q_0'", remedy)
         qd = _vector(log, f"{prefix}_qd")
-        # actual_current is in ampere, and its factor to a torque is not published.
+        # Currents count where torques are not said; their factors to torques are not published.
         tau = _vector(log, "actual_current_as_torque")
+        current = [] if tau else _vector(log, "actual_current")
         # The rotation vector behind it tells nothing that the joints do not.
         tcp, speed = (_vector(log, f"{prefix}_TCP_{what}")[:3] for what in ("pose", "speed"))
         payload = [c for c in ("payload",) if c in log.names]
         status: list[str] = [c for c in ("robot_mode", "safety_status", "safety_mode") if c in log.names]
-        values = log.read(["timestamp", *q, *qd, *tau, *tcp, *speed, *payload, *status])
+        values = log.read(["timestamp", *q, *qd, *tau, *current, *tcp, *speed, *payload, *status])
         invalid, warnings = _status(values, status)
         trajectory = Trajectory(
             file=self.file,
@@ -63,6 +64,7 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
             q=values.table(q),
             qd=values.table(qd) if len(qd) == len(q) else None,
             tau=values.table(tau) if len(tau) == len(q) else None,
+            current=values.table(current) if len(current) == len(q) else None,
             tcp_position=values.table(tcp) if tcp else None,
             tcp_speed=np.linalg.norm(values.table(speed), axis=1) if speed else None,
             payload=values.column("payload") if payload else None,

@@ -150,6 +150,8 @@ class Trajectory(Timed):
     """Joint velocities as the file gives them [rad/s or m/s], shape (n, dof)."""
     tau: Array | None = None
     """Measured joint torques [N·m or N], shape (n, dof)."""
+    current: Array | None = None
+    """Measured motor currents, where the file says no torques [A], shape (n, dof)."""
     tcp_position: Array | None = None
     """Tool centre point in whatever frame the file uses [m], shape (n, 3)."""
     tcp_said: NDArray[np.bool_] | None = None
@@ -184,12 +186,13 @@ class Trajectory(Timed):
             yield Problem(self.file, "", f"time {self.t.shape} and joints {self.q.shape} are not a table")
             return
         yield from self._count_problems()
-        widths = {"q": self.dof, "qd": self.dof, "tau": self.dof, "tcp_position": 3, "tcp_wxyz": 4}
+        widths = {"q": self.dof, "qd": self.dof, "tau": self.dof, "current": self.dof}
+        widths |= {"tcp_position": 3, "tcp_wxyz": 4}
         yield from self._width_problems(widths)
 
     def _value_problems(self) -> Iterator[Problem]:
         yield from self._time_problems()
-        every = ("q", "qd", "tau", "tcp_position", "tcp_wxyz", "tcp_speed", "payload")
+        every = ("q", "qd", "tau", "current", "tcp_position", "tcp_wxyz", "tcp_speed", "payload")
         yield from self._number_problems(every)
 
 

@@ -436,9 +436,10 @@ class ControllerLog(NamedTuple):
         if said is not None:
             rows = rows[np.isfinite(said.reshape(len(said), -1)).all(axis=1)]
         rows = rows[:: max(1, -(-len(rows) // most))]
-        every = {field: getattr(self, field) for field in ("qd", "tau", "tcp", "tcp_speed", "current")}
-        thin = {field: None if x is None else x[rows] for field, x in every.items()}
-        return self._replace(t=self.t[rows], q=self.q[rows], **thin)
+        every = (self.qd, self.tau, self.tcp, self.tcp_speed, self.current)
+        qd, tau, tcp, speed, current = (None if x is None else x[rows] for x in every)
+        thin = self._replace(t=self.t[rows], q=self.q[rows], qd=qd, tau=tau, tcp=tcp)
+        return thin._replace(tcp_speed=speed, current=current)
 
 
 def controller_log(samples: Iterable[Sample], file: str) -> ControllerLog | None:

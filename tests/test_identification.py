@@ -175,11 +175,12 @@ def test_currents_tell_as_much_as_what_makes_torques_of_them():
         said = in_ampere(simulated(seed))
         off = np.random.default_rng(seed).choice([-0.05, 0.05], 6)
         stated = Known(constants=tuple(CONSTANTS / (1 + off)), tolerance=0.05)
-        carrying = in_ampere(simulated(seed + 50, payload=payload))
-        weight = Known(payload=mass / (1 + tolerance), tolerance=tolerance)
-        of_constants = identify(robot, GRAVITY, said, None, stated)
-        of_mass = identify(robot, GRAVITY, said, carrying, weight)
-        for found in (of_constants, of_mass):
+        each = [identify(robot, GRAVITY, said, None, stated)]
+        if seed == 1:
+            carrying = in_ampere(simulated(seed + 50, payload=payload))
+            weight = Known(payload=mass / (1 + tolerance), tolerance=tolerance)
+            each.append(identify(robot, GRAVITY, said, carrying, weight))
+        for found in each:
             assert found.hidden == ()
             truth = [*(found.base.regrouped @ truth_of_all), *COULOMB, *VISCOUS, *CONSTANTS]
             figures = [*found.values, *found.coulomb, *found.viscous, *found.constants]
@@ -193,7 +194,7 @@ def test_currents_tell_as_much_as_what_makes_torques_of_them():
         identify(robot, GRAVITY, said, None, Known(constants=(1.0,) * 5))
     with pytest.raises(InputError, match="measured already"):
         identify(robot, GRAVITY, simulated(0), None, stated)
-    feather = in_ampere(simulated(60))
+    said, feather = (in_ampere(simulated(k, n=200)) for k in (1, 60))
     with pytest.raises(InputError, match="does not show in them"):
         identify(robot, GRAVITY, said, feather, Known(payload=0.5))
 

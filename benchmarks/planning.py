@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/planning.py``; ``--smoke`` takes one seed and two problems. Both in one process, by
 turns, RRT-Connect with steps of one length, short cuts, the same shapes, 30 mm kept. Then random
-problems in the manner of MotionBenchMaker (its own were not taken): shelves, a table, an open box, a cage, all
-of random sizes, from a random clear posture to one with the tool in there, 10 mm kept.
+problems in the manner of MotionBenchMaker (its own were not taken): shelves, a table, an open box, a cage,
+all of random sizes, from a random clear posture to one with the tool in there, 10 mm kept.
 
 The peer asks Coal at postures along a way whether any two bodies are nearer than the margin (its
 ``security_margin``): balls around them first, all in one call of NumPy. Nothing between

@@ -213,6 +213,7 @@ CALLS = {
     "criteria.safety.tool_force.pseudo_inverse_change": {"least": 0.5, "change": 0.1},
     "criteria.safety.velocity.point_velocity": {"J": J, "qd": TWO},
     "criteria.safety.velocity.speed_noise": {"J": J, "error": TWO},
+    "criteria.stopping.planned.terms": {"S_r": 0.1, "S_s": 0.2, "S_h": 0.3},
     "criteria.stopping.onset.accelerated": {"v": HALF, "T_r": 0.1, "a": 2.0, "qd": TWO},
     "criteria.stopping.onset.largest_between": {"t": TWO, "q": np.eye(2), "qd": np.eye(2)},
     "criteria.stopping.onset.farthest": {

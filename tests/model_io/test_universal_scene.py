@@ -180,6 +180,14 @@ def test_layers_beside_the_file_are_followed_and_others_are_named(tmp_path):
     assert set(found.files) == {"parts/pin.usda"}
 
 
+@pytest.mark.parametrize("axis", ["", "ZZ"])
+def test_an_up_axis_that_is_none_is_named(tmp_path, axis):
+    path = tmp_path / "a.usda"
+    path.write_text(f'#usda 1.0\n( upAxis = "{axis}" )\ndef Cube "c" {{\n}}\n')
+    with pytest.raises(InputError, match="upAxis is"):
+        read(path)
+
+
 def test_a_package_that_leads_out_of_itself_is_refused(tmp_path):
     stage = Usd.Stage.CreateInMemory()
     block(stage, "/pin")

@@ -234,3 +234,45 @@ def test_two_boxes_are_filled_in_rounds_of_twelve_seconds_whatever_the_machine()
         assert len(found) == (4 if by == "gripper" else 2)
         assert found == pytest.approx([seconds] * len(found), abs=off)
     assert not [e for e in events if e.what in ("torn", "dropped", "refused")]
+
+
+ASKED = """
+import os, runpy, sys
+from pathlib import Path
+from numba.core.dispatcher import Dispatcher
+from seerob.session import run
+
+def asked():
+    return {
+        f"{name} {loop.__name__}"
+        for name, module in list(sys.modules.items()) if name.startswith("seerob.kernels.")
+        for loop in vars(module).values() if isinstance(loop, Dispatcher) and loop.signatures
+    }
+
+warm_up, before = run.warm_up, set()
+def then(model):
+    warm_up(model)
+    before.update(asked())
+run.warm_up = then
+ended = os._exit
+def now(code):
+    Path(os.environ["ASKED"]).write_text("\\n".join(sorted(asked() - before)))
+    ended(code)
+os._exit = now
+runpy.run_module("seerob", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", CYCLES)
+def test_no_loop_is_asked_for_the_first_time_while_a_live_cell_runs(name, tmp_path):
+    """Compiled then, at the very first start, it would make the run late."""
+    arguments = ["run", str(CELLS / name), "--emulated", "--seconds", "5", "--port", "0", "--no-record"]
+    arguments += ["--allow-writing"] * (name in {"niryo_picking", "two_places"})
+    asked = tmp_path / "asked"
+    command = [sys.executable, "-P", "-c", ASKED, *arguments]
+    done = subprocess.run(
+        command, check=False, capture_output=True, text=True, env={**os.environ, "ASKED": str(asked)}
+    )
+    assert asked.exists(), done.stdout + done.stderr
+    assert asked.read_text() == ""

@@ -137,7 +137,9 @@ def forward(q: Array, links: Links, poses: Poses) -> None:
             for i in range(3):
                 for j in range(3):
                     new[i, j] = R[b, i, 0] * own[0, j] + R[b, i, 1] * own[1, j] + R[b, i, 2] * own[2, j]
-            R[b] = new
+            for i in range(3):
+                for j in range(3):  # not as a slice, which takes 4 s to compile
+                    R[b, i, j] = new[i, j]
             for i in range(3):
                 # The anchor stays where it was.
                 p[b, i] = through[d, i] - (

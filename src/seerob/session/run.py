@@ -23,6 +23,7 @@ from seerob.criteria.judging import Judge as Judge  # noqa: PLC0414
 from seerob.criteria.judging import undecided
 from seerob.criteria.question import Bound as Bound  # noqa: PLC0414
 from seerob.criteria.question import bound_to
+from seerob.description.capture.fitting import Fitter
 from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model
@@ -34,6 +35,7 @@ from seerob.recording.result_log import ResultLog
 from seerob.session.huge_pages import use_huge_pages
 from seerob.session.opening import coarse, gappy, signal_timeouts, untimed
 from seerob.session.scene import Looks, camera_of, invalid_reasons, landmark_of
+from seerob.twin import controller_check
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
 from seerob.twin.state import State
@@ -205,7 +207,12 @@ def warm_up(model: Model) -> None:
     engine = Engine(model, controllers=False)
     judge = Judge(bind(model))
     judge(engine.start())
+    judge(engine.tick())
     Engine(model).tick()
+    for source in model.workstation.sources:
+        controller_check.try_out(model, source.target())
+        if source.target() in {human.name for human in model.workstation.humans}:
+            Fitter(model.human(source.target()).description)
 
 
 def engine_of(model: Model, state: type[State] = State, *, contacts: bool = True) -> Engine:

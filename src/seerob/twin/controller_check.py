@@ -375,6 +375,15 @@ def bound(model: Model, name: str) -> ControllerTool | None:
     return ControllerTool(arm, _tips(model, robot, mechanism), np.array(bases), tolerance)
 
 
+def try_out(model: Model, name: str) -> None:
+    """Ask of a robot once what is asked of each of its samples: what is compiled at first use is, then."""
+    if (robot := bound(model, name)) is not None:
+        still = np.zeros((1, robot.arm.n))
+        speeds = np.append(0.0, robot.speeds(robot.arm.posture(still), still))
+        robot.off(robot.arm.posture(still), np.zeros((1, 3)))
+        _differ(_past([_Ways(0.0, speeds, speeds)]), _Ways(1.0, speeds, speeds))
+
+
 def _tips(model: Model, robot: Robot, mechanism: Mechanism) -> dict[str, Array]:
     if robot.controller_tcp is not None:
         return {"controller_tcp": pose_matrix(robot.controller_tcp)[:3, 3]}

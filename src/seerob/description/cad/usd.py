@@ -24,4 +24,6 @@ def read(source: MeshSource) -> Assembly:
     need("pxr")
     arguments = source.path, source.data, source.max_bytes, source.max_faces
     told = parsed(plain, *arguments, file=str(source.path), seconds=SECONDS)
+    if told["up"] not in Z_FROM:
+        source.fail(f"upAxis is {told['up']!r}", 'write upAxis = "Y" or "Z"', "upAxis")
     return assembled(source, told, "USD", Z_FROM[told["up"]], told["meters"])

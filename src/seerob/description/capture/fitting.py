@@ -130,6 +130,9 @@ class Fitter:
         # Where the person is and faces has no rest.
         self._w_rest = np.where(own_place, 0.0, np.where(turns, TURN_REST, REST) ** 2)
         self._w_keep = np.where(own_place, 1e-4, KEEP**2)
+        # Loops that are not kept yet are compiled now: a run that waits for them falls behind.
+        nothing = pulls((), np.eye(4))
+        self.errors(nothing, self.fit(nothing, None)[0])
 
     def start(self, seen: Pulls) -> Array:
         """The posture of rest at the place and heading of what is seen: where a fit begins, shape (n,)."""

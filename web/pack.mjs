@@ -1,8 +1,11 @@
-// Pack the scene for notebooks, which weighs a quarter then in an installation; Python unpacks it.
+// Pack scripts, which weigh a quarter then in an installation; Python unpacks them.
 
-import { readFileSync, rmSync, writeFileSync } from "node:fs";
+import { readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 
-const script = "../src/seerob/app/server/page/notebook.js";
-writeFileSync(`${script}.gz`, gzipSync(readFileSync(script), { level: 9 }));
-rmSync(script);
+const page = "../src/seerob/app/server/page";
+for (const file of readdirSync(page, { recursive: true })) {
+  if (!file.endsWith(".js")) continue;
+  writeFileSync(`${page}/${file}.gz`, gzipSync(readFileSync(`${page}/${file}`), { level: 9 }));
+  rmSync(`${page}/${file}`);
+}

@@ -1,7 +1,9 @@
 """Pixels whose colour is known from geometry alone."""
 
+import gzip
 import math
 from io import BytesIO
+from pathlib import Path
 
 import made_run
 import numpy as np
@@ -235,8 +237,8 @@ def test_every_marker_and_every_odd_pose_gives_a_picture():
 @pytest.mark.parametrize("size", [12, 19, 40])
 @pytest.mark.parametrize("text", ["separation 0.123 m", "✓ ✕ ↔ äöéÅŁß", "Ωμ Жд", "x", " ", "\U0001f600", ""])
 def test_words_are_those_that_pillow_writes(text, size):
-    path = lettering.__file__.replace("lettering.py", "DejaVuSans-Bold.ttf")
-    peer = ImageFont.truetype(path, size, layout_engine=ImageFont.Layout.BASIC)
+    packed = Path(lettering.__file__).with_name("DejaVuSans-Bold.ttf.gz").read_bytes()
+    peer = ImageFont.truetype(BytesIO(gzip.decompress(packed)), size, layout_engine=ImageFont.Layout.BASIC)
     # Its hinting sets letters on whole pixels.
     assert lettering.width(text, size) == pytest.approx(peer.getlength(text), abs=0.51 * max(len(text), 1))
     ours = np.full((80, 700, 3), 255, np.uint8)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import gzip
 import logging
 import socket
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
@@ -93,15 +94,17 @@ def _files(folder: Path, _: int) -> dict[str, Path]:
 
 
 def answer(folder: Path, path: str) -> Response:
-    """The file at ``path`` (the page itself when empty); 503 when the page was not built."""
+    """The file at ``path`` (the page itself when empty), packed or not; 503 when the page was not built."""
     listed = _files(folder, int(monotonic() / LISTED))
     if "index.html" not in listed:
         return HTMLResponse(_NOT_BUILT, 503)
-    file = listed.get(path or "index.html")
+    name = path or "index.html"
+    file = listed.get(name) or listed.get(f"{name}.gz")
     if file is None:
         return PlainTextResponse("no such file\n", 404)
-    kind = _TYPES.get(file.suffix.lower(), "application/octet-stream")
-    return Response(file.read_bytes(), media_type=kind, headers={"Cache-Control": "no-store"})
+    kind = _TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
+    content = file.read_bytes() if file.suffix != ".gz" else gzip.decompress(file.read_bytes())
+    return Response(content, media_type=kind, headers={"Cache-Control": "no-store"})
 
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]

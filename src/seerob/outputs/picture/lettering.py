@@ -5,6 +5,7 @@ A library that draws text and writes PNG weighs 20 MB, of which this was all tha
 
 from __future__ import annotations
 
+import gzip
 import struct
 import zlib
 from functools import cache
@@ -26,8 +27,8 @@ _STEPS = 4
 class Font:
     """A TrueType font: its outlines in units of its grid, y up."""
 
-    def __init__(self, path: Path) -> None:
-        self._data = data = path.read_bytes()
+    def __init__(self, data: bytes) -> None:
+        self._data = data
         (count,) = struct.unpack_from(">H", data, 4)
         entries = (struct.unpack_from(">4s4xII", data, 12 + 16 * k) for k in range(count))
         self._tables = {tag: data[start : start + size] for tag, start, size in entries}
@@ -171,7 +172,7 @@ def _lines(contour: tuple[Array, NDArray[np.bool_]]) -> Array:
 @cache
 def font() -> Font:
     """A font that has ✓, ✕ and ↔: DejaVu Sans, whose licence lies beside it."""
-    return Font(Path(__file__).with_name("DejaVuSans-Bold.ttf"))
+    return Font(gzip.decompress(Path(__file__).with_name("DejaVuSans-Bold.ttf.gz").read_bytes()))
 
 
 def width(text: str, size: int) -> float:

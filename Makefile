@@ -118,7 +118,7 @@ unit: export PYTHONDONTWRITEBYTECODE :=
 # Workers occupy the processors; threads of a library's own would wait for each other there.
 unit: export OPENBLAS_NUM_THREADS := 1
 unit: $(DEV) $(PAGE)
-	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(BIN)/pytest -n 4 --dist loadfile
+	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(BIN)/pytest -n 3 --dist loadfile
 
 web-test: $(DEV) $(PAGE)
 	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && cd web && ../scripts/npm run check && ../scripts/npm run lint && ../scripts/npm test

@@ -13,7 +13,7 @@ import pytest
 from made_cells import make_cell, seerob
 
 import seerob as sr
-from seerob.app.console.terminal import PrintableLines
+from seerob.app.console.terminal import PrintableLines, line
 from seerob.core.errors import InputError
 from seerob.core.markers import Label
 from seerob.core.printable import obeyed, printable, printable_record
@@ -28,6 +28,12 @@ from seerob.recording.recording import Recording
 OBEYED = "\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202egnirts\u2066"
 WORDS = "操作员 – Рука 🤖 ½ m²\tπ"
 NAME = f"{OBEYED}\n{WORDS}"
+
+
+def test_bytes_of_a_fingerprint_are_no_pictures(capsys):
+    """Rich shows a disc for ``:CD:``, and a flag for ``:DE:``."""
+    line("trust", "SHA-256 BF:63:08:CD:4C:83:DE:02, :ok:")
+    assert "BF:63:08:CD:4C:83:DE:02, :ok:" in capsys.readouterr().out
 
 
 def test_nothing_is_left_that_a_terminal_obeys_and_every_encoding_takes_it():

@@ -83,7 +83,7 @@ def progress(duration: float, what: str) -> Iterator[Progress]:
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
-    columns = (BarColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+    columns = (BarColumn(), TextColumn("{task.description}", markup=False), TimeRemainingColumn())
     with Bars(*columns, console=STATUS, transient=True) as bars:
         task = bars.add_task(what, total=duration)
         yield Progress(
@@ -193,12 +193,12 @@ def spinner(*, quiet: bool = False) -> Iterator[Callable[[str], None]]:
     if quiet or not STATUS.is_terminal:
         yield (lambda _: None) if quiet else lines()
         return
-    from rich.markup import escape
+    from rich.text import Text
 
     status = STATUS.status("")
 
     def say(text: str) -> None:
-        status.update(escape(printable(text)))
+        status.update(Text(printable(text)))
         status.start()
 
     try:

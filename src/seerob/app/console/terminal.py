@@ -49,8 +49,8 @@ class Console(RichConsole):
         raise BrokenPipeError
 
 
-OUT = Console(highlight=False, soft_wrap=True)
-STATUS = Console(highlight=False, soft_wrap=True, stderr=True)
+OUT = Console(highlight=False, soft_wrap=True, emoji=False)
+STATUS = Console(highlight=False, soft_wrap=True, emoji=False, stderr=True)
 """For progress: what is piped on stays clean."""
 
 WORDS = {

@@ -3,7 +3,7 @@
 import { heardPresences, heardVisitors, ownDevice } from "./company";
 import { refused } from "./doing";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
-import type { Frame, FromWorker, Shown, ToWorker } from "./messages";
+import type { Frame, FromWorker, Shown, ShownResult, ToWorker } from "./messages";
 import {
   beginScene,
   besideTitle,
@@ -26,6 +26,7 @@ import {
 import { PoseReader } from "./poses";
 import { numbersEveryMs } from "./scene/effort";
 import { traceFromWire } from "./traces";
+import { STATE_ORDER, stateOf } from "./verdicts";
 import { heardMeasured } from "./view/measure";
 import { heardReach } from "./view/reach";
 import { type History, SCHEMA, type Scene } from "./wire";
@@ -198,6 +199,9 @@ export class Connection {
   private show(whole: Frame | null, shown: Shown): void {
     if (whole) this.pending = whole;
     this.unread = whole === null;
+    // Whatever got worse is not waited for: no text says within beside what is drawn as exceeded.
+    if (this.unread && worse(shown.results, (this.pending ?? frame.peek())?.results ?? []))
+      this.numbersAt = Number.NEGATIVE_INFINITY;
     this.shownT = shown.t;
     // Panels that follow it cost more than a picture, and in the room nobody sees them.
     if (whole || ownDevice.peek() === "desk") now.value = shown.t;
@@ -213,6 +217,19 @@ export class Connection {
       stale.value = this.silent || performance.timeOrigin + performance.now() - this.heard > OLD_MS;
     else stale.value = frame.value === null && this.pending === null;
   }
+}
+
+/** Whether any result is in a worse state than the one before. */
+function worse(results: readonly ShownResult[], before: readonly ShownResult[]): boolean {
+  for (let k = 0; k < results.length; k += 1) {
+    const [one, other] = [results[k]!, before[k]];
+    if (other?.name === one.name && rankOf(one) < rankOf(other)) return true;
+  }
+  return false;
+}
+
+function rankOf(result: ShownResult): number {
+  return STATE_ORDER.indexOf(stateOf(result));
 }
 
 /** Poses that came by message, where memory cannot be shared. */

@@ -21,7 +21,7 @@ import { film } from "./view/film";
 import { saveView } from "./view/kept";
 import { connectMeasure } from "./view/measure";
 import { connectReach } from "./view/reach";
-import type { Register, Tracking, VisitorInfo } from "./wire";
+import type { Register, Tracking, Verdict, VisitorInfo } from "./wire";
 import { Visit } from "./xr/visit";
 
 declare global {
@@ -44,6 +44,8 @@ declare global {
       project(point: [number, number, number]): [number, number];
       /** What is written in the room. */
       readonly written: string[];
+      /** Verdict of each result whose markers are drawn there. */
+      readonly drawn: Record<string, Verdict | null>;
       /** Whether the pointer is on a handle of what is edited, or drags one. */
       readonly held: boolean;
       /** Where a point of a visitor's room [m] is in three.js's own world, y up; null without a visit. */
@@ -130,6 +132,9 @@ function begin(element: HTMLElement): void {
     project: (point) => viewer.project(point),
     get written() {
       return viewer.markers.texts;
+    },
+    get drawn() {
+      return Object.fromEntries(viewer.markers.drawn.map(({ name, verdict }) => [name, verdict]));
     },
     get held() {
       return viewer.gizmo.held;

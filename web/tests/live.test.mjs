@@ -89,6 +89,29 @@ test("a figure in the room is that of the table, in every picture", async () => 
   );
 });
 
+test("what gets worse is told at once: no table says within for long beside what is drawn as exceeded", async () => {
+  const late = await page.evaluate(
+    () =>
+      new Promise((done) => {
+        const badge = document.querySelector('tr[data-criterion="separation"] .badge');
+        let [t, drawn, behind, most, turns] = [0, "", 0, 0, 0];
+        const look = () => {
+          const verdict = window.seerob.drawn.separation;
+          if (window.seerob.t !== t) {
+            behind = verdict === "exceeded" && badge.textContent.includes("within") ? behind + 1 : 0;
+            most = Math.max(most, behind);
+            turns += verdict === "exceeded" && drawn !== verdict;
+            [t, drawn] = [window.seerob.t, verdict];
+          }
+          if (turns < 3) requestAnimationFrame(look);
+          else done(most);
+        };
+        look();
+      }),
+  );
+  assert.ok(late <= 3, `${late} instants`);
+});
+
 test("the worst comes first and the pill names it", async () => {
   // Rows change their order at most twice a second, so for a moment the worst may be below.
   await page.waitForFunction(() => {

@@ -34,6 +34,8 @@ export interface Written {
 
 export class MarkerLayer {
   readonly root = new Group();
+  /** Whose markers are drawn. */
+  drawn: readonly ShownResult[] = [];
   /** Bodies that highlights paint. */
   readonly painted = new Map<string, Verdict | null>();
   private readonly slots = new Map<string, Slot[]>();
@@ -50,6 +52,7 @@ export class MarkerLayer {
    */
   update(results: readonly ShownResult[], muted: ReadonlySet<string>, written: Written): void {
     const { told, selected, most } = written;
+    this.drawn = results;
     this.painted.clear();
     const captioned = worst(told, muted, most);
     if (most > 0 && selected) captioned.add(selected);

@@ -468,10 +468,7 @@ class State(Validity):
                 and not (self.lags and any(self.lags.values()))
                 and not (self.left and any(self.left.values()))
                 and not any(hearing.bones for hearing in hearings.values())
-                # Who is driven, and was heard more than once, is moved: mostly everybody.
-                and (
-                    all(h.driven and not h.once for h in hearings.values()) or all(map(self.moved, hearings))
-                )
+                and self.all_moved()
             )
         return found
 

@@ -93,8 +93,6 @@ class Validity:
         self._tracking_limits = {
             m.name: limits.get(m.role, engine.tracking_limit) for m in model.mechanisms.values()
         }
-        self._by_itself = frozenset(m.name for m in model.mechanisms.values() if not m.on)
-        """Whom nobody carries."""
         self._owners_of: dict[tuple[int, ...], _Owners] = {}
         self._owners_last: dict[int, tuple[tuple[int, ...], _Owners]] = {}
         """By the identity of bodies that were asked for, them and whom they belong to."""
@@ -139,6 +137,11 @@ class Validity:
             found = self._model.mechanisms[name].role != "robot" or any(h.driven or h.heard for h in every)
             found = self._moved[name] = found and not any(hearing.once for hearing in every)
         return found
+
+    def all_moved(self) -> bool:
+        """Whether all are, as of `moved`: of whom each is driven, and not heard only once, none is asked."""
+        every = self._hearings
+        return all(h.driven and not h.once for h in every.values()) or all(map(self.moved, every))
 
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 
@@ -228,13 +231,19 @@ class Validity:
         hearing = self._hearings[name]
         if reason := self.invalid_source_reason(name):
             return reason
+        if not self._off(name, hearing):
+            return ""
         if hearing.reset_at > self.t - 2 * self._period:
             return f"{name}: the twin had to be put back to what was heard"
+        why = " (a torque limit is reached)" if hearing.saturated else ""
         limit = self._tracking_limits[name]
-        if hearing.error > limit:
-            why = " (a torque limit is reached)" if hearing.saturated else ""
-            return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
-        return ""
+        return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
+
+    def _off(self, name: str, hearing: Hearing) -> bool:
+        """Whether the twin is not where it was heard to be, or was put back there just now."""
+        return (
+            hearing.reset_at > self.t - 2 * self._period or not hearing.error <= self._tracking_limits[name]
+        )
 
     def invalid_source_reason(self, name: str) -> str:
         """Why what was heard may not be relied on, whether or not the twin follows it; empty when it may."""
@@ -419,20 +428,7 @@ class Validity:
         if self._sound is None:
             # Nobody asked for them yet.
             asked, self.asked = self.asked, set()
-            alone, put_back, t = self._by_itself, self.t - 2 * self._period, self.t
-            self._sound = frozenset(
-                name
-                for name, hearing in self._hearings.items()
-                # Of most there is nothing else that could be in doubt, and this is found out quickly.
-                if (
-                    name in alone
-                    and not hearing.bones_heard
-                    and not (hearing.reset_at > put_back or hearing.error > self._tracking_limits[name])
-                    and not hearing.invalid_reason(t)
-                    and not self.held
-                )
-                or self._is_sound(name)
-            )
+            self._sound = frozenset(filter(self._is_sound, self._hearings))
             self.asked = asked
         return self._sound
 
@@ -444,10 +440,11 @@ class Validity:
         return tuple(name for name in self._hearings if name not in sound)
 
     def _is_sound(self, name: str) -> bool:
-        if self._invalid_place(name):
+        hearing = self._hearings[name]
+        if self._off(name, hearing) or self.invalid_source_reason(name):
             return False
         # Of whom nothing is heard bone by bone there is no other reason.
-        if not self._hearings[name].bones_heard:
+        if not hearing.bones_heard:
             return True
         return not self.invalid_reason(name) and not self._invalid_bones(name)
 

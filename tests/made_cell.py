@@ -18,6 +18,39 @@ from seerob.workstation.source import Opened
 
 FLOATING = "engine = { gravity = [0, 0, 0] }\n"
 
+VISITOR_AT_TABLE = """
+title = "A visitor at a table"
+[[parts]]
+name = "table"
+shape = { box = [0.6, 1.2, 0.75] }
+at = { position = [0.9, 0, 0.375] }
+[[humans]]
+name = "anna"
+stature = 1.75
+mass = 75
+sex = "male"
+unseen_uncertainty_mm = 100
+[[sources]]
+kind = "headset"
+human = "anna"
+timeout = 2
+hold = 2
+"""
+TABLE_ON_AXIS = """
+[[machines]]
+name = "axis"
+shape = { box = [0.6, 0.6, 0.1] }
+mass = 50
+slide = { along = [1, 0, 0], lower = -1, upper = 3 }
+[[machines]]
+name = "table"
+on = "axis"
+at = { position = [0, 0, 0.1] }
+shape = { cylinder = [0.3, 0.1] }
+mass = 20
+turn = { }
+"""
+
 
 def two_r(*, mimic: str = "", masses: tuple[float, float] = (1.0, 1.0), effort: float = 1000.0) -> str:
     """A planar arm of two links of 1 m with masses at their ends, turning about z.

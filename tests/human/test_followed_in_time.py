@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import seerob as sr
+from made_cell import VISITOR_AT_TABLE
 from seerob.core.errors import Undecided
 from seerob.core.samples import BodySample
 from seerob.core.snapshot import Tracking
@@ -31,27 +32,13 @@ LASTS = 0.4
 STARTS = 1 / 6
 """So long whoever leapt gets faster [s]."""
 FOLLOWS, WITHIN = 0.010, 0.100
-CELL = """
-title = "A visitor at a table"
-[[parts]]
-name = "table"
-shape = { box = [0.6, 1.2, 0.75] }
-at = { position = [0.9, 0, 0.375] }
-[[humans]]
-name = "anna"
-stature = 1.75
-mass = 75
-sex = "male"
-unseen_uncertainty_mm = 100
-[[sources]]
-kind = "headset"
-human = "anna"
-timeout = 2
-hold = 2
-[[safety]]
+CELL = (
+    VISITOR_AT_TABLE
+    + """[[safety]]
 kind = "minimum_distance"
 between = ["anna", "table"]
 """
+)
 
 
 def reaching(t):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from made_cell import person
+from made_cell import TABLE_ON_AXIS, person
 from seerob import load
 from seerob.core.errors import InputError, Undecided
 from seerob.core.samples import JointSample, PoseSample
@@ -16,20 +16,8 @@ from seerob.twin.moving_base import velocity_of
 
 STATION = (
     f"[engine]\nphysics = false\n{person('op', 3, 0, 0)}"
-    + """
-[[machines]]
-name = "axis"
-shape = { box = [0.6, 0.6, 0.1] }
-mass = 50
-slide = { along = [1, 0, 0], lower = -1, upper = 3 }
-[[machines]]
-name = "table"
-on = "axis"
-at = { position = [0, 0, 0.1] }
-shape = { cylinder = [0.3, 0.1] }
-mass = 20
-turn = { }
-[[robots]]
+    + TABLE_ON_AXIS
+    + """[[robots]]
 name = "arm"
 model = "library:ur10"
 on = "table"

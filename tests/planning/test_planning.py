@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import seerob
+from made_cell import TABLE_ON_AXIS
 from seerob.core.errors import InputError
 from seerob.kernels import ways
 from seerob.session.planning.clearance import Clearance
@@ -162,20 +163,9 @@ def test_the_planned_file_is_a_motion_that_keeps_the_margin(model, tmp_path):
     assert min(clearance.nearest(np.array(s.q)).distance for s in opened.samples) >= 0.03 - 1e-6
 
 
-CARRIED = """
-[[machines]]
-name = "axis"
-shape = { box = [0.6, 0.6, 0.1] }
-mass = 50
-slide = { along = [1, 0, 0], lower = -1, upper = 3 }
-[[machines]]
-name = "table"
-on = "axis"
-at = { position = [0, 0, 0.1] }
-shape = { cylinder = [0.3, 0.1] }
-mass = 20
-turn = { }
-[[robots]]
+CARRIED = (
+    TABLE_ON_AXIS
+    + """[[robots]]
 name = "arm"
 model = "arm.urdf"
 on = "table"
@@ -192,6 +182,7 @@ name = "ball"
 shape = { sphere = 0.1 }
 at = { position = [2.6, 0.3, 0.5] }
 """
+)
 FOLLOWING = """<robot name="arm"><link name="base"/>{links}
 <joint name="j1" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0 0 0.3"/>
 <axis xyz="0 0.6 0.8"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>

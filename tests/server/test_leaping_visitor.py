@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 
 import seerob as sr
+from made_cell import VISITOR_AT_TABLE
 from seerob.app.server.live import LiveView
 from seerob.core.snapshot import Hello, History, Scene, Snapshot, SoFar, Tracked, Tracking, Transport, Verdict
 from server.frames import PATIENCE, Visitor
@@ -15,24 +16,9 @@ STANDS = np.array([[0, 1.56, 0], [-0.25, 1.02, -0.3], [0.25, 1.02, -0.3]])
 LEAP = np.array([5.0, 0, 0])
 """To the right of whoever looks ahead, so that the table is farther away then."""
 HZ, NEAR, SLOW = 72.0, 0.1, 3.0
-CELL = """
-title = "A visitor at a table"
-[[parts]]
-name = "table"
-shape = { box = [0.6, 1.2, 0.75] }
-at = { position = [0.9, 0, 0.375] }
-[[humans]]
-name = "anna"
-stature = 1.75
-mass = 75
-sex = "male"
-unseen_uncertainty_mm = 100
-[[sources]]
-kind = "headset"
-human = "anna"
-timeout = 2
-hold = 2
-[[safety]]
+CELL = (
+    VISITOR_AT_TABLE
+    + """[[safety]]
 kind = "minimum_distance"
 name = "distance"
 between = ["anna", "table"]
@@ -43,6 +29,7 @@ name = "speed"
 of = "anna/head"
 limit = 3.0
 """
+)
 
 
 class Headset(Visitor):

@@ -38,7 +38,9 @@ from seerob.core.samples import GrabSample
 from seerob.core.snapshot import Event
 from seerob.core.transforms import (
     Array,
+    cross,
     inverse,
+    length,
     rotation_from_rpy,
     rotation_from_wxyz,
     transform,
@@ -260,7 +262,7 @@ class Loose:
                 self.lose([piece.name], reason)
         speed = float(known.value or 0.0)
         piece.rides, piece.by = speed * runs.way, piece.by or runs.part
-        pressure = float(np.linalg.norm(normal))
+        pressure = float(length(normal))
         if not pressure:
             return
         up = normal / pressure
@@ -268,7 +270,7 @@ class Loose:
         mujoco.mj_objectVelocity(self._mj, self._data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
         slip = velocity[3:] - piece.rides
         slip = slip - up * (up @ slip)
-        fast, spin = float(np.linalg.norm(slip)), float(up @ velocity[:3])
+        fast, spin = float(length(slip)), float(up @ velocity[:3])
         most = piece.friction * pressure
         if fast > 0:
             drag = min(most, 0.5 * piece.mass * fast / dt)
@@ -287,7 +289,7 @@ class Loose:
         to = wanted[:3, :3] @ mj.body_ipos[piece.body] + wanted[:3, 3]
         if spring.reels:
             away = to - carrier[:3, 3]
-            far, least = float(np.linalg.norm(away)), piece.radius + 0.5 * NEAR
+            far, least = float(length(away)), piece.radius + 0.5 * NEAR
             rest = max(far - REEL * dt, least)
             shift = away * (rest / far - 1) if far > least else np.zeros(3)
             spring.carrier_from_piece[:3, 3] += carrier[:3, :3].T @ shift
@@ -298,7 +300,7 @@ class Loose:
         if spring.carrier:
             mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_XBODY, spring.carrier, of_carrier, 0)
         spin = of_carrier[:3]
-        speed = of_carrier[3:] + np.cross(spin, to - carrier[:3, 3])
+        speed = of_carrier[3:] + cross(spin, to - carrier[:3, 3])
         gap = to - com
         pulled = min(piece.mass, HEAVY)
         wanted_speed = _at_most(speed + 0.5 * omega * gap, FASTEST)
@@ -311,9 +313,9 @@ class Loose:
         data.xfrc_applied[piece.body] += np.concatenate([force, torque])
         if spring.carrier:
             lever = (com if spring.firm else carrier[:3, 3]) - data.xipos[spring.carrier]
-            moment = np.cross(lever, force) + (torque if spring.firm else 0.0)
+            moment = cross(lever, force) + (torque if spring.firm else 0.0)
             data.xfrc_applied[spring.carrier] += np.concatenate([-force, -moment])
-        return float(np.linalg.norm(gap))
+        return float(length(gap))
 
     # -- hands ------------------------------------------------------------------------------
 
@@ -346,7 +348,7 @@ class Loose:
         com = self._mj.body_ipos[piece.body]
         shift = (wanted - here)[:3, :3] @ com + (wanted - here)[:3, 3]
         turn = float(np.linalg.norm(_rotation_vector(wanted[:3, :3] @ here[:3, :3].T)))
-        return float(np.linalg.norm(shift)) + 2 * piece.radius * math.sin(0.5 * turn)
+        return float(length(shift)) + 2 * piece.radius * math.sin(0.5 * turn)
 
     def _grab(self, sample: GrabSample, t: float) -> None:
         hand = sample.target
@@ -657,8 +659,8 @@ def _pose(data: mujoco.MjData, body: int) -> Array:
 
 def _at_most(vector: Array, most: float) -> Array:
     """A vector, no longer than that."""
-    length = float(np.linalg.norm(vector))
-    return vector if length <= most else vector * (most / length)
+    far = float(length(vector))
+    return vector if far <= most else vector * (most / far)
 
 
 def _about(axis: int, angle: float) -> Array:

@@ -3,7 +3,8 @@
 import { heardPresences, heardVisitors, ownDevice } from "./company";
 import { refused } from "./doing";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
-import type { Frame, FromWorker, Shown, ShownResult, ToWorker } from "./messages";
+import { Form } from "./form";
+import { DRAWN, type Frame, type FromWorker, PANELS, type ToWorker } from "./messages";
 import {
   beginScene,
   besideTitle,
@@ -23,13 +24,13 @@ import {
   tracked,
   transport,
 } from "./page_state";
-import { PoseReader } from "./poses";
+import { FormNumbers, PoseReader } from "./poses";
 import { numbersEveryMs } from "./scene/effort";
 import { traceFromWire } from "./traces";
 import { STATE_ORDER, stateOf } from "./verdicts";
 import { heardMeasured } from "./view/measure";
 import { heardReach } from "./view/reach";
-import { type History, SCHEMA, type Scene } from "./wire";
+import { type History, type Result, SCHEMA, type Scene } from "./wire";
 
 /** In the room panels are drawn no faster, and nobody sees the page. */
 const NUMBERS_IN_ROOM_MS = 240;
@@ -48,8 +49,12 @@ export interface PoseFeed {
 
 export interface ConnectionEvents {
   scene(scene: Scene, poses: PoseFeed): void;
-  /** Every shown frame, at up to the display's rate: markers follow the poses, numbers need not. */
-  frame(frame: Shown): void;
+  /**
+   * What is drawn now, at up to the display's rate: markers follow the poses, numbers of panels need not.
+   *
+   * @param numbers Those of the form, when it has others now; valid during the call.
+   */
+  drawn(form: Form, numbers: Float64Array | null): void;
 }
 
 export class Connection {
@@ -60,11 +65,16 @@ export class Connection {
   private silent = false;
   private numbersAt = 0;
   private pending: Frame | null = null;
-  /** Whether what was drawn last came without its numbers. */
-  private unread = false;
+  /** Whether the panels were sent what they asked for. */
+  private asked = true;
+  /** What the page asks of the worker, in memory that both share; null where it cannot be shared. */
+  private asks: Int32Array | null = null;
+  private form: Form | null = null;
+  private formId = 0;
+  private drawnId = 0;
+  private numbers: FormNumbers | null = null;
   /** Run time of what is drawn [s]; panels may be behind it. */
   shownT = Number.NaN;
-  private readonly want = (time: number): void => this.send({ kind: "want", whole: this.due(time) });
 
   constructor(private readonly events: ConnectionEvents) {
     this.worker.onmessage = (event: MessageEvent<FromWorker>) => this.receive(event.data);
@@ -83,11 +93,25 @@ export class Connection {
     if (this.pending) {
       this.numbersAt = time;
       frame.value = this.pending;
+      if (ownDevice.peek() !== "desk") now.value = this.pending.t;
       this.pending = null;
+      this.asked = false;
     }
-    if (this.unread && this.due(time)) {
-      this.unread = false;
-      this.want(time);
+    const numbers = this.numbers?.read();
+    if (numbers && this.form && numbers[0] === this.formId) {
+      this.heard = numbers[2]!;
+      this.silent = numbers[3] === 1;
+      this.show(numbers[1]!, this.form, numbers);
+    }
+    const drawn = this.drawnId !== this.formId;
+    const due = !this.asked && this.due(time);
+    if (!drawn && !due) return;
+    this.drawnId = this.formId;
+    this.asked ||= due;
+    if (!this.asks) this.send({ kind: "asks", drawn: this.drawnId, panels: this.asked ? 1 : 0 });
+    else {
+      Atomics.store(this.asks, DRAWN, this.drawnId);
+      if (due) Atomics.store(this.asks, PANELS, 1);
     }
   }
 
@@ -115,6 +139,7 @@ export class Connection {
         reach.value = { start: 0, end: message.hello.duration ?? 0 };
         return;
       case "scene":
+        this.asks = message.asks && new Int32Array(message.asks);
         this.begin(message.scene, message.shared);
         return;
       case "history":
@@ -162,9 +187,15 @@ export class Connection {
         this.posted?.put(message.buffer, message.t);
         return;
       case "frame":
+        this.pending = message.frame;
+        return;
+      case "form":
         this.heard = message.heard;
         this.silent = message.silent;
-        this.show(message.frame, message.shown);
+        this.numbers = message.numbers && new FormNumbers(message.numbers);
+        this.form = new Form(message.shown);
+        this.formId = message.id;
+        this.show(message.shown.t, this.form, null);
         return;
       case "silence":
         this.silent = true;
@@ -175,7 +206,7 @@ export class Connection {
 
   private begin(scene: Scene, shared: SharedArrayBuffer | null): void {
     this.pending = null;
-    this.unread = false;
+    this.form = null;
     beginScene(scene);
     this.posted = shared ? null : new PostedPoses((buffer) => this.send({ kind: "recycle", buffer }));
     this.events.scene(scene, shared ? new PoseReader(shared) : this.posted!);
@@ -196,18 +227,15 @@ export class Connection {
     tracesRevision.value += 1;
   }
 
-  private show(whole: Frame | null, shown: Shown): void {
-    if (whole) this.pending = whole;
-    this.unread = whole === null;
+  private show(t: number, form: Form, numbers: Float64Array | null): void {
     // Whatever got worse is not waited for: no text says within beside what is drawn as exceeded.
-    if (this.unread && worse(shown.results, (this.pending ?? frame.peek())?.results ?? []))
-      this.numbersAt = Number.NEGATIVE_INFINITY;
-    this.shownT = shown.t;
+    const before = (this.pending ?? frame.peek())?.results;
+    if (before && worse(form, numbers, before)) this.numbersAt = Number.NEGATIVE_INFINITY;
+    this.shownT = t;
     // Panels that follow it cost more than a picture, and in the room nobody sees them.
-    if (whole || ownDevice.peek() === "desk") now.value = shown.t;
+    if (ownDevice.peek() === "desk") now.value = t;
     this.watch();
-    this.events.frame(shown);
-    requestAnimationFrame(this.want);
+    this.events.drawn(form, numbers);
   }
 
   // Live numbers that stopped coming must not stay on the screen as if they were true.
@@ -220,16 +248,14 @@ export class Connection {
 }
 
 /** Whether any result is in a worse state than the one before. */
-function worse(results: readonly ShownResult[], before: readonly ShownResult[]): boolean {
+function worse(form: Form, numbers: Float64Array | null, before: readonly Result[]): boolean {
+  const { results } = form.shown;
   for (let k = 0; k < results.length; k += 1) {
-    const [one, other] = [results[k]!, before[k]];
-    if (other?.name === one.name && rankOf(one) < rankOf(other)) return true;
+    const other = before[k];
+    if (other?.name !== results[k]!.name) continue;
+    if (STATE_ORDER.indexOf(form.stateOf(k, numbers)) < STATE_ORDER.indexOf(stateOf(other))) return true;
   }
   return false;
-}
-
-function rankOf(result: ShownResult): number {
-  return STATE_ORDER.indexOf(stateOf(result));
 }
 
 /** Poses that came by message, where memory cannot be shared. */

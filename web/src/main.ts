@@ -68,7 +68,7 @@ function begin(element: HTMLElement): void {
   const viewer = new Viewer(element);
   const connection = new Connection({
     scene: (scene, poses) => void viewer.begin(scene, poses),
-    frame: (frame) => viewer.show(frame),
+    drawn: (form, numbers) => viewer.show(form, numbers),
   });
   actions.time.connect((message) => connection.send(message));
   connectDraft((edit) => connection.send({ kind: "edit", edit }));

@@ -63,10 +63,14 @@ export interface Shown extends Pick<Frame, "t" | "looks" | "doubts"> {
 }
 export type ShownResult = Pick<Result, "name" | "value" | "limit" | "at_most" | "verdict" | "markers">;
 
+/** Where of what a page asks of the worker it says which form it has drawn, and whether its panels can take numbers. */
+export const DRAWN = 0;
+export const PANELS = 1;
+
 export type FromWorker =
   | { kind: "link"; state: LinkState; reason: string; retryInMs: number | null }
   | { kind: "hello"; hello: Hello }
-  | { kind: "scene"; scene: Scene; shared: SharedArrayBuffer | null }
+  | { kind: "scene"; scene: Scene; shared: SharedArrayBuffer | null; asks: SharedArrayBuffer | null }
   | { kind: "history"; history: History }
   | { kind: "transport"; transport: Transport }
   /** What the run came to. */
@@ -83,8 +87,20 @@ export type FromWorker =
   | { kind: "presences"; presences: Presences }
   /** Where the room of this page's headset lies, as far as is known. */
   | { kind: "registered"; registered: Registered }
-  /** `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run. */
-  | { kind: "frame"; frame: Frame | null; shown: Shown; heard: number; silent: boolean }
+  /** For the panels. */
+  | { kind: "frame"; frame: Frame }
+  /**
+   * For the room: what has another form than before; its numbers alone come through shared memory, where there is some.
+   * `heard` is when the newest snapshot came [ms since 1970]; `silent`: too long ago for a live run.
+   */
+  | {
+      kind: "form";
+      id: number;
+      shown: Shown;
+      numbers: SharedArrayBuffer | null;
+      heard: number;
+      silent: boolean;
+    }
   /** A live run has said nothing for too long. */
   | { kind: "silence" }
   | { kind: "points"; points: TracePoints[]; newest: number; oldest: number }
@@ -92,8 +108,8 @@ export type FromWorker =
 
 export type ToWorker =
   | { kind: "connect"; url: string; shared: boolean }
-  /** The page has drawn the last frame and can take another: its numbers, too, or what is drawn alone. */
-  | { kind: "want"; whole: boolean }
+  /** Where memory cannot be shared, which form the page has drawn, and whether its panels can take numbers. */
+  | { kind: "asks"; drawn: number; panels: number }
   | { kind: "recycle"; buffer: ArrayBuffer }
   | { kind: "command"; action: Action; value: number | null }
   | { kind: "tracking"; tracking: Tracking }

@@ -2,6 +2,7 @@
 
 import { Decoder } from "@msgpack/msgpack";
 import { completed } from "./completed";
+import { Form } from "./form";
 import { formatTime } from "./format";
 import type { Frame } from "./messages";
 import { beginScene, frame, stale } from "./page_state";
@@ -79,7 +80,7 @@ function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
     const { seq, t, joints, tracking, late, results, looks, doubts, sources } = snapshot;
     const next: Frame = { seq, t, joints, tracking, late, results, looks, doubts, sources };
     frame.value = next;
-    viewer.show(next);
+    viewer.show(new Form(structuredClone({ t, looks, doubts, results })));
     slider.value = String(k);
     time.value = formatTime(t);
     const state = worstState(results.map(stateOf));

@@ -3,9 +3,10 @@
 
 import { Decoder } from "@msgpack/msgpack";
 import { completed, completedMeasure } from "./completed";
-import type { Frame, FromWorker, Shown, ToWorker } from "./messages";
+import { countOf, HEAD, numbersOf } from "./form";
+import { DRAWN, type Frame, type FromWorker, PANELS, type Shown, type ToWorker } from "./messages";
 import { PointCollector } from "./points";
-import { FLOATS_PER_NODE, PoseWriter, poseBufferBytes } from "./poses";
+import { FLOATS_PER_NODE, FormNumbers, numberBufferBytes, PoseWriter, poseBufferBytes } from "./poses";
 import { Recent } from "./recent";
 import { Socket } from "./socket";
 import type { Scene, ServerMessage, Snapshot } from "./wire";
@@ -25,11 +26,18 @@ let live = false;
 let writer: PoseWriter | null = null;
 let poseBytes = 0;
 let lookingAt: number | null = null;
-let pageWants = true;
-let pageReads = true;
-let waiting: Frame | null = null;
-/** What was drawn last without its numbers. */
+/** What the page asks; in its own memory, too, where that can be shared. */
+let asks: Int32Array = new Int32Array([0, 1]);
+let asksShared: SharedArrayBuffer | null = null;
+/** Not drawn yet, and not read by panels yet. */
+let waiting: Shown | null = null;
 let unread: Frame | null = null;
+/** What the page was told last, as far as not its numbers alone have changed since, and those. */
+let form: Shown | null = null;
+let formId = 0;
+let numbers = new Float64Array();
+let numbersShared: SharedArrayBuffer | null = null;
+let numbersWriter: FormNumbers | null = null;
 let newest = Number.NaN;
 let newestRaw: Uint8Array | null = null;
 /** When the newest snapshot came [ms since 1970]. */
@@ -106,13 +114,18 @@ function begin(scene: Scene): void {
   const shared = mayShare ? new SharedArrayBuffer(poseBufferBytes(floats)) : null;
   writer = shared ? new PoseWriter(shared) : null;
   lookingAt = null;
-  waiting = unread = null;
+  form = waiting = unread = null;
   newest = Number.NaN;
   newestRaw = null;
   silence = Math.max(SILENCE_MS, 3000 * scene.period);
   recent.clear();
   collector.clear();
-  post({ kind: "scene", scene, shared });
+  if (mayShare && !asksShared) {
+    asksShared = new SharedArrayBuffer(asks.byteLength);
+    asks = new Int32Array(asksShared);
+    asks[PANELS] = 1;
+  }
+  post({ kind: "scene", scene, shared, asks: asksShared });
 }
 
 function heard(snapshot: Snapshot, raw: Uint8Array): void {
@@ -151,21 +164,44 @@ function show(snapshot: Snapshot): void {
   }
   const { seq, t, joints, tracking, late, results, looks, doubts } = snapshot;
   if (Object.keys(snapshot.sources).length > 0) sources = snapshot.sources;
-  waiting = { seq, t, joints, tracking, late, results, looks, doubts, sources };
+  unread = { seq, t, joints, tracking, late, results, looks, doubts, sources };
+  waiting = drawnOf(unread);
   deliver();
 }
 
-// Latest wins: a frame is replaced until the page has drawn the one before it.
+// Latest wins: what is not drawn yet, or not read yet, is replaced.
 function deliver(): void {
-  const next = waiting ?? (pageReads ? unread : null);
-  if (!pageWants || !next) return;
-  const frame = pageReads ? next : null;
-  unread = frame ? null : next;
-  pageWants = pageReads = false;
-  waiting = null;
-  post({ kind: "frame", frame, shown: frame ?? drawnOf(next), heard: heardAt, silent: isSilent() });
+  if (unread && Atomics.load(asks, PANELS) === 1) {
+    Atomics.store(asks, PANELS, 0);
+    post({ kind: "frame", frame: unread });
+    unread = null;
+  }
+  if (!waiting) return;
+  if (form && numbersWriter && numbersOf(form, waiting, numbers, HEAD) === numbers.length) {
+    numbers[0] = formId;
+    numbers[1] = waiting.t;
+    numbers[2] = heardAt;
+    numbers[3] = isSilent() ? 1 : 0;
+    numbersWriter.write(numbers, formId);
+    waiting = null;
+  } else if (Atomics.load(asks, DRAWN) === formId) {
+    told(waiting);
+    waiting = null;
+  }
 }
 
+function told(shown: Shown): void {
+  form = shown;
+  formId += 1;
+  numbers = new Float64Array(HEAD + countOf(shown));
+  if (mayShare && !(numbersWriter && numbersWriter.room >= numbers.length)) {
+    numbersShared = new SharedArrayBuffer(numberBufferBytes(2 * numbers.length));
+    numbersWriter = new FormNumbers(numbersShared);
+  }
+  post({ kind: "form", id: formId, shown, numbers: numbersShared, heard: heardAt, silent: isSilent() });
+}
+
+// Without what is written: that the panels say.
 function drawnOf({ t, looks, doubts, results }: Frame): Shown {
   return {
     t,
@@ -182,6 +218,8 @@ const isSilent = () => live && (ended || !steady || clock() - heardAt > silence)
 
 // Here, because the page itself may be late: what it has not drawn yet is no silence.
 setInterval(() => {
+  // What the page asked for since the newest came.
+  deliver();
   if (saidSilent || !isSilent()) return;
   saidSilent = true;
   post({ kind: "silence" });
@@ -211,9 +249,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
         state: (state, reason, retryInMs) => post({ kind: "link", state, reason, retryInMs }),
       });
       return;
-    case "want":
-      pageWants = true;
-      pageReads ||= message.whole;
+    case "asks":
+      asks[DRAWN] = message.drawn;
+      asks[PANELS] = message.panels;
       deliver();
       return;
     case "recycle":

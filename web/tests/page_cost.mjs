@@ -2,7 +2,7 @@
 // `node tests/page_cost.mjs [seconds] [--where]`.
 // Told are the script's time per picture (processor time of the page's thread, from the browser's trace), what is
 // allocated per picture, and how old the poses are, by the clock that both ends share: when the server offers them to
-// pages, when the worker has them, when they are taken for a picture, and when the script is done with it; and how many
+// pages, when they are taken for a picture, and when the script is done with it; and how many
 // snapshots were sent and how many replaced before they were. `--where` tells which functions allocate, and whose the
 // script's time is; a build with `npx vite build --minify false --sourcemap` names them.
 
@@ -20,7 +20,7 @@ const OWN = 22;
 const WRAPPED = `
 (() => {
   const most = 1 << 16;
-  const cost = { n: 0, begun: 0, heards: 0, heard: new Float64Array(most), taken: new Float64Array(most), done: new Float64Array(most), said: new Float64Array(most) };
+  const cost = { n: 0, begun: 0, taken: new Float64Array(most), done: new Float64Array(most), said: new Float64Array(most) };
   window.cost = cost;
   const wrapped = (own) => {
     const kept = new WeakMap();
@@ -46,17 +46,6 @@ const WRAPPED = `
     };
   };
   window.requestAnimationFrame = wrapped(window.requestAnimationFrame);
-  // When the newest had come as the worker knows it, of what it tells the page.
-  window.Worker = class extends Worker {
-    constructor(...given) {
-      super(...given);
-      this.addEventListener("message", function onmessage({ data }) {
-        if (data.kind !== "frame" || cost.heards >= most) return;
-        cost.heard[cost.heards] = data.heard - cost.begun - 1000 * data.shown.t;
-        cost.heards += 1;
-      });
-    }
-  };
   const session = window.XRSession?.prototype;
   if (session?.requestAnimationFrame) session.requestAnimationFrame = wrapped(session.requestAnimationFrame);
 })();`;
@@ -119,7 +108,8 @@ function allocated(head) {
   const into = { picture: new Map(), heard: new Map(), panels: new Map(), theirs: new Map() };
   const walk = ({ callFrame: { url, functionName, lineNumber }, selfSize, children }, part, ours) => {
     const within = functionName === "timed" ? "picture" : functionName.endsWith("onmessage") ? "heard" : part;
-    const own = url.includes("/assets/") || within === "heard" || (url === "" && ours);
+    // Functions of the browser's own have no line.
+    const own = url.includes("/assets/") || (url === "" && lineNumber < 0 && (ours || within === "heard"));
     const to = into[own ? within : "theirs"];
     const key = `${functionName || "(anonymous)"}:${lineNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
     to.set(key, (to.get(key) ?? 0) + selfSize);
@@ -172,16 +162,15 @@ async function measure(name) {
   await page.waitForTimeout(4000);
   const { slots, collected } = await traced();
   await page.evaluate(() => {
-    window.cost.n = window.cost.heards = 0;
+    window.cost.n = 0;
   });
   const before = (await served.tell("told")).clients[0];
   await page.waitForTimeout(1000 * SECONDS);
   const { ages, clients } = await served.tell("told");
   const [sent, skipped] = clients[0].map((count, i) => count - before[i]);
-  const { taken, done, said, heard } = await page.evaluate(() => {
-    const { n, heards } = window.cost;
-    const of = (key, count) => [...window.cost[key].subarray(0, count)];
-    return { taken: of("taken", n), done: of("done", n), said: of("said", n), heard: of("heard", heards) };
+  const { taken, done, said } = await page.evaluate(() => {
+    const of = (key) => [...window.cost[key].subarray(0, window.cost.n)];
+    return { taken: of("taken"), done: of("done"), said: of("said") };
   });
   await cdp.send("HeapProfiler.startSampling", {
     samplingInterval: 256,
@@ -201,7 +190,7 @@ async function measure(name) {
     `${name}: ${BODIES} bodies at 100 Hz, ${taken.length} pictures in ${SECONDS} s\n` +
       `  script per picture  mean ${mean.toFixed(2)}, ${both(slots)} of processor time (${collected} collections in ${slots.length} pictures)\n` +
       `  ${sent} snapshots sent, ${skipped} replaced before they were\n` +
-      `  age when offered ${both(ages.slice(-100 * SECONDS).map((s) => 1000 * s))}; when heard ${both(heard)}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
+      `  age when offered ${both(ages.slice(-100 * SECONDS).map((s) => 1000 * s))}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
       `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
   );
   if (!WHERE) return;

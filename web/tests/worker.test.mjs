@@ -7,7 +7,9 @@ import { load } from "./source.mjs";
 
 const FRAMES = 400;
 const { FIELDS } = await load("wire");
-const { PoseReader } = await load("poses");
+const { FormNumbers, PoseReader } = await load("poses");
+const { Form, numbersOf, countOf, HEAD } = await load("form");
+const { DRAWN, PANELS } = await load("messages");
 const posted = [];
 const sent = [];
 const timers = [];
@@ -54,12 +56,79 @@ test("no frame is lost in the worker while the page draws nothing", () => {
     acknowledged,
     Array.from({ length: FRAMES / 4 }, (_, k) => 4 * (k + 1)),
   );
-  // The page asked for one: of the others it gets the newest, when it asks again.
+  // What the page drew first has its form since, and numbers come through memory that both share: the newest alone.
+  const [{ shown, id, numbers }] = told("form");
+  assert.equal(told("form").length, 1);
+  assert.equal(shown.t, 0.01);
+  const form = new Form(structuredClone(shown));
+  const newest = new FormNumbers(numbers).read();
+  assert.deepEqual([...newest.subarray(0, 2)], [id, FRAMES / 100]);
+  form.fill(newest);
+  assert.equal(form.shown.results[0].value, FRAMES);
+  assert.equal(form.shown.t, FRAMES / 100);
+  assert.equal(new PoseReader(told("scene")[0].shared).read()[0], FRAMES);
+  // Panels get the newest, too, when they ask again.
   assert.deepEqual(
-    told("frame").map(({ shown }) => shown.t),
+    told("frame").map(({ frame }) => frame.t),
     [0.01],
   );
-  assert.equal(new PoseReader(told("scene")[0].shared).read()[0], FRAMES);
-  self.onmessage({ data: { kind: "want", whole: true } });
+  Atomics.store(new Int32Array(told("scene")[0].asks), PANELS, 1);
+  for (const each of timers) each();
   assert.equal(told("frame").at(-1).frame.t, FRAMES / 100);
+});
+
+test("what has another form is told once the page has drawn the one before it, and then the newest", () => {
+  const poses = new Uint8Array(28);
+  const say = (k, ...results) => hear({ type: "snapshot", seq: k, t: k / 100, poses, results });
+  say(FRAMES + 1, result(1), result(2));
+  say(FRAMES + 2, result(3), result(4));
+  assert.equal(told("form").length, 1);
+  const { id } = told("form")[0];
+  Atomics.store(new Int32Array(told("scene")[0].asks), DRAWN, id);
+  for (const each of timers) each();
+  assert.deepEqual(
+    told("form")[1].shown.results.map(({ value }) => value),
+    [3, 4],
+  );
+});
+
+test("numbers of a form are those of the value it is filled from, and nothing else passes for it", () => {
+  const shown = (x, { radius = 1, verdict = "within", look = [0.1, 0.2, 0.3], hits = [0] } = {}) => ({
+    t: x,
+    looks: { lamp: look, text: [x, 0, 0] },
+    doubts: {},
+    results: [
+      {
+        ...{ name: "gap", value: x, limit: null, at_most: false, verdict },
+        markers: [
+          { type: "segment", start: [x, 0, 0], end: [0, x, 0], label: `${x} m`, verdict },
+          { type: "sphere", center: [0, 0, x], radius, label: "", verdict: null },
+          { type: "rays", starts: [[0, 0, x]], ends: [[x, 1, 2]], hits, filled: true, label: "", verdict },
+        ],
+      },
+      { name: "speed", value: 1 / x, limit: 1.05, at_most: true, verdict, markers: [] },
+    ],
+  });
+  const form = shown(1);
+  const numbers = new Float64Array(HEAD + countOf(form));
+  assert.equal(numbersOf(form, shown(2, { radius: 3 }), numbers, HEAD), numbers.length);
+  const drawn = new Form(structuredClone(form));
+  assert.deepEqual([drawn.stateOf(1, null), drawn.stateOf(1, numbers)], ["close", "within"]);
+  assert.ok(drawn.fill(numbers));
+  assert.equal(drawn.stateOf(1, null), "within");
+  assert.ok(!drawn.fill(numbers));
+  const plain = JSON.stringify(drawn.shown, (_, v) => (v instanceof Float64Array ? [...v] : v));
+  // What is written is the panels' affair.
+  assert.deepEqual(
+    { ...JSON.parse(plain) },
+    JSON.parse(JSON.stringify(shown(2, { radius: 3 })).replace("2 m", "1 m")),
+  );
+  for (const other of [
+    { verdict: "exceeded" },
+    { radius: null },
+    { look: null },
+    { hits: [] },
+    { hits: [0, 1] },
+  ])
+    assert.equal(numbersOf(form, shown(2, other), numbers, HEAD), -1, JSON.stringify(other));
 });

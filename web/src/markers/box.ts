@@ -3,7 +3,7 @@
 import { BoxGeometry, EdgesGeometry, Vector3 } from "three";
 import type { Box } from "../wire";
 import type { Drawn } from "./drawn";
-import { Surface } from "./surface";
+import { Surface, turn } from "./surface";
 
 const CUBE = new BoxGeometry(1, 1, 1);
 const EDGES = new EdgesGeometry(CUBE);
@@ -14,10 +14,9 @@ export class BoxDrawn implements Drawn<Box> {
   readonly anchor = new Vector3();
 
   update(marker: Box): void {
-    const [w, x, y, z] = marker.wxyz;
     this.object.position.fromArray(marker.center);
-    this.object.quaternion.set(x, y, z, w);
-    this.object.scale.set(...marker.size).clampScalar(1e-6, Number.POSITIVE_INFINITY);
+    turn(this.object.quaternion, marker.wxyz);
+    this.object.scale.fromArray(marker.size).clampScalar(1e-6, Number.POSITIVE_INFINITY);
     this.anchor.copy(this.object.position);
     this.anchor.z += marker.size[2] / 2;
     this.surface.color(marker.verdict);

@@ -3,7 +3,7 @@
 import { BufferGeometry, Float32BufferAttribute, SphereGeometry, Vector3 } from "three";
 import type { Ellipsoid } from "../wire";
 import type { Drawn } from "./drawn";
-import { Surface } from "./surface";
+import { Surface, turn } from "./surface";
 
 export const BALL = new SphereGeometry(1, 32, 20);
 export const CIRCLES = circles(48);
@@ -14,10 +14,9 @@ export class EllipsoidDrawn implements Drawn<Ellipsoid> {
   readonly anchor = new Vector3();
 
   update(marker: Ellipsoid): void {
-    const [w, x, y, z] = marker.wxyz;
     this.object.position.fromArray(marker.center);
-    this.object.quaternion.set(x, y, z, w);
-    this.object.scale.set(...marker.radii).clampScalar(1e-6, Number.POSITIVE_INFINITY);
+    turn(this.object.quaternion, marker.wxyz);
+    this.object.scale.fromArray(marker.radii).clampScalar(1e-6, Number.POSITIVE_INFINITY);
     this.anchor.copy(this.object.position);
     this.surface.color(marker.verdict);
   }

@@ -10,22 +10,28 @@ export class HullDrawn implements Drawn<Hull> {
   private readonly surface = new Surface(new BufferGeometry(), new BufferGeometry());
   readonly object = this.surface.object;
   readonly anchor = new Vector3();
-  private drawn: Hull | null = null;
+  private vertices: readonly number[] = [];
+  private faces: readonly number[] = [];
 
   update(marker: Hull): void {
-    if (this.drawn && sameShape(this.drawn, marker)) {
-      this.surface.color(marker.verdict);
+    const { vertices, faces, verdict } = marker;
+    // Numbers of a marker change in place: it is compared with what was drawn.
+    if (same(vertices, this.vertices) && same(faces, this.faces)) {
+      this.surface.color(verdict);
       return;
     }
-    this.drawn = marker;
+    const points = flat(vertices);
+    const corners = flat(faces);
+    this.vertices = points;
+    this.faces = corners;
     const fill = new BufferGeometry();
-    fill.setAttribute("position", new Float32BufferAttribute(marker.vertices.flat(), 3));
-    fill.setIndex(marker.faces.flat());
+    fill.setAttribute("position", new Float32BufferAttribute(points, 3));
+    fill.setIndex(corners);
     fill.computeBoundingSphere();
     fill.computeVertexNormals();
     const { lines, smooth } = featureEdges(fill);
     this.surface.reshape(fill, lines, smooth);
-    this.surface.color(marker.verdict);
+    this.surface.color(verdict);
     if (fill.boundingSphere) this.anchor.copy(fill.boundingSphere.center);
   }
 
@@ -34,11 +40,12 @@ export class HullDrawn implements Drawn<Hull> {
   }
 }
 
-function sameShape(a: Hull, b: Hull): boolean {
-  return (
-    a.vertices.length === b.vertices.length &&
-    a.faces.length === b.faces.length &&
-    a.vertices.every((v, i) => v.every((x, k) => x === b.vertices[i]![k])) &&
-    a.faces.every((f, i) => f.every((x, k) => x === b.faces[i]![k]))
-  );
+const flat = (triples: readonly ArrayLike<number>[]): number[] =>
+  triples.flatMap((triple) => Array.from(triple));
+
+function same(triples: readonly ArrayLike<number>[], numbers: readonly number[]): boolean {
+  if (3 * triples.length !== numbers.length) return false;
+  for (let i = 0; i < triples.length; i += 1)
+    for (let k = 0; k < 3; k += 1) if (triples[i]![k] !== numbers[3 * i + k]) return false;
+  return true;
 }

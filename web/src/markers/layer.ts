@@ -2,6 +2,7 @@
 // no garbage to speak of.
 
 import { Group } from "three";
+import { UNSEEN } from "../form";
 import type { Shown, ShownResult } from "../messages";
 import { STATE_ORDER, stateOf } from "../verdicts";
 import type { Marker, Verdict } from "../wire";
@@ -51,8 +52,12 @@ export class MarkerLayer {
    * @param muted Criteria whose markers are not drawn.
    */
   update(results: readonly ShownResult[], muted: ReadonlySet<string>, written: Written): void {
-    const { told, selected, most } = written;
     this.drawn = results;
+    if (!this.news(results, muted, written)) {
+      this.move(results, muted);
+      return;
+    }
+    const { told, selected, most } = written;
     this.painted.clear();
     const captioned = worst(told, muted, most);
     if (most > 0 && selected) captioned.add(selected);
@@ -67,6 +72,55 @@ export class MarkerLayer {
     }
   }
 
+  /** Write everything anew at the next update: what is written otherwise now, such as units. */
+  rewrite(): void {
+    this.toldBefore.length = this.drawnBefore.length = 0;
+    this.mostBefore = -1;
+  }
+
+  private readonly drawnBefore: ShownResult[] = [];
+  private readonly toldBefore: ShownResult[] = [];
+  private mutedBefore: ReadonlySet<string> | null = null;
+  private selectedBefore: string | null = null;
+  private mostBefore = -1;
+
+  /** Whether it is not the same results with other numbers. */
+  private news(
+    results: readonly ShownResult[],
+    muted: ReadonlySet<string>,
+    { told, selected, most }: Written,
+  ): boolean {
+    const others = keep(results, this.drawnBefore);
+    const texts = keep(told, this.toldBefore);
+    const news =
+      others ||
+      texts ||
+      muted !== this.mutedBefore ||
+      selected !== this.selectedBefore ||
+      most !== this.mostBefore;
+    this.mutedBefore = muted;
+    this.selectedBefore = selected;
+    this.mostBefore = most;
+    return news;
+  }
+
+  // Nothing is made for it: that is what happens in each picture.
+  private move(results: readonly ShownResult[], muted: ReadonlySet<string>): void {
+    for (let k = 0; k < results.length; k += 1) {
+      const { name, markers } = results[k]!;
+      const slots = this.slots.get(name);
+      if (!slots || muted.has(name)) continue;
+      let used = 0;
+      for (let i = 0; i < markers.length && used < slots.length; i += 1) {
+        const { type, drawn, caption } = slots[used]!;
+        if (type !== markers[i]!.type) continue;
+        drawn.update(markers[i]!);
+        if (caption) caption.object.position.copy(drawn.anchor);
+        used += 1;
+      }
+    }
+  }
+
   /**
    * Called before each picture: what has a size in pixels keeps it.
    *
@@ -74,13 +128,11 @@ export class MarkerLayer {
    */
   face(view: View, others: readonly Caption[]): void {
     const { written } = this;
-    written.length = 0;
-    for (let k = 0; k < others.length; k += 1) {
-      if (!others[k]!.object.visible) continue;
-      written.push(others[k]!);
-    }
+    this.count = 0;
+    for (let k = 0; k < others.length; k += 1) if (others[k]!.object.visible) this.note(others[k]!);
     this.view = view;
     this.slots.forEach(this.faceAll);
+    written.length = this.count;
     for (let k = 0; k < written.length; k += 1) written[k]!.face(view);
     placeCaptions(written, view);
     this.leaders.update(written, view);
@@ -93,15 +145,21 @@ export class MarkerLayer {
 
   /** Captions of a picture; made once, as a picture allocates nothing of ours. */
   private readonly written: Caption[] = [];
+  private count = 0;
   private view: View | null = null;
   private readonly faceAll = (slots: Slot[]): void => {
     for (let k = 0; k < slots.length; k += 1) {
       const { drawn, caption } = slots[k]!;
       drawn.face?.(this.view!);
-      if (caption?.object.visible) this.written.push(caption);
-      if (drawn.caption) this.written.push(drawn.caption);
+      if (caption?.object.visible) this.note(caption);
+      if (drawn.caption) this.note(drawn.caption);
     }
   };
+
+  private note(caption: Caption): void {
+    this.written[this.count] = caption;
+    this.count += 1;
+  }
 
   private draw(name: string, markers: readonly Marker[], texts: readonly Marker[], labels: number): void {
     const slots = this.slots.get(name) ?? [];
@@ -170,6 +228,17 @@ export class MarkerLayer {
   }
 }
 
+/** Keep what is in a list; whether that is something else than before. */
+function keep<T>(list: readonly T[], before: T[]): boolean {
+  let other = list.length !== before.length;
+  before.length = list.length;
+  for (let k = 0; k < list.length; k += 1) {
+    if (before[k] !== list[k]) other = true;
+    before[k] = list[k]!;
+  }
+  return other;
+}
+
 function worst(results: readonly ShownResult[], muted: ReadonlySet<string>, count: number): Set<string> {
   const rank = (r: ShownResult): number => STATE_ORDER.indexOf(stateOf(r));
   const shown = results.filter((r) => !muted.has(r.name) && r.markers.length > 0);
@@ -187,9 +256,6 @@ function paintWorst(painted: Map<string, Verdict | null>, body: string, verdict:
   const before = painted.get(body);
   if (before === undefined || RANK.indexOf(verdict) > RANK.indexOf(before)) painted.set(body, verdict);
 }
-
-/** What differs by less looks the same [m]: where everybody stands, what a twin settles to trembles by less. */
-const UNSEEN = 1e-6;
 
 /** Whether two frames look the same in the room, wherever their bodies are: a still room costs no picture. */
 export function alike(a: Shown | null, b: Shown | null): boolean {

@@ -16,7 +16,7 @@ export class PolylineDrawn implements Drawn<Polyline> {
   update(marker: Polyline): void {
     const { points, closed, verdict } = marker;
     const count = points.length < 2 ? 0 : points.length - (closed ? 0 : 1);
-    for (const leg of this.legs.splice(count)) leg.object.removeFromParent();
+    if (this.legs.length > count) for (const leg of this.legs.splice(count)) leg.object.removeFromParent();
     for (let i = 0; i < count; i += 1) {
       let leg = this.legs[i];
       if (!leg) {

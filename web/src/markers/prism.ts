@@ -3,30 +3,40 @@
 import { BufferGeometry, Float32BufferAttribute, ShapeUtils, Vector2, Vector3 } from "three";
 import type { Prism } from "../wire";
 import type { Drawn } from "./drawn";
-import { Surface } from "./surface";
+import { Surface, turn } from "./surface";
 
 export class PrismDrawn implements Drawn<Prism> {
   private readonly surface = new Surface(new BufferGeometry(), new BufferGeometry());
   readonly object = this.surface.object;
   readonly anchor = new Vector3();
-  private shape = "";
+  /** Outline, lower and upper edge of what is drawn. */
+  private shape = new Float64Array();
   private readonly top = new Vector3();
 
   update(marker: Prism): void {
-    const [w, x, y, z] = marker.wxyz;
     this.object.position.fromArray(marker.position);
-    this.object.quaternion.set(x, y, z, w);
+    turn(this.object.quaternion, marker.wxyz);
     this.surface.color(marker.verdict);
-    const shape = JSON.stringify([marker.outline, marker.lower, marker.upper]);
-    if (shape !== this.shape) {
-      this.shape = shape;
-      this.reshape(marker);
-    }
+    if (this.changed(marker)) this.reshape(marker);
     this.anchor.copy(this.top).applyQuaternion(this.object.quaternion).add(this.object.position);
   }
 
   dispose(): void {
     this.surface.free();
+  }
+
+  // Numbers of a marker change in place: it is compared with what is drawn.
+  private changed({ outline, lower, upper }: Prism): boolean {
+    const count = 2 * outline.length + 2;
+    let changed = this.shape.length !== count;
+    if (changed) this.shape = new Float64Array(count);
+    const { shape } = this;
+    for (let k = 0; k < count; k += 1) {
+      const next = k < count - 2 ? outline[k >> 1]![k % 2]! : k === count - 2 ? lower : upper;
+      if (shape[k] !== next) changed = true;
+      shape[k] = next;
+    }
+    return changed;
   }
 
   private reshape({ outline, lower, upper }: Prism): void {

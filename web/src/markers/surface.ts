@@ -1,10 +1,15 @@
 // A translucent closed surface with its outline drawn, so that it reads against any background.
 
-import { type BufferGeometry, Group, LineSegments, Mesh } from "three";
+import { type BufferGeometry, Group, LineSegments, Mesh, type Quaternion } from "three";
 import { turnOutward } from "../scene/feature_edges";
 import { lineMaterial, markerMaterial } from "../scene/materials";
 import { veilMaterial } from "../scene/veil";
 import type { Verdict } from "../wire";
+
+/** Turn by a quaternion that has w first. */
+export function turn(quaternion: Quaternion, wxyz: readonly [number, number, number, number]): void {
+  quaternion.set(wxyz[1], wxyz[2], wxyz[3], wxyz[0]);
+}
 
 export class Surface {
   readonly object = new Group();

@@ -1,6 +1,6 @@
 // The one time axis of plots and lanes: what of the run they show, and where the cursor is.
 
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import { isLive, lookingAt, now, reach, traces, tracesRevision } from "../page_state";
 import { remembered } from "../remembered";
 
@@ -30,7 +30,7 @@ export function stopAxis(t: number): void {
   let { start, end } = shownRange();
   if (t < start || t > end) {
     const span = end - start;
-    start = Math.max(t - span / 2, firstTime());
+    start = Math.max(t - span / 2, firstTime.value);
     end = start + span;
   }
   stopped.value = { range: { start, end }, width: width.value };
@@ -49,7 +49,7 @@ export function shownRange(): TimeRange {
   const seconds = SECONDS[width.value];
   const { start, end } = reach.value;
   if (isLive.value) {
-    const first = firstTime();
+    const first = firstTime.value;
     const span = seconds ?? Math.max(end - first, LIVE_LEAST_S);
     const newest = Math.max(end, first + span);
     return { start: newest - span, end: newest };
@@ -61,12 +61,12 @@ export function shownRange(): TimeRange {
 }
 
 // A page that came late was told what happened before.
-function firstTime(): number {
+const firstTime = computed(() => {
   void tracesRevision.value;
   let first = Number.POSITIVE_INFINITY;
   for (const trace of traces.values()) if (trace.length > 0) first = Math.min(first, trace.t[0]!);
   return Number.isFinite(first) ? first : 0;
-}
+});
 
 /** Run time at a share of the axis [s]. */
 export function timeAt({ start, end }: TimeRange, share: number): number {

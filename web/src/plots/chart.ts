@@ -162,10 +162,11 @@ function valueRange(...columns: (number | null)[][]): { min: number; max: number
   let min = Number.POSITIVE_INFINITY;
   let max = Number.NEGATIVE_INFINITY;
   for (const column of columns) {
-    for (const x of column) {
+    for (let k = 0; k < column.length; k += 1) {
+      const x = column[k]!;
       if (x === null) continue;
-      min = Math.min(min, x);
-      max = Math.max(max, x);
+      if (x < min) min = x;
+      if (x > max) max = x;
     }
   }
   if (min > max) return { min: 0, max: 1 };

@@ -317,8 +317,8 @@ export class Bodies {
 
   /** Looks that follow variables: colours in 0…1, null for what is not drawn. */
   wear(looks: Looks): void {
+    if (!this.worn && isEmpty(looks)) return;
     const names = Object.keys(looks);
-    if (names.length === 0 && !this.worn) return;
     this.worn = names.length > 0;
     this.absent = new Set(names.filter((name) => looks[name] === null));
     for (const body of this.list) {
@@ -364,6 +364,11 @@ export class Bodies {
       body.paint(verdicts.get(body.node.name));
     }
   }
+}
+
+function isEmpty(looks: Looks): boolean {
+  for (const _ in looks) return false;
+  return true;
 }
 
 const given = new Map<string, Uint8Array>();

@@ -5,8 +5,8 @@ import { ownMaterial } from "./materials";
 
 /** Fewer of one shape are drawn one by one. */
 const LEAST = 4;
-/** Layer of what no camera sees, and rays meet all the same. */
-export const ALONE_LAYER = 30;
+/** Layer of what no camera sees, and rays meet all the same. Masks of higher ones are no small integers to V8. */
+export const ALONE_LAYER = 28;
 const NOWHERE = new Matrix4().makeScale(0, 0, 0);
 
 /** A mesh of a body that may be drawn with others. */

@@ -23,16 +23,17 @@ export class DoubtCaptions {
    */
   update(scene: Scene | null, doubts: Doubts, most: number): void {
     let used = 0;
-    for (const { name } of scene?.mechanisms ?? []) {
-      const reason = used < most ? doubts.get(name) : undefined;
-      if (reason === undefined || !this.above(name)) continue;
-      const caption = this.captionAt(used);
-      this.box.getCenter(caption.object.position).z = this.box.max.z;
-      caption.object.visible = true;
-      caption.say(shortened(name, spoken(reason)), "undecided");
-      used += 1;
-    }
-    for (const caption of this.captions.slice(used)) caption.object.visible = false;
+    if (doubts.size > 0)
+      for (const { name } of scene?.mechanisms ?? []) {
+        const reason = used < most ? doubts.get(name) : undefined;
+        if (reason === undefined || !this.above(name)) continue;
+        const caption = this.captionAt(used);
+        this.box.getCenter(caption.object.position).z = this.box.max.z;
+        caption.object.visible = true;
+        caption.say(shortened(name, spoken(reason)), "undecided");
+        used += 1;
+      }
+    for (let k = used; k < this.captions.length; k += 1) this.captions[k]!.object.visible = false;
   }
 
   private captionAt(index: number): Caption {

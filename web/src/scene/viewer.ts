@@ -6,10 +6,11 @@ import { following, others, showPresences } from "../company";
 import type { PoseFeed } from "../connection";
 import { doubts, doubtsIn } from "../doubts";
 import { axisMarker, pointedAt } from "../editing/bringing";
+import type { Form } from "../form";
 import { Glide } from "../glide";
 import { alike, MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
-import type { Frame, Shown } from "../messages";
+import type { Frame, Shown, ShownResult } from "../messages";
 import {
   frame,
   hidden,
@@ -43,10 +44,14 @@ import { hides } from "./volumes";
 
 /** Criteria that are labelled in the room, and a room that has space for one. */
 const LABELLED = 3;
-const UNSEEN_LAYER = 31;
+const UNSEEN_LAYER = 29;
 const NARROW_PX = 520;
 /** Above and below the tools of the room. */
 const TOOLS_MARGIN_PX = 20;
+
+const NO_LOOKS = {};
+const NONE: readonly unknown[] = [];
+const UNPAINTED: ReadonlyMap<string, null> = new Map();
 
 export const showCaptions = signal(true);
 export const showGrid = signal(true);
@@ -70,8 +75,10 @@ export class Viewer {
   private through: CameraView | null = null;
   private feed: PoseFeed | null = null;
   private frame: Shown | null = null;
-  /** Heard, and shown as soon as the bodies are where it speaks of. */
-  private coming: Shown | null = null;
+  /** Heard, and shown as soon as the bodies are where it speaks of; with other numbers, if there are some. */
+  private coming: Form | null = null;
+  private numbers = new Float64Array();
+  private filled = true;
   private tickedAt = Number.NEGATIVE_INFINITY;
   /** What the panels show, as far as it was written in the room. */
   private told: Frame | null = null;
@@ -79,6 +86,10 @@ export class Viewer {
   /** Whether bodies have moved since markers were drawn. */
   private moved = false;
   private labels = LABELLED;
+  private doubted: Shown | null = null;
+  // Made once: a picture allocates nothing of ours.
+  private readonly results: ShownResult[] = [];
+  private readonly written = { told: [] as ShownResult[], selected: null as string | null, most: 0 };
   private framed = false;
   private dressed = false;
 
@@ -123,6 +134,7 @@ export class Viewer {
     this.coming = null;
     this.glide.clear();
     this.dressed = false;
+    this.doubted = null;
     this.markers.update([], new Set(), { told: [], selected: null, most: 0 });
     unseen.value = await this.bodies.load(scene);
     if (feed !== this.feed) return;
@@ -135,10 +147,15 @@ export class Viewer {
     this.stage.moved();
   }
 
-  show(frame: Shown): void {
+  /** @param numbers Other numbers than the form has; copied. */
+  show(form: Form, numbers: Float64Array | null = null): void {
     // What the next picture replaces need not be drawn.
     if (this.coming && this.glide.moving) this.arrive();
-    this.coming = frame;
+    this.coming = form;
+    this.filled = numbers === null;
+    if (!numbers) return;
+    if (this.numbers.length !== numbers.length) this.numbers = numbers.slice();
+    else this.numbers.set(numbers);
   }
 
   /** Once per display frame, before drawing. */
@@ -234,13 +251,17 @@ export class Viewer {
   private readonly volumes: Mesh[] = [];
   private readonly boxes: Box3[] = [];
   private readonly eye = new Vector3();
+  private volumeCount = 0;
   private readonly addVolume = (part: Object3D): void => {
-    if (part.userData.volume === true) this.volumes.push(part as Mesh);
+    if (part.userData.volume !== true) return;
+    this.volumes[this.volumeCount] = part as Mesh;
+    this.volumeCount += 1;
   };
 
   private findVolumes(): void {
-    this.volumes.length = 0;
+    this.volumeCount = 0;
     this.stage.world.traverse(this.addVolume);
+    this.volumes.length = this.volumeCount;
     while (this.boxes.length < this.volumes.length) this.boxes.push(new Box3());
     this.boxes.length = this.volumes.length;
   }
@@ -262,10 +283,12 @@ export class Viewer {
 
   private arrive(): void {
     const before = this.frame;
-    this.frame = this.coming;
+    const { shown } = this.coming!;
+    const filled = !this.filled && this.coming!.fill(this.numbers);
+    this.frame = shown;
     this.coming = null;
     // What hangs on bodies goes along with them.
-    if (this.moved || !alike(before, this.frame)) this.draw();
+    if (this.moved || filled || !alike(before, shown)) this.draw();
   }
 
   // On a phone there is no margin for more, and the table is right below.
@@ -278,23 +301,34 @@ export class Viewer {
     const chosen = selection.peek();
     const measured = measuring.peek()?.result;
     this.labels = this.labelled();
-    const asked = [measured, reaching.peek()?.result, axisMarker()].filter((result) => result != null);
-    this.markers.update([...asked, ...(this.frame?.results ?? [])], mutedCriteria.peek(), {
-      told: [...asked, ...(this.told?.results ?? [])],
-      selected: measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null),
-      most: showCaptions.peek() ? this.labels : 0,
-    });
+    const { results, written } = this;
+    const asked = reaching.peek()?.result;
+    const axis = axisMarker();
+    let first = 0;
+    for (let k = 0; k < 3; k += 1) {
+      const one = k === 0 ? measured : k === 1 ? asked : axis;
+      if (!one) continue;
+      results[first] = written.told[first] = one;
+      first += 1;
+    }
+    putFrom(results, first, this.frame?.results);
+    putFrom(written.told, first, this.told?.results);
+    written.selected = measured?.name ?? (chosen?.kind === "criterion" ? chosen.name : null);
+    written.most = showCaptions.peek() ? this.labels : 0;
+    this.markers.update(results, mutedCriteria.peek(), written);
     this.paint();
     this.findVolumes();
-    this.bodies.wear(this.frame?.looks ?? {});
-    this.bodies.doubt(doubtsIn(this.frame));
+    this.bodies.wear(this.frame?.looks ?? NO_LOOKS);
+    // Who is in doubt, and why, is of the form.
+    if (this.frame !== this.doubted) this.bodies.doubt(doubtsIn(this.frame));
+    this.doubted = this.frame;
     this.doubts.update(run.peek(), doubts.peek(), showCaptions.peek() ? this.labels + 1 : 0);
     this.stage.invalidate();
   }
 
   // What may be out of date has no colour of a verdict.
   private paint(): void {
-    this.bodies.paint(stale.peek() ? new Map() : this.markers.painted);
+    this.bodies.paint(stale.peek() ? UNPAINTED : this.markers.painted);
   }
 
   // A body is bracketed, a whole robot or person only lit; a criterion shows itself by its markers.
@@ -373,6 +407,7 @@ export class Viewer {
       void [mutedCriteria.value, selection.value, showCaptions.value, measuring.value, reaching.value];
       void pointedAt.value;
       void [language.value, lengthUnit.value, angleUnit.value];
+      this.markers.rewrite();
       this.draw();
     });
     effect(() => {
@@ -384,4 +419,10 @@ export class Viewer {
       this.stage.invalidate();
     });
   }
+}
+
+/** What a list has from some place on. An array that is emptied first would be made anew. */
+function putFrom<T>(list: T[], first: number, others: readonly T[] = NONE as readonly T[]): void {
+  for (let k = 0; k < others.length; k += 1) list[first + k] = others[k]!;
+  list.length = first + others.length;
 }

@@ -2,6 +2,7 @@
 
 import type { Span, Trace } from "./traces";
 import type { State } from "./verdicts";
+import { said } from "./words";
 
 export interface Elsewhere {
   verdict: Span["verdict"];
@@ -30,8 +31,8 @@ export function worseElsewhere(traces: Iterable<Trace>, shown: State): Elsewhere
 
 /** How long ago, in words that a glance takes in. */
 export function ago(seconds: number): string {
-  if (seconds < 1) return "just now";
-  if (seconds < 90) return `${Math.floor(seconds)} s ago`;
-  if (seconds < 5400) return `${Math.floor(seconds / 60)} min ago`;
-  return `${Math.floor(seconds / 3600)} h ago`;
+  if (seconds < 1) return said("just now");
+  if (seconds < 90) return said("{n} s ago", { n: Math.floor(seconds) });
+  if (seconds < 5400) return said("{n} min ago", { n: Math.floor(seconds / 60) });
+  return said("{n} h ago", { n: Math.floor(seconds / 3600) });
 }

@@ -2,7 +2,7 @@
 
 import { ask, mayEdit } from "./editing/draft";
 import { gizmoMode } from "./editing/handles";
-import { rows, select, selection, toggleMuted } from "./page_state";
+import { elsewhere, rows, select, selection, toggleMuted } from "./page_state";
 import type { Actions } from "./panels/app_context";
 import { keysShown } from "./panels/Keys";
 import { worstOf } from "./posture/instants";
@@ -92,9 +92,10 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
   }
 }
 
-// To the worst instant of the selected criterion, or of the one that the pill names.
+// To the worst instant of the selected criterion, or of the run: what is worse at another time than here comes first.
 function visitWorst(time: TimeControl): void {
-  const chosen = selection.value?.kind === "criterion" ? selection.value.name : null;
+  const chosen =
+    selection.value?.kind === "criterion" ? selection.value.name : (elsewhere.value?.criteria[0] ?? null);
   const row = orderedRows.value.find(({ info }) => chosen === null || info.name === chosen);
   const instant = row && worstOf(row.info)[0];
   if (instant) time.visit(instant.t);

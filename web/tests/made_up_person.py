@@ -85,7 +85,7 @@ def criteria() -> tuple[CriterionInfo, ...]:
 
 def results(t: float, speed: float, apart: float) -> tuple[Result, ...]:
     """Results at run time ``t`` [s], with a tool at ``speed`` [m/s], ``apart`` [m] from the hand."""
-    return _scanner(), _contacts(speed, apart), _score(t)
+    return _scanner(), _contacts(t, speed, apart), _score(t)
 
 
 def _scanner() -> Result:
@@ -116,7 +116,14 @@ def _scanner() -> Result:
     )
 
 
-def _contacts(speed: float, apart: float) -> Result:
+UNHEARD = (10.5, 11.0)
+"""When nobody knows who can be hit [s]."""
+
+
+def _contacts(t: float, speed: float, apart: float) -> Result:
+    if UNHEARD[0] <= t < UNHEARD[1]:
+        why = f"ur10: not heard for {t - 10.2:.2f} s (time-out 0.2 s)"
+        return Result(name="contacts", unit="m/s", limit=0.5, verdict=Verdict.UNDECIDED, reason=why)
     if apart > 1.1:
         return Result(name="contacts", unit="m/s", reason="nobody within 1.1 m of a moving part")
     rows = [_row(area, speed) for area in AREAS]

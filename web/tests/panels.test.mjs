@@ -83,6 +83,16 @@ for (const t of [0.3, 1, 5.5, 8]) {
   });
 }
 
+test("while the robot is not heard no area looks as if nothing moved near it, with the reason", async () => {
+  await seek(10.7);
+  await page.waitForFunction(() => document.querySelectorAll("[data-spot].look-undecided").length > 40);
+  assert.equal(await page.locator("[data-spot]:not(.look-undecided)").count(), 0);
+  assert.equal(await page.locator(".region:not(.look-undecided)").count(), 0);
+  const head = await page.locator(".contact-head").innerText();
+  assert.match(head, /undecided[\s\S]*ur10: not heard for 0\.[45]\d* s/i);
+  assert.doesNotMatch(head, /within reach/);
+});
+
 test("contact that is not permitted is hatched, feet without a limit are grey, neither has a number", async () => {
   await seek(0.3);
   assert.equal(await look("1 "), "forbidden");
@@ -209,6 +219,47 @@ test("arrows go from tab to tab without moving time", async () => {
   assert.equal(await shown(), "tab-findings");
   assert.equal(await page.evaluate(() => document.activeElement.id), "tab-findings");
   assert.equal(await page.evaluate(() => window.seerob.t), t);
+});
+
+test("body and posture are said in the language that is chosen", async () => {
+  const words = () =>
+    page
+      .locator(
+        ".choice button, .look-legend li, figcaption, .body-figure .side, .contact-details dt, .origin, .scores th, .angle",
+      )
+      .allTextContents();
+  const titles = () =>
+    page
+      .locator(".body-figure svg, .spot, .link[title], .jump")
+      .evaluateAll((all) => all.map((one) => one.getAttribute("aria-label") ?? one.getAttribute("title")));
+  const language = page.locator("select", { has: page.locator("option", { hasText: "Deutsch" }) });
+  const seen = {};
+  await seek(5.5);
+  for (const chosen of ["Deutsch", "English"]) {
+    await language.selectOption({ label: chosen });
+    seen[chosen] = [];
+    for (const id of ["body", "posture"]) {
+      await page.locator(`#tab-${id}`).click();
+      await page.locator(`.${id === "body" ? "look-legend" : "scores"}`).waitFor();
+      seen[chosen].push(...(await words()), ...(await titles()));
+    }
+  }
+  const names = /^(Zone|contacts|posture score|tcp speed|separation)$/;
+  const stayed = seen.Deutsch.filter((text) => seen.English.includes(text) && /[a-z]{3}/.test(text));
+  assert.ok(seen.English.length > 80);
+  assert.deepEqual(
+    stayed.filter((text) => !names.test(text)),
+    [],
+  );
+  await tab("Criteria");
+});
+
+test("the key W leads to the worst instant of the run where nothing is selected", async () => {
+  await seek(10);
+  await page.waitForSelector(".pill .now-undecided");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("w");
+  await page.waitForSelector(".pill .now-exceeded");
 });
 
 test("a criterion's row and the key W lead to its worst instant too", async () => {

@@ -1,6 +1,7 @@
 // From a result's rows to what the body map shows of each place: which row, and how near it is to its limit.
 
 import type { Input, Result, Row, RowState, Scene } from "../wire";
+import { word } from "../words";
 import type { Side, Spot } from "./figure";
 
 /** Which of the limits of a contact is looked at. */
@@ -19,14 +20,14 @@ export interface Told {
 export const BANDS = [0.5, 0.8, 1] as const;
 
 export const LOOK_WORDS: Record<Look, string> = {
-  clear: "nothing within reach moves",
-  low: "under half of the limit",
-  middle: "half to 80 %",
-  high: "80 to 100 %",
-  exceeded: "over the limit",
-  undecided: "undecided",
-  forbidden: "contact not permitted",
-  none: "no limit available",
+  clear: word("nothing within reach moves"),
+  low: word("under half of the limit"),
+  middle: word("half to 80 %"),
+  high: word("80 to 100 %"),
+  exceeded: word("over the limit"),
+  undecided: word("undecided"),
+  forbidden: word("contact not permitted"),
+  none: word("no limit available"),
 };
 
 const WITHOUT_LIMIT: ReadonlySet<RowState> = new Set(["forbidden", "no_limit", "excluded"]);
@@ -75,6 +76,28 @@ export function lookOf(row: Row | undefined, aspect: Aspect): Look {
   if (aspect === "worst" && row.verdict === "exceeded") return "exceeded";
   if (share === null) return "undecided";
   return share < BANDS[0] ? "low" : share < BANDS[1] ? "middle" : "high";
+}
+
+/**
+ * How a place looks, of which `told` is the worst row that speaks of it.
+ *
+ * @param open Whether a criterion leaves open what can be hit: then no place is known to be harmless.
+ */
+export function lookAt(told: Told | undefined, aspect: Aspect, open: boolean): Look {
+  const look = lookOf(told?.row, aspect);
+  return open && look !== "exceeded" && look !== "forbidden" ? "undecided" : look;
+}
+
+/**
+ * Whether a criterion leaves open what of the body can be hit, beside the places that its rows speak of.
+ *
+ * One that is undecided as a whole has no rows, or none that is within; of one that is undecided because of a place
+ * others are within.
+ */
+export function leavesOpen({ verdict, muted, rows }: Result): boolean {
+  const limited = rows.filter((row) => isContact(row) && !WITHOUT_LIMIT.has(row.state));
+  if (limited.some((row) => row.verdict === "within")) return false;
+  return muted || verdict === "undecided" || limited.some((row) => row.verdict === "undecided");
 }
 
 /** The worst row of a spot; undefined where nothing can be hit. */

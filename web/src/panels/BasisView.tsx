@@ -5,7 +5,7 @@ import { spoken } from "../units";
 import type { Basis, Input } from "../wire";
 import { said, word } from "../words";
 
-const ORIGINS: Record<string, string> = {
+export const ORIGINS: Record<string, string> = {
   measured: word("measured"),
   stated: word("stated"),
   given: word("given"),

@@ -2,6 +2,7 @@
 
 import type { Look } from "../body_map/exposure";
 import { HEIGHT, type Outline, outlines, type Spot, sideAtRight, type View, WIDTH } from "../body_map/figure";
+import { said, word } from "../words";
 
 export interface DrawnSpot extends Spot {
   key: string;
@@ -13,6 +14,7 @@ export interface DrawnSpot extends Spot {
 /** Beside colour: what a look is written as. */
 const SIGNS: Partial<Record<Look, string>> = { exceeded: "✕", undecided: "?", forbidden: "⊘" };
 
+const SEEN: Record<View, string> = { front: word("from in front"), back: word("from behind") };
 const VIEWS: Record<View, readonly Outline[]> = { front: outlines("front"), back: outlines("back") };
 
 export function BodyFigure(props: {
@@ -33,7 +35,7 @@ export function BodyFigure(props: {
       <svg
         viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
         role="group"
-        aria-label={`Body from ${view === "front" ? "in front" : "behind"}`}
+        aria-label={`${said("Whole body")}, ${said(SEEN[view])}`}
       >
         <defs>
           <pattern
@@ -96,13 +98,13 @@ export function BodyFigure(props: {
           </g>
         ))}
         <text class="side" x="20" y="414">
-          {right === "left" ? "right" : "left"}
+          {said(right === "left" ? "right" : "left")}
         </text>
         <text class="side" x={WIDTH - 20} y="414">
-          {right}
+          {said(right)}
         </text>
       </svg>
-      <figcaption>{view}</figcaption>
+      <figcaption>{said(SEEN[view])}</figcaption>
     </figure>
   );
 }

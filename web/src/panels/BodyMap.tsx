@@ -5,7 +5,7 @@ import {
   type Aspect,
   LOOK_WORDS,
   type Look,
-  lookOf,
+  lookAt,
   shareOf,
   type Told,
   toldOf,
@@ -15,15 +15,15 @@ import type { Spot } from "../body_map/figure";
 import { aspect, contacts, only } from "../body_map/shown";
 import { percent } from "../figures";
 import { scene, stale } from "../page_state";
-import { said } from "../words";
+import { said, told, word } from "../words";
 import { BodyFigure, type DrawnSpot } from "./BodyFigure";
 import { ContactDetails, ContactHead } from "./ContactCard";
 
 const ASPECTS: readonly [Aspect, string][] = [
-  ["worst", "Worst"],
-  ["force", "Force"],
-  ["pressure", "Pressure"],
-  ["energy", "Energy"],
+  ["worst", word("Worst")],
+  ["force", word("Force")],
+  ["pressure", word("Pressure")],
+  ["energy", word("Energy")],
 ];
 const LEGEND: readonly Look[] = [
   "clear",
@@ -41,7 +41,7 @@ const pinned = signal<string | null>(null);
 
 export function BodyMap() {
   const run = scene.value;
-  const { judged, sources, from, all, governing, spots } = contacts.value;
+  const { judged, sources, from, all, open, governing, spots } = contacts.value;
   if (!run || !judged) {
     return (
       <section class="body-map scroll" aria-label={said("Body map")}>
@@ -54,7 +54,7 @@ export function BodyMap() {
       </section>
     );
   }
-  const drawn = spots.map((spot) => drawnSpot(spot, all));
+  const drawn = spots.map((spot) => drawnSpot(spot, all, open !== null));
   const keyOf = (told: Told | undefined): string | null =>
     drawn.find((spot) => told && toldOf(spot, all, aspect.value) === told)?.key ?? null;
   const shownKey = pointed.value ?? pinned.value ?? keyOf(governing);
@@ -74,7 +74,7 @@ export function BodyMap() {
                 aspect.value = key;
               }}
             >
-              {title}
+              {said(title)}
             </button>
           ))}
         </fieldset>
@@ -95,7 +95,7 @@ export function BodyMap() {
           </select>
         )}
       </div>
-      <ContactHead spot={shown} told={told} aspect={aspect.value} />
+      <ContactHead spot={shown} told={told} aspect={aspect.value} open={open} />
       <fieldset class="figures" aria-label={said("Body areas")} onKeyDown={(event) => move(event, drawn)}>
         {(["front", "back"] as const).map((view) => (
           <BodyFigure
@@ -103,7 +103,7 @@ export function BodyMap() {
             view={view}
             spots={drawn.filter((spot) => spot.view === view)}
             regionLook={({ region, side }) =>
-              lookOf(toldOfRegion(region, side, all, aspect.value)?.row, aspect.value)
+              lookAt(toldOfRegion(region, side, all, aspect.value), aspect.value, open !== null)
             }
             chosen={pinned.value}
             reachable={shownKey ?? drawn[0]?.key ?? null}
@@ -120,7 +120,7 @@ export function BodyMap() {
         {LEGEND.map((look) => (
           <li key={look}>
             <i class={`swatch look-${look}`} aria-hidden="true" />
-            {LOOK_WORDS[look]}
+            {said(LOOK_WORDS[look])}
           </li>
         ))}
       </ul>
@@ -129,18 +129,19 @@ export function BodyMap() {
   );
 }
 
-function drawnSpot(spot: Spot, all: readonly Told[]): DrawnSpot {
-  const told = toldOf(spot, all, aspect.value);
-  const look = lookOf(told?.row, aspect.value);
-  const share = told ? shareOf(told.row, aspect.value) : null;
-  const name = told ? told.row.name : `area ${spot.area}`;
-  const side = spot.side === "" ? "" : `${spot.side} `;
-  const amount = share === null ? "" : `, ${percent(share, "up")} of the permissible speed`;
+function drawnSpot(spot: Spot, all: readonly Told[], open: boolean): DrawnSpot {
+  const here = toldOf(spot, all, aspect.value);
+  const look = lookAt(here, aspect.value, open);
+  const share = here ? shareOf(here.row, aspect.value) : null;
+  const name = here ? told(here.row.name) : said("area {n}", { n: spot.area });
+  const side = spot.side === "" ? "" : `${said(spot.side)} `;
+  const amount =
+    share === null ? "" : `, ${said("{share} of the permissible speed", { share: percent(share, "up") })}`;
   return {
     ...spot,
     key: `${spot.area} ${spot.side}`,
     look,
-    title: `${side}${name}: ${LOOK_WORDS[look]}${amount}`,
+    title: `${side}${name}: ${said(LOOK_WORDS[look])}${amount}`,
   };
 }
 

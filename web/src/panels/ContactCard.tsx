@@ -1,50 +1,63 @@
 // What is said of one area of the body: the verdict first, then what each limit allows and where it is from.
 
-import { type Aspect, inputsOf, LOOK_WORDS, lookOf, shareOf, type Told } from "../body_map/exposure";
+import { type Aspect, inputsOf, LOOK_WORDS, lookAt, lookOf, shareOf, type Told } from "../body_map/exposure";
 import type { Spot } from "../body_map/figure";
 import { against, atLeast, figure, percent, withUnit } from "../figures";
 import { formatNumber } from "../format";
 import { spoken } from "../units";
 import type { Input, Scene } from "../wire";
-import { said } from "../words";
+import { said, told as words } from "../words";
+import { ORIGINS } from "./BasisView";
 import { StateBadge } from "./StateBadge";
 
 /** Of constant height, so that the figures stay where they are while one points from area to area. */
-export function ContactHead(props: { spot: Spot | undefined; told: Told | undefined; aspect: Aspect }) {
-  const { spot, told, aspect } = props;
+export function ContactHead(props: {
+  spot: Spot | undefined;
+  told: Told | undefined;
+  aspect: Aspect;
+  /** Why nobody knows who can be hit; null where that is known. */
+  open: string | null;
+}) {
+  const { spot, told, aspect, open } = props;
   if (!told) {
     return (
       <div class="contact-head">
-        <h2>{spot ? `Area ${spot.area}` : "Whole body"}</h2>
-        <p class="reason">{said("Nothing that moves is within reach.")}</p>
+        <h2>{spot ? said("area {n}", { n: spot.area }) : said("Whole body")}</h2>
+        {open !== null && (
+          <p class="contact-speed">
+            <StateBadge state="undecided" />
+          </p>
+        )}
+        <p class="reason">{open === null ? said("Nothing that moves is within reach.") : spoken(open)}</p>
       </div>
     );
   }
   const { row } = told;
-  const look = lookOf(row, aspect);
+  const look = lookAt(told, aspect, open !== null);
+  const verdict = open !== null && row.verdict === "within" ? "undecided" : row.verdict;
   const side = row.side || (spot?.side ?? "");
   const share = shareOf(row, aspect);
   const figures = against(row.value, row.limit, row.unit, true);
   return (
     <div class={`contact-head card-${look}`}>
       <h2>
-        {side !== "" && `${side} `}
-        {row.name}
+        {side !== "" && `${said(side)} `}
+        {words(row.name)}
         <span class="unit">
-          {row.areas.length ? ` area ${row.areas.join(", ")}` : ""}
-          {row.group && row.group !== row.name ? ` · ${row.group}` : ""}
+          {row.areas.length > 0 && ` ${said("area {n}", { n: row.areas.join(", ") })}`}
+          {row.group && row.group !== row.name && ` · ${words(row.group)}`}
         </span>
       </h2>
       <p class="contact-speed">
-        {row.verdict && row.state !== "forbidden" ? <StateBadge state={row.verdict} /> : LOOK_WORDS[look]}
+        {verdict && row.state !== "forbidden" ? <StateBadge state={verdict} /> : said(LOOK_WORDS[look])}
         {row.limit != null && (
           <span>
-            {figures.value} of {withUnit(figures.limit, row.unit)}
+            {said("{value} of {limit}", { value: figures.value, limit: withUnit(figures.limit, row.unit) })}
           </span>
         )}
         {share !== null && <span>{percent(share, "up")}</span>}
       </p>
-      <p class="reason">{spoken(row.reason)}</p>
+      <p class="reason">{spoken(open === null ? row.reason : `${open}; ${row.reason}`)}</p>
     </div>
   );
 }
@@ -58,9 +71,15 @@ export function ContactDetails({ run, told }: { run: Scene; told: Told }) {
         <dt>{said("Speed now")}</dt>
         <dd>{known(row.value, row.unit, figure)}</dd>
         <dt>{said("Permissible speed")}</dt>
-        <dd>{row.limit == null ? LOOK_WORDS[lookOf(row, "worst")] : known(row.limit, row.unit, atLeast)}</dd>
+        <dd>
+          {row.limit == null ? said(LOOK_WORDS[lookOf(row, "worst")]) : known(row.limit, row.unit, atLeast)}
+        </dd>
         {row.aspects.map((one) => (
-          <AspectRow key={one.name} name={one.name} text={one.band || known(one.value, one.unit, atLeast)} />
+          <AspectRow
+            key={one.name}
+            name={words(one.name)}
+            text={words(one.band) || known(one.value, one.unit, atLeast)}
+          />
         ))}
         <dt>{said("Criterion")}</dt>
         <dd>{criterion}</dd>
@@ -92,12 +111,12 @@ function LimitRow({ input, group }: { input: Input; group: string }) {
   const value = typeof input.value === "number" ? formatNumber(input.value) : (input.value ?? "–");
   return (
     <tr>
-      <th scope="row">{input.name.replace(`${group}: `, "")}</th>
+      <th scope="row">{words(input.name.replace(`${group}: `, ""))}</th>
       <td class="number">
         {value} <span class="unit">{input.unit}</span>
       </td>
       <td>
-        <span class={`origin origin-${input.origin}`}>{input.origin}</span>
+        <span class={`origin origin-${input.origin}`}>{said(ORIGINS[input.origin] ?? input.origin)}</span>
         <span class="reason">{spoken(input.source)}</span>
       </td>
     </tr>
@@ -105,5 +124,5 @@ function LimitRow({ input, group }: { input: Input; group: string }) {
 }
 
 function known(value: number | null | undefined, unit: string | undefined, written: typeof figure): string {
-  return value == null ? "not known" : withUnit(written(value, unit ?? ""), unit ?? "");
+  return value == null ? said("not known") : withUnit(written(value, unit ?? ""), unit ?? "");
 }

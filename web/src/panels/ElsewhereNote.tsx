@@ -122,7 +122,7 @@ export function VisitedInstant() {
           visited.value = null;
         }}
       >
-        close
+        {said("close")}
       </button>
     </div>
   );

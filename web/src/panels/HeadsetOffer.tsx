@@ -3,6 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { ownScale, SCALES } from "../company";
 import { isLive, mayTrack, scene, tracked } from "../page_state";
+import { said, told, word } from "../words";
 import { type Mode, sessionModes } from "../xr/visit";
 import { useActions } from "./app_context";
 
@@ -30,12 +31,12 @@ export function HeadsetOffer() {
     }
   };
   const answer = tracked.value;
-  const said = failure || (answer && !answer.accepted ? answer.reason : "");
+  const complaint = failure || (answer && !answer.accepted ? answer.reason : "");
   return (
     <div class="headset-offer">
-      {inside && <span role="status">headset on</span>}
+      {inside && <span role="status">{said("headset on")}</span>}
       <label class="own-scale">
-        my size
+        {said("my size")}
         <select
           value={String(ownScale.value)}
           onChange={(event) => {
@@ -51,8 +52,8 @@ export function HeadsetOffer() {
       </label>
       {!inside &&
         modes.map((mode) => (
-          <button key={mode} type="button" title={TITLES[mode]} onClick={() => void begin(mode, null)}>
-            enter {WORDS[mode]}
+          <button key={mode} type="button" title={said(TITLES[mode])} onClick={() => void begin(mode, null)}>
+            {said("enter {mode}", { mode: WORDS[mode] })}
           </button>
         ))}
       {!inside &&
@@ -60,17 +61,18 @@ export function HeadsetOffer() {
         [...people].flatMap((human) =>
           modes.map((mode) => (
             <button key={human + mode} type="button" onClick={() => void begin(mode, human)}>
-              be {human}
-              {modes.length > 1 && ` in ${WORDS[mode]}`}
+              {modes.length > 1
+                ? said("be {name} in {mode}", { name: human, mode: WORDS[mode] })
+                : said("be {name}", { name: human })}
             </button>
           )),
         )}
-      {said && <span role="alert">{said}</span>}
+      {complaint && <span role="alert">{told(complaint)}</span>}
     </div>
   );
 }
 
 const TITLES: Record<Mode, string> = {
-  "immersive-vr": "Stand in the twin",
-  "immersive-ar": "See the twin where you are",
+  "immersive-vr": word("Stand in the twin"),
+  "immersive-ar": word("See the twin where you are"),
 };

@@ -2,8 +2,9 @@
 
 import { against, withUnit } from "../figures";
 import { formatTime } from "../format";
-import { STATE_ICONS } from "../verdicts";
+import { STATE_ICONS, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo } from "../wire";
+import { said } from "../words";
 import { type Instant, verdictOf } from "../worst_instant";
 import { useActions } from "./app_context";
 
@@ -18,7 +19,7 @@ export function Instants({ info, instants }: { info: CriterionInfo; instants: re
             key={instant.t}
             type="button"
             class={`jump ${verdict ? `state-${verdict}` : ""}`}
-            title={`Go to ${formatTime(instant.t)}${verdict ? `: ${verdict}` : ""}`}
+            title={`${said("Go to {time}", { time: formatTime(instant.t) })}${verdict ? `: ${said(STATE_WORDS[verdict])}` : ""}`}
             data-worst={i === 0 ? info.name : undefined}
             onClick={() => time.visit(instant.t)}
           >

@@ -11,7 +11,7 @@ const KEYS: readonly [keys: string, does: string][] = [
   ["← →", word("one snapshot back or ahead; with shift, one second")],
   ["Home End", word("to the begin; to the end, live: to the newest")],
   ["[ ]", word("to where a limit begins to be exceeded, before or after")],
-  ["W", word("to the worst instant of the selected criterion, or of the one that is worst now")],
+  ["W", word("to the worst instant of the selected criterion, or of the run")],
   ["L", word("back to live")],
   ["F", word("frame the selection")],
   ["D", word("measure a distance, or end that")],

@@ -22,7 +22,7 @@ export function Posture() {
     return (
       <section class="posture scroll" aria-label={said("Posture")}>
         <p class="empty">
-          No ergonomics rule in this run. Add one to the workstation file, such as{" "}
+          {said("No ergonomics rule in this run. Add one to the workstation file, such as")}{" "}
           <code>[[ergonomics]] kind = "rula"</code>.
         </p>
       </section>

@@ -240,7 +240,7 @@ function CriterionProperties({ run, name }: { run: Scene; name: string }) {
         <dt>{said("Limit")}</dt>
         <dd>
           {info.limit === null
-            ? "none in the file"
+            ? said("none in the file")
             : `${info.at_most ? "at most" : "at least"} ${formatQuantity(info.limit, info.unit)}`}
         </dd>
       </dl>

@@ -2,9 +2,13 @@
 
 import { coloring, palette } from "../posture/coloring";
 import { COLORINGS, type Coloring, cssColor, PALETTES, type Palette, scaleColor } from "../posture/scores";
-import { said } from "../words";
+import { said, word } from "../words";
 
-const TITLES: Record<Coloring, string> = { parts: "Body parts", overall: "Overall", verdict: "Verdicts" };
+const TITLES: Record<Coloring, string> = {
+  parts: word("Body parts"),
+  overall: word("Overall"),
+  verdict: word("Verdicts"),
+};
 const STEPS = [0, 0.25, 0.5, 0.75, 1];
 
 export function ColoringChoice() {
@@ -20,7 +24,7 @@ export function ColoringChoice() {
             coloring.value = key;
           }}
         >
-          {TITLES[key]}
+          {said(TITLES[key])}
         </button>
       ))}
     </fieldset>
@@ -53,7 +57,7 @@ export function PaletteChoice() {
       >
         {PALETTES.map((name) => (
           <option key={name} value={name}>
-            {name}
+            {said(name)}
           </option>
         ))}
       </select>

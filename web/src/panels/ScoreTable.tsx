@@ -6,7 +6,7 @@ import { palette } from "../posture/coloring";
 import { type Component, cssColor, scaleColor, shareOfScale, TOTAL } from "../posture/scores";
 import { spoken } from "../units";
 import type { Aspect, Row } from "../wire";
-import { said } from "../words";
+import { said, told, word } from "../words";
 
 export function ScoreTable({ parts }: { parts: readonly Component[] }) {
   return (
@@ -21,7 +21,7 @@ export function ScoreTable({ parts }: { parts: readonly Component[] }) {
       <tbody>
         {parts.map((part) => (
           <tr key={part.name} class={part.name === TOTAL ? "total" : ""}>
-            <th scope="row">{part.name}</th>
+            <th scope="row">{part.name === TOTAL ? said("score") : told(part.name)}</th>
             {part.left || part.right ? (
               <>
                 <ScoreCell row={part.left} />
@@ -42,15 +42,15 @@ function ScoreCell({ row, span = 1 }: { row: Row | null; span?: number }) {
   const share = shareOfScale(row);
   const color = share === null ? undefined : cssColor(scaleColor(share, palette.value));
   const [best, worst] = row.scale ?? [null, null];
-  const scale = best === null ? "" : `, from ${best} to ${worst}`;
+  const scale = best === null || worst === null ? "" : said("from {best} to {worst}", { best, worst });
   return (
-    <td colSpan={span} title={`${spoken(row.reason)}${scale}`}>
+    <td colSpan={span} title={[spoken(row.reason), scale].filter((text) => text !== "").join(", ")}>
       <span class={share === null ? "chip chip-unknown" : "chip"} style={{ background: color }}>
         {share === null ? "?" : figure(row.value, "")}
         {worst !== null && share !== null && <small>/{worst}</small>}
       </span>
       <span class="angles">
-        {share === null && <em>{spoken(row.reason || "not assessed")} </em>}
+        {share === null && <em>{row.reason === "" ? said("not assessed") : spoken(row.reason)} </em>}
         {row.aspects.map((aspect) => (
           <Angle key={aspect.name} aspect={aspect} />
         ))}
@@ -63,14 +63,23 @@ function Angle({ aspect }: { aspect: Aspect }) {
   const angular = aspect.unit === "rad";
   const value =
     aspect.value == null
-      ? "not measured"
+      ? said("not measured")
       : angular
         ? `${formatFixed((aspect.value * 180) / Math.PI, 0)}°`
         : `${figure(aspect.value, aspect.unit)} ${aspect.unit}`;
   return (
     <span class="angle">
-      {aspect.name} <b>{value}</b>
-      {aspect.band && <small> {aspect.band}</small>}
+      {told(aspect.name)} <b>{value}</b>
+      {aspect.band && <small> {band(aspect.band)}</small>}
     </span>
   );
+}
+
+/** The band of an angle in words: the engine says `below 20°`, `20° to 45°` or `beyond 45°`. */
+function band(text: string): string {
+  const one = /^(below|beyond) (\S+)$/.exec(text);
+  if (one)
+    return said(one[1] === "below" ? word("below {angle}") : word("beyond {angle}"), { angle: one[2]! });
+  const two = /^(\S+) to (\S+)$/.exec(text);
+  return two ? said("{low} to {high}", { low: two[1]!, high: two[2]! }) : told(text);
 }

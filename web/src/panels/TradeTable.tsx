@@ -3,7 +3,7 @@
 import { against } from "../figures";
 import { formatTime } from "../format";
 import { tradeColumns, tradeRows } from "../posture/instants";
-import { STATE_ICONS } from "../verdicts";
+import { STATE_ICONS, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo } from "../wire";
 import { said } from "../words";
 import { type Instant, verdictOf } from "../worst_instant";
@@ -37,7 +37,7 @@ export function TradeTable() {
                   <button
                     type="button"
                     class="link"
-                    title={`Worst of ${row.of}`}
+                    title={said("Worst of {name}", { name: row.of })}
                     onClick={() => time.visit(row.t)}
                   >
                     {formatTime(row.t)}
@@ -60,7 +60,7 @@ function TradeCell({ cell, info, of }: { cell: Instant | null; info: CriterionIn
   return (
     <td class={`number ${verdict ? `state-${verdict}` : ""} ${info.name === of ? "own" : ""}`}>
       {verdict && <span aria-hidden="true">{STATE_ICONS[verdict]} </span>}
-      {verdict && <span class="visually-hidden">{verdict} </span>}
+      {verdict && <span class="visually-hidden">{said(STATE_WORDS[verdict])} </span>}
       {against(cell?.value ?? null, cell?.limit ?? null, info.unit, info.at_most).value}
     </td>
   );

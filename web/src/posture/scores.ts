@@ -1,9 +1,10 @@
 // Scores of a posture as the panel and the manikin show them: components by side, shares of the scale, colours.
 
 import type { Result, Row } from "../wire";
+import { word } from "../words";
 
 export type Palette = "green to red" | "blue to orange";
-export const PALETTES: readonly Palette[] = ["green to red", "blue to orange"];
+export const PALETTES: readonly Palette[] = [word("green to red"), word("blue to orange")];
 
 /** Name of a row that is the total of a side, or of the whole. */
 export const TOTAL = "score";

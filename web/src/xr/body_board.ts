@@ -1,7 +1,7 @@
 // The body map on a board in the room, from what feeds that of the page.
 
 import { effect } from "@preact/signals";
-import { LOOK_WORDS, type Look, lookOf, shareOf, toldOf, toldOfRegion } from "../body_map/exposure";
+import { LOOK_WORDS, type Look, lookAt, shareOf, toldOf, toldOfRegion } from "../body_map/exposure";
 import { HEIGHT, outlines, sideAtRight, type View, WIDTH } from "../body_map/figure";
 import { aspect, contacts, only } from "../body_map/shown";
 import { percent } from "../figures";
@@ -44,15 +44,16 @@ export class BodyBoard extends Panel {
 
   /** What stands above the figures. */
   static headline(): string {
-    const { judged, governing } = contacts.peek();
+    const { judged, governing, open } = contacts.peek();
     if (stale.peek()) return "NO CURRENT DATA";
     if (!judged) return "no criterion judges contacts";
+    if (open !== null && !governing) return `UNDECIDED: ${open}`;
     if (!governing) return "nothing that moves is within reach";
     const { row } = governing;
     const share = shareOf(row, aspect.peek());
     const amount = share === null ? "" : `, ${percent(share, "up")} of the permissible speed`;
     const side = row.side ? `${row.side} ` : "";
-    return `${side}${row.name}: ${LOOK_WORDS[lookOf(row, aspect.peek())]}${amount}`;
+    return `${side}${row.name}: ${LOOK_WORDS[lookAt(governing, aspect.peek(), open !== null)]}${amount}`;
   }
 
   protected news(): boolean {
@@ -74,13 +75,14 @@ export class BodyBoard extends Panel {
 
   private figure(view: View, k: number): void {
     const { brush } = this;
-    const { all, spots } = contacts.peek();
+    const { all, open, spots } = contacts.peek();
     const limit = aspect.peek();
     brush.save();
     brush.translate(40 + (k * PIXELS.width) / 2, TOP_PX);
     brush.scale(SCALE, SCALE);
     for (const { outline, path } of this.paths[k]!) {
-      brush.fillStyle = COLORS[lookOf(toldOfRegion(outline.region, outline.side, all, limit)?.row, limit)];
+      brush.fillStyle =
+        COLORS[lookAt(toldOfRegion(outline.region, outline.side, all, limit), limit, open !== null)];
       brush.globalAlpha = 0.55;
       brush.fill(path);
       brush.globalAlpha = 1;
@@ -91,7 +93,7 @@ export class BodyBoard extends Panel {
     brush.textBaseline = "middle";
     for (const spot of spots) {
       if (spot.view !== view) continue;
-      const look = lookOf(toldOf(spot, all, limit)?.row, limit);
+      const look = lookAt(toldOf(spot, all, limit), limit, open !== null);
       brush.beginPath();
       brush.arc(spot.x, spot.y, spot.r, 0, 2 * Math.PI);
       brush.fillStyle = COLORS[look];

@@ -20,6 +20,7 @@ from seerob.criteria.safety.power_and_force import Contacts
 from seerob.description.humans.skeleton import BONES
 from seerob.session.run import Judge, bind, engine_of, pump, ticks
 from seerob.twin.engine import Engine
+from seerob.twin.state import State
 from worst_between import one_by_one, worst_found
 
 msgpack = msgspec.msgpack.Encoder(enc_hook=plain).encode
@@ -72,6 +73,21 @@ THROUGH = {
         '[[safety]]\nkind = "light_curtain"\nname = "c"\nsensor = "curtain"\nof = "stick"\n',
     ),
 }
+
+
+def test_who_has_no_limit_is_not_bounded_between_ticks(tmp_path, monkeypatch):
+    """Nothing that it says could be lost there, by its period or by a field of a sensor something could."""
+    told = '[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\n'
+    distance = THROUGH["post"][1].replace("limit = 0.005\n", "")
+    for more, criterion in enumerate([*(c for _, c in THROUGH.values()), f"{told}every = 0.1\n"]):
+        thing = THROUGH["curtain"][0] if "curtain" in criterion else AREA + POST
+        (one,) = passing(tmp_path / str(more), criterion, thing).bound
+        assert not one.watch.informs
+    station = passing(tmp_path / "informs", told + distance, POST)
+    assert all(one.watch.informs for one in station.bound)
+    monkeypatch.setattr(State, "largest_speeds", lambda state: 1 / 0)
+    said = station.run().results
+    assert [(said[name].verdict, said[name].max() > 0) for name in "vc"] == [(None, True)] * 2
 
 
 @pytest.mark.parametrize("physics", ["true", "false"])

@@ -9,9 +9,12 @@ from scipy.stats import norm
 
 from made_cell import made, person, results_at
 from seerob.core.errors import InputError
+from seerob.core.snapshot import Verdict
+from seerob.criteria.criterion import Criterion
 from seerob.criteria.ergonomics import hand_activity, strain_index
 from seerob.criteria.ergonomics.manual_handling import Handling, acceptable, share_of
 from seerob.criteria.ergonomics.strain_index import _wrist_span, composite, wrist_multiplier
+from seerob.recording.series import CODES
 from seerob.session.run import bind
 
 PHASES = """
@@ -268,3 +271,40 @@ def test_loads_against_a_share_of_people(tmp_path):
     assert (open_.verdict, open_.reason) == ("undecided", "not entered: handles of task 1")
     with pytest.raises(InputError, match="do not apply: one handed"):
         bind(made(tmp_path / "f", person() + LOADS.replace("[]", '["one_handed"]')).model)
+
+
+@pytest.mark.parametrize(
+    ("limit", "more"),
+    [
+        ("limit = 12", ""),
+        ("limit = 12", "accuracy_deg = 20\n"),
+        ("limit = 100", "accuracy_deg = 20\n"),
+        ("limit = 100", 'unmeasured = ["right_hand"]\n'),
+        ("", "accuracy_deg = 20\n"),
+    ],
+)
+def test_an_index_of_many_instants_is_that_of_each(tmp_path, monkeypatch, limit, more):
+    """In the phases of each, with wrists that turn, or with the one that is entered; a hand that may be off
+    and keeps the limit at its worst is within, as the whole is."""
+    phases = PHASES.replace('title = "walks"', 'title = "presses"').replace("exertion = 0", "") + (
+        "end = 8\nexertion = 6\nexertions = 1\nexertion_time = 1\nwrist_deg = 20\n"
+        '[[phases]]\ntitle = "walks"\nstart = 8\ncycle = 10\nexertion = 0\n'
+    )
+    rule = RULES.partition('[[ergonomics]]\nkind = "hand_activity"')[0].replace("limit = 12", limit) + more
+    station = made(tmp_path, person() + phases + rule)
+    t = np.linspace(0, 10, 41)
+    human = station.model.human("op")
+    q = np.tile(human.home, (len(t), 1))
+    bends = [k for k, joint in enumerate(human.joints) if "wrist" in joint.name]
+    q[:, bends] = 0.6 * np.sin(t)[:, None]
+    many = station.batch({"op": q}, {"op": np.zeros_like(q)}, t=t)["strain"]
+    monkeypatch.setattr(Criterion, "batch", lambda *_: None)
+    each = station.batch({"op": q}, {"op": np.zeros_like(q)}, t=t)["strain"]
+    assert (many.note, each.note[:15]) == ("", "asked instant b")
+    np.testing.assert_array_equal(many.answers.verdict, each.answers.verdict)
+    np.testing.assert_array_equal(many.value, each.value)
+    if each.answers.interval is not None:
+        np.testing.assert_array_equal(many.answers.interval, each.answers.interval)
+    wanted = {"": None, "limit = 100": Verdict.WITHIN, "limit = 12": Verdict.EXCEEDED}[limit]
+    undecided = Verdict.UNDECIDED if "unmeasured" in more else wanted
+    assert {*many.answers.verdict.tolist()} == {CODES[None], CODES[undecided]}

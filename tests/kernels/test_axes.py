@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.kernels.axes import mobility, principal_axes
+from seerob.kernels.axes import half_axes, mobility, principal_axes
 
 random = np.random.default_rng(5)
 
@@ -13,6 +13,9 @@ random = np.random.default_rng(5)
 def axes_of(A):
     values, axes = np.empty((len(A), 3)), np.empty((len(A), 3, 3))
     principal_axes(A.copy(), values, axes)
+    alone = np.empty((len(A), 3))
+    half_axes(A, alone)
+    np.testing.assert_allclose(alone, values, rtol=1e-12, atol=1e-14 * values.max())
     return values, axes
 
 

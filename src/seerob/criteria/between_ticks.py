@@ -30,6 +30,7 @@ from seerob.model.model import Model
 from seerob.twin.signals import SLACK
 from seerob.twin.spans import (
     AllFalls,
+    Approaching,
     Fall,
     Falls,
     Gap,
@@ -38,6 +39,7 @@ from seerob.twin.spans import (
     Points,
     Span,
     Speeding,
+    Turning,
 )
 from seerob.twin.state import VARIABLE, State
 
@@ -84,6 +86,18 @@ class Watch:
         """Whether it applies at all times, by a limit that is bounded with its figure, which is one."""
         own = type(self.criterion).margin is not Criterion.margin
         return self.criterion.active is None and self.follows is None and not own
+
+    @property
+    def informs(self) -> bool:
+        """Whether it has no limit, and so never a verdict that the way between two ticks could take back.
+
+        Of kinds that ship and compare one figure with the limit of the file; by its period it is asked
+        earlier where nothing is known of the way, and then it has to be looked at all the same.
+        """
+        criterion = self.criterion
+        compares = self.plain and isinstance(self.falls, Approaching | Speeding | Turning)
+        ships = type(criterion).__module__.startswith("seerob.")
+        return compares and ships and criterion.every is None and getattr(criterion, "limit", 0.0) is None
 
     @property
     def accepted(self) -> str:
@@ -213,6 +227,7 @@ class BetweenTicks:
     """
 
     def __init__(self, watches: Sequence[Watch | None]) -> None:
+        watches = [None if watch is None or watch.informs else watch for watch in watches]
         self._watches = watches
         self._points = next((watch.points for watch in watches if watch is not None), None)
         self._before: list[End | None] = [None] * len(watches)

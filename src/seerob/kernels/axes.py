@@ -17,6 +17,8 @@ from seerob.core.transforms import Array
 SWEEPS = 30
 """At most; five or six are usual."""
 ORTHOGONAL = 1e-16
+LIKE_ORTHOGONAL = 1e-15
+"""Cosine that is left where directions are not asked: it changes a length by no more than rounding does."""
 
 
 @njit("void(f8[:,:,::1], f8[:,::1], f8[:,:,::1])", cache=True, nogil=True, error_model="numpy")
@@ -72,6 +74,67 @@ def principal_axes(A: Array, values: Array, axes: Array) -> None:
                     for i in range(3):
                         # One of them turned about, so that the frame stays right-handed.
                         U[i, q], U[i, q + 1] = U[i, q + 1], -U[i, q]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def half_axes(J: Array, values: Array) -> None:
+    """Singular values of the first three rows of many matrices, largest first, without their directions.
+
+    What the rows are to one another, a triangle of 3 by 3, has the same ones, and is turned as
+    `principal_axes` turns rows; to rounding they are the same.
+
+    Args:
+        J: Matrices, shape (N, 3, n) or with more rows.
+        values: Written: shape (N, 3); NaN, all three, of what is not finite.
+    """
+    n = J.shape[2]
+    rest, L = np.empty((3, n)), np.empty((3, 3))
+    for k in range(len(J)):
+        for p in range(3):
+            for i in range(n):
+                rest[p, i] = J[k, p, i]
+        for p in range(3):
+            square = 0.0
+            for i in range(n):
+                square += rest[p, i] * rest[p, i]
+            L[p, p] = math.sqrt(square)
+            per = 1.0 / L[p, p] if square > 0.0 else 0.0
+            for q in range(p + 1, 3):
+                along = 0.0
+                for i in range(n):
+                    along += rest[p, i] * rest[q, i]
+                along *= per
+                L[q, p], L[p, q] = along, 0.0
+                for i in range(n):
+                    rest[q, i] -= along * per * rest[p, i]
+        for _ in range(SWEEPS):
+            turned = False
+            for p in range(2):
+                for q in range(p + 1, 3):
+                    pp = L[p, 0] * L[p, 0] + L[p, 1] * L[p, 1] + L[p, 2] * L[p, 2]
+                    qq = L[q, 0] * L[q, 0] + L[q, 1] * L[q, 1] + L[q, 2] * L[q, 2]
+                    pq = L[p, 0] * L[q, 0] + L[p, 1] * L[q, 1] + L[p, 2] * L[q, 2]
+                    if not pq * pq > LIKE_ORTHOGONAL * LIKE_ORTHOGONAL * pp * qq:
+                        continue
+                    turned = True
+                    zeta = (qq - pp) / (2.0 * pq)
+                    t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                    c = 1.0 / math.sqrt(1.0 + t * t)
+                    s = c * t
+                    for i in range(3):
+                        x, y = L[p, i], L[q, i]
+                        L[p, i], L[q, i] = c * x - s * y, s * x + c * y
+            if not turned:
+                break
+        a = math.sqrt(L[0, 0] * L[0, 0] + L[0, 1] * L[0, 1] + L[0, 2] * L[0, 2])
+        b = math.sqrt(L[1, 0] * L[1, 0] + L[1, 1] * L[1, 1] + L[1, 2] * L[1, 2])
+        c = math.sqrt(L[2, 0] * L[2, 0] + L[2, 1] * L[2, 1] + L[2, 2] * L[2, 2])
+        if not math.isfinite(a + b + c):
+            values[k, 0] = values[k, 1] = values[k, 2] = np.nan
+            continue
+        a, b = max(a, b), min(a, b)
+        b, c = max(b, c), min(b, c)
+        values[k, 0], values[k, 1], values[k, 2] = max(a, b), min(a, b), c
 
 
 @njit("b1(f8[:,:,::1], f8[:,:,::1], f8[:,:,::1])", cache=True, nogil=True, error_model="numpy")

@@ -357,6 +357,23 @@ def columns_of(
             found[k, 3, c], found[k, 4, c], found[k, 5, c] = s[0], s[1], s[2]
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def carried_by(jacobian: Array, qd: Array, found: Array) -> None:
+    """Velocities that joints give a point at many instants.
+
+    Args:
+        jacobian: Shape (N, 6, n).
+        qd: Joint velocities [rad/s or m/s], shape (N, n).
+        found: Receives them, shape (N, 6).
+    """
+    for k in range(len(qd)):
+        for r in range(found.shape[1]):
+            total = 0.0
+            for c in range(qd.shape[1]):
+                total += jacobian[k, r, c] * qd[k, c]
+            found[k, r] = total
+
+
 @njit(
     "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, i8, i8[::1], b1[::1], f8[::1], f8[::1],"
     " f8[:,::1], f8[::1], f8[:,::1], f8[::1])",

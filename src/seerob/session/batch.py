@@ -45,9 +45,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from matplotlib.figure import Figure
 
-STRETCH, LONGEST = 256, 1024
+STRETCH, LONGEST, LONGEST_OF_SEVERAL = 256, 4096, 1024
 """Instants that are placed together, at least and at most: enough for the arrays to pay, few enough for the
-processor's cache."""
+processor's cache, which several threads share."""
 SHARES = 8
 """Parts that a motion has between the two, so that threads end together."""
 ASKED_AGAIN = 8
@@ -203,7 +203,7 @@ def judged(
         findings = (*findings, *filter(None, refuted))
     # Whom that holds, and when, is found out on the road.
     asked, notes = _able(model, bound, (*findings, *motion.implausible))
-    length = min(max(STRETCH, -(-n // SHARES)), LONGEST)
+    length = LONGEST if threads <= 1 else min(max(STRETCH, -(-n // SHARES)), LONGEST_OF_SEVERAL)
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, length), n]) if begin < end]
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
     left: dict[str, list[Flags]] = {name: [] for name in asked}
@@ -213,10 +213,11 @@ def judged(
         # Learns what distances are asked, so that every stretch asks for all of them together.
         bench = Bench(model, Questions(model))
         _stretch(bench, asked, parts[0].part(0, 1))
-        with ThreadPoolExecutor(max(1, threads), "seerob batch") as pool:
-            shares = [parts[k::threads] for k in range(max(1, threads))]
-            benches = [bench, *(bench.another() for _ in shares[1:])]
-            made = list(pool.map(lambda at, share: _share(at, asked, share), benches, shares))
+        shares = [parts[k::threads] for k in range(max(1, threads))]
+        benches = [bench, *(bench.another() for _ in shares[1:])]
+        with ThreadPoolExecutor(len(shares), "seerob batch") if shares[1:] else nullcontext() as pool:
+            at_once = map if pool is None else pool.map
+            made = list(at_once(lambda at, share: _share(at, asked, share), benches, shares))
         for k in range(len(parts)):
             stretch, fast, rested = made[k % len(shares)][k // len(shares)]
             if fast is not None:

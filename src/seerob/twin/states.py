@@ -25,8 +25,8 @@ from seerob.core.errors import InputError, Problem, Undecided
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.distance.least import Closests, Per, Query, Survey
-from seerob.kernels.axes import mobility, principal_axes
-from seerob.kernels.chain import along, held_many, jacobians
+from seerob.kernels.axes import half_axes, mobility
+from seerob.kernels.chain import along, carried_by, held_many, jacobians
 from seerob.kernels.speed import by_coordinate, fastest_many, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.recording.answers import Flags
@@ -411,14 +411,18 @@ class States:
 
     def velocity(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
         """Velocities that the joints of a mechanism give a point, linear before angular, shape (N, 6)."""
-        return np.asarray((self.jacobian(frame, mechanism, offset) @ self.qd(mechanism)[..., None])[..., 0])
+        J, qd = self.jacobian(frame, mechanism, offset), self.qd(mechanism)
+        key = "velocity", id(frame), mechanism.name, None if offset is None else offset.tobytes()
+        if key not in self._cache:
+            found = np.empty((len(self), 6))
+            carried_by(np.ascontiguousarray(J), np.ascontiguousarray(qd), found)
+            self._cache[key] = frame, found
+        return np.asarray(self._cache[key][1])
 
     def singular_values(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
         """Singular values of the linear rows of `jacobian`, largest first, shape (3, N)."""
-        rows = np.array(self.jacobian(frame, mechanism, offset)[:, :3])
-        values, directions = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
-        principal_axes(rows, values, directions)
-        values[np.isnan(values).any(axis=-1)] = np.nan
+        values = np.empty((len(self), 3))
+        half_axes(np.ascontiguousarray(self.jacobian(frame, mechanism, offset)), values)
         return values.T
 
     def pose(self, frame: Frame) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from typing import Annotated, ClassVar, NamedTuple, cast
 
 import numpy as np
 from msgspec import Meta
+from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
 from seerob.core.domains import number
@@ -21,15 +22,20 @@ from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin, verdict_of
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, posture_quality
-from seerob.criteria.scoring.exertions import Exertion, ExertionPhase, exertion_inputs, hand_work, hours_input
+from seerob.criteria.scoring.exertions import (
+    Exertion,
+    ExertionPhase,
+    HandWork,
+    exertion_inputs,
+    hand_work,
+    hours_input,
+)
 from seerob.criteria.scoring.measured import Measured
-from seerob.criteria.scoring.phases import phase_at
-from seerob.criteria.scoring.rule import PostureRule, bind_posture
+from seerob.criteria.scoring.rule import PostureRule, bind_posture, by_phase
 from seerob.description.humans.angles import Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.twin.state import State
 
 DAY = 86400.0
 FARTHEST = math.pi / 2
@@ -106,6 +112,8 @@ class Strained(NamedTuple):
     """Least index of the right hand and the left one."""
     high: tuple[float, float]
     reason: str
+    measured: tuple[float | None, float | None] = (None, None)
+    """Index of each hand with the wrists as they were measured; None where one was not."""
 
 
 class StrainIndex(PostureRule, frozen=True, kw_only=True):
@@ -130,34 +138,43 @@ class StrainIndex(PostureRule, frozen=True, kw_only=True):
         limit, daily = self.limit, self.daily
         busy = {each.phase for each in work.exertions}
 
-        def compute(twin: Twin) -> Figure:
-            assert isinstance(twin, State)
-            angles = read(twin)
-            if absent or daily is None:
-                said = f"not entered: {', '.join(absent)}"
-                return Figure(None, limit, undecided=True, beside=Strained((0, 0), (math.inf,) * 2, said))
-            phase = phase_at(phases, twin.t, ExertionPhase())
+        def scored(angles: Angles, phase: ExertionPhase) -> Figure:
+            shape = angles.trunk_flexion.shape[:1]
             if busy and phase not in busy:
-                said = "no exertion in this phase"
-                return Figure(None, limit, nothing=True, beside=Strained((0, 0), (0, 0), said))
-            ends = [self._index(work.of(side), daily, angles, side, 0.0) for side in range(2)]
+                none, said = np.full(shape, np.nan), "no exertion in this phase"
+                return Figure(
+                    none, limit, interval=(none, none), nothing=np.ones(shape, bool),
+                    open=np.zeros(shape, bool), beside=Strained((0, 0), (0, 0), said),
+                )  # fmt: skip
+            assert daily is not None
+            low, high = ends = self._ends(work, daily, angles, 0.0)
             wide = ends
             if error is not None:
                 off = Measured(angles, error).error("wrist_flexion")
-                wide = [self._index(work.of(side), daily, angles, side, off) for side in range(2)]
-            low, high = max(end[0] for end in wide), max(end[1] for end in wide)
-            known = all(end[0] == end[1] for end in ends)
-            unseen = [SIDES[side] for side in range(2) if ends[side][0] != ends[side][1]]
-            said = f"not measured: {' and '.join(unseen)} wrist" if unseen else ""
+                wide = self._ends(work, daily, angles, off)
+            unseen = low != high
+            open_ = unseen.any(axis=-1)
+            said = ""
+            if not shape and open_:
+                said = f"not measured: {' and '.join(SIDES[i] for i in np.flatnonzero(unseen))} wrist"
+            least, most = (end.max(axis=-1) for end in wide)
+            value = np.where(open_, np.nan, low.max(axis=-1))
+            beside = None
+            if not shape:
+                right, left = (None if lost else x for x, lost in zip(low.tolist(), unseen, strict=True))
+                said = said or _largest(work.exertions)
+                beside = Strained(_hands(wide[0]), _hands(wide[1]), said, (right, left))
             return Figure(
-                max(end[0] for end in ends) if known else None,
-                limit,
-                interval=None if known and error is None else (low, high),
-                open=not known,
-                beside=Strained(
-                    (wide[0][0], wide[1][0]), (wide[0][1], wide[1][1]), said or _largest(work.exertions)
-                ),
+                value, limit, interval=(least, most), nothing=np.zeros(shape, bool), open=open_, beside=beside
             )
+
+        def compute(twin: Twin) -> Figure:
+            angles = read(twin)
+            if absent:
+                said = f"not entered: {', '.join(absent)}"
+                return Figure(None, limit, undecided=True, beside=Strained((0, 0), (math.inf,) * 2, said))
+            figure = by_phase(twin.t, angles, phases, ExertionPhase(), scored)
+            return figure if twin.many else _of_one(figure, spread=error is not None)
 
         return compute
 
@@ -166,45 +183,45 @@ class StrainIndex(PostureRule, frozen=True, kw_only=True):
         return lambda state, figure, verdict: self._shown(figure, verdict)
 
     def one_by_one(self, model: Model) -> str:
-        """Say so: a wrist counts in the phase of its instant."""
-        return "exertions are of the phase of each instant"
+        """Nothing: an index takes the wrist of its instant."""
+        return ""
 
-    def _index(
-        self, exertions: Sequence[Exertion], daily: float, angles: Angles, side: int, off: float
-    ) -> tuple[float, float]:
-        """Least and greatest index of a hand whose wrist may be off [rad]."""
-        if not exertions:
-            return 0.0, 0.0
-        seen = float(angles.wrist_flexion[..., side])
-        spans = [_wrist_span(seen, off) if each.wrist is None else (each.wrist,) * 2 for each in exertions]
-        forces, times = [each.force for each in exertions], [each.time for each in exertions]
-        rates = [each.per_minute for each in exertions]
-        rest = intensity_multiplier(forces) * time_multiplier(times) * daily_multiplier(daily)
-        least = composite(rest * wrist_multiplier([span[0] for span in spans]), rates)
-        most = composite(rest * wrist_multiplier([span[1] for span in spans]), rates)
-        return float(least), float(most)
+    def _ends(self, work: HandWork, daily: float, angles: Angles, off: float) -> tuple[Array, Array]:
+        """Least and greatest index of right and left hands whose wrists may be off [rad], (..., 2) each."""
+        seen = angles.wrist_flexion.reshape(*angles.trunk_flexion.shape[:1], 2)
+        low, high = np.zeros_like(seen), np.zeros_like(seen)
+        for side in range(2):
+            exertions = work.of(side)
+            if not exertions:
+                continue
+            own = _wrist_span(seen[..., side], off)
+            forces, times = [each.force for each in exertions], [each.time for each in exertions]
+            rates = [each.per_minute for each in exertions]
+            rest = intensity_multiplier(forces) * time_multiplier(times) * daily_multiplier(daily)
+            for found, wrist in zip((low, high), own, strict=True):
+                wrists = [
+                    wrist if each.wrist is None else np.full_like(wrist, each.wrist) for each in exertions
+                ]
+                found[..., side] = composite(rest * wrist_multiplier(np.stack(wrists, axis=-1)), rates)
+        return low, high
 
     def _shown(self, figure: Figure, verdict: Verdict | None) -> Shown:
-        low, high, reason = cast("Strained", figure.beside)
+        low, high, reason, measured = cast("Strained", figure.beside)
         if figure.undecided or figure.nothing:
             return Shown(reason)
         parts = []
         for side, name in enumerate(SIDES):
-            known = low[side] == high[side]
-            own = Figure(
-                low[side] if known else None,
-                self.limit,
-                interval=None if known else (low[side], high[side]),
-                open=bool(figure.open) and not known,
-            )
+            index = measured[side]
+            interval = None if low[side] == high[side] else (low[side], high[side])
+            own = Figure(index, self.limit, interval=interval, open=index is None)
             parts.append(
                 Result(
                     name=f"{name} hand",
-                    value=None if own.value is None else float(own.number),
+                    value=index,
                     limit=self.limit,
-                    interval=None if known else (low[side], high[side]),
+                    interval=interval,
                     verdict=verdict_of(own, at_most=True),
-                    nothing=not known and self.limit is None,
+                    nothing=index is None and self.limit is None,
                 )
             )
         worst = SIDES[int(high[1] > high[0])]
@@ -252,21 +269,45 @@ class StrainIndex(PostureRule, frozen=True, kw_only=True):
         )
 
 
-def _wrist_span(flexion: float, off: float) -> tuple[float, float]:
-    """Wrists of the least and the greatest multiplier [rad] of one that may be off.
+def _hands(ends: Array) -> tuple[float, float]:
+    right, left = ends.tolist()
+    return right, left
+
+
+def _of_one(figure: Figure, *, spread: bool) -> Figure:
+    """The figure of one instant, in numbers.
 
     Args:
-        flexion: [rad], extension negative; NaN where nobody knows: any.
-        off: How far it may be off [rad].
+        figure: As computed, in arrays of the shape ().
+        spread: Whether an accuracy of angles makes an interval of what is known.
     """
-    if math.isnan(flexion):
-        return 0.0, FARTHEST
-    first, last = (min(max(flexion + d, -FARTHEST), FARTHEST) for d in (-abs(off), abs(off)))
+    low, high = cast("tuple[Array, Array]", figure.interval)
+    known = not (figure.open or figure.nothing)
+    return replace(
+        figure,
+        value=float(cast("Array", figure.value)) if known else None,
+        interval=None if figure.nothing or (known and not spread) else (float(low), float(high)),
+        nothing=bool(figure.nothing),
+        open=bool(figure.open),
+    )
+
+
+def _wrist_span(flexion: ArrayLike, off: float) -> tuple[Array, Array]:
+    """Wrists of the least and the greatest multiplier [rad] of ones that may be off.
+
+    Args:
+        flexion: [rad], extension negative, shape (...); NaN where nobody knows: any.
+        off: How far they may be off [rad].
+    """
+    seen = np.asarray(flexion, float)
+    first, last = (np.clip(seen + d, -FARTHEST, FARTHEST) for d in (-abs(off), abs(off)))
     # Least between an extension of 30° and straight.
-    best = min(max(first, -STRAIGHT_TO), 0.0) if first <= 0 <= last or first < -STRAIGHT_TO else first
-    least = min(max(best, first), last)
-    ends = wrist_multiplier([first, last])
-    return least, (first, last)[int(ends[1] >= ends[0])]
+    bends = ((first <= 0) & (last >= 0)) | (first < -STRAIGHT_TO)
+    best = np.where(bends, np.minimum(np.maximum(first, -STRAIGHT_TO), 0.0), first)
+    least = np.minimum(np.maximum(best, first), last)
+    most = np.where(wrist_multiplier(last) >= wrist_multiplier(first), last, first)
+    unknown = np.isnan(seen)
+    return np.where(unknown, 0.0, least), np.where(unknown, FARTHEST, most)
 
 
 def _largest(exertions: Sequence[Exertion]) -> str:

@@ -176,6 +176,9 @@ def together(parts: Sequence[tuple[Flags, Figure]]) -> Figure:
         value=joined([figure.value for figure in figures]),
         interval=(joined([low for low, _ in ends]), joined([high for _, high in ends])),
         open=joined([figure.open for figure in figures]),
+        nothing=joined(
+            [np.full(np.shape(low), figure.nothing) for figure, (low, _) in zip(figures, ends, strict=True)]
+        ),
     )
 
 

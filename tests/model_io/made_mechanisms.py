@@ -98,6 +98,35 @@ def slide():
     return {"base": base, "block": block}, [Axis("prismatic", ("base", "block"), (0, 50, 20), (1, 0, 0))]
 
 
+def cylinder():
+    """A piston with its rod in a tube: it turns as well, but the way is what it is made for."""
+    tube = _cut(
+        _cylinder(25, 200, (0, 0, 0)), _cylinder(20, 180, (0, 0, 10)), _cylinder(8.05, 30, (0, 0, 180))
+    )
+    rod = _fuse(_cylinder(19.95, 15, (0, 0, 60)), _cylinder(8, 200, (0, 0, 70)))
+    return {"tube": tube, "rod": rod}, [Axis("prismatic", ("tube", "rod"), (0, 0, 0), (0, 0, 1))]
+
+
+def slider_crank():
+    """A crank on a base, a rod on its pin, and a piston between two guides."""
+    guides = [_box(150, 12, 40, (120, y, 0)) for y in (-32, 20)]
+    base = _fuse(_box(400, 100, 20, (-100, -50, -20)), _cylinder(15, 30, (0, 0, 0)), *guides)
+    base = _cut(base, _cylinder(8.1, 40, (0, 0, -10)))
+    crank = _fuse(
+        _cylinder(30, 10, (0, 0, 32)), _box(60, 20, 10, (0, -10, 32)), _cylinder(6, 22, (50, 0, 42))
+    )
+    crank = _fuse(crank, _cylinder(8, 32, (0, 0, 0)))
+    rod = _fuse(_box(130, 14, 10, (50, -7, 43)), *(_cylinder(12, 10, (x, 0, 43)) for x in (50, 180)))
+    rod = _cut(rod, *(_cylinder(6.1, 40, (x, 0, 30)) for x in (50, 180)))
+    piston = _fuse(_box(50, 40, 40, (160, -20, 0)), _cylinder(6, 20, (180, 0, 40)))
+    return {"base": base, "crank": crank, "rod": rod, "piston": piston}, [
+        Axis("revolute", ("base", "crank"), (0, 0, 0), (0, 0, 1)),
+        Axis("revolute", ("crank", "rod"), (50, 0, 0), (0, 0, 1)),
+        Axis("revolute", ("rod", "piston"), (180, 0, 0), (0, 0, 1)),
+        Axis("prismatic", ("base", "piston"), (180, 0, 0), (1, 0, 0)),
+    ]
+
+
 def arm(count=6):
     """Links of an arm with a shaft at one end and a hole at the other; each axis is across the one before."""
     parts, axes = {}, []
@@ -122,7 +151,15 @@ def arm(count=6):
     return parts, axes
 
 
-MECHANISMS = {"door": door, "clamp": clamp, "linear_axis": linear_axis, "slide": slide, "arm": arm}
+MECHANISMS = {
+    "door": door,
+    "clamp": clamp,
+    "linear_axis": linear_axis,
+    "slide": slide,
+    "cylinder": cylinder,
+    "slider_crank": slider_crank,
+    "arm": arm,
+}
 
 
 def write(path: Path, parts: dict) -> None:

@@ -17,7 +17,7 @@ from seerob.description.cad.assembly import Assembly, baked
 from seerob.description.mesh_files import MeshSource
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.moments import signed_volume
-from seerob.kernels.signed_distance import outside
+from seerob.kernels.signed_distance import farthest_outside, outside
 from seerob.kernels.tree import build_tree
 
 MADE = runpy.run_path(str(Path(__file__).parents[2] / "scripts/make-imported-line"))
@@ -95,6 +95,10 @@ def test_no_point_of_the_surface_is_farther_outside_than_said(tmp_path, toleranc
     nodes, links, T = build_tree(mesh.vertices, mesh.faces)
     far = outside(nodes, links, T, points).max()
     assert 0 < far <= shape.deviation <= 1.5 * tolerance + 1e-7
+    # Points that are farther from the surface, but inside, do not count; nothing is inside of what is open.
+    within = points[:1000] * [0.5, 0.5, 1.0]
+    assert farthest_outside(nodes, links, T, True, np.vstack([within, points])) == far
+    assert farthest_outside(nodes, links, T, False, within) > 0.1
 
 
 def test_a_face_against_the_sense_of_its_surface_has_its_outside_outside(tmp_path):

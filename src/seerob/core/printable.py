@@ -28,6 +28,11 @@ def printable(text: str) -> str:
     return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
+def is_printable(text: str) -> bool:
+    """Whether `printable` leaves a text, and every piece of it, as it is."""
+    return _OBEYED.search(text) is None
+
+
 def printable_table(value: Any) -> Any:
     """A table with every text in it `printable`, keys too."""
     if isinstance(value, str):

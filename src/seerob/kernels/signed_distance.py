@@ -165,3 +165,31 @@ def outside(nodes: Array, links: Links, T: Array, points: Array) -> Array:
             d = 0.0
         distance[n] = d
     return distance
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def farthest_outside(nodes: Array, links: Links, T: Array, closed: bool, points: Array) -> float:
+    """Distance [m] of the farthest of points (n, 3) that lie outside of the solid; 0 where none does.
+
+    Which side a point is on takes a hundred times as long as how far it is, and is asked of those alone that
+    are farther than all before.
+
+    Args:
+        nodes: As built by `seerob.kernels.tree.build_tree`.
+        links: Likewise.
+        T: Likewise.
+        closed: Whether the mesh encloses anything; no point is inside of one that does not.
+        points: In the mesh's frame [m].
+    """
+    far = 0.0
+    stack = np.empty(128, np.int32)
+    bounds = np.empty(128)
+    W = np.empty(6)
+    hint = -1
+    for n in range(len(points)):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        squared, hint = mesh_segment(nodes, links, T, x, y, z, 0.0, 0.0, 0.0, np.inf, hint, stack, bounds, W)
+        d = math.sqrt(squared)
+        if d > far and (d <= NEGLIGIBLE or not closed or not encloses(nodes, links, T, closed, x, y, z)):
+            far = d
+    return far

@@ -49,11 +49,14 @@ def named_outside(table: Mapping[str, object], folder: Path) -> Iterator[Named]:
     Raises:
         ValueError: It is nested more deeply than any table is.
     """
+    known: dict[str, Path | None] = {}  # instances share their meshes
     for key, text in texts(table):
         if len(text) > _LONGEST:
             continue
         path = folder / text
-        if (real := leads_outside(path, folder)) is not None:
+        if text not in known:
+            known[text] = leads_outside(path, folder)
+        if (real := known[text]) is not None:
             yield Named(key, text, real)
         elif key.startswith("sources[") and text and path.is_dir():
             yield from (Named(key, text, real) for real in _linked(path, folder))

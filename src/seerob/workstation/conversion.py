@@ -238,7 +238,7 @@ def _scaled(value: object, factor: float) -> object:
 
 
 def _value(value: Any, wanted: Any, place: str, file: str, problems: list[Problem]) -> Any:
-    for option in members(wanted):
+    for option in members(wanted) if isinstance(value, dict | list) else ():
         arguments = get_args(option)
         if is_struct(option) and isinstance(value, dict):
             return convert(value, option, file=file, key=place, problems=problems)

@@ -109,6 +109,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
     from seerob.app.importing import reading
     from seerob.app.importing.folder import densities, densities_of_table, files
     from seerob.app.importing.picture import FILE, picture
+    from seerob.app.importing.revision import under_former_root
 
     if options.densities is not None:
         # Of the table the figures are kept, for the next revision.
@@ -129,6 +130,9 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
             cache=cache_folder(),
             progress=say,
         )
+    renamed = ""
+    if before is not None:
+        assembly, renamed = under_former_root(assembly, before)
     assembly = reading.wanted(
         assembly,
         patterns=options.without,
@@ -149,6 +153,8 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
         _write(folder, made.texts, {**made.meshes, FILE: shown})
     else:
         _revise(folder, before, made, shown)
+        if renamed:
+            line("renamed", renamed, "yellow")
     _say(options.file, assembly, made)
     return Exit.WITHIN
 
@@ -245,7 +251,8 @@ def _say(file: Path, assembly: Assembly, made: Files) -> None:
         size = " × ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))
         triangles = sum(row["triangles"] for row in made.parts)
         several = "" if len(made.parts) == 1 else "s"
-        parts = f"{len(made.parts)} part{several} of {len(assembly.shapes)} shapes"
+        shapes = f"{len(assembly.shapes)} shape{'' if len(assembly.shapes) == 1 else 's'}"
+        parts = f"{len(made.parts)} part{several} of {shapes}"
         line("found", f"{parts}, {triangles} triangles, {size} m")
         _say_masses(made.parts)
     for row in made.robots:

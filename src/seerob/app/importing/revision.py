@@ -1,7 +1,8 @@
 """A new revision of a CAD file in a folder that was made of an older one: what stays, comes, moves and goes.
 
-Parts are the same where their full names are. What the user wrote in their tables stays; what the import
-wrote and nobody changed becomes what it writes now. Comments and the order of the file stay.
+Parts are the same where their full names are, whatever their only root is called. What the user wrote in
+their tables stays; what the import wrote and nobody changed becomes what it writes now. Comments and the
+order of the file stay.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
@@ -16,6 +18,7 @@ import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.page_messages import Change
+from seerob.description.cad.assembly import Assembly
 from seerob.workstation.editing import changed
 
 _MESH = re.compile(r"cad/[\w.\-]+\.glb|robots/[\w\-][\w.\-]*/(?:meshes/)?[\w.\-]+\.(?:stl|urdf)", re.ASCII)
@@ -33,6 +36,35 @@ class Revision(NamedTuple):
     """What is new: a word, and what it is about."""
     unused: tuple[str, ...]
     """Mesh files of the older revision that no table names any more."""
+
+
+def under_former_root(assembly: Assembly, before: Mapping[str, Any]) -> tuple[Assembly, str]:
+    """The assembly under the name that everything of the older revision is under, and what is told of it.
+
+    CAD systems call the root as the file, which a new revision often calls otherwise. It is the same root
+    where both revisions have one alone, and at least half of the fewer names below are in both.
+
+    Args:
+        assembly: Of the new revision.
+        before: The table of the older one.
+    """
+    older = [row["name"].partition("/") for row in before["parts"]]
+    newer = [name.partition("/") for name in assembly.names()]
+    roots = [{root for root, _, _ in names} for names in (older, newer)]
+    if len(roots[0]) != 1 or len(roots[1]) != 1 or roots[0] == roots[1]:
+        return assembly, ""
+    (was,), (now,) = roots
+    below = [{rest for _, _, rest in names if rest} for names in (older, newer)]
+    same, fewer = len(below[0] & below[1]), min(map(len, below))
+    if not fewer or 2 * same < fewer:
+        return assembly, ""
+    instances = tuple(replace(i, path=(was, *i.path[1:])) for i in assembly.instances)
+    left_out = tuple(
+        (was + name.removeprefix(now) if name.partition("/")[0] == now else name, why)
+        for name, why in assembly.left_out
+    )
+    text = f"{now} is taken as {was}, for {same} of {len(below[0])} names below it are the same"
+    return replace(assembly, instances=instances, left_out=left_out), text
 
 
 def revised(

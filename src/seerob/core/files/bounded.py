@@ -28,6 +28,7 @@ def missing_file(name: str | Path, remedy: str) -> str:
 def leads_outside(path: Path, folder: Path) -> Path | None:
     """Where a path leads when that exists outside a folder; None when it does not."""
     try:
+        path.stat()  # most texts of a workstation are no files: one call tells that
         real = path.resolve(strict=True)
         inside = real.is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):  # no such file, links in a circle, no name of a file

@@ -9,7 +9,7 @@ from typing import Any
 
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import TooLarge, content
-from seerob.core.printable import printable_table
+from seerob.core.printable import is_printable, printable_table
 
 MAX_FILE_SIZE = 4 << 20
 """A file larger than this [byte] is none that a user wrote."""
@@ -64,8 +64,10 @@ def _check_whole_numbers(value: Any) -> None:
 def parsed_toml(raw: bytes, path: Path) -> dict[str, Any]:
     """Content of a TOML file that was read; raises as `read_toml` does."""
     try:
-        table: dict[str, Any] = printable_table(loads(raw.decode("utf-8-sig").replace("\r\n", "\n")))
-        return table
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+        table: dict[str, Any] = loads(text)
+        # Only an escape writes what the text itself does not have.
+        return table if "\\" not in text and is_printable(text) else printable_table(table)
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError.at(path, f"line {line}", "not UTF-8", "save it as UTF-8 text") from error

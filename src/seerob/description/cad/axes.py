@@ -36,6 +36,8 @@ GAP = 3e-4
 """Planes that are apart by less touch [m], as do parts."""
 LEAST = 1e-3
 """Surfaces that lie beside each other for less are no fit [m]."""
+GOES_ON = 4.0
+"""A shaft or its hole that is so many times as long as what fits of it is a way rather than a bearing."""
 MOST_PAIRS = 20_000
 """Pairs of parts near each other that are looked at."""
 STEPS = 72
@@ -202,6 +204,8 @@ class _Fit:
     gap: float
     covered: float
     cone: bool
+    longer: float
+    """Length of the shaft or of the hole, whichever is more [m]."""
 
 
 def _fits(a: Sequence[Round], b: Sequence[Round]) -> list[_Fit]:
@@ -224,7 +228,8 @@ def _fits(a: Sequence[Round], b: Sequence[Round]) -> list[_Fit]:
             middle = (max(-one.half, along - other.half) + min(one.half, along + other.half)) / 2
             covered = min(one.covered, other.covered)
             cone = bool(abs(one.slope) > 1e-6)
-            found.append(_Fit(one.point + middle * one.axis, one.axis, length, at, gap, covered, cone))
+            point, longer = one.point + middle * one.axis, 2 * max(one.half, other.half)
+            found.append(_Fit(point, one.axis, length, at, gap, covered, cone, longer))
     return sorted(found, key=lambda fit: -fit.length * fit.covered)
 
 
@@ -289,7 +294,12 @@ def _turning(
         yield Proposal(JointKind.REVOLUTE, a, b, best.point, best.axis, score, "; ".join(told))
         if number not in parallel and not shoulders:
             told = [told[0], "nothing holds it along the axis"]
-            yield Proposal(JointKind.PRISMATIC, a, b, best.point, best.axis, score * 0.6, "; ".join(told))
+            goes_on = min(fit.longer for fit in group) / length
+            share = 0.6
+            if goes_on >= GOES_ON:
+                share = 1.1
+                told.append(f"shaft or hole go on {goes_on:.2g} times as long")
+            yield Proposal(JointKind.PRISMATIC, a, b, best.point, best.axis, score * share, "; ".join(told))
 
 
 def _touching(a: Sequence[Flat], b: Sequence[Flat]) -> list[tuple[Array, Array]]:

@@ -25,7 +25,7 @@ from seerob.description.cad.opencascade import plain
 from seerob.description.mesh_files import MeshSource
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.moments import signed_volume
-from seerob.kernels.signed_distance import outside
+from seerob.kernels.signed_distance import farthest_outside
 from seerob.kernels.tree import build_tree
 
 TOLERANCE = 1e-4
@@ -176,11 +176,11 @@ def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Sh
 def _contradicted(row: dict[str, Any]) -> Iterator[str]:
     """What the file states of a shape and its surface does not have: something was lost, or never there."""
     stated = row["stated"]
-    for key, what, unit in (("volume", "volume", "m³"), ("area", "area", "m²")):
+    for key, what, unit in (("volume", "a volume", "m³"), ("area", "an area", "m²")):
         has = row[key]
         if stated.get(key, 0.0) > 0 and has > 0 and abs(has / stated[key] - 1) > VALIDATION:
             share = 100 * (has / stated[key] - 1)
-            yield f"the file states a {what} of {stated[key]:.6g} {unit}; its surface has {share:+.2g} %"
+            yield f"the file states {what} of {stated[key]:.6g} {unit}; its surface has {share:+.2g} %"
     if "center" in stated and row["center"] is not None and row["volume"] > 0:
         off = float(np.linalg.norm(np.subtract(stated["center"], row["center"])))
         if off > VALIDATION * row["volume"] ** (1 / 3):
@@ -191,9 +191,7 @@ def _farthest(whole: Mesh, points: Array) -> float:
     """How far the farthest of points on the surface lies outside the triangles [m]."""
     if not len(points) or not len(whole.faces):
         return 0.0
-    faces = whole.faces
-    if not is_closed(whole):
-        # Sides that are there twice enclose nothing: what counts is how far the triangles are.
-        faces = np.vstack([faces, faces[:, ::-1]])
-    nodes, links, T = build_tree(np.ascontiguousarray(whole.vertices), np.ascontiguousarray(faces, np.int32))
-    return float(outside(nodes, links, T, np.ascontiguousarray(points)).max())
+    vertices, faces = np.ascontiguousarray(whole.vertices), np.ascontiguousarray(whole.faces, np.int32)
+    return float(
+        farthest_outside(*build_tree(vertices, faces), is_closed(whole), np.ascontiguousarray(points))
+    )

@@ -14,7 +14,7 @@ import re
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -282,10 +282,12 @@ class Quantity(NamedTuple):
 
 def row_of(quantity: Quantity) -> Range | None:
     """The first row that is of it; None when none is."""
-    fitting = (
-        row for row in data().ranges if row.unit == quantity.unit and fnmatchcase(quantity.kind, row.key)
-    )
-    return next(fitting, None)
+    return _row(quantity.kind, quantity.unit)
+
+
+@lru_cache(4096)
+def _row(kind: str, unit: str) -> Range | None:
+    return next((row for row in data().ranges if row.unit == unit and fnmatchcase(kind, row.key)), None)
 
 
 def implausible(values: Sequence[float], row: Range) -> float | None:

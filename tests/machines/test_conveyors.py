@@ -1,5 +1,6 @@
 """Surfaces that run: loose workpieces ride along, from gripper to belt and off its end, and come back."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -128,3 +129,23 @@ def test_a_belt_that_stands_lets_nothing_creep(tmp_path):
     cell = Cell(tmp_path).go(20, 0.0)
     begin = cell.at()
     assert np.abs(cell.go(200, 0.0).at() - begin).max() < 2e-4
+
+
+def test_what_a_belt_carries_presses_on_it_as_mujoco_tells_and_lags_no_more_than_its_step(tmp_path):
+    """Contact by contact, by MuJoCo's own sums and velocities: what is compiled asks for neither."""
+    engine = Cell(tmp_path).go(30, 0.2).engine
+    loose, mj, data = engine._loose, engine._mj, engine._data
+    assert loose._pressed() == data.ncon == 4
+    force, total = np.zeros(6), np.zeros(3)
+    for k in range(data.ncon):
+        mujoco.mj_contactForce(mj, data, k, force)
+        total += data.contact.frame[k][:3] * force[0]
+    np.testing.assert_allclose(np.abs(loose._normal[0, 0]), np.abs(total), rtol=1e-12, atol=1e-12)
+    assert loose._normal[0, 0, 2] == pytest.approx(0.8 * 9.81, rel=0.01), "upward, as heavy as it is"
+    piece = loose._pieces["blank"]
+    velocity = np.zeros(6)
+    mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
+    loose._xfrc[:] = 0.0
+    loose._rub(piece, np.array([0.2, 0.0, 0.0]), loose._normal[0, 0], 1.0)
+    slip = velocity[3:] - (0.2, 0.0, 0.0)
+    np.testing.assert_allclose(loose._xfrc[piece.body, :2], -0.5 * 0.8 * slip[:2], rtol=1e-6, atol=1e-12)

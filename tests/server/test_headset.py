@@ -8,17 +8,28 @@ import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 
+from seerob.app.emulation.mvn_person import Pose, segments
+from seerob.app.emulators.headset import seen as visitor
 from seerob.app.server.access import Tokens
 from seerob.app.server.live import Live
 from seerob.app.server.serving import Server
 from seerob.core.samples import BodySample
 from seerob.core.snapshot import Tracked, Tracking
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.description.capture.calibration import POSTURES, CalibrationPose
 from seerob.description.capture.estimated import estimated
+from seerob.description.capture.following import Following
 from seerob.description.capture.mapping import conventions
-from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, SHORTEST
+from seerob.description.humans import manikin
+from seerob.description.humans.angles import angles
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import bone_poses
+from seerob.devices.capture.options import Calibration
+from seerob.devices.capture.stream_source import _Hearing
+from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, SHORTEST, Offer
 from seerob.devices.live.listening import Listener
 from seerob.devices.live.receivers import Receivers
-from seerob.devices.sources.headset import Headset
+from seerob.devices.sources.headset import Headset, frame, layout_of
 from server.frames import MESHES, PATIENCE, Visitor, scene
 
 POINTS = ("viewer", "left-grip", "right-grip")
@@ -321,3 +332,50 @@ def test_who_does_not_stand_still_is_not_fitted(server, samples):
         assert answer.fits is False
         assert "stand still" in answer.found
         assert after.placing is None
+
+
+def worn(*, calibrated, blind=()):
+    """Somebody who turns neck and wrist, as a headset sees them that does not track the names in `blind`.
+
+    Returns:
+        What nothing tells of their posture, its angles as they are captured, and as they are.
+    """
+    person = manikin.build(name="anna", stature=1.75, mass=75.0, sex="male")
+    calibration = Calibration(pose=CalibrationPose.NPOSE if calibrated else CalibrationPose.NONE)
+    source = Headset(human="anna", name="headset", calibration=calibration)
+    hearing, following = _Hearing(source, person), Following(person, np.eye(4))
+    upright = posture(person, POSTURES[CalibrationPose.NPOSE])
+    turns = {"neck_turn_left_deg": 30.0, "right_wrist_ulnar_deviation_deg": 20.0}
+    bent = posture(person, turns | POSTURES[CalibrationPose.NPOSE])
+    layout, found = None, []
+    for k in range(200):
+        places, turns = segments(person, upright if k < 80 else bent)
+        pose = Pose(places, np.array([wxyz_from_rotation(turn) for turn in turns]))
+        names, poses = visitor(lambda _, pose=pose: pose, body=True)(0.0)
+        poses[[name in blind for name in names]] = np.nan
+        layout = layout or layout_of(names)
+        t, places = k / 72, poses[:, :3] + 1e-6 * (k % 3)
+        offer = Offer(t, t, names, places, poses[:, 3:], (False,) * len(names))
+        sample = hearing.take(layout, frame(offer, layout), t)
+        if isinstance(sample, BodySample):
+            following.hear(sample)
+            found += following.until(t)
+    return found[-1].undetermined, *(angles(*bone_poses(person, q)) for q in (found[-1].q, bent))
+
+
+def test_turns_of_headset_and_controllers_count_once_it_is_known_how_they_are_worn():
+    untold, captured, said = worn(calibrated=True)
+    assert untold == frozenset()
+    for name in ("neck_twist", "wrist_deviation", "wrist_flexion", "forearm_rotation"):
+        np.testing.assert_allclose(
+            getattr(captured, name), getattr(said, name), atol=np.radians(3.0), err_msg=name
+        )
+    bent = "wrist_flexion", "wrist_deviation", "forearm_rotation"
+    wrists = {(what, side) for what in bent for side in range(2)}
+    uncalibrated, *_ = worn(calibrated=False)
+    assert uncalibrated == wrists | {("neck_twist", 0), ("neck_side_bend", 0)}
+    one_lost, *_ = worn(calibrated=True, blind=("viewer", "left-grip"))
+    assert one_lost == {
+        *((what, 1) for what in bent),
+        *((f"neck_{w}", 0) for w in ("flexion", "twist", "side_bend")),
+    }

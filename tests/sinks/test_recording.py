@@ -82,7 +82,8 @@ def test_who_looked_on_has_one_channel_that_other_recordings_lack(path, tmp_path
 
 def test_seek_agrees_with_search_in_all_of_it(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder_module, "FLUSH_PERIOD", 0.0)  # a chunk per few ticks
-    recording = Recording.open(record(tmp_path, pause=1e-3))
+    monkeypatch.setattr(recorder_module, "TOGETHER", 1)
+    recording = Recording.open(record(tmp_path, pause=2e-3))
     every = list(recording.snapshots())
     assert every == [made_run.snapshot(k) for k in range(N)]
     rng = np.random.default_rng(1)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 __version__: str
 
 class MjOption:
+    cone: int
     disableflags: int
     gravity: NDArray[np.float64]
     integrator: int
@@ -130,6 +131,7 @@ class MjData:
     ctrl: NDArray[np.float64]
     cvel: NDArray[np.float64]
     energy: NDArray[np.float64]
+    efc_force: NDArray[np.float64]
     ncon: int
     nplugin: int
     qacc: NDArray[np.float64]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -88,18 +88,12 @@ class Angles:
 
     def without(self, bones: Collection[str]) -> Angles:
         """Return these angles, with NaN for every angle that needs one of the bones: it is not assessed."""
-        changed: dict[str, Array] = {}
-        for name, needed in NEEDS.items():
-            values = np.array(getattr(self, name), float)
-            for side, own in enumerate(SIDES):
-                if any(bone.format(side=own) in bones for bone in needed):
-                    values[(..., side) if name in SIDED else ...] = np.nan
-            if not np.array_equal(values, getattr(self, name), equal_nan=True):
-                changed[name] = values
-        return replace(self, **changed) if changed else self
+        return self.masked(made_of(frozenset(bones)))
 
     def masked(self, angles: Collection[tuple[str, int]]) -> Angles:
         """Set the angles named, by name and side (0 right, 1 left), to NaN: they are not assessed."""
+        if not angles:
+            return self
         changed = {name: np.array(getattr(self, name), float) for name, _ in angles}
         for name, side in angles:
             changed[name][(..., side) if name in SIDED else ...] = np.nan
@@ -139,6 +133,17 @@ SIDED = frozenset(NEEDS) - {
     f"{part}_{way}" for part in ("trunk", "neck") for way in ("flexion", "side_bend", "twist")
 }
 """Angles with a last axis (right, left)."""
+
+
+@lru_cache(maxsize=256)
+def made_of(bones: frozenset[str]) -> tuple[tuple[str, int], ...]:
+    """Angles that need one of the bones, each with its side: 0 right or none, 1 left."""
+    return tuple(
+        (name, side)
+        for name, needed in NEEDS.items()
+        for side, own in enumerate(SIDES if name in SIDED else SIDES[:1])
+        if any(bone.format(side=own) in bones for bone in needed)
+    )
 
 
 def angles(rotations: ArrayLike, positions: ArrayLike) -> Angles:

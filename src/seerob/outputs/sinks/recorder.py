@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 FLUSH_PERIOD = 0.4
 """Longest time that a tick waits before it is on disk [s]."""
 
+TOGETHER, GATHER = 50, 0.05
+"""So many ticks are taken over at once, or those of so long [s]."""
+
 MAX_REASON = 2000
 """Longest reason that is recorded of a run that broke off [characters]."""
 
@@ -98,6 +101,7 @@ class RecorderWriter(Closing):
         self.out_of_order = 0
         """Ticks left out because seq or time did not advance."""
         self._tape, self._lossless, self._queue = tape, lossless, queue
+        self._together = min(TOGETHER, queue)
         self._waiting: deque[_Waiting] = deque()
         self._condition = Condition()
         self._closing = False
@@ -155,7 +159,8 @@ class RecorderWriter(Closing):
                 visitors, presences = self._visited.take(), self._visited.seen()
             pictures = () if self._pictured is None or kept is None else self._pictured.taken()
             self._waiting.append(_Waiting(seq, t, samples, kept, visitors, presences, pictures))
-            self._condition.notify_all()
+            if len(self._waiting) >= self._together:
+                self._condition.notify_all()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -212,9 +217,10 @@ class RecorderWriter(Closing):
         oldest: float | None = None  # when the first tick that is not on disk was written
         while True:
             with self._condition:
-                while not self._waiting and not self._closing:
-                    left = None if oldest is None else oldest + FLUSH_PERIOD - time.monotonic()
-                    if left is not None and left <= 0:
+                # Woken at every tick it would hold the twin up at every tick.
+                gathered = time.monotonic() + GATHER
+                while len(self._waiting) < self._together and not self._closing:
+                    if (left := gathered - time.monotonic()) <= 0:
                         break
                     self._condition.wait(left)
                 # A few at a time: a long backlog must not delay the flush.
@@ -227,7 +233,7 @@ class RecorderWriter(Closing):
                 self._tape.finish(self._counts(), self._broken_off)
                 return
             if taken and oldest is None:
-                oldest = time.monotonic()
+                oldest = time.monotonic() - GATHER
             for tick in taken:
                 self._tape.tick(tick.seq, tick.t, tick.samples, tick.snapshot)
                 self._tape.visitors(tick.t, tick.visitors)
@@ -235,7 +241,8 @@ class RecorderWriter(Closing):
                     self._tape.presences(tick.t, tick.presences)
                 for camera, jpeg in tick.pictures:
                     self._tape.picture(tick.t, camera, jpeg)
-            if oldest is not None and time.monotonic() - oldest >= FLUSH_PERIOD:
+            # Looked at again a `GATHER` later.
+            if oldest is not None and time.monotonic() + GATHER - oldest >= FLUSH_PERIOD:
                 self._tape.flush()
                 oldest = None
 

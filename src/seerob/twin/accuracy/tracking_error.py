@@ -210,16 +210,15 @@ class TrackingError:
             unaimed, inferred = hearing.unaimed(state.t), self._inferred(state, person, errors)
             for k, (_, bone, reach) in enumerate(points):
                 position, angle = errors.get(bone, (None, None))
-                chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
-                found[k] = (position or 0.0) + max((angle or 0.0) * reach, chord)
-                found[k] = max(found[k], inferred.get(bone, 0.0))
+                chord = 2 * reach * math.sin(unaimed[bone] / 2) if bone in unaimed else 0.0
+                own = (position or 0.0) + max((angle or 0.0) * reach, chord)
+                found[k] = max(own, inferred.get(bone, 0.0))
         if stray:
             away, turns = state.strayed(person, tuple(where.values()))
             for k, (_, bone, reach) in enumerate(points):
                 row = place[bone]
                 found[k] += away[row] + 2 * reach * np.sin(turns[row] / 2)
-        if errors:
-            slack = hearing.slack(state.t)
+        if errors and (slack := hearing.slack(state.t)):
             found += [slack.get(bone, 0.0) for _, bone, _ in points]
         for placing in hearing.placings(state.t) if errors else ():
             if placing.covariance:

@@ -117,6 +117,7 @@ class Grips:
                 if isinstance(machine.motion, Fingers)
                 and any(fnmatchcase(name, machine.motion.takes) for name in loose.names)
             ]
+        self._masses = np.zeros(0)
         self._weigh(state)
 
     def follow(self, state: State) -> bool:
@@ -127,9 +128,11 @@ class Grips:
         return any(changed)
 
     def _weigh(self, state: State) -> None:
-        if self._grips:
+        mj = state.model.mj
+        if self._grips and not np.array_equal(self._masses, mj.body_subtreemass):
+            self._masses = mj.body_subtreemass.copy()
             mechanisms = state.model.mechanisms.values()
-            state.columns = {m.name: Columns.of(m, state.model.mj) for m in mechanisms}
+            state.columns = {m.name: Columns.of(m, mj) for m in mechanisms}
 
 
 class _Grip:

@@ -38,7 +38,6 @@ from seerob.core.samples import GrabSample
 from seerob.core.snapshot import Event
 from seerob.core.transforms import (
     Array,
-    cross,
     inverse,
     length,
     rotation_from_rpy,
@@ -46,6 +45,7 @@ from seerob.core.transforms import (
     transform,
     wxyz_from_rotation,
 )
+from seerob.kernels import loose as kernel
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.machines import BODY
@@ -112,8 +112,12 @@ class _Piece:
     radius: float
     """Of the ball about its centre of mass that contains it [m]."""
     friction: float
+    com: Array
+    """Centre of mass in its frame [m], shape (3,)."""
+    moments: Array
+    """Principal ones about it [kg·m²], shape (3,)."""
     inertia: float
-    """Largest moment about its centre of mass [kg·m²]."""
+    """The largest of them."""
     hands: dict[str, _Spring] = field(default_factory=dict)
     place: str = ""
     """Where it lies, or whose spring pulls it."""
@@ -181,7 +185,18 @@ class Loose:
             if body.role == "part" and body.owner == part.name
         }
         """Surfaces that run, by MuJoCo's body."""
-        self._by_body = {piece.body: piece for piece in self._pieces.values()}
+        self._body_of, self._cone = physics.geom_bodyid.astype(np.int32), int(physics.opt.cone)
+        self._piece_of, self._surface_of = np.full((2, physics.nbody), -1, np.int64)
+        self._piece_of[[piece.body for piece in self._pieces.values()]] = np.arange(len(self._pieces))
+        self._surface_of[list(self._running)] = np.arange(len(self._running))
+        self._normal = np.zeros((len(self._pieces), len(self._running), 3))
+        self._touch = np.zeros(self._normal.shape[:2], bool)
+        self._riding = False
+        """Whether anything lay on a surface that runs at the step before."""
+        # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
+        self._placed = data.xpos, data.xmat, data.ximat
+        self._moving = data.xipos, data.cvel, data.subtree_com, physics.body_rootid
+        self._xfrc, self._gravity = data.xfrc_applied, physics.opt.gravity
         self._back: list[tuple[_Piece, str]] = []
         """What is put into the pose of a place at the next tick."""
         self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
@@ -193,8 +208,22 @@ class Loose:
         """When places were filled [s]."""
         self._first: float | None = None
         """When anything was taken first [s]."""
-        self._before: dict[str, tuple[Array, Array]] = {}
+        self._before: dict[str, tuple[list[float], float, int]] = {}
         self._pulls = False
+        self._second = np.array([piece.q[4] for piece in self._pieces.values()], np.int64)
+        """Columns of their second turns in ``qpos``."""
+        if (
+            self._pieces
+        ):  # Loops that are not kept yet are compiled now: a run that waits for them falls behind.
+            self._compile()
+
+    def _compile(self) -> None:
+        """Ask each loop once, of nothing."""
+        piece = next(iter(self._pieces.values()))
+        self._pull(piece, _Spring(0, np.eye(4)), self._mj.opt.timestep)
+        self._pressed()
+        self._rub(piece, np.zeros(3), np.zeros(3), self._mj.opt.timestep)
+        self._xfrc[:] = 0.0
 
     def bodies(self) -> frozenset[int]:
         """Bodies of all of them, by index."""
@@ -211,7 +240,7 @@ class Loose:
         while self._waiting and self._waiting[0].t <= t + SLACK:
             self._grab(self._waiting.popleft(), t)
         if self._pulls:
-            self._data.xfrc_applied[:] = 0.0
+            self._xfrc[:] = 0.0
             self._pulls = False
         if self._running:
             self._drag(t, dt)
@@ -230,28 +259,29 @@ class Loose:
 
     def _drag(self, t: float, dt: float) -> None:
         """Let surfaces that run drag what lies on them."""
-        data, force = self._data, np.zeros(6)
-        pressed: dict[int, dict[int, Array]] = {}
-        """By MuJoCo's body of a workpiece and of what runs: the sum of normal forces [N]."""
-        for k, (one, other) in enumerate(self._mj.geom_bodyid[data.contact.geom].tolist()):
-            if not (
-                (one in self._running and other in self._by_body)
-                or (other in self._running and one in self._by_body)
-            ):
-                continue
-            mujoco.mj_contactForce(self._mj, data, k, force)
-            normal = data.contact.frame[k][:3] * (force[0] if one in self._running else -force[0])
-            below, piece = (one, other) if one in self._running else (other, one)
-            on = pressed.setdefault(piece, {})
-            on[below] = on.get(below, np.zeros(3)) + normal
-        for piece in self._pieces.values():
-            if piece.rides is not None and piece.body not in pressed:
+        count = self._pressed()
+        if not count and not self._riding:
+            return
+        self._riding = bool(count)
+        for piece, touch, normals in zip(
+            self._pieces.values(), self._touch.tolist(), self._normal, strict=True
+        ):
+            if piece.rides is not None and not any(touch):
                 piece.rides = None
                 if not piece.hands:
                     piece.falls, piece.since = True, math.inf
-        for body, on in pressed.items():
-            for below, normal in on.items():
-                self._ride(self._by_body[body], self._running[below], normal, t, dt)
+            for runs, lies, normal in zip(self._running.values(), touch, normals, strict=True):
+                if lies:
+                    self._ride(piece, runs, normal, t, dt)
+
+    def _pressed(self) -> int:
+        """How many contacts workpieces have with surfaces that run; sums their normal forces."""
+        contact = self._data.contact
+        found = kernel.pressed(
+            contact.geom, contact.frame, contact.dim, contact.efc_address, self._data.efc_force,
+            self._cone, self._body_of, self._piece_of, self._surface_of, self._normal, self._touch,
+        )  # fmt: skip
+        return int(found)
 
     def _ride(self, piece: _Piece, runs: _Running, normal: Array, t: float, dt: float) -> None:
         known = self._signals.at(runs.variable, t)
@@ -260,62 +290,30 @@ class Loose:
             if not self.is_lost(piece.name) and not piece.hands:
                 reason = f"{piece.name}: how far {runs.part} took it along nobody knows ({why})"
                 self.lose([piece.name], reason)
-        speed = float(known.value or 0.0)
-        piece.rides, piece.by = speed * runs.way, piece.by or runs.part
-        pressure = float(length(normal))
-        if not pressure:
-            return
-        up = normal / pressure
-        velocity = np.zeros(6)
-        mujoco.mj_objectVelocity(self._mj, self._data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
-        slip = velocity[3:] - piece.rides
-        slip = slip - up * (up @ slip)
-        fast, spin = float(length(slip)), float(up @ velocity[:3])
-        most = piece.friction * pressure
-        if fast > 0:
-            drag = min(most, 0.5 * piece.mass * fast / dt)
-            self._data.xfrc_applied[piece.body, :3] -= drag * slip / fast
-        turn = min(0.5 * most * piece.radius, 0.5 * piece.inertia * abs(spin) / dt)
-        self._data.xfrc_applied[piece.body, 3:] -= math.copysign(turn, spin) * up
+        piece.rides, piece.by = float(known.value or 0.0) * runs.way, piece.by or runs.part
+        self._rub(piece, piece.rides, normal, dt)
         self._pulls = True
+
+    def _rub(self, piece: _Piece, rides: Array, normal: Array, dt: float) -> None:
+        """Set the friction on a surface that runs at a velocity [m/s] and presses it with a force [N]."""
+        xipos, cvel, subtree_com, root = self._moving
+        kernel.drag(
+            xipos, cvel, subtree_com, root, self._xfrc, piece.body, rides, normal, piece.mass,
+            piece.friction, piece.inertia, piece.radius, dt,
+        )  # fmt: skip
 
     def _pull(self, piece: _Piece, spring: _Spring, dt: float) -> float:
         """Set the forces of a spring; how far the workpiece is from where it pulls [m]."""
-        mj, data, omega = self._mj, self._data, self._firm if spring.firm else self._omega
-        carrier = _pose(data, spring.carrier)
-        wanted = carrier @ spring.carrier_from_piece
-        here = _pose(data, piece.body)
-        com = data.xipos[piece.body].copy()
-        to = wanted[:3, :3] @ mj.body_ipos[piece.body] + wanted[:3, 3]
-        if spring.reels:
-            away = to - carrier[:3, 3]
-            far, least = float(length(away)), piece.radius + 0.5 * NEAR
-            rest = max(far - REEL * dt, least)
-            shift = away * (rest / far - 1) if far > least else np.zeros(3)
-            spring.carrier_from_piece[:3, 3] += carrier[:3, :3].T @ shift
-            spring.reels = rest > least
-            to = to + shift
-        velocity, of_carrier = np.zeros(6), np.zeros(6)
-        mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
-        if spring.carrier:
-            mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_XBODY, spring.carrier, of_carrier, 0)
-        spin = of_carrier[:3]
-        speed = of_carrier[3:] + cross(spin, to - carrier[:3, 3])
-        gap = to - com
-        pulled = min(piece.mass, HEAVY)
-        wanted_speed = _at_most(speed + 0.5 * omega * gap, FASTEST)
-        force = 2 * omega * pulled * (wanted_speed - velocity[3:]) - piece.mass * mj.opt.gravity
-        turn = wanted[:3, :3] @ here[:3, :3].T
-        axes = data.ximat[piece.body].reshape(3, 3)
-        inertia = axes @ np.diag(mj.body_inertia[piece.body]) @ axes.T
-        wanted_spin = _at_most(spin + 0.5 * omega * _rotation_vector(turn), QUICKEST)
-        torque = 2 * omega * inertia @ (wanted_spin - velocity[:3])
-        data.xfrc_applied[piece.body] += np.concatenate([force, torque])
-        if spring.carrier:
-            lever = (com if spring.firm else carrier[:3, 3]) - data.xipos[spring.carrier]
-            moment = cross(lever, force) + (torque if spring.firm else 0.0)
-            data.xfrc_applied[spring.carrier] += np.concatenate([-force, -moment])
-        return float(length(gap))
+        xpos, xmat, ximat = self._placed
+        xipos, cvel, subtree_com, root = self._moving
+        gap, reels = kernel.pull(
+            xpos, xmat, ximat, xipos, cvel, subtree_com, root, self._xfrc, self._gravity, piece.com,
+            piece.moments, piece.body, spring.carrier, spring.carrier_from_piece, piece.mass,
+            min(piece.mass, HEAVY), piece.radius, self._firm if spring.firm else self._omega, spring.firm,
+            spring.reels, REEL * dt, 0.5 * NEAR, FASTEST, QUICKEST,
+        )  # fmt: skip
+        spring.reels = bool(reels)
+        return float(gap)
 
     # -- hands ------------------------------------------------------------------------------
 
@@ -481,9 +479,10 @@ class Loose:
             self._data.qacc_warmstart[piece.v] = 0.0
             piece.place, piece.rides = "", None
             self._before.pop(piece.name, None)
-        for piece in self._pieces.values():
-            if abs(self._data.qpos[piece.q[4]]) > TILTED:
-                self._put_frame_anew(piece, before)
+        if len(self._second) and np.abs(self._data.qpos[self._second]).max() > TILTED:
+            for piece in self._pieces.values():
+                if abs(self._data.qpos[piece.q[4]]) > TILTED:
+                    self._put_frame_anew(piece, before)
         return tuple(piece.name for piece, _ in back)
 
     def _put_frame_anew(self, piece: _Piece, before: Array) -> None:
@@ -520,18 +519,18 @@ class Loose:
 
     def end(self, t: float) -> None:
         """After a tick at ``t`` [s]: look what lies, and where."""
+        places = self._shown.xpos
         for piece in self._pieces.values():
-            here = _pose(self._shown, piece.body)
-            carrier = 0 if piece.pulled is None else piece.pulled.carrier
-            local = inverse(_pose(self._shown, carrier)) @ here
+            place, carrier = places[piece.body], 0 if piece.pulled is None else piece.pulled.carrier
+            if carrier:
+                place = self._shown.xmat[carrier].reshape(3, 3).T @ (place - places[carrier])
             if piece.rides is not None:
-                local[:3, 3] -= t * piece.rides
-            last = self._before.get(piece.name)
-            self._before[piece.name] = local[:3, 3], np.array([t, carrier])
+                place = place - t * piece.rides
+            here = place.tolist()
+            last, self._before[piece.name] = self._before.get(piece.name), (here, t, carrier)
             if not piece.falls:
                 continue
-            span = math.inf if last is None or last[1][1] != carrier else t - float(last[1][0])
-            if last is None or float(np.linalg.norm(local[:3, 3] - last[0])) > STILL * span:
+            if last is None or (last[2] == carrier and math.dist(here, last[0]) > STILL * (t - last[1])):
                 piece.since = math.inf
                 continue
             piece.since = min(piece.since, t)
@@ -633,6 +632,8 @@ def _piece(model: Model, name: str, torn: float) -> _Piece:
         torn,
         max(reach, default=0.0),
         table.friction,
+        com.copy(),
+        model.mj.body_inertia[body].copy(),
         float(model.mj.body_inertia[body].max()),
     )
 
@@ -655,12 +656,6 @@ def _fixed(model: Model, place: Place) -> tuple[int, Array, float]:
 def _pose(data: mujoco.MjData, body: int) -> Array:
     """World from body, shape (4, 4)."""
     return transform(data.xmat[body].reshape(3, 3), data.xpos[body])
-
-
-def _at_most(vector: Array, most: float) -> Array:
-    """A vector, no longer than that."""
-    far = float(length(vector))
-    return vector if far <= most else vector * (most / far)
 
 
 def _about(axis: int, angle: float) -> Array:

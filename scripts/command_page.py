@@ -63,7 +63,8 @@ def _sentence(text: str | None) -> str:
 def _options(parser: argparse.ArgumentParser) -> str:
     rows = []
     for action in parser._actions:
-        if isinstance(action, argparse._HelpAction | argparse._SubParsersAction):
+        hidden = action.help == argparse.SUPPRESS
+        if hidden or isinstance(action, argparse._HelpAction | argparse._SubParsersAction):
             continue
         shown = ", ".join(f"`{word}`" for word in _words(action))
         text = ((action.help or "") % {"default": action.default}).replace("|", "\\|").replace("<", "\\<")

@@ -2,6 +2,7 @@
 
 import base64
 import re
+import sys
 from pathlib import Path
 
 import made_run
@@ -78,9 +79,31 @@ def test_no_rule_of_the_style_stands_twice(tmp_path):
     assert len(rules) == len(set(rules)) > 20
 
 
-def test_without_a_browser_nothing_begins(tmp_path, monkeypatch):
+@pytest.fixture
+def without_browser(monkeypatch):
     monkeypatch.setattr(printing, "BROWSERS", ())
     monkeypatch.delenv("CHROMIUM", raising=False)
+
+
+@pytest.mark.usefixtures("without_browser")
+def test_without_a_browser_weasyprint_prints_and_reads_nothing_beside_the_page(tmp_path, caplog):
+    (tmp_path / "secret.png").write_bytes(PIXEL)
+    beside = f'<img src="{(tmp_path / "secret.png").as_uri()}"></body>'
+    with Dossier(pdf=True, pictures=0).open(made_run.scene(), made_run.MESHES, {}, tmp_path) as writer:
+        writer.write(made_run.snapshot(0), made_run.samples(0))
+    page = (tmp_path / "report.html").read_text()
+    data = (tmp_path / "report.pdf").read_bytes()
+    assert data.startswith(b"%PDF")
+    assert b"%%EOF" in data[-99:]
+    assert "</body>" in page
+    assert not caplog.records
+    printing.printed(page.replace("</body>", beside).encode())
+    assert "Failed to load image" in caplog.text
+
+
+@pytest.mark.usefixtures("without_browser")
+def test_without_a_browser_and_weasyprint_nothing_begins(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
     with pytest.raises(InputError, match="no Chromium, Chrome or Edge is installed; install one"):
         Dossier(pdf=True).open(made_run.scene(), {}, {}, tmp_path)
 

@@ -30,6 +30,7 @@ EXTRAS = {
     "robot_descriptions": "robots",
     "pxr": "usd",
     "cv2": "camera",
+    "weasyprint": "print",
 }
 """Package as it is imported → the extra that brings it."""
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def add_pdf(sub: argparse.ArgumentParser) -> None:
     """The option of commands that write a report."""
-    text = "also print the report to PDF, by a Chromium, Chrome or Edge that is installed"
+    text = "also print the report to PDF, by a Chromium, Chrome or Edge that is installed, or WeasyPrint"
     sub.add_argument("--pdf", action="store_true", help=text)
 
 

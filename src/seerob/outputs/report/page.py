@@ -84,9 +84,9 @@ figcaption {{ font-size: .84rem; color: var(--soft); margin-top: .3rem; }}
 .logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
 section.criterion {{ border-top: 1px solid var(--rule); padding-top: .2rem; margin-top: 1.6rem; }}
 h2 + section.criterion {{ border-top: none; margin-top: 0; }}
-@media print, (min-width: 56rem) {{
+.evidence > :only-child {{ grid-column: 1 / -1; }}
+@media screen and (min-width: 56rem) {{
   .evidence {{ display: grid; grid-template-columns: 4fr 5fr; gap: 1rem; align-items: center; }}
-  .evidence > :only-child {{ grid-column: 1 / -1; }}
 }}
 @media screen and (max-width: 56rem) {{
   table {{ display: block; overflow-x: auto; }}
@@ -104,7 +104,7 @@ h2 + section.criterion {{ border-top: none; margin-top: 0; }}
   table {{ font-size: 7.5pt; line-height: 1.3; margin: .3rem 0; }}
   th, td {{ padding: .1rem .4rem; }}
   section.criterion {{ margin-top: .6rem; }}
-  .evidence {{ grid-template-columns: 4fr 6fr; }}
+  .evidence {{ display: grid; grid-template-columns: 4fr 6fr; gap: 1rem; align-items: center; }}
   .lanes {{ width: 80%; }}
   .lead {{ margin: .1rem 0 .3rem; font-size: 8pt; }}
   .parts {{ font-size: 6.8pt; }}

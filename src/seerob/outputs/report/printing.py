@@ -1,7 +1,8 @@
-"""The report on paper: printed to PDF by a browser that is installed."""
+"""The report on paper: printed to PDF by a browser that is installed, or by WeasyPrint where none is."""
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from seerob.core.errors import InputError
+from seerob.core.extras import MissingPackage, need
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 """That print by the same options, as they are found on the path; ``CHROMIUM`` names another."""
@@ -24,35 +26,62 @@ QUIETLY = (
 )
 _TAIL = 1024
 """Of a file in which its end mark is [bytes]."""
+_NARROWER = ".overview td:last-child { min-width: 0 !important; width: 34%; }"
+"""WeasyPrint lets a table grow beyond the page for what its columns want at least."""
 LONGEST = 180.0
 """After which a browser does not print any more [s]."""
 
 
-def browser() -> str:
-    """Path of a browser that prints.
+def browser() -> str | None:
+    """Path of a browser that prints; None where WeasyPrint does.
 
     Raises:
-        InputError: None is installed.
+        InputError: Neither is installed, or WeasyPrint lacks a library of the system.
     """
     named = os.environ.get("CHROMIUM", "")
     for name in (named, *BROWSERS):
         if name and (found := shutil.which(name)):
             return found
-    remedy = "install one, name it by CHROMIUM=/path/to/chromium, or print report.html from any browser"
-    raise InputError.at("report", "pdf", "no Chromium, Chrome or Edge is installed", remedy)
+    try:
+        need("weasyprint")
+    except MissingPackage:
+        remedy = (
+            "install one, name it by CHROMIUM=/path/to/chromium, pip install 'seerob[print]', "
+            "or print report.html from any browser"
+        )
+        raise InputError.at("report", "pdf", "no Chromium, Chrome or Edge is installed", remedy) from None
+    except OSError as error:
+        remedy = "install Pango by your system's packages, or a Chromium, Chrome or Edge"
+        raise InputError.at("report", "pdf", f"WeasyPrint cannot be loaded: {error}", remedy) from error
+    return None
+
+
+def _printed_without_browser(page: bytes) -> bytes:
+    from weasyprint import CSS, HTML
+    from weasyprint.urls import URLFetcher
+
+    # What it does not know of the style is none of the reader's; what it fails to load is.
+    logging.getLogger("weasyprint").setLevel(logging.ERROR)
+    # Everything is in the page; nothing else is read or fetched.
+    html = HTML(string=page.decode(), url_fetcher=URLFetcher(allowed_protocols={"data"}))
+    pdf: bytes = html.write_pdf(stylesheets=[CSS(string=_NARROWER)])
+    return pdf
 
 
 def printed(page: bytes) -> bytes:
     """PDF of a page that needs nothing else.
 
     Raises:
-        InputError: No browser is there, or it prints nothing.
+        InputError: Neither a browser nor WeasyPrint is there, or the browser prints nothing.
     """
+    path = browser()
+    if path is None:
+        return _printed_without_browser(page)
     with TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "report.html").write_bytes(page)
         command = [
-            browser(),
+            path,
             *QUIETLY,
             f"--user-data-dir={folder}/profile",
             f"--print-to-pdf={folder}/report.pdf",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from numba.core.sigutils import normalize_signature
 
-from seerob.kernels._beforehand import LOOPS
+from seerob.kernels._beforehand import LOOPS, PLANNING, PLANNING_IN_TIME
 
 SCRIPT = """
 import json, sys
@@ -60,11 +60,11 @@ def test_a_run_compiles_no_loop_but_those_that_are_listed(tmp_path):
     assert not ready
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", [*LOOPS, *PLANNING, *PLANNING_IN_TIME])
 def test_what_is_listed_is_there(name):
     module, function = name.split()
     loop = getattr(import_module(f"seerob.kernels.{module}"), function)
-    if LOOPS[name]:
-        assert len(normalize_signature(LOOPS[name])[0]) == len(signature(loop.py_func).parameters)
+    if types := {**LOOPS, **PLANNING, **PLANNING_IN_TIME}[name]:
+        assert len(normalize_signature(types)[0]) == len(signature(loop.py_func).parameters)
     else:
         assert not loop._can_compile, "its decorator has no types"

@@ -60,15 +60,37 @@ LOOPS = {
 its decorator has them, and those of its module are compiled by importing it."""
 
 
+PLANNING = {
+    "ways connect": (
+        "(f8[:,:,::1], i8[:,::1], i8[::1], u8[::1], f8[::1], f8[::1], f8, i8, f8[::1], f8, b1, i8[:,::1])"
+    ),
+    "ways least_on": "(f8[:,::1], f8[::1], f8, i8[:,::1])",
+    "ways is_clear": "(f8[::1], f8[::1], f8[::1], f8, b1, i8[:,::1])",
+    "ways too_near": "(f8[::1], f8[::1], i8[:,::1])",
+}
+"""Of plans alone, likewise; a wheel does not bring them: they and the next would add 1.5 MB."""
+
+PLANNING_IN_TIME = {
+    "ways clear_at": (
+        "(f8[:,::1], f8[:,:,:,::1], f8[:,:,::1], i8[::1], i8[::1], f8[::1], b1[::1], b1, i8[:,::1])"
+    ),
+    "ways judged": (
+        "(f8[::1], f8[:,:,::1], f8[:,::1], i8[::1], i8[::1], i8[::1], f8[::1], f8[::1], i1[::1], i8[:,::1])"
+    ),
+    "ways stand": "(f8[:,:,::1], f8[:,::1], i8[::1], i8[::1], i8[:,::1])",
+}
+"""Of plans beside others who move, beside `PLANNING`."""
+
+
 def compile_loop(name: str) -> None:
-    """Compile one of `LOOPS`, or load it."""
+    """Compile one of `LOOPS`, `PLANNING` and `PLANNING_IN_TIME`, or load it."""
     from numba.core.sigutils import normalize_signature
 
     module, function = name.split()
     loop = getattr(import_module(f"seerob.kernels.{module}"), function)
-    if LOOPS[name]:
+    if types := {**LOOPS, **PLANNING, **PLANNING_IN_TIME}[name]:
         # Types, not text: Numba keeps it under what it is given, and a call gives types.
-        loop.compile(normalize_signature(LOOPS[name])[0])  # type: ignore[no-untyped-call]
+        loop.compile(normalize_signature(types)[0])  # type: ignore[no-untyped-call]
 
 
 def main() -> None:

@@ -5,6 +5,8 @@ needed by half of that is clear, and only the pairs of solids of which that is n
 halves. Where nothing is proven a pair counts as clear as soon as it moves less than a spacing between two
 postures that were looked at.
 
+Others may move meanwhile: at instants they are placed, too, before anything is asked.
+
 The search is RRT-Connect ([Kuffner2000]_): two trees, of which one takes a step towards a random posture and
 the other follows it as far as it can. All of it is one loop, without a call of Python.
 """
@@ -222,7 +224,7 @@ def too_near(q: Array, need: Array, table: Indices) -> bool:
     room = _room_in(table, _ROOM_AT)
     put(q, table)
     before = room.counts[1]
-    if gap_of(before, need[before], table) < need[before]:
+    if len(need) > 0 and gap_of(before, need[before], table) < need[before]:
         return True
     for p in range(len(need)):
         if gap_of(p, need[p], table) < need[p]:
@@ -298,6 +300,107 @@ def is_clear(a: Array, b: Array, need: Array, spacing: float, proven: bool, tabl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def stand(R: Array, x: Array, bodies: Indices, used: Indices, table: Indices) -> None:
+    """Place bodies that the arm does not move.
+
+    Args:
+        R: world_from_body of all bodies, shape (nb, 3, 3).
+        x: [m], shape (nb, 3).
+        bodies: Which are placed, shape (b,).
+        used: Their solids.
+        table: Of a `Bound`.
+    """
+    solids, room = _solids_in(table, 0), _room_in(table, _ROOM_AT)
+    for b in bodies:
+        for r in range(3):
+            room.x[b, r] = x[b, r]
+            for c in range(3):
+                room.R[b, r, c] = R[b, r, c]
+    place(room.R, room.x, 0, solids, used, room.world, room.centre, room.at, room.moved)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def clear_at(
+    q: Array,
+    R: Array,
+    x: Array,
+    bodies: Indices,
+    used: Indices,
+    need: Array,
+    clear: NDArray[np.bool_],
+    stop: bool,
+    table: Indices,
+) -> int:
+    """At which instants all pairs keep what they need, the others being elsewhere at each.
+
+    Args:
+        q: Joint positions of the arm, shape (k, n).
+        R: Of all bodies, shape (k, nb, 3, 3).
+        x: [m], shape (k, nb, 3).
+        bodies: As of `stand`, and so is the next.
+        used: Likewise.
+        need: Of each pair [m], shape (p,).
+        clear: Is written, shape (k,).
+        stop: Whether to end where it is not.
+        table: Of a `Bound`.
+
+    Returns:
+        How many instants were looked at.
+    """
+    for k in range(len(q)):
+        stand(R[k], x[k], bodies, used, table)
+        clear[k] = not too_near(q[k], need, table)
+        if stop and not clear[k]:
+            return k + 1
+    return len(q)
+
+
+CLEAR, OPEN, NEAR = 0, 1, 2
+"""What `judged` says of a pair."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def judged(
+    q: Array,
+    R: Array,
+    x: Array,
+    bodies: Indices,
+    used: Indices,
+    pairs: Indices,
+    need: Array,
+    beyond: Array,
+    found: NDArray[np.int8],
+    table: Indices,
+) -> None:
+    """Whether pairs keep what they need as long as their distances change by no more than a bound.
+
+    Args:
+        q: Joint positions of the arm, shape (n,).
+        R: Of all bodies, shape (nb, 3, 3).
+        x: [m], shape (nb, 3).
+        bodies: As of `stand`, and so is the next.
+        used: Likewise.
+        pairs: Which are asked of, shape (e,).
+        need: Of each of these [m], shape (e,).
+        beyond: By how much the distance may change [m], shape (e,).
+        found: Is written: `CLEAR`, `NEAR` where it is less now, else `OPEN`; shape (e,).
+        table: Of a `Bound`.
+    """
+    stand(R, x, bodies, used, table)
+    put(q, table)
+    for e in range(len(pairs)):
+        found[e] = CLEAR
+        if far(pairs[e], need[e] + beyond[e], table):
+            continue
+        coarse = beyond[e] > COARSE
+        gap = gap_of(pairs[e], need[e] + (0.0 if coarse else beyond[e]), table)
+        if gap < need[e]:
+            found[e] = NEAR
+        elif coarse or gap < np.inf:
+            found[e] = OPEN
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def least_on(path: Array, deviation: Array, tolerance: float, table: Indices) -> float:
     """A bound from below on the least distance on straight ways between postures, too small by a tolerance.
 
@@ -356,12 +459,7 @@ def drawn(random: Random) -> float:
     return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) / 9007199254740992.0
 
 
-@njit(
-    "i8(f8[:,:,::1], i8[:,::1], i8[::1], u8[::1], f8[::1], f8[::1], f8, i8, f8[::1], f8, b1, i8[:,::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
+@njit(cache=True, nogil=True, error_model="numpy")
 def connect(
     nodes: Array,
     parents: Indices,

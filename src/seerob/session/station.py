@@ -505,7 +505,7 @@ class Station:
                 exactly one source of the robot's motion.
         """
         from seerob.session.permissible import evaluation
-        from seerob.session.permissible.joint_limits import joint_limits
+        from seerob.session.permissible.joint_limits import limits_of
 
         if sources is None:
             require_recorded(self.workstation)
@@ -518,17 +518,7 @@ class Station:
         subject = self.model.robot(names[0] if robot is None else robot)
         played = self.sources if sources is None else sources
         motion, solved_from = evaluation.given_motion(self.model, played, subject.name)
-        file = next(iter(self.workstation.files), "workstation")
-        own = next(r for r in self.workstation.robots if r.name == subject.name)
-        asked = {"acceleration": acceleration, "jerk": jerk}
-        limits = joint_limits(
-            subject,
-            velocity=velocity,
-            acceleration=own.acceleration_limits if acceleration is None else acceleration,
-            jerk=own.jerk_limits if jerk is None else jerk,
-            file=file,
-            written=[key for key, value in asked.items() if value is None],
-        )
+        limits = limits_of(self.model, subject, velocity=velocity, acceleration=acceleration, jerk=jerk)
         scene = self.scene(with_sources=sources is None)
         seen = evaluation.witness(self.model, played, self.bound, scene.criteria, say)
 

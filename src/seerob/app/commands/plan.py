@@ -1,7 +1,7 @@
 """``seerob plan``: a path of a robot that keeps a distance from everything, as a file of waypoints.
 
-Those who move beside the planned robot are still, are where they are at an instant, or are all that they
-sweep.
+Those who move beside the planned robot are still, are where they are at an instant, are all that they
+sweep, or move as their sources say: then the plan is a motion, as a table.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from seerob.app.commands.permissible import per_joint
 from seerob.app.console.loading import compiled
-from seerob.app.console.progress import spinner
+from seerob.app.console.progress import compile_loops, spinner
 from seerob.app.console.terminal import Exit, add_workstation, allowed, cache_folder, describe, line, seconds
 from seerob.core.errors import InputError
-from seerob.core.figures import rounded_down
+from seerob.core.figures import rounded_down, rounded_up
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -27,10 +28,11 @@ if TYPE_CHECKING:
     from seerob.session.station import Station
 
 
-STILL, SWEPT = "still", "swept"
+STILL, SWEPT, MOVING = "still", "swept", "moving"
 OTHERS = (
     "where robots, people and machines that sources move are taken to be: still (where the file puts them), "
-    "swept (everywhere that their recorded motion takes them) or an instant of that motion [s] "
+    "swept (everywhere that their recorded motion takes them), moving (where that motion has them at each "
+    "instant, which plans a motion) or an instant of that motion [s] "
     "(default: still, and the answer is undecided where somebody moves)"
 )
 
@@ -45,16 +47,20 @@ class Around:
     """Joint positions of others by name [rad or m], (n,) each."""
     swept: tuple[str, ...] = ()
     """Others that an area stands for."""
+    off: float = 0.0
+    """How far others may be from there [m]."""
 
 
 def others(text: str) -> str | float:
-    """``still``, ``swept``, or an instant [s]."""
-    if text in (STILL, SWEPT):
+    """``still``, ``swept``, ``moving``, or an instant [s]."""
+    if text in (STILL, SWEPT, MOVING):
         return text
     try:
-        return 0.0 if text.strip() in ("0", "0.0") else seconds(text)
+        return instant(text)
     except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not still, swept or a number of seconds") from None
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not still, swept, moving or a number of seconds"
+        ) from None
 
 
 def around(
@@ -106,7 +112,8 @@ def around(
     tell("following the others")
     witness.require()
     if instant is not None:
-        return Around(station, tuple(keep_out), places={name: witness.places[name] for name in who})
+        places = {name: witness.places[name] for name in who}
+        return Around(station, tuple(keep_out), places, off=witness.off)
     whole = Station(with_sweeps(bare.workstation, who, voxel), cache=cache_folder(), progress=tell)
     return Around(whole, (*keep_out, *made_for(who)), swept=who)
 
@@ -124,6 +131,11 @@ def posture(text: str) -> list[float]:
     if not all(map(math.isfinite, values)):
         raise argparse.ArgumentTypeError(f"{text!r} are no numbers with commas between them")
     return values
+
+
+def instant(text: str) -> float:
+    """A time of 0 s or more."""
+    return 0.0 if text.strip() in ("0", "0.0") else seconds(text)
 
 
 def distance(text: str) -> float:
@@ -170,10 +182,29 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--voxel", type=edge, default=0.05, help="of what others sweep [m] (default: 0.05; at most 1)"
     )
+    sub.add_argument(
+        "--begin",
+        type=instant,
+        default=0.0,
+        help="of moving others: when it may begin to move [s] (default: 0)",
+    )
+    sub.add_argument(
+        "--within",
+        type=seconds,
+        default=30.0,
+        help="of moving others: when it arrives at the latest [s] (default: 30)",
+    )
+    for name, unit in (("velocity", "rad/s"), ("acceleration", "rad/s²"), ("jerk", "rad/s³")):
+        own = "instead of the robot's" if name == "velocity" else f"instead of the file's {name}_limits"
+        text = f"of moving others: limit of the joints [{unit}], one for all or one each with commas, {own}"
+        sub.add_argument(f"--{name}", type=per_joint, help=text)
     sub.add_argument("--seed", type=int, default=1, help="the same seed gives the same path (default: 1)")
     sub.add_argument("--seconds", type=seconds, default=60.0, help="longest time per posture (default: 60)")
     sub.add_argument(
-        "-o", "--output", type=Path, default=Path("planned.toml"), help="file of waypoints to write"
+        "-o",
+        "--output",
+        type=Path,
+        help="file to write (default: planned.toml, waypoints; beside moving others planned.csv, a motion)",
     )
 
 
@@ -183,10 +214,18 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: A posture that cannot be, or a file that exists already.
     """
+    from seerob.kernels._beforehand import PLANNING, PLANNING_IN_TIME
+
+    timed = options.others == MOVING
+    if options.output is None:
+        options.output = Path("planned.csv" if timed else "planned.toml")
     _refuse_existing(options.output)
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
+    if timed and options.output.suffix != ".csv":
+        raise InputError.at(options.output, "", "is no .csv", "a motion beside moving others is a table")
     station = compiled(options.workstation, allowed(options), sources=False)
+    compile_loops([*PLANNING, *(PLANNING_IN_TIME if timed else ())])
     from seerob.app.console.interruption import Stopped as Asked
     from seerob.outputs.sinks.dossier import write_whole
     from seerob.session.planning.others import movers
@@ -204,6 +243,8 @@ def run(options: argparse.Namespace) -> int:
     if options.waypoints is not None:
         given = _Given(station, robot, options.waypoints)
         goals += given.goals(options.start)
+    if timed:
+        return _in_time(options, station, robot, goals, asked)
     try:
         with spinner() as show:
             place = around(
@@ -231,6 +272,7 @@ def run(options: argparse.Namespace) -> int:
                 keep_out=place.keep_out,
                 places=place.places,
                 swept=place.swept,
+                off=place.off,
                 say=say,
             )
     except (NoPath, Stopped) as error:
@@ -267,6 +309,88 @@ def run(options: argparse.Namespace) -> int:
         f'kind = "waypoints", robot = "{found.robot}", file = "{options.output.name}" with joint_speed …',
     )
     return Exit.UNDECIDED if open_ else Exit.WITHIN
+
+
+def _in_time(
+    options: argparse.Namespace,
+    station: Station,
+    robot: str,
+    goals: list[ArrayLike],
+    stopped: Callable[[], bool],
+) -> int:
+    """Plan beside others who move, and write the motion as a table."""
+    from seerob.files.trajectories.trajectory import Trajectory
+    from seerob.outputs.sinks.dossier import write_whole
+    from seerob.session.permissible import tables
+    from seerob.session.permissible.joint_limits import limits_of
+    from seerob.session.planning.in_time import plan_in_time
+    from seerob.session.planning.others import alone, course, movers
+    from seerob.session.planning.plan import NoPath, Stopped
+    from seerob.session.station import Station
+
+    who = movers(station.workstation, robot)
+    if not who:
+        what = "no source moves anybody else"
+        raise InputError.at("plan", "--others", what, "plan without it: a path is enough")
+    wanted = {name: getattr(options, name) for name in ("velocity", "acceleration", "jerk")}
+    given = {name: v[0] if v and len(v) == 1 else v for name, v in wanted.items()}
+    limits = limits_of(station.model, station.model.robot(robot), **given)
+    try:
+        with spinner() as show:
+            show("following the others")
+            around = alone(station.workstation, robot, who, options.keep_out)
+            bare = Station(around, cache=cache_folder(), progress=show)
+
+            def say(tried: int) -> bool:
+                show(f"planning: {tried} instants looked at")
+                return stopped()
+
+            found = plan_in_time(
+                bare.model,
+                robot,
+                goals,
+                course=course(bare, who, stopped),
+                begin=options.begin,
+                who=who,
+                limits=limits,
+                start=options.start,
+                margin=options.margin,
+                seed=options.seed,
+                seconds=options.seconds,
+                within=options.within,
+                keep_out=options.keep_out,
+                say=say,
+            )
+    except (NoPath, Stopped) as error:
+        line("no path", str(error), "yellow")
+        return Exit.UNDECIDED
+    _refuse_existing(options.output)
+    rows = found.rows
+    motion = Trajectory(str(options.output), rows.t, rows.q, rows.qd)
+    head = tables.trajectory_head(motion, limits.units)
+    write_whole(options.output, tables.csv_bytes(head, tables.trajectory_rows(motion)))
+    end = float(rows.t[-1])
+    line(
+        "planned",
+        f"a motion that arrives at {end:.2f} s and that nothing comes nearer to than {found.margin:g} m at "
+        f"any instant, {found.waits:.2f} s of it waiting ({found.asked} instants looked at)",
+    )
+    if found.nearest is not None:
+        near = rounded_down(found.nearest.distance, "m")
+        line("nearest", f"{found.nearest.what}, {near} at {found.at:.2f} s, of the instants looked at")
+    line("stays", f"where it arrives it keeps that until {found.stays:.2f} s; {found.until}")
+    if found.off > 0:
+        line("others", f"may be {rounded_up(found.off, 'm')} from where they were seen, which is kept too")
+    for pair in found.left_out:
+        line("assumed", f"{pair} touch at the start and are not watched", "yellow")
+    for name in who:
+        line("others", f"{name}: moves as its source says; another time it may move otherwise")
+    for text in found.open:
+        line("undecided", text, "yellow")
+    line("note", "preliminary: planned, and executed by nobody")
+    line("wrote", str(options.output))
+    line("next", f'kind = "csv", robot = "{robot}", file = "{options.output.name}", origin = "planned"')
+    return Exit.UNDECIDED if found.open else Exit.WITHIN
 
 
 def _refuse_existing(path: Path) -> None:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -212,12 +212,14 @@ MOST = 4
 """Processes at once, of about 300 MB each; one loop takes a third of all the time."""
 
 
-def compile_loops() -> None:
+def compile_loops(wanted: Collection[str] | None = None) -> None:
     """Compile loops of `seerob.kernels._beforehand` that are not kept as they are now; say how far it is.
+
+    Those of `LOOPS` there unless others are named.
 
     What cannot be compiled here, whatever the reason, is compiled when it is called.
     """
-    missing = missing_loops()
+    missing = missing_loops(wanted)
     if not missing or not sys.executable or getattr(sys, "frozen", False):
         return
     STATUS.print(f"{COMPILING}: 0 of {len(missing)}", markup=False)
@@ -226,8 +228,8 @@ def compile_loops() -> None:
             say(f"{COMPILING}: {done} of {len(missing)}")
 
 
-def missing_loops() -> list[str]:
-    """Names in `seerob.kernels._beforehand.LOOPS` of what is neither kept as it is now nor brought."""
+def missing_loops(wanted: Collection[str] | None = None) -> list[str]:
+    """Names in `seerob.kernels._beforehand` of what is neither kept as it is now nor brought."""
     from seerob.kernels._beforehand import LOOPS
     from seerob.kernels._kept_loops import BROUGHT, key_of, stood_in_for
 
@@ -246,7 +248,7 @@ def missing_loops() -> list[str]:
 
         return among(kept) or any(among(brought, processor) for processor in stood_in_for())
 
-    return [name for name in LOOPS if not is_there(name)]
+    return [name for name in (LOOPS if wanted is None else wanted) if not is_there(name)]
 
 
 def _compiled(names: Sequence[str]) -> Generator[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from seerob.core.errors import InputError, Problem
 from seerob.core.snapshot import Input, Origin
 from seerob.core.transforms import Array
-from seerob.model.model import Mechanism
+from seerob.model.model import Mechanism, Model
 
 Given = Sequence[float] | float | None
 """One value for all joints, or one for each; None: not given."""
@@ -31,6 +31,26 @@ class JointLimits:
     """[rad/s³ or m/s³]"""
     inputs: tuple[Input, ...]
     """These limits as inputs, each with where it is from."""
+
+
+def limits_of(
+    model: Model, robot: Mechanism, *, velocity: Given = None, acceleration: Given = None, jerk: Given = None
+) -> JointLimits:
+    """Limits of a robot's joints as given, else those of its description and of the workstation file.
+
+    Raises:
+        InputError: See `joint_limits`.
+    """
+    station = model.workstation
+    own = next(r for r in station.robots if r.name == robot.name)
+    return joint_limits(
+        robot,
+        velocity=velocity,
+        acceleration=own.acceleration_limits if acceleration is None else acceleration,
+        jerk=own.jerk_limits if jerk is None else jerk,
+        file=next(iter(station.files), "workstation"),
+        written=[k for k, given in (("acceleration", acceleration), ("jerk", jerk)) if given is None],
+    )
 
 
 def joint_limits(

@@ -77,6 +77,7 @@ class Clearance:
         keep_out: Areas that are kept away from like everything else.
         places: Joint positions of others, by name [rad or m], (n,) each, instead of those of the file.
         swept: Names of others that are looked through: an area of ``keep_out`` is in their place.
+        off: How far others may be from where they are taken to be [m].
 
     Raises:
         UnknownName: No such area.
@@ -93,8 +94,9 @@ class Clearance:
         keep_out: Sequence[str] = (),
         places: Mapping[str, Array] | None = None,
         swept: Collection[str] = (),
+        off: float = 0.0,
     ) -> None:
-        self._model, self.robot = model, robot
+        self._model, self.robot, self._off = model, robot, off
         self._data = mujoco.MjData(model.mj)
         self._ids = np.array([body.mj for body in model.bodies])
         places = places or {}
@@ -132,19 +134,26 @@ class Clearance:
         self.left_out: tuple[str, ...] = ()
         """Pairs of the robot's own bodies that touch or overlap at the start and are not watched."""
         self._pairs += self._itself(own, start)
-        if not self._pairs:
+        if not self._pairs and not swept:
             raise InputError.at("workstation", robot.name, "there is nothing to keep away from")
         # Of each pair of bodies the row of the weights: those of a body of the robot with all others are one.
         weights = np.concatenate(
-            [p.weight if p.own else np.tile(p.weight, (len(p.query.a), 1)) for p in self._pairs]
+            [
+                np.zeros((0, len(robot.joints))),
+                *(p.weight if p.own else np.tile(p.weight, (len(p.query.a), 1)) for p in self._pairs),
+            ]
         )
         found = [pairs.query.members(Per.WHETHER) for pairs in self._pairs]
-        row = np.repeat(np.arange(len(weights)), np.concatenate([np.diff(m.start) for m in found]))
-        own_rows = np.repeat([p.own for p in self._pairs], [len(m.rows) for m in found])
+        counts = [len(m.rows) for m in found]
+        each = np.concatenate([np.zeros(0, np.int64), *(np.diff(m.start) for m in found)])
+        row = np.repeat(np.arange(len(weights)), each)
+        own_rows = np.repeat(np.array([p.own for p in self._pairs], bool), counts)
         self._own: NDArray[np.bool_] = own_rows
-        self._deviations = np.repeat([p.deviation for p in self._pairs], [len(m.rows) for m in found])
-        pair = np.ascontiguousarray(np.concatenate([m.rows[:, :2] for m in found]))
-        self._bound = self._bind(Apart(pair, np.ascontiguousarray(weights[row])), start)
+        self._deviations = np.repeat(np.array([p.deviation for p in self._pairs], float), counts)
+        pair = np.concatenate([np.zeros((0, 2), np.int64), *(m.rows[:, :2] for m in found)])
+        self.apart = Apart(pair, np.ascontiguousarray(weights[row]))
+        """Pairs of solids, and how fast the robot changes their distances."""
+        self._bound = self._bind(self.apart, start)
         self.table = self._bound.table
         """What `seerob.kernels.ways` is given."""
 
@@ -162,6 +171,10 @@ class Clearance:
                 first, second = (self._model.bodies[i].name for i in (closest.body_a, closest.body_b))
                 found.append(Nearest(closest.distance - pairs.deviation, f"{second} ↔ {first}"))
         return min(found, key=lambda near: near.distance, default=None)
+
+    def place_others(self, qpos: Array) -> None:
+        """Put everybody else where MuJoCo's positions have them, for `nearest`."""
+        self._data.qpos[:] = qpos
 
     def fault(self, q: Array, margin: float) -> str:
         """Why a posture is not clear; empty when it is."""
@@ -260,7 +273,7 @@ class Clearance:
     def _against(self, others: tuple[int, ...]) -> _Pairs:
         query = Query(self._model.shapes, others, self._mine)
         weight = np.array([self._weight(self._chains[i], frozenset()) for i in self._mine])
-        return _Pairs(query, weight, self._deviation(others, self._mine), own=False)
+        return _Pairs(query, weight, self._deviation(others, self._mine) + self._off, own=False)
 
     def _itself(self, own: Iterable[int], start: Array) -> list[_Pairs]:
         """Pairs of bodies of the robot with at least two joints between them."""

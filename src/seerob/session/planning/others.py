@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from typing import ClassVar
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
+import mujoco
 import numpy as np
 from msgspec.structs import replace
 
@@ -15,8 +17,15 @@ from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.model.model import Model
 from seerob.outputs.sink import Closing
+from seerob.session.recorded_motion import recorded
+from seerob.session.run import pump
+from seerob.twin.accuracy.tracking_error import TrackingError
+from seerob.twin.spans import Path
 from seerob.twin.state import State
 from seerob.workstation.workstation import Area, SweptArea, Workstation
+
+if TYPE_CHECKING:
+    from seerob.session.station import Station
 
 SWEEPS = "sweep_of_"
 """Begin of the names of areas that are made for a plan."""
@@ -83,6 +92,8 @@ class PoseRecorder(Closing):
         """Run time of the last tick that was looked at [s]."""
         self.places: dict[str, Array] = {}
         """Joint positions by name [rad or m], shape (n,)."""
+        self.off = 0.0
+        """How far others may be from there then [m]."""
         self._unknown = ""
 
     @property
@@ -98,9 +109,10 @@ class PoseRecorder(Closing):
         self.last = snapshot.t
         if self._instant is not None:
             self.places = {name: np.array(q) for name, q in snapshot.joints.items()}
-        reason = next(
-            (r.reason for r in snapshot.results if r.name == KNOWN and r.verdict is not Verdict.WITHIN), ""
-        )
+        known = next((r for r in snapshot.results if r.name == KNOWN), None)
+        if known is not None and known.value is not None:
+            self.off = known.value
+        reason = "" if known is None or known.verdict is Verdict.WITHIN else known.reason
         if reason:
             self._unknown = f"{reason} (at {snapshot.t:.2f} s)"
 
@@ -117,10 +129,96 @@ class PoseRecorder(Closing):
             raise InputError(problems)
 
 
-class _Known(Criterion, frozen=True, kw_only=True):
-    """Whether it is known where everybody of interest is: within where nothing of theirs is in doubt."""
+class Watch(Closing):
+    """A writer that keeps how long the motion of everybody is known, and how well."""
 
-    unit: ClassVar[str] = ""
+    def __init__(self) -> None:
+        self.end = -np.inf
+        """Last tick until which everything was known [s]."""
+        self.why = ""
+        """Why no more is known then; empty where the motion ends."""
+        self.off = 0.0
+        """How far others may be from where they are taken to be, at any tick [m]."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the rest of the run says nothing more."""
+        return bool(self.why)
+
+    def write(self, snapshot: Snapshot, samples: Iterable[Sample]) -> None:
+        """Take one tick: what goes out, and what came in to make it."""
+        if self.done:
+            return
+        known = next(r for r in snapshot.results if r.name == KNOWN)
+        if known.verdict is not Verdict.WITHIN or known.value is None:
+            self.why = f"{known.reason} (at {snapshot.t:.2f} s)"
+            return
+        self.end, self.off = snapshot.t, max(self.off, known.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Where everybody beside the robot is, from 0 s on: cubics from knot to knot."""
+
+    t: Array
+    """Knots, increasing [s], shape (k,)."""
+    q: Array
+    """``qpos`` there, shape (k, nq)."""
+    v: Array
+    """``qvel`` there, shape (k, nv)."""
+    end: float
+    """Until when the motion is known [s]."""
+    why: str
+    """Why not longer."""
+    off: float
+    """How far others may be from there [m]."""
+
+
+def course(station: Station, who: Collection[str], stopped: Callable[[], bool]) -> Course:
+    """The motion of everybody, as a run without physics has it.
+
+    Args:
+        station: Of `alone`.
+        who: Who may move.
+        stopped: Whether to stop.
+
+    Raises:
+        InputError: It is not known when it begins, or somebody moves otherwise than by joints that a
+            source says.
+    """
+    watch = Watch()
+    station.run(writers=[watch], stop=lambda: stopped() or watch.done)
+    remedy = "correct the source, or plan with others that stand still"
+    if not watch.end > 0:
+        what = watch.why or "the others do not move"
+        raise InputError.at("plan", "--others", what, remedy)
+    model = station.model
+    motion = recorded(model, pump(station.sources, station.workstation.engine.tick), station.duration)
+    paths = [p for p in motion.ways or () if p.t[0] < watch.end]
+    for path in paths:
+        if path.broken or path.captured is not None or path.gaps or path.loose:
+            named = ", ".join(path.broken) or "somebody"
+            what = f"{named}: how they get from one place to the next is not known (at {path.t[0]:.2f} s)"
+            raise InputError.at("plan", "--others", what, remedy)
+    if motion.implausible:
+        raise InputError.at("plan", "--others", motion.implausible[0].text, remedy)
+    whole = Path.joined(paths, ())
+    dofs = [model.mechanisms[name].v_address for name in who]
+    moved = (np.ptp(whole.q, axis=0) > 0) | (np.abs(whole.v).max(axis=0) > 0)
+    moved[np.concatenate(dofs)] = False
+    if moved.any():
+        joint = mujoco.mj_id2name(
+            model.mj, mujoco.mjtObj.mjOBJ_JOINT, int(model.mj.dof_jntid[np.flatnonzero(moved)[0]])
+        )
+        raise InputError.at("plan", "--others", f"{joint} moves, and no source says it", remedy)
+    why = watch.why or "their motion ends"
+    return Course(whole.t, whole.q, whole.v, min(watch.end, float(whole.t[-1])), why, watch.off)
+
+
+class _Known(Criterion, frozen=True, kw_only=True):
+    """Whether it is known where everybody of interest is, and how far they may be from there [m]."""
+
+    unit: ClassVar[str] = "m"
     limit: ClassVar[float] = 1.0
 
     who: tuple[str, ...]
@@ -129,10 +227,18 @@ class _Known(Criterion, frozen=True, kw_only=True):
         return self.who
 
     def bind(self, model: Model) -> Evaluate:
+        bodies = [body.index for body in model.bodies if body.owner in self.who]
+        errors = TrackingError(model, bodies)
+
         def evaluate(state: State) -> Result:
             for name in self.who:
                 state.require(name)
-            return Result(name=self.name, value=0.0, unit=self.unit, limit=self.limit, verdict=Verdict.WITHIN)
+            off = 0.0 if errors.none(state) else float(errors.at(state).max(initial=0.0))
+            verdict = Verdict.WITHIN if off < self.limit else Verdict.EXCEEDED
+            reason = "" if off < self.limit else "somebody may be a metre from where they were seen"
+            return Result(
+                name=self.name, value=off, unit=self.unit, limit=self.limit, verdict=verdict, reason=reason
+            )
 
         return evaluate
 

@@ -86,6 +86,7 @@ def plan(
     keep_out: Sequence[str] = (),
     places: Mapping[str, Array] | None = None,
     swept: Collection[str] = (),
+    off: float = 0.0,
     say: Callable[[int], bool] = lambda tried: False,
 ) -> Plan:
     """A path from a start through goals that keeps a margin from everything, proven between postures too.
@@ -105,6 +106,7 @@ def plan(
         keep_out: Areas that are kept away from like everything else.
         places: Joint positions of others by name [rad or m], (n,) each, instead of those of the file.
         swept: Others that are looked through, as an area of ``keep_out`` is what they sweep.
+        off: How far others may be from where they are taken to be [m].
         say: Told how many postures were tried; True stops the work.
 
     Raises:
@@ -132,11 +134,13 @@ def plan(
     names = ["start", *(f"goal {i + 1}" for i in range(len(goals)))]
     problems: list[Problem] = []
     for name, q in zip(names, postures, strict=True):
-        problems += _wrong(mechanism, name, q)
+        problems += wrong(mechanism, name, q)
     if problems:
         raise InputError(problems)
-    clearance = Clearance(model, mechanism, postures[0], keep_out=keep_out, places=places, swept=swept)
-    postures = [_first_clear(clearance, q, margin) for q in postures]
+    clearance = Clearance(
+        model, mechanism, postures[0], keep_out=keep_out, places=places, swept=swept, off=off
+    )
+    postures = [first_clear(clearance, q, margin) for q in postures]
     for name, q in zip(names, postures, strict=True):
         what = clearance.fault(q, margin)
         if what:
@@ -165,11 +169,11 @@ def plan(
         left_out=clearance.left_out,
         at=tuple(at),
         around=_around(model, robot, keep_out, places or {}, swept),
-        open=tuple(_open(model, robot, keep_out)),
+        open=tuple(open_findings(model, robot, keep_out)),
     )
 
 
-def _open(model: Model, robot: str, keep_out: Sequence[str]) -> Iterator[str]:
+def open_findings(model: Model, robot: str, keep_out: Sequence[str]) -> Iterator[str]:
     """What findings hold of whatever is kept apart: a run calls no distance of theirs within."""
     bodies = [b for b in model.bodies if b.role in WATCHED or b.name in keep_out]
     names = {robot, *model.mechanisms, *(b.name for b in bodies), *(b.owner for b in bodies)}
@@ -201,12 +205,14 @@ def _around(
     return tuple(said)
 
 
-def _first_clear(clearance: Clearance, ways: Array, margin: float) -> Array:
+def first_clear(clearance: Clearance, ways: Array, margin: float) -> Array:
+    """Of postures (k, n) the first that keeps a margin [m], or the first; or one (n,)."""
     rows = np.atleast_2d(ways)
     return next((q for q in rows if not clearance.fault(q, margin)), rows[0])
 
 
-def _wrong(robot: Mechanism, name: str, ways: Array) -> Iterator[Problem]:
+def wrong(robot: Mechanism, name: str, ways: Array) -> Iterator[Problem]:
+    """What is not a posture of a robot, (n,), or several, (k, n)."""
     n = len(robot.joints)
     if ways.ndim not in (1, 2) or not ways.size or ways.shape[-1] != n:
         yield Problem("plan", name, f"an array of shape {ways.shape}", f"give {n} numbers [rad or m]")
@@ -304,7 +310,7 @@ def _searched(
         NoPath: None was found in time.
         Stopped: Nobody wants to wait.
     """
-    low, high = _bounds(clearance.robot, start, goal)
+    low, high = bounds(clearance.robot, start, goal)
     nodes, parents = np.empty((2, NODES, len(start))), np.zeros((2, NODES), np.int64)
     nodes[:, 0] = start, goal
     size = np.array([1, 1, 0])
@@ -389,7 +395,7 @@ class _Patience:
         return NoPath(f"no path was found {spent}; that there is none is not known")
 
 
-def _bounds(robot: Mechanism, start: Array, goal: Array) -> tuple[Array, Array]:
+def bounds(robot: Mechanism, start: Array, goal: Array) -> tuple[Array, Array]:
     """Where postures are tried: within the limits, and where there are none half a turn around both ends."""
     least, most = np.minimum(start, goal), np.maximum(start, goal)
     low = np.minimum(np.maximum(robot.lower, least - np.pi), least)

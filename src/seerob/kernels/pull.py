@@ -79,6 +79,9 @@ class Physics(NamedTuple):
     calls: Indices
     """Addresses: the `mujoco.MjModel`, its data in which the motion itself is worked out, ``mj_rne``, and
     what is called before."""
+    step: Indices
+    """Addresses: the `mujoco.MjModel`, the twin's data, and what a step is made of where nothing but joints
+    and actuators takes part (`STEP`); else none."""
     qpos: Array
     qvel: Array
     before: Array
@@ -94,6 +97,13 @@ class Physics(NamedTuple):
     wanted_v: Array
     wanted_a: Array
     passive: Array
+    bias: Array
+    """In the twin's data, as the next four: forces of joints [N·m or N], shape (nv,)."""
+    own_passive: Array
+    applied: Array
+    actuated: Array
+    smooth: Array
+    """Receives their sum."""
     armature: Array
     """Rotor inertia, shape (nv,) [kg·m² or kg]."""
     damping: Array
@@ -135,6 +145,13 @@ class Physics(NamedTuple):
     """How far velocities of each are from those that are said; not a number where none are, shape (r,)."""
 
 
+STEP = (
+    "mj_kinematics", "mj_comPos", "mj_makeM", "mj_transmission", "mj_fwdVelocity", "mj_fwdActuation",
+    "mj_implicit",
+)  # fmt: skip
+"""What of ``mj_step`` moves joints that actuators alone act on: no contact, no limit and no equality, which
+ask for accelerations, too."""
+
 _FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
 KNOTS = Layout(
     Knots,
@@ -146,7 +163,7 @@ JOINTS = Layout(
 PHYSICS = Layout(
     Physics,
     [
-        (_WHOLE, 1), *[(_FLOAT, 1)] * 16, (_WHOLE, 1), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3,
+        *[(_WHOLE, 1)] * 2, *[(_FLOAT, 1)] * 21, (_WHOLE, 1), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3,
         *[(_FLOAT, 2)] * 3, (_FLOAT, 1), (_FLAG, 1), (_FLAG, 1), (_FLOAT, 1),
     ],
 )  # fmt: skip
@@ -531,6 +548,36 @@ def end(physics: Indices, step: int, centred: bool, wild: float) -> bool:
     if step + 1 < len(all_.steering):
         begin(physics, step + 1)
     return True
+
+
+@njit(f"i8({_TABLE}, i8, b1, f8)", cache=True, nogil=True)
+def steps(physics: Indices, first: int, centred: bool, wild: float) -> int:
+    """Make the steps of a tick that are left, the first of which has begun, where `STEP` is all of them.
+
+    Bit for bit what ``mj_step`` does, without what nobody asks for: it factors the mass matrix once more, and
+    looks for contacts.
+
+    Args:
+        physics: Table of `PHYSICS`; written as by `begin` and `end`.
+        first: The step that has begun.
+        centred: As of `end`.
+        wild: As of `end`.
+
+    Returns:
+        How many steps of the tick are made; one less where after that one a velocity is not below ``wild``.
+    """
+    all_ = _physics_in(physics, 0)
+    model, data, last = all_.step[0], all_.step[1], len(all_.step) - 1
+    for step in range(first, len(all_.steering)):
+        for function in all_.step[2:last]:
+            updated(function, model, data)
+        for i in range(len(all_.smooth)):
+            force = all_.own_passive[i] - all_.bias[i] + all_.applied[i]
+            all_.smooth[i] = force + all_.actuated[i]
+        updated(all_.step[last], model, data)
+        if not end(physics, step, centred, wild):
+            return step
+    return len(all_.steering)
 
 
 @njit(f"b1({_TABLE}, b1)", cache=True, nogil=True)

@@ -88,6 +88,18 @@ def together(off: Array) -> Array:
     return np.asarray(np.sqrt((off > 0).sum(axis=-1, keepdims=True)) * off)
 
 
+def moved_by_joints_alone(mj: mujoco.MjModel) -> bool:
+    """Whether nothing but joints and actuators takes part in a step, integrated as here.
+
+    Args:
+        mj: The model, with no contacts, limits, equalities, friction, tendons, soft bodies, sensors or
+            plug-ins, if so.
+    """
+    parts = mj.ngeom, mj.neq, mj.ntendon, mj.nflex, mj.nsensor, mj.nplugin, mj.na
+    limits = mj.jnt_limited.any() or mj.dof_frictionloss.any()
+    return not (any(parts) or limits) and mj.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+
+
 def last_tick(duration: float, period: float) -> int:
     """Number of the last tick of a motion, which ends with it: from half to one and a half as long as others.
 
@@ -213,9 +225,14 @@ class Engine:
         """Whether the physics holds a person elsewhere than captured."""
         self._almost = 0.999 * self._limits
         self._before, self._torques = np.zeros((2, self._mj.nv))
-        # Called from Python once, it tells when there is not enough memory for them.
+        self._simple = self.controllers and not self._task_pulls and moved_by_joints_alone(self._mj)
+        """Whether a step is no more than `kernel.STEP`."""
+        # Called from Python once, they tell when there is not enough memory for them.
         mujoco.mj_passive(self._mj, self._wanted)
         mujoco.mj_rne(self._mj, self._wanted, 1, self._torques)
+        if self._simple:
+            mujoco.mj_step(self._mj, self._wanted)
+            mujoco.mj_resetData(self._mj, self._wanted)
         n = len(self._mechanisms)
         self._found = np.zeros(n), np.zeros(n, bool), np.zeros(n)
         """Of each who is pulled the largest error of a joint [rad or m], whether a torque limit is reached,
@@ -282,8 +299,11 @@ class Engine:
         person = np.array([m.role == "human" for m in self._mechanisms], bool)
         error, saturated, unlike = self._found
         physics = kernel.Physics(
-            calls, data.qpos, data.qvel, self._before, data.ctrl, data.actuator_force, shown.qpos, shown.qvel,
-            wanted.qpos, wanted.qvel, wanted.qacc, wanted.qfrc_passive, mj.dof_armature, mj.dof_damping,
+            calls, addresses(mj, data, *kernel.STEP) if self._simple else calls[:0],
+            data.qpos, data.qvel, self._before, data.ctrl, data.actuator_force, shown.qpos, shown.qvel,
+            wanted.qpos, wanted.qvel, wanted.qacc, wanted.qfrc_passive,
+            data.qfrc_bias, data.qfrc_passive, data.qfrc_applied, data.qfrc_actuator, data.qfrc_smooth,
+            mj.dof_armature, mj.dof_damping,
             self._kp, self._kd, self._almost, self._dof, self._instants, *self._course, self._torques,
             np.zeros(mj.nv), np.zeros(1), np.zeros((steps, mj.nu)), *self._way,
             error, person, saturated, unlike,
@@ -637,21 +657,30 @@ class Engine:
         self._aim(start, end)
         every = self._mechanisms if self.controllers else ()
         self._landing = [one for one in every if self._references[one.name].landing]
-        physics, begun = self._physics, False
-        for step in range(self._steps):
+        physics, begun, step = self._physics, False, 0
+        while step < self._steps:
             if not begun or self._landing or self._task_pulls:
                 self._pull(step, start + step * self._dt)
-            if self._loose.names:
-                self._loose.pull(start + step * self._dt, self._dt)
-            try:
-                mujoco.mj_step(self._mj, self._data)
-            except FAULTS as error:
-                raise self._gave_up(error) from error
-            begun = kernel.end(physics, step, self._centred, WILD)
+            if self._simple and not (self._landing or self._loose.names):
+                step = kernel.steps(physics, step, True, WILD)
+                begun = step == self._steps
+            else:
+                self._step_once(start + step * self._dt)
+                begun = kernel.end(physics, step, self._centred, WILD)
             if not begun and self.controllers:
                 self._put_back(step + 1, start + (step + 1) * self._dt)
                 begun = kernel.end(physics, step, self._centred, WILD)
+            step += 1
         self._land(self._steps, end)
+
+    def _step_once(self, t: float) -> None:
+        """Make one step of the physics, with all that may take part in it, from ``t`` on [s]."""
+        if self._loose.names:
+            self._loose.pull(t, self._dt)
+        try:
+            mujoco.mj_step(self._mj, self._data)
+        except FAULTS as error:
+            raise self._gave_up(error) from error
 
     def _aim(self, start: float, end: float) -> None:
         """Work out where every joint is to be at each step of the tick that begins, and at its end [s]."""

@@ -219,6 +219,24 @@ def test_two_runs_are_equal_bit_for_bit(ur10):
     assert once() == once()
 
 
+@pytest.mark.parametrize("torque", [np.inf, 30.0])
+def test_a_step_of_joints_alone_is_a_step_of_mujoco_bit_for_bit(ur10, torque):
+    ways = []
+    for simple in (True, False):
+        engine = Engine(ur10.model, driven={"arm": 0.2})
+        assert engine._simple
+        engine._simple = simple
+        engine._mj.actuator_forcerange[:] = np.clip(engine._mj.actuator_forcerange, -torque, torque)
+        for k, samples in enumerate(pump([(Source(), recorded("arm", wave, 100, 0.2))], 0.01)):
+            engine.take(samples)
+            state = engine.tick() if k else engine.start()
+            data = engine._data
+            now = data.qpos, data.qvel, data.actuator_force, data.qfrc_smooth
+            ways.append((simple, k, state.poses(), *(each.tobytes() for each in now)))
+    half = len(ways) // 2
+    assert [way[1:] for way in ways[:half]] == [way[1:] for way in ways[half:]]
+
+
 def test_what_mujoco_works_out_for_compiled_loops_is_what_it_works_out_for_python(ur10):
     engine = Engine(ur10.model, driven={"arm": 0.2})
     for k, samples in enumerate(pump([(Source(), recorded("arm", wave, 100, 0.2))], 0.01)):

@@ -60,9 +60,16 @@ def test_a_surveyor_says_what_the_query_says_however_it_is_asked(crowd):
     R, x = walk(700, 7, 0.6, 5)
     asked = questions(crowd)
     answers = [query.batch(R, x, per) for query, per in asked]
-    surveyor, random = Surveyor(crowd), np.random.default_rng(0)
+    surveyor, random, together = Surveyor(crowd), np.random.default_rng(0), 0
     for n in range(len(R)):
         surveyor.forget()
         # One always, one never after a while, the others now and then and more than once.
         for k in [0, *([1] if n < 100 else []), *random.integers(2, 5, 3).tolist()]:
             same(surveyor.ask(*asked[k], R[n], x[n]), answers[k].of(n))
+        both = random.choice(5, 2, replace=False).tolist()
+        if found := surveyor.together(tuple(asked[k] for k in both), R[n], x[n]):
+            every, begins = found
+            for k, begin in zip(both, begins, strict=True):
+                same(every.of(slice(begin, begin + len(answers[k].distance[n]))), answers[k].of(n))
+                together += 1
+    assert together > 100

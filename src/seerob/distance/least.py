@@ -9,8 +9,8 @@ no library gives a meaningful depth of two concave meshes. The least over many p
 these values, so a body inside a machine can never read as far from it.
 
 Criteria ask one by one and share pairs of bodies without knowing of each other: a `Surveyor` asks what was
-asked at two ticks in a row together from then on, in one compiled call. The answers are functions of the
-poses alone, so this saves time and changes nothing.
+asked at two ticks in a row together from then on, in one compiled call, but for what was not asked at the
+last tick. The answers are functions of the poses alone, so this saves time and changes nothing.
 """
 
 from __future__ import annotations
@@ -284,9 +284,22 @@ class Survey:
             return [found]
         return [found.of(columns) for columns in self._columns]
 
-    def together(self, rotations: ArrayLike, positions: ArrayLike) -> Closests:
-        """All answers for one set of poses, those to each question in its `columns`."""
-        return self._run(rotations, positions, (), self._memory, self._caps)
+    def together(self, rotations: ArrayLike, positions: ArrayLike, caps: Array | None = None) -> Closests:
+        """All answers for one set of poses, those to each question in its `columns`.
+
+        Args:
+            rotations: As of `Query.minimum`.
+            positions: Likewise.
+            caps: Of `without`.
+        """
+        return self._run(rotations, positions, (), self._memory, self._caps if caps is None else caps)
+
+    def without(self, questions: Iterable[Question]) -> Array:
+        """Caps [m] with which some questions are not asked, for `together`."""
+        caps = self._caps.copy()
+        for question in questions:
+            caps[self.columns[question]] = -np.inf
+        return caps
 
     def within(self, rotations: ArrayLike, positions: ArrayLike, caps: Array) -> Closests:
         """Answers up to other caps, one after the other in the order of the questions.
@@ -396,6 +409,10 @@ class Surveyor:
         self._together: dict[Question, int] = {}
         """Questions that are asked together, and the tick when each was last asked for."""
         self._survey: Survey | None = None
+        self._resting: set[Question] = set()
+        """Those of them that were not asked for at the last tick: they are asked alone when they are."""
+        self._caps: Array | None = None
+        """Without them."""
         self._asked: dict[Question, None] = {}
         self._before: dict[Question, None] = {}
         self._tick = 0
@@ -419,16 +436,21 @@ class Surveyor:
             self._together |= dict.fromkeys(new, self._tick)
             questions = list(self._together)
             self._survey = Survey(self._shapes, questions) if len(questions) > 1 else None
+            self._resting, self._caps = set(), None
+        since = self._tick - 1
+        resting = {question for question, last in self._together.items() if last < since}
+        if resting != self._resting and self._survey is not None:
+            self._resting, self._caps = resting, self._survey.without(resting)
         self._before, self._asked = self._asked, {}
 
     def closest(self, query: Query, rotations: Array, positions: Array) -> Closest:
         """Where two sets are nearest at this tick; see `Query`."""
         question = query, Per.SETS
-        if self._survey is None or question not in self._together:
+        if self._survey is None or question not in self._together or question in self._resting:
             return self.ask(query, Per.SETS, rotations, positions).at(0)
         self._together[question] = self._tick
         if self._found is None:
-            self._found = self._survey.together(rotations, positions)
+            self._found = self._survey.together(rotations, positions, self._caps)
         return self._found.at(self._survey.columns[question].start)
 
     def together(
@@ -436,16 +458,18 @@ class Surveyor:
     ) -> tuple[Closests, list[int]] | None:
         """All answers of a tick, and where those to some questions begin; None while one is asked alone."""
         survey, known = self._survey, self._together
-        if survey is None:
-            return None
-        rows = survey.begins.get(questions)
+        rows = None if survey is None else survey.begins.get(questions)
         if rows is None:
-            if not known.keys() >= set(questions):
+            new = [question for question in questions if question not in known]
+            if survey is None or new:
+                self._asked |= dict.fromkeys(new)
                 return None
             rows = survey.begins[questions] = [survey.columns[each].start for each in questions]
         known.update(dict.fromkeys(questions, self._tick))
+        if not self._resting.isdisjoint(questions):
+            return None
         if self._found is None:
-            self._found = survey.together(rotations, positions)
+            self._found = survey.together(rotations, positions, self._caps)
         return self._found, rows
 
     def ask(self, query: Query, per: Per, rotations: Array, positions: Array) -> Closests:
@@ -454,9 +478,9 @@ class Surveyor:
         found = self._answers.get(question)
         if question in self._together:
             self._together[question] = self._tick
-            if found is None and self._survey is not None:
+            if found is None and self._survey is not None and question not in self._resting:
                 if self._found is None:
-                    self._found = self._survey.together(rotations, positions)
+                    self._found = self._survey.together(rotations, positions, self._caps)
                 found = self._found.of(self._survey.columns[question])
                 self._answers[question] = found
                 return found

@@ -163,8 +163,8 @@ JOINTS = Layout(
 PHYSICS = Layout(
     Physics,
     [
-        *[(_WHOLE, 1)] * 2, *[(_FLOAT, 1)] * 21, (_WHOLE, 1), (_FLOAT, 1), *[(_FLOAT, 2)] * 3, *[(_FLOAT, 1)] * 3,
-        *[(_FLOAT, 2)] * 3, (_FLOAT, 1), (_FLAG, 1), (_FLAG, 1), (_FLOAT, 1),
+        *[(_WHOLE, 1)] * 2, *[(_FLOAT, 1)] * 21, (_WHOLE, 1), (_FLOAT, 1), *[(_FLOAT, 2)] * 3,
+        *[(_FLOAT, 1)] * 3, *[(_FLOAT, 2)] * 3, (_FLOAT, 1), (_FLAG, 1), (_FLAG, 1), (_FLOAT, 1),
     ],
 )  # fmt: skip
 KNOT_ROWS = len(KNOTS.arrays)

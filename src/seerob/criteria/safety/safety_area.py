@@ -244,33 +244,32 @@ class _Outside:
     """Areas of which all keep out at one instant, of a tick's plan."""
 
     def __init__(self, criteria: Sequence[SafetyArea], model: Model) -> None:
-        self._every = list[tuple[list[tuple[int, float, list[str]]], Present, Result]]()
-        """Of each: of every area how many bodies, how much nearer they may be [m], and where."""
+        self._every = list[tuple[list[tuple[float, dict[int, str]]], Present, Result]]()
+        """Of each: of every area how much nearer than it seems anybody may be [m], and where each body is."""
         asked = list[tuple[Query, Per]]()
         for each in criteria:
             watched, several = each._watched(model), len(_names(each.area)) > 1
             places = [[_where(model, one, i, several) for i in range(len(one.gap.b))] for one in watched]
-            asked += [(one.gap.query, Per.BODY) for one in watched]
-            sizes = [
-                (len(where), one.gap.deviation, where) for one, where in zip(watched, places, strict=True)
+            asked += [(one.gap.query, Per.SETS) for one in watched]
+            areas = [
+                (one.gap.deviation, dict(zip(one.gap.b, where, strict=True)))
+                for one, where in zip(watched, places, strict=True)
             ]
             same = Result(name=each.name, unit=each.unit, at_most=each.at_most)
-            self._every.append((sizes, each.present(model), same))
+            self._every.append((areas, each.present(model), same))
         self._asked = tuple(asked)
 
     def results(self, state: State) -> list[Result | None]:
         """Say of each area that nobody is inside of, or may be, who is nearest; as `SafetyArea.bind`."""
         found, begins = state.nearest(self._asked)
         row, results = iter(begins), list[Result | None]()
-        for sizes, present, same in self._every:
+        for areas, present, same in self._every:
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
-            for count, may, where in sizes:
-                begin = next(row)
-                distance = found.distance[begin : begin + count]
-                i = int(distance.argmin())
-                value = distance.item(i)
-                nearest = min(nearest, (value, where[i]))
-                perhaps = min(perhaps, (value - may, where[i], may))
+            for may, where in areas:
+                k = next(row)
+                value, who = found.distance.item(k), where[found.body_b.item(k)]
+                nearest = min(nearest, (value, who))
+                perhaps = min(perhaps, (value - may, who, may))
             (value, who), least = nearest, perhaps[0]
             ends = None if least >= value else (least, value)
             figure = Figure(value, 0.0, ends, beside=_Near(who, *perhaps[1:]))

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from made_cell import AMPLITUDE, FLOATING, Q0, TWO_R, UR10, heard, hinge_limits, made, recorded, two_r, wave
 from seerob.session.run import pump
 from seerob.twin.engine import Engine
+from seerob.twin.partial_model import partial_model
 from seerob.workstation.source import Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
@@ -257,6 +258,25 @@ def test_what_mujoco_works_out_for_compiled_loops_is_what_it_works_out_for_pytho
     assert engine._torques.tobytes() == torques.tobytes()
     assert np.abs(torques).min() > 0
     assert state.positions.tobytes() == asked.xpos[[body.mj for body in ur10.model.bodies]].tobytes()
+
+
+@pytest.mark.parametrize("name", ["arm", "op"])
+def test_trees_by_themselves_are_where_they_are_in_the_cell_bit_for_bit(tmp_path, name):
+    model = made(tmp_path, UR10 + PERSON).model
+    mj, robot = model.mj, model.mechanism(name)
+    found = partial_model(mj, np.unique(mj.body_rootid[list(robot.mj_bodies)]))
+    whole, alone = mujoco.MjData(mj), mujoco.MjData(found.mj)
+    whole.qpos[:], whole.qvel[:] = np.random.default_rng(3).uniform(-2, 2, (2, mj.nv))
+    alone.qpos[:], alone.qvel[:] = whole.qpos[found.q], whole.qvel[found.v]
+    for model, data in ((mj, whole), (found.mj, alone)):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+    own = found.bodies[1:]
+    assert {*robot.mj_bodies.tolist()} <= {*own.tolist()}
+    assert len(found.v) == len(robot.v_address) < mj.nv
+    for array in ("xpos", "xmat", "xquat", "cvel", "subtree_com"):
+        assert getattr(alone, array)[1:].tobytes() == getattr(whole, array)[own].tobytes()
 
 
 @pytest.mark.parametrize("speed", [1e4, np.nan])

@@ -39,6 +39,7 @@ from seerob.kernels.speed import by_coordinate
 from seerob.model.model import Body, Gap, Mechanism, Model
 from seerob.twin.moving_base import RESTS
 from seerob.twin.mujoco_addresses import POSES, addresses
+from seerob.twin.partial_model import partial_model
 from seerob.twin.spans import ROUNDING, Knots, Points, rows_of
 from seerob.twin.speed_noise import levers as levers_of
 from seerob.twin.state import State
@@ -335,45 +336,62 @@ class _Parts:
                 `seerob.kernels.speed.fastest_of` takes them.
         """
         self._robot, self._points, self._rows, self._shapes = robot, Points(model), parts, shapes
-        self._mj, self._data = model.mj, (data := mujoco.MjData(model.mj))
-        self._moved = data.qpos, data.qvel
-        for name in POSES:
-            getattr(mujoco, name)(model.mj, data)
-        self._own_rows = robot.q_address, robot.v_address
+        self._mj = model.mj
         self._coupled = np.ascontiguousarray(robot.coupling, float), np.ascontiguousarray(robot.offset, float)
+        self._roots = frozenset[int]()
+        self._attached = b""
+
+    def _place(self, roots: frozenset[int]) -> None:
+        """Have the trees that begin with some of MuJoCo's bodies, and the robot's own, by themselves."""
+        robot, mj = self._robot, self._mj
+        self._roots = roots | {*mj.body_rootid[mj.dof_bodyid[robot.v_address]].tolist()}
+        self._partial = partial = partial_model(mj, np.array(sorted(self._roots)))
+        self._data = data = mujoco.MjData(partial.mj)
+        for name in POSES:
+            getattr(mujoco, name)(partial.mj, data)
+        self._moved = data.qpos, data.qvel
+        self._own_rows = (
+            np.searchsorted(partial.q, robot.q_address),
+            np.searchsorted(partial.v, robot.v_address),
+        )
         self._others = tuple(
             np.setdiff1d(np.arange(len(every)), own)
             for every, own in zip(self._moved, self._own_rows, strict=True)
         )
-        self._attached = b""
 
     def follow(self, state: State) -> bool:
         """Resolve who moves whom now, where that is not as it was; whether it is."""
-        ids, mj, data, robot = state.attachments.ids, self._mj, self._data, self._robot
+        ids, mj, robot = state.attachments.ids, self._mj, self._robot
         attached = ids.tobytes()
         if self._attached == attached:
             return True
         self._attached = attached
+        roots = frozenset(mj.body_rootid[ids[self._rows]].tolist())
+        if not roots or not roots <= self._roots:
+            self._place(roots)
+        data, partial = self._data, self._partial
         chains = self._points.chains(self._rows, ids, mj)
         own = {dof: row for row, dof in enumerate(robot.v_address.tolist())}
         rows = np.array([own.get(dof, -1) for dof in chains.dofs.tolist()], np.int64)
         others = [m.v_address for m in state.model.mechanisms.values() if m is not robot]
         self._bound = kernel.Parts(
-            addresses(mj, data, *POSES), data.xmat, data.xpos, data.cvel, data.subtree_com,
-            ids[self._rows], state.attachments.roots[self._rows], *self._shapes,
-            mj.qpos0[chains.dofs], chains.start, chains.joints, chains.turns, chains.lengths,
-            chains.dofs, rows, np.isin(chains.dofs, np.concatenate([chains.dofs[:0], *others])) & (rows < 0),
+            addresses(partial.mj, data, *POSES), data.xmat, data.xpos, data.cvel, data.subtree_com,
+            *(np.searchsorted(partial.bodies, each[self._rows]) for each in (ids, state.attachments.roots)),
+            *self._shapes, mj.qpos0[chains.dofs], chains.start, chains.joints, chains.turns, chains.lengths,
+            np.searchsorted(partial.v, chains.dofs), rows,
+            np.isin(chains.dofs, np.concatenate([chains.dofs[:0], *others])) & (rows < 0),
             *self._moved, *self._own_rows, *self._coupled,
         )  # fmt: skip
         self.table = PARTS.rows(self._bound)
         direct = np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not np.any(robot.offset)
         self.alone = direct and chains.dofs.tolist() == robot.v_address.tolist()
-        self._beside = chains.dofs[rows < 0]
+        self._beside = np.searchsorted(partial.v, chains.dofs[rows < 0])
         return False
 
     def put_others(self, now: mujoco.MjData) -> bool:
         """Put all but the robot where they are now; whether those that move its parts go on as before."""
-        every = tuple(zip(self._moved, (now.qpos, now.qvel), strict=True))
+        there = now.qpos[self._partial.q], now.qvel[self._partial.v]
+        every = tuple(zip(self._moved, there, strict=True))
         beside = self._beside
         if all((np.abs(there[beside] - put[beside]) <= RESTS).all() for put, there in every):
             return True

@@ -458,8 +458,7 @@ class Surveyor:
     ) -> tuple[Closests, list[int]] | None:
         """All answers of a tick, and where those to some questions begin; None while one is asked alone."""
         survey, known = self._survey, self._together
-        rows = None if survey is None else survey.begins.get(questions)
-        if rows is None:
+        if survey is None or (rows := survey.begins.get(questions)) is None:
             new = [question for question in questions if question not in known]
             if survey is None or new:
                 self._asked |= dict.fromkeys(new)

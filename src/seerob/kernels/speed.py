@@ -40,11 +40,13 @@ class Placed(NamedTuple):
     """[m], shape (n, 3)."""
     quaternions: Array
     """Shape (n, 4)."""
+    shown: NDArray[np.float32]
+    """Position [m] and quaternion of each, shape (n, 7)."""
 
 
 PLACED = Layout(
     Placed,
-    [(np.int64, 1), *[(np.float64, 2)] * 3, (np.float64, 3), *[(np.float64, 2)] * 2],
+    [(np.int64, 1), *[(np.float64, 2)] * 3, (np.float64, 3), *[(np.float64, 2)] * 2, (np.float32, 2)],
 )
 _placed_in = PLACED.read
 
@@ -54,7 +56,7 @@ def place(table: Indices, ids: Indices) -> None:
     """Work out poses and velocities of MuJoCo's bodies, and take over the poses of some.
 
     Args:
-        table: Of `PLACED`; its last three are written, and what MuJoCo works out where ``calls`` says.
+        table: Of `PLACED`; its last four are written, and what MuJoCo works out where ``calls`` says.
         ids: Which, shape (n,).
     """
     all_ = _placed_in(table, 0)
@@ -64,9 +66,9 @@ def place(table: Indices, ids: Indices) -> None:
         for c in range(9):
             all_.rotations[i, c // 3, c % 3] = all_.xmat[ids[i], c]
         for c in range(3):
-            all_.positions[i, c] = all_.xpos[ids[i], c]
+            all_.positions[i, c] = all_.shown[i, c] = all_.xpos[ids[i], c]
         for c in range(4):
-            all_.quaternions[i, c] = all_.xquat[ids[i], c]
+            all_.quaternions[i, c] = all_.shown[i, 3 + c] = all_.xquat[ids[i], c]
 
 
 @njit(cache=True, nogil=True)

@@ -182,14 +182,14 @@ def snapshot(
     sources: dict[str, SourceLine] | None = None,
 ) -> Snapshot:
     """What goes out of a state."""
-    mechanisms, hearings = state.model.mechanisms.values(), state.hearings
+    hearings = state.hearings
     return Snapshot(
         seq=seq,
         t=state.t,
         poses=state.poses(),
-        joints={m.name: tuple(state.joint_positions(m).tolist()) for m in mechanisms},
-        tracking={m.name: hearings[m.name].error for m in mechanisms},
-        bones={m.name: bones for m in mechanisms if (bones := hearings[m.name].bones)},
+        joints=state.joints(),
+        tracking={name: hearing.error for name, hearing in hearings.items()},
+        bones={name: hearing.bones for name, hearing in hearings.items() if hearing.bones},
         late=late or {},
         results=results,
         looks={} if looks is None else looks.at(state),

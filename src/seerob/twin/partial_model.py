@@ -60,4 +60,4 @@ def partial_model(mj: mujoco.MjModel, roots: Indices) -> PartialModel:
 
 def _joint_of_positions(mj: mujoco.MjModel) -> Indices:
     """The joint that each of ``qpos`` is of, shape (nq,)."""
-    return np.repeat(np.arange(mj.njnt), np.diff([*mj.jnt_qposadr, mj.nq]))
+    return np.repeat(np.arange(len(mj.jnt_qposadr)), np.diff([*mj.jnt_qposadr, mj.nq]))

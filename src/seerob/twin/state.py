@@ -15,6 +15,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import deepcopy
 from functools import partial
+from operator import itemgetter
 from typing import ClassVar, NamedTuple, cast
 
 import mujoco
@@ -81,6 +82,13 @@ class _Point(NamedTuple):
     wxyz: list[float]
 
 
+def _picking(rows: Indices) -> Callable[[list[float]], tuple[float, ...]]:
+    """Make what takes some of many numbers."""
+    if len(rows) < 2:
+        return lambda every: tuple(every[i] for i in rows)
+    return cast("Callable[[list[float]], tuple[float, ...]]", itemgetter(*rows.tolist()))
+
+
 class State(Validity):
     """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
 
@@ -128,11 +136,12 @@ class State(Validity):
         """Points of which Jacobians are asked: what of them is the same at all ticks."""
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
+        self._joints = {name: _picking(each.own_q) for name, each in self.columns.items()}
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
         self._xmat, self._xpos = data.xmat, data.xpos
         self._placed = Placed(
             addresses(model.mj, data, *POSES), self._xmat, self._xpos, data.xquat,
-            self._rotations, self._positions, self._quaternions,
+            self._rotations, self._positions, self._quaternions, self._shown,
         )  # fmt: skip
         """Keeps the arrays of its table."""
         self._table = PLACED.rows(self._placed)
@@ -197,8 +206,13 @@ class State(Validity):
     def poses(self) -> bytes:
         """Little-endian float32, seven per body: position [m], quaternion w first."""
         self._open("poses", "placed(bodies)")
-        self._shown[:, :3], self._shown[:, 3:] = self._positions, self._quaternions
         return self._shown.take(self.attachments.drawn, axis=0).tobytes()
+
+    def joints(self) -> dict[str, tuple[float, ...]]:
+        """Joint positions of everybody as they are shown [rad or m], by name."""
+        self._open("joints", "q(mechanism)")
+        every = self._qpos.tolist()
+        return {name: pick(every) for name, pick in self._joints.items()}
 
     # -- people as they were captured -------------------------------------------------------
 

@@ -96,6 +96,8 @@ class MjModel:
     names: bytes
     nbody: int
     neq: int
+    ngeom: int
+    nsensor: int
     nexclude: int
     nflex: int
     npair: int
@@ -136,8 +138,11 @@ class MjData:
     nplugin: int
     qacc: NDArray[np.float64]
     qacc_warmstart: NDArray[np.float64]
+    qfrc_actuator: NDArray[np.float64]
+    qfrc_applied: NDArray[np.float64]
     qfrc_bias: NDArray[np.float64]
     qfrc_passive: NDArray[np.float64]
+    qfrc_smooth: NDArray[np.float64]
     qpos: NDArray[np.float64]
     qvel: NDArray[np.float64]
     subtree_com: NDArray[np.float64]
@@ -216,6 +221,7 @@ def mj_objectVelocity(
 def mj_passive(m: MjModel, d: MjData) -> None: ...
 def mj_rne(m: MjModel, d: MjData, flg_acc: int, result: NDArray[np.float64]) -> None: ...
 def mj_setConst(m: MjModel, d: MjData) -> None: ...
+def mj_resetData(m: MjModel, d: MjData) -> None: ...
 def mj_step(m: MjModel, d: MjData, nstep: int = 1) -> None: ...
 def mju_quat2Vel(res: NDArray[np.float64], quat: NDArray[np.float64], dt: float) -> None: ...
 def mju_quat2Mat(res: NDArray[np.float64], quat: NDArray[np.float64]) -> None: ...

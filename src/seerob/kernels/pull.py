@@ -332,42 +332,6 @@ def ticks_ahead(
     return found
 
 
-@njit(f"void({_TABLE}, {_TABLE}, f8, f8, f8)", cache=True, nogil=True, error_model="numpy")
-def aim(motions: Indices, physics: Indices, start: float, end: float, dt: float) -> None:
-    """Work out where everybody is to be at the steps of a tick, and at its end.
-
-    Args:
-        motions: Table of everybody, as `MOTION_ROWS` says; their `Joints` are written.
-        physics: Table of `PHYSICS`; ``t``, ``q``, ``v`` and ``a`` are written.
-        start: When the tick begins [s].
-        end: When it ends [s].
-        dt: Timestep [s].
-    """
-    all_ = _physics_in(physics, 0)
-    last, half = len(all_.t) - 1, 0.5 * dt
-    for row in range(last):
-        all_.t[row] = start + row * dt
-    all_.t[last] = end
-    for r in range(0, len(motions), MOTION_ROWS):
-        knots, joints = _knots_in(motions, r), _joints_in(motions, r + KNOT_ROWS)
-        _along(knots, all_.t, joints.q, joints.v, joints.a)
-        led = len(joints.coupling) == 0
-        for row in range(last + 1):
-            q, v, a = joints.q[row], joints.v[row], joints.a[row]
-            for i in range(len(joints.v_places)):
-                at, to = joints.q_places[i], joints.v_places[i]
-                if led:
-                    all_.q[row, at], all_.v[row, to], all_.a[row, to] = q[i], v[i] - half * a[i], a[i]
-                    continue
-                x, speed, change = 0.0, 0.0, 0.0
-                for j in range(len(q)):
-                    share = joints.coupling[i, j]
-                    x += share * q[j]
-                    speed += share * (v[j] - half * a[j])
-                    change += share * a[j]
-                all_.q[row, at], all_.v[row, to], all_.a[row, to] = x + joints.offset[i], speed, change
-
-
 @njit(f"void({_TABLE}, {_TABLE}, f8)", cache=True, nogil=True, error_model="numpy")
 def follow(motions: Indices, physics: Indices, t: float) -> None:
     """Put everybody who was heard on his motion at an instant.
@@ -521,6 +485,46 @@ def begin(physics: Indices, step: int) -> None:
             all_.q_way[0, i] = all_.shown_q[i]
         for i in range(len(all_.qvel)):
             all_.v_way[0, i] = all_.shown_v[i]
+
+
+@njit(f"void({_TABLE}, {_TABLE}, f8, f8, f8, b1)", cache=True, nogil=True, error_model="numpy")
+def aim(motions: Indices, physics: Indices, start: float, end: float, dt: float, steers: bool) -> None:
+    """Work out where everybody is to be at the steps of a tick, and at its end, and begin the first.
+
+    Args:
+        motions: Table of everybody, as `MOTION_ROWS` says; their `Joints` are written.
+        physics: Table of `PHYSICS`; ``t``, ``q``, ``v`` and ``a`` are written, and what `begin` writes.
+        start: When the tick begins [s].
+        end: When it ends [s].
+        dt: Timestep [s].
+        steers: Whether also what actuators are told is worked out now, of all steps (`steer`).
+    """
+    all_ = _physics_in(physics, 0)
+    last, half = len(all_.t) - 1, 0.5 * dt
+    for row in range(last):
+        all_.t[row] = start + row * dt
+    all_.t[last] = end
+    for r in range(0, len(motions), MOTION_ROWS):
+        knots, joints = _knots_in(motions, r), _joints_in(motions, r + KNOT_ROWS)
+        _along(knots, all_.t, joints.q, joints.v, joints.a)
+        led = len(joints.coupling) == 0
+        for row in range(last + 1):
+            q, v, a = joints.q[row], joints.v[row], joints.a[row]
+            for i in range(len(joints.v_places)):
+                at, to = joints.q_places[i], joints.v_places[i]
+                if led:
+                    all_.q[row, at], all_.v[row, to], all_.a[row, to] = q[i], v[i] - half * a[i], a[i]
+                    continue
+                x, speed, change = 0.0, 0.0, 0.0
+                for j in range(len(q)):
+                    share = joints.coupling[i, j]
+                    x += share * q[j]
+                    speed += share * (v[j] - half * a[j])
+                    change += share * a[j]
+                all_.q[row, at], all_.v[row, to], all_.a[row, to] = x + joints.offset[i], speed, change
+    if steers:
+        steer(physics, 0, len(all_.steering), dt)
+    begin(physics, 0)
 
 
 @njit(cache=True, nogil=True)

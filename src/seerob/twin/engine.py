@@ -657,7 +657,7 @@ class Engine:
         self._aim(start, end)
         every = self._mechanisms if self.controllers else ()
         self._landing = [one for one in every if self._references[one.name].landing]
-        physics, begun, step = self._physics, False, 0
+        physics, begun, step = self._physics, True, 0
         while step < self._steps:
             if not begun or self._landing or self._task_pulls:
                 self._pull(step, start + step * self._dt)
@@ -684,9 +684,8 @@ class Engine:
 
     def _aim(self, start: float, end: float) -> None:
         """Work out where every joint is to be at each step of the tick that begins, and at its end [s]."""
-        kernel.aim(self._motions, self._physics, start, end, self._dt)
-        if self.controllers and not self._task_pulls:
-            kernel.steer(self._physics, 0, self._steps, self._dt)
+        steers = self.controllers and not self._task_pulls
+        kernel.aim(self._motions, self._physics, start, end, self._dt, steers)
 
     def _pull(self, step: int, t: float) -> None:
         if self._landing:

@@ -376,7 +376,8 @@ class _Parts:
         others = [m.v_address for m in state.model.mechanisms.values() if m is not robot]
         self._bound = kernel.Parts(
             addresses(partial.mj, data, *POSES), data.xmat, data.xpos, data.cvel, data.subtree_com,
-            *(np.searchsorted(partial.bodies, each[self._rows]) for each in (ids, state.attachments.roots)),
+            np.searchsorted(partial.bodies, ids[self._rows]),
+            np.searchsorted(partial.bodies, state.attachments.roots[self._rows]),
             *self._shapes, mj.qpos0[chains.dofs], chains.start, chains.joints, chains.turns, chains.lengths,
             np.searchsorted(partial.v, chains.dofs), rows,
             np.isin(chains.dofs, np.concatenate([chains.dofs[:0], *others])) & (rows < 0),
@@ -390,8 +391,8 @@ class _Parts:
 
     def put_others(self, now: mujoco.MjData) -> bool:
         """Put all but the robot where they are now; whether those that move its parts go on as before."""
-        there = now.qpos[self._partial.q], now.qvel[self._partial.v]
-        every = tuple(zip(self._moved, there, strict=True))
+        now_there = now.qpos[self._partial.q], now.qvel[self._partial.v]
+        every = tuple(zip(self._moved, now_there, strict=True))
         beside = self._beside
         if all((np.abs(there[beside] - put[beside]) <= RESTS).all() for put, there in every):
             return True

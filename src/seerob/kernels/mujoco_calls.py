@@ -5,7 +5,8 @@ address with it that is another one in the next process: so addresses are argume
 What MuJoCo reports as an error inside of such a call ends the process, for only its Python functions turn it
 into an exception. So nothing is called here that can fail in one state and not in another: kinematics take no
 memory, Newton–Euler and passive forces the same in every state, and who calls these has called them from
-Python once. A step of the physics takes as much as its contacts do: it is called from Python.
+Python once. A step of the physics takes as much memory as its contacts do: it is called from Python, but
+where nothing can touch (`seerob.kernels.pull.STEP`).
 """
 
 from __future__ import annotations

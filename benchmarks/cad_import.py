@@ -1,4 +1,4 @@
-"""A generated line of 2 000 parts and 10⁶ triangles: import beside OpenCASCADE alone; starts; a tick.
+"""A generated line of 2 000 parts and 10⁶ triangles: import beside OpenCASCADE, starts beside MuJoCo, a tick.
 
     python benchmarks/cad_import.py           # wall and processor times, memory of the whole process tree
     python benchmarks/cad_import.py --page    # pictures a second in a browser beside the run, too (CHROMIUM)
@@ -47,6 +47,14 @@ begin = time.process_time(), time.perf_counter()
 station = load(Path(sys.argv[1]), cache=Path(sys.argv[2]))
 used, took = time.process_time() - begin[0], time.perf_counter() - begin[1]
 print(f"{len(station.model.bodies)} bodies, {used:.2f} s of processor time, {took:.1f} s by the clock")
+"""
+PEER = """
+import sys, time
+begin = time.process_time(), time.perf_counter()
+import mujoco
+model = mujoco.MjModel.from_xml_path(sys.argv[1])
+used, took = time.process_time() - begin[0], time.perf_counter() - begin[1]
+print(f"{model.nbody - 1} bodies, {used:.2f} s of processor time, {took:.1f} s by the clock")
 """
 TICK = """
 import sys, time
@@ -194,6 +202,9 @@ def main() -> None:
         for which in ("first start", "second start"):
             said, cost = timed("-c", START, str(cell), str(cache))
             print(f"{which:18} {cost}; loading: {said.strip()}")
+        timed("-m", "seerob", "export", str(cell), "--to", "mjcf", "-o", str(folder / "mjcf"))
+        said, cost = timed("-c", PEER, str(folder / "mjcf/cell.xml"))
+        print(f"MuJoCo alone       {cost}; loading what was exported: {said.strip()}")
         shutil.copy(ROOT / "workstations/imported_line/motion/cycle.csv", cell)
         with (cell / "workstation.toml").open("a", encoding="utf-8") as added:
             added.write(ADDED)

@@ -248,6 +248,7 @@ CONTENTS = {
     "NX": b"SPLMSSTR\0\0",
     "JT": b"Version 9.5 JT  DM 6.3.0.1",
     "Parasolid": b"**ABCDEFGHIJKLMNOPQRSTUVWXYZ***",
+    "Fusion": zipped("FusionAssetName[Active]/Design1.f3d"),
 }
 
 

@@ -171,9 +171,11 @@ def test_layers_beside_the_file_are_followed_and_others_are_named(tmp_path):
         ("./parts/pin.usda", "../secret.usda", str(tmp_path / "secret.usda"), "no.usda")
     ):
         stage.DefinePrim(f"/pin_{number}").GetReferences().AddReference(name)
+    # What is in the layer itself is no file that could be missing.
+    stage.DefinePrim("/pin_again").GetReferences().AddInternalReference("/pin_0")
     stage.Save()
     found = read(folder / "a.usda")
-    assert found.names() == ["pin_0"]
+    assert found.names() == ["pin_0", "pin_again"]
     assert sorted(name for name, _ in found.left_out) == sorted(
         ["../secret.usda", str(tmp_path / "secret.usda"), "no.usda"]
     )

@@ -46,6 +46,8 @@ CLOSED = {
     "FBX": Closed("FBX", "in Blender or the program that wrote it: export as glTF 2.0 (.glb)"),
     "Blender": Closed("Blender", "File > Export > glTF 2.0 (.glb)"),
     "SketchUp": Closed("SketchUp", "File > Export > 3D Model > COLLADA (.dae) or glTF"),
+    "FreeCAD": Closed("FreeCAD", f"select the assembly, File > Export > {_STEP}"),
+    "Fusion": Closed("Fusion", f"open the assembly, File > Export > {_STEP}"),
     "Rhino": Closed("Rhino", f"File > Export Selected > {_STEP}"),
 }
 _BEGINS = (
@@ -196,4 +198,8 @@ def _zipped(path: Path, data: bytes) -> str:
         return ".3dxml"
     if any(name.endswith((".usd", ".usda", ".usdc")) for name in names):
         return ".usd"
+    if "document.xml" in names and path.suffix.lower() == ".fcstd":
+        raise refused(path, "FreeCAD")
+    if any(name.endswith((".f3d", ".f3z")) for name in names) or path.suffix.lower() in (".f3d", ".f3z"):
+        raise refused(path, "Fusion")
     raise InputError.at(path, "", f"is an archive without a CAD file ({', '.join(names[:3])})", _known())

@@ -103,7 +103,8 @@ class _Layers:
         if layer is None:
             self.source.fail(f"{at / file.name} is not a readable layer of USD", "export it again")
         changed = False
-        for name in sorted(layer.GetCompositionAssetDependencies()):
+        # The empty name is the layer itself, of which one prim is made as another is.
+        for name in sorted(filter(None, layer.GetCompositionAssetDependencies())):
             self.count += 1
             if self.count > MAX_LAYERS:
                 self.source.fail(f"has more than {MAX_LAYERS} layers", "flatten it")

@@ -100,6 +100,8 @@ class Layout:
     """Whose skeleton it is: ``xsens``, ``azure_kinect``, ``cmu`` …; empty when it is the file's own."""
     parents: tuple[int, ...] = ()
     """Index of the parent of each row, -1 for a root; empty when there is no tree."""
+    scaled: bool = False
+    """Whether its metres are a guess: only directions count then, with the lengths of the person."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,19 @@ LARGEST = 1e3
 """No person is farther from the origin of a device's world [m]."""
 UNIT = 0.1
 """By how much the length of a quaternion may differ from 1."""
+LIMBS = (
+    ("left_thigh", "right_thigh"),
+    ("left_upper_arm", "right_upper_arm"),
+    *(
+        (f"{side}_{bone}", f"{side}_{next_bone}")
+        for side in ("left", "right")
+        for bone, next_bone in (
+            ("thigh", "shank"), ("shank", "foot"), ("upper_arm", "forearm"), ("forearm", "hand"),
+        )
+    ),
+)  # fmt: skip
+"""Bones that begin at the two ends of what no posture changes in length, but for the shoulders, by some
+centimetres; from the trunk outward."""
 OWN_PLACE = 0.2
 """No device places a joint farther from ours [m]: about the length of a clavicle."""
 
@@ -46,12 +59,61 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
+class Size:
+    """Lengths of the person, for a device whose metres, and whose shares of a body, are a guess."""
+
+    hips: tuple[int, int]
+    """Rows of both hips."""
+    shoulders: tuple[int, int]
+    """Rows of both shoulders."""
+    trunk: float
+    """From the middle of the hips to that of the shoulders of who stands upright [m]."""
+    limbs: tuple[tuple[int, int, float], ...]
+    """Rows at both ends of a limb, from the trunk outward, and its length [m]; hips and shoulders first."""
+    carried: tuple[tuple[int, int], ...]
+    """Rows that are at no joint, and the row of the joint that carries them."""
+
+    def fitted(self, positions: Array) -> Array:
+        """Places of a frame with every limb as long as the person's, in the directions that the device sees.
+
+        Args:
+            positions: About the middle of the hips, shape (n, 3), NaN where not known.
+
+        Returns:
+            Positions about the middle of the hips [m], shape (n, 3); trunk and shoulders are those of who
+            stands upright, as nothing shows how they bend. NaN where no direction leads there.
+        """
+        ends, lengths = (
+            np.array([limb[:2] for limb in self.limbs]),
+            np.array([limb[2] for limb in self.limbs]),
+        )
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            ways = positions[ends[:, 1]] - positions[ends[:, 0]]
+            found = np.linalg.norm(ways, axis=1)
+            scale = float(lengths.sum() / found.sum())
+            ways *= (lengths / found)[:, None]
+            out = np.full(positions.shape, np.nan)
+            out[self.hips[0]], out[self.hips[1]] = -ways[0] / 2, ways[0] / 2
+            middle = positions[list(self.shoulders)].mean(axis=0)
+            trunk = middle - positions[list(self.hips)].mean(axis=0)
+            trunk *= self.trunk / float(np.linalg.norm(trunk))
+            out[self.shoulders[0]], out[self.shoulders[1]] = trunk - ways[1] / 2, trunk + ways[1] / 2
+            for (near, far, _), way in zip(self.limbs[2:], ways[2:], strict=True):
+                out[far] = out[near] + way
+            for row, joint in self.carried:
+                out[row] = out[joint] + (positions[row] - positions[joint]) * scale
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class Observer:
     """Makes pulls on bones of what one device sees; frozen."""
 
     rows: tuple[Row, ...]
     world_from_capture: Array
     """Shape (4, 4)."""
+    size: Size | None = None
+    """Of a device whose metres are a guess."""
 
     def points(self, frame: CaptureFrame) -> tuple[BodyPoint, ...]:
         """What a frame says of the person's bones, in the order of the rows.
@@ -61,6 +123,8 @@ class Observer:
         """
         R, origin = self.world_from_capture[:3, :3], self.world_from_capture[:3, 3]
         seen = np.asarray(frame.positions, float)
+        if self.size is not None:
+            seen = self.size.fitted(seen)
         with np.errstate(invalid="ignore", over="ignore"):
             positions = seen @ R.T + origin
             near = (np.abs(seen) < LARGEST).all(axis=1)  # false for NaN
@@ -140,7 +204,30 @@ def bind(
             )
         )
     world = np.eye(4) if world_from_capture is None else world_from_capture
-    return Observer(tuple(rows), world)
+    return Observer(tuple(rows), world, _size(places, description) if layout.scaled else None)
+
+
+def _size(places: Sequence[Place | None], description: Description) -> Size | None:
+    """Of the rows that lie at joints; None where a limb has not both ends."""
+    _, positions = bone_poses(description, np.zeros(len(description.joints())))
+    own = {bone: positions[BONES.index(bone)] for bone in BONES}
+    at_joint = {
+        place.bone: row for row, place in enumerate(places) if place is not None and not place.at.any()
+    }
+    if any(bone not in at_joint for limb in LIMBS for bone in limb):
+        return None
+    shoulders, hips = ((own[f"left_{x}"] + own[f"right_{x}"]) / 2 for x in ("upper_arm", "thigh"))
+    return Size(
+        hips=(at_joint["left_thigh"], at_joint["right_thigh"]),
+        shoulders=(at_joint["left_upper_arm"], at_joint["right_upper_arm"]),
+        trunk=float(np.linalg.norm(shoulders - hips)),
+        limbs=tuple((at_joint[a], at_joint[b], float(np.linalg.norm(own[b] - own[a]))) for a, b in LIMBS),
+        carried=tuple(
+            (row, at_joint[place.bone.replace("toes", "foot")])
+            for row, place in enumerate(places)
+            if place is not None and place.position > 0 and row not in at_joint.values()
+        ),
+    )
 
 
 def with_mounts(observer: Observer, mounts: Mapping[int, tuple[Array, Array]]) -> Observer:

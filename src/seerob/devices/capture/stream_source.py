@@ -59,6 +59,8 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
     captured: ClassVar[str] = "live"
     known_error: ClassVar[PostureError | None] = None
     """How far angles of a posture may be off, as somebody found."""
+    placed: ClassVar[bool] = True
+    """Whether its positions say where the person stands, and not only how they lie to each other."""
 
     human: str
     """The person it drives; several devices may drive the same one."""
@@ -200,6 +202,7 @@ class _Hearing:
             latency=late,
             hold=self._source.hold,
             smoothing=self._source.smoothing or 0.0,
+            placed=self._source.placed,
             quality=_quality(points, changed),
             placing=Placing(reason=self._unlike) if self._unlike else frame.placing or self._source.stated(),
         )

@@ -27,7 +27,7 @@ from seerob.devices.capture.options import AZURE_KINECT, placement
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.listening import Contact, contact_of
 from seerob.files.motion_capture.persons import Follower, numbers
-from seerob.files.motion_capture.upright import camera_upright, upright_rotation
+from seerob.files.motion_capture.upright import kinect_upright, upright_rotation
 from seerob.protocols.tracking.kinect import LAYOUT, PORT, Body, Picture, from_datagrams, from_websocket
 from seerob.workstation.source import Opened, PostureError, Target
 from seerob.workstation.workstation import Pose
@@ -202,7 +202,7 @@ def _standing(heard: list[Picture]) -> tuple[str, str] | None:
     bodies = [p.bodies[0].positions for p in heard if len(p.bodies) == 1]
     if not bodies:
         return None
-    _, finding = camera_upright(np.stack(bodies), file="the camera has no accelerometer")
+    _, finding = kinect_upright(np.stack(bodies), file="the camera has no accelerometer")
     return finding.level, finding.text
 
 

@@ -160,7 +160,7 @@ _PLACE = re.compile(
     rf"{_SPLIT}(?P<axis>[xyzXYZ])$"
 )
 _SURE = re.compile(
-    rf"^(?P<name>.+?){_SPLIT}(?:conf|confidence|Confidence|(?P<state>[tT]racking_?[sS]tate)|quality)$"
+    rf"^(?P<name>.+?){_SPLIT}(?:conf|confidence|Confidence|visibility|(?P<state>[tT]racking_?[sS]tate)|quality)$"
 )
 UNITS = {"mm": "mm", "cm": "cm", "m": "m", "millimeter": "mm", "meter": "m", "millimetre": "mm", "metre": "m"}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
@@ -195,9 +195,21 @@ def column(header: str) -> Column | None:
         return time
     if plain in ("body", "body_id", "person", "person_id", "user", "user_id", "subject", "skeleton_id"):
         return Column("", "person")
-    if plain in ("joint", "joint_name", "joint_id", "point", "marker", "segment", "bone", "name"):
+    if plain in (
+        "joint",
+        "joint_name",
+        "joint_id",
+        "point",
+        "marker",
+        "segment",
+        "bone",
+        "name",
+        "landmark",
+        "landmark_id",
+        "landmark_name",
+    ):
         return Column("", "point")
-    if plain in ("confidence", "conf", "joint_confidence"):
+    if plain in ("confidence", "conf", "joint_confidence", "visibility"):
         return Column("", "confidence")
     if plain in ("tracking_state", "trackingstate"):
         return Column("", "level")

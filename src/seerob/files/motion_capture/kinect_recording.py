@@ -23,7 +23,7 @@ from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture import body_table, persons
 from seerob.files.motion_capture.body_table import BodyTable
 from seerob.files.motion_capture.frame_arrays import FrameArrays, check_size, checked
-from seerob.files.motion_capture.upright import camera_upright
+from seerob.files.motion_capture.upright import kinect_upright
 from seerob.files.tables.table_files import check_file
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.kinect import JOINTS, LAYOUT, Body, Picture, camera_body, decode_frame
@@ -68,7 +68,7 @@ def recording(pictures: Iterable[Picture], reading: Reading, notes: tuple[Findin
         notes = (*notes, Finding(level="assumed", subject="", text=text))
     said = [*notes, *found, *persons.findings(follower, file=reading.file, subject="", start=start)]
     if not reading.level:
-        world_from_camera, finding = camera_upright(frames.positions, file=reading.file)
+        world_from_camera, finding = kinect_upright(frames.positions, file=reading.file)
         frames, said = frames.turned(world_from_camera), [*said, finding]
     return Captured(layout=LAYOUT, frames=frames, rate=rate, count=len(frames), findings=tuple(said))
 

@@ -14,7 +14,7 @@ from seerob.protocols.tracking.kinect import JOINTS
 UPRIGHT_SHARE = 0.1
 """Share of the frames, those in which the body is longest, that tell the vertical."""
 SOLE = 0.02
-"""Height of the joints FOOT of a depth camera over the floor of somebody who stands [m]; a choice."""
+"""Height of joints of the feet over the floor of somebody who stands, as cameras see them [m]; a choice."""
 CLEAR = 0.6
 """An axis is up when so much of the way from feet to head is along it, as a share."""
 
@@ -114,24 +114,33 @@ def up_axis(names: tuple[str, ...], positions: Array) -> tuple[str, float] | Non
 
 _ANKLES = [JOINTS.index("ANKLE_LEFT"), JOINTS.index("ANKLE_RIGHT")]
 _FEET = [JOINTS.index("FOOT_LEFT"), JOINTS.index("FOOT_RIGHT")]
-_NECK, _PELVIS = JOINTS.index("NECK"), JOINTS.index("PELVIS")
+_NECK = JOINTS.index("NECK")
 
 
-def camera_upright(positions: Array, *, file: str) -> tuple[Array, Finding]:
+def kinect_upright(positions: Array, *, file: str) -> tuple[Array, Finding]:
+    """Where a depth camera stands, by its joints, shape (n, 32, 3); see `camera_upright`."""
+    return camera_upright(
+        positions[:, _ANKLES].mean(axis=1), positions[:, _NECK], positions[:, _FEET], file=file
+    )
+
+
+def camera_upright(ankles: Array, neck: Array, feet: Array, *, file: str) -> tuple[Array, Finding]:
     """Where the camera stands, from the person it sees: upright, over a floor, heading kept.
 
     The vertical is the direction from the ankles to the neck in the frames in which that way is longest.
 
     Args:
-        positions: Joints in the camera's frame x forward, y left, z up [m], shape (n, 32, 3).
+        ankles: Their middle in the camera's frame x forward, y left, z up [m], shape (n, 3); NaN where not
+            seen.
+        neck: Likewise, or the middle of the shoulders.
+        feet: What stands on the floor, shape (n, k, 3).
         file: As messages name it.
 
     Returns:
         World from camera, shape (4, 4): the floor at z = 0, the camera above the origin, looking along x;
         and what was estimated.
     """
-    ankles = positions[:, _ANKLES].mean(axis=1)
-    ways = positions[:, _NECK] - ankles
+    ways = neck - ankles
     length = np.linalg.norm(ways, axis=1)
     usable = np.flatnonzero(np.isfinite(length) & (length > 0.3))
     if len(usable) == 0:
@@ -146,8 +155,8 @@ def camera_upright(positions: Array, *, file: str) -> tuple[Array, Finding]:
     up /= np.linalg.norm(up)
     spread = float(np.degrees(np.median(np.arccos(np.clip(directions @ up, -1, 1)))))
     rotation = upright_rotation(up)
-    feet = (positions[:, _FEET] @ rotation.T)[..., 2]
-    floor = float(np.nanpercentile(feet, 5)) - SOLE if np.isfinite(feet).any() else 0.0
+    heights = (feet @ rotation.T)[..., 2]
+    floor = float(np.nanpercentile(heights, 5)) - SOLE if np.isfinite(heights).any() else 0.0
     tilt = float(np.degrees(np.arccos(np.clip(up[2], -1, 1))))
     text = (
         f"{file}: pose of the camera estimated from {len(longest)} frames in which the person stands most "

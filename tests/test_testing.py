@@ -123,6 +123,7 @@ ERGONOMICS = {
     "iso_11226": "",
     "en_1005_4": "",
     "strain_index": "daily = 14400\nlimit = 10\n",
+    "back_compression": "load = 0\nslow = true\n",
     "acme.bending": "limit = 10\n",
     "acme.bent_load": "limit = 2\n",
 }

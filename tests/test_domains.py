@@ -199,6 +199,12 @@ CALLS = {
         "inverse": np.eye(3),
         "velocity": np.array([0.3, 0.4, 0.0]),
     },
+    "criteria.ergonomics.back_compression.compression": {
+        "moment": 100.0,
+        "weight": 400.0,
+        "upright": 0.5,
+        "lever": 0.05,
+    },
     "criteria.safety.manipulability.singular_values": {"J_v": J},
     "criteria.safety.manipulability.least_value_after": {"J": np.eye(6)},
     "criteria.safety.separation.separation_bound": {
@@ -347,6 +353,7 @@ STRICT = {
 }
 """What is strictest, or right, where an argument is not a number."""
 BELOW = {
+    "criteria.ergonomics.back_compression.compression": "moment weight lever",
     "criteria.safety.joint_torque.shares": "limits uncertainty",
     "criteria.safety.kinetic_energy.kinetic_energy": "M",
     "criteria.safety.point_energy.point_energy": "inverse",

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 from math import inf
 from time import monotonic
-from typing import NamedTuple
-
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from typing import NamedTuple, Protocol
 
 WINDOW = 32
 """Frames in flight at most."""
@@ -31,22 +30,42 @@ class Closing(NamedTuple):
     reason: str
 
 
+class Line(Protocol):
+    """A connection that takes messages at once."""
+
+    on_read: Callable[[], None]
+    """Is called when the page has read what was too much."""
+
+    @property
+    def reads(self) -> bool:
+        """Whether the page has read so much that more may be written."""
+        ...
+
+    def write(self, messages: list[bytes]) -> None:
+        """Write messages at once."""
+        ...
+
+
 class Client:
     """What one page has been sent, has acknowledged and still waits for.
 
+    What is offered is written in the same turn of the loop: no task is woken for it.
+
     Args:
-        socket: Its accepted WebSocket.
+        line: To it.
         patience: How long a frame may wait for it before the connection is closed [s].
     """
 
-    def __init__(self, socket: WebSocket, *, patience: float) -> None:
-        self._socket, self._patience = socket, patience
+    def __init__(self, line: Line, *, patience: float) -> None:
+        self._line, self._patience = line, patience
+        line.on_read = self.flush
         self._waiting: dict[str, bytes] = {}
         self._seq, self._until = 0, inf
         self._in_flight: deque[int] = deque(maxlen=WINDOW)
         self._waiting_since: float | None = None
-        self._wake = asyncio.Event()
-        self._over: asyncio.Future[Closing] = asyncio.get_running_loop().create_future()
+        self._loop = asyncio.get_running_loop()
+        self._due: asyncio.Handle | None = None
+        self._over: asyncio.Future[Closing] = self._loop.create_future()
         self.sent = 0
         """Frames sent."""
         self.skipped = 0
@@ -57,10 +76,15 @@ class Client:
         """Done when the server has decided to end the connection."""
         return self._over
 
-    def offer(self, kind: str, payload: bytes) -> None:
-        """Let a message wait; it replaces an earlier one of its kind."""
+    def put(self, kind: str, payload: bytes) -> None:
+        """Let a message wait for what comes with it; it replaces an earlier one of its kind."""
         self._waiting[kind] = payload
-        self._wake.set()
+
+    def offer(self, kind: str, payload: bytes) -> None:
+        """Let a message wait until this turn of the loop is over; it replaces an earlier one of its kind."""
+        self._waiting[kind] = payload
+        if self._due is None:
+            self._due = self._loop.call_soon(self.flush)
 
     def begin(self, scene: bytes) -> None:
         """Let another scene wait; a frame of the one before it is dropped."""
@@ -84,7 +108,8 @@ class Client:
         elif now - self._waiting_since > self._patience:
             self.end(Closing(1013, f"nothing acknowledged for {self._patience:g} s"))
         self._seq, self._until = seq, until
-        self.offer(FRAME, payload)
+        self._waiting[FRAME] = payload
+        self.flush()
 
     def acknowledge(self, seq: int) -> None:
         """The page has the frame ``seq``, and therefore all that were sent before it."""
@@ -93,7 +118,8 @@ class Client:
             if self._in_flight[i] == seq:
                 for _ in range(i + 1):
                     self._in_flight.popleft()
-                self._wake.set()
+                if self._waiting:
+                    self.flush()
                 return
 
     def end(self, closing: Closing) -> None:
@@ -120,20 +146,17 @@ class Client:
                 return self._waiting.pop(kind)
         return None
 
-    async def send(self) -> None:
-        """Send what waits until the connection ends."""
-        try:
-            while True:
-                self._wake.clear()
-                while (payload := self._next()) is not None:
-                    together = [payload]
-                    while len(together) < TOGETHER and (payload := self._next()) is not None:
-                        together.append(payload)
-                    # Several at once: each write of its own costs more than all they hold.
-                    await self._socket.send({"type": "websocket.send", "every": together})
-                    # A turn of the loop, in which it may learn that the page is gone.
-                    await asyncio.sleep(0)
-                await self._wake.wait()
-        except (WebSocketDisconnect, RuntimeError):
-            # RuntimeError is what Starlette raises when the connection was closed meanwhile.
-            self.end(Closing(1006, "gone"))
+    def flush(self) -> None:
+        """Write what waits, as far as the page reads."""
+        if self._due is not None:
+            self._due.cancel()
+            self._due = None
+        together: list[bytes] = []
+        while self._line.reads and (payload := self._next()) is not None:
+            together.append(payload)
+            # Several at once: each write of its own costs more than all they hold.
+            if not self._waiting or len(together) == TOGETHER:
+                self._line.write(together)
+                together = []
+        if together:
+            self._line.write(together)

@@ -290,8 +290,8 @@ class Company:
             wait = max(0.0, self._told + EVERY - monotonic())
             self._due = asyncio.get_running_loop().call_later(wait, self.show)
 
-    def show(self) -> None:
-        """Say where all are, if anybody has moved."""
+    def show(self, *, with_frame: bool = False) -> None:
+        """Say where all are, if anybody has moved; with a frame that comes next, which is then one write."""
         if self._due is None:
             return
         self._due.cancel()
@@ -301,4 +301,4 @@ class Company:
         payload = _encode(presences)
         for one in self._of.values():
             if one.said is not None:
-                one.client.offer(PRESENCES, payload)
+                (one.client.put if with_frame else one.client.offer)(PRESENCES, payload)

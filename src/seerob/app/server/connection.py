@@ -10,12 +10,12 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
+from collections.abc import Callable
 from typing import Any, cast
 from weakref import WeakSet
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
-from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 from websockets.protocol import State
@@ -158,11 +158,14 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
     exception in the log for text that is not UTF-8 and keep empty fragments without end.
     """
 
+    on_read: Callable[[], None] = staticmethod(lambda: None)
+    """Is called when the peer has read what was too much."""
+
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Let the application cut the connection: a polite close waits for whoever does not read."""
+        """Let the application write, and cut the connection: a polite close waits for who does not read."""
         super().connection_made(transport)
         self._abort = cast(asyncio.Transport, transport).abort
-        self.app_state = {**self.app_state, "abort": self._abort}
+        self.app_state = {**self.app_state, "abort": self._abort, "line": self}
         self._pings = Allowance(*PINGS)
         self._held = False
         self._unread = bytearray()
@@ -193,19 +196,26 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
         self._held = False
         self._read_on()
 
-    async def send(self, message: Any) -> None:
-        """Send; who was refused has been answered, too, which is no error for the log.
+    @property
+    def reads(self) -> bool:
+        """Whether the peer has read so much that more may be written."""
+        return self.writable.is_set()
 
-        A ``websocket.send`` may have ``every``: messages that are written at once, as they are. What a server
-        sends is not masked, so that a frame is its header and the message (RFC 6455 5.2).
+    def write(self, messages: list[bytes]) -> None:
+        """Write whole binary messages at once, without waiting.
+
+        What a server sends is not masked, so that a frame is its header and the message (RFC 6455 5.2).
         """
-        if "every" in message:
-            await self.writable.wait()
-            if self.disconnected:
-                raise ClientDisconnected
-            if self.conn.state is State.OPEN and not self.close_sent:
-                self.transport.write(b"".join(p for m in message["every"] for p in (header(len(m)), m)))
-            return
+        if self.conn.state is State.OPEN and not (self.close_sent or self.disconnected):
+            self.transport.write(b"".join([p for m in messages for p in (header(len(m)), m)]))
+
+    def resume_writing(self) -> None:
+        """The peer has read."""
+        super().resume_writing()
+        self.on_read()
+
+    async def send(self, message: Any) -> None:
+        """Send; who was refused has been answered, too, which is no error for the log."""
         await super().send(message)
         if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
             self.handshake_complete = True

@@ -178,7 +178,7 @@ class Hub:
         if not self.clients:
             return
         payload = _encode(snapshot)
-        self.company.show()
+        self.company.show(with_frame=True)
         for client in self.clients:
             client.offer_frame(snapshot.seq, payload, until)
 
@@ -220,7 +220,7 @@ class Hub:
             self._visits.turn_away(address, f"{MOST_CLIENTS} pages are connected already")
             await _close(socket, Closing(1013, f"{MOST_CLIENTS} pages are connected already"))
             return
-        client = Client(socket, patience=self._patience)
+        client = Client(state["line"], patience=self._patience)
         edits = self._desk is not None and Role.CONTROL in state["roles"]
         measures = self._ruler is not None and Role.CONTROL in state["roles"]
         number = self.company.number()
@@ -244,7 +244,7 @@ class Hub:
         visit = self._visits.come(state["role"], address, number)
         self.company.come(client, visit, state["roles"], number)
         listening = self._listen(client, socket, visit, state["roles"])
-        tasks = [asyncio.create_task(client.send()), asyncio.create_task(listening)]
+        task = asyncio.create_task(listening)
         try:
             closing = await client.over
         finally:
@@ -255,9 +255,8 @@ class Hub:
             self._registrar.gone(client)
             if self._desk is not None:
                 self._desk.gone(client)
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
             visit.leave()
         await _close(socket, closing)
 

@@ -60,6 +60,7 @@ export interface ConnectionEvents {
 export class Connection {
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
   private posted: PostedPoses | null = null;
+  private poses: PoseReader | null = null;
   /** When the newest that is known here came [ms since 1970], and whether that is too long ago. */
   private heard = Number.NEGATIVE_INFINITY;
   private silent = false;
@@ -98,10 +99,10 @@ export class Connection {
       this.asked = false;
     }
     const numbers = this.numbers?.read();
-    if (numbers && this.form && numbers[0] === this.formId) {
-      this.heard = numbers[2]!;
-      this.silent = numbers[3] === 1;
-      this.show(numbers[1]!, this.form, numbers);
+    if (numbers && this.form) {
+      this.heard = numbers[1]!;
+      this.silent = numbers[2] === 1;
+      this.show(numbers[0]!, this.form, numbers);
     }
     const drawn = this.drawnId !== this.formId;
     const due = !this.asked && this.due(time);
@@ -192,9 +193,11 @@ export class Connection {
       case "form":
         this.heard = message.heard;
         this.silent = message.silent;
-        this.numbers = message.numbers && new FormNumbers(message.numbers);
         this.form = new Form(message.shown);
         this.formId = message.id;
+        this.numbers = message.numbers && new FormNumbers(message.numbers);
+        if (this.numbers) this.numbers.form = message.id;
+        if (this.poses) this.poses.form = message.id;
         this.show(message.shown.t, this.form, null);
         return;
       case "silence":
@@ -209,7 +212,9 @@ export class Connection {
     this.form = null;
     beginScene(scene);
     this.posted = shared ? null : new PostedPoses((buffer) => this.send({ kind: "recycle", buffer }));
-    this.events.scene(scene, shared ? new PoseReader(shared) : this.posted!);
+    this.poses = shared && new PoseReader(shared);
+    this.numbers = null;
+    this.events.scene(scene, this.poses ?? this.posted!);
   }
 
   private history(history: History): void {

@@ -4,8 +4,8 @@
 import type { Shown, ShownResult } from "./messages";
 import { type State, stateOf } from "./verdicts";
 
-/** Before the numbers: of which form they are, run time [s], when that was heard [ms since 1970], whether it is silent. */
-export const HEAD = 4;
+/** Before the numbers: run time [s], when that was heard [ms since 1970], whether it is silent. */
+export const HEAD = 3;
 
 /** What differs by less looks the same [m]: where everybody stands, what a twin settles to trembles by less. */
 export const UNSEEN = 1e-6;

@@ -30,7 +30,7 @@ let lookingAt: number | null = null;
 let asks: Int32Array = new Int32Array([0, 1]);
 let asksShared: SharedArrayBuffer | null = null;
 /** Not drawn yet, and not read by panels yet. */
-let waiting: Shown | null = null;
+let waiting: { shown: Shown; poses: Uint8Array; seq: number } | null = null;
 let unread: Frame | null = null;
 /** What the page was told last, as far as not its numbers alone have changed since, and those. */
 let form: Shown | null = null;
@@ -154,22 +154,14 @@ function heard(snapshot: Snapshot, raw: Uint8Array): void {
 let sources: Snapshot["sources"] = {};
 
 function show(snapshot: Snapshot): void {
-  if (writer) {
-    writer.write(snapshot.poses, snapshot.t, snapshot.seq);
-  } else {
-    let buffer = spare.pop();
-    if (!buffer || buffer.byteLength !== poseBytes) buffer = new ArrayBuffer(poseBytes);
-    new Uint8Array(buffer).set(snapshot.poses);
-    post({ kind: "poses", buffer, t: snapshot.t, seq: snapshot.seq }, [buffer]);
-  }
   const { seq, t, joints, tracking, late, results, looks, doubts } = snapshot;
   if (Object.keys(snapshot.sources).length > 0) sources = snapshot.sources;
   unread = { seq, t, joints, tracking, late, results, looks, doubts, sources };
-  waiting = drawnOf(unread);
+  waiting = { shown: drawnOf(unread), poses: snapshot.poses, seq };
   deliver();
 }
 
-// Latest wins: what is not drawn yet, or not read yet, is replaced.
+// Latest wins: what is not drawn yet, or not read yet, is replaced. Bodies are never ahead of what is said of them.
 function deliver(): void {
   if (unread && Atomics.load(asks, PANELS) === 1) {
     Atomics.store(asks, PANELS, 0);
@@ -177,17 +169,23 @@ function deliver(): void {
     unread = null;
   }
   if (!waiting) return;
-  if (form && numbersWriter && numbersOf(form, waiting, numbers, HEAD) === numbers.length) {
-    numbers[0] = formId;
-    numbers[1] = waiting.t;
-    numbers[2] = heardAt;
-    numbers[3] = isSilent() ? 1 : 0;
+  const { shown, poses, seq } = waiting;
+  if (form && numbersWriter && numbersOf(form, shown, numbers, HEAD) === numbers.length) {
+    numbers[0] = shown.t;
+    numbers[1] = heardAt;
+    numbers[2] = isSilent() ? 1 : 0;
     numbersWriter.write(numbers, formId);
-    waiting = null;
-  } else if (Atomics.load(asks, DRAWN) === formId) {
-    told(waiting);
-    waiting = null;
+  } else if (Atomics.load(asks, DRAWN) === formId) told(shown);
+  else return;
+  waiting = null;
+  if (writer) {
+    writer.write(poses, shown.t, seq, formId);
+    return;
   }
+  let buffer = spare.pop();
+  if (!buffer || buffer.byteLength !== poseBytes) buffer = new ArrayBuffer(poseBytes);
+  new Uint8Array(buffer).set(poses);
+  post({ kind: "poses", buffer, t: shown.t, seq }, [buffer]);
 }
 
 function told(shown: Shown): void {

@@ -36,6 +36,11 @@ kind = "minimum_distance"
 name = "operator – table"
 limit = 0.05
 between = ["operator", "table"]
+[[safety]]
+kind = "velocity"
+name = "speed"
+of = "operator/head"
+limit = 3.0
 `;
 
 let folder;
@@ -139,6 +144,56 @@ test("head and hand of the person go where those of the visitor go", { timeout: 
     const off = length(minus(inWorld(later[k], held[k]), expected[k]));
     assert.ok(off < FOLLOWS, `${bone}: ${off} m off`);
   }
+  assert.deepEqual([browser.complaints, browser.outside], [[], []]);
+});
+
+test("who is 5 m elsewhere from one picture to the next is UNDECIDED, and nobody is fast", {
+  timeout: 900_000,
+}, async () => {
+  const names = ["operator – table", "speed"];
+  await put(page, [0, 1.56, 0], [0.25, 1.02, -0.3]);
+  await page.evaluate(() => window.put(1, [-0.25, 1.02, -0.3]));
+  const [before] = await stand(["operator/head"]);
+  // What is drawn in each picture, seen at its end.
+  await page.evaluate(() => {
+    window.seen = [];
+    const note = () => {
+      const { seerob, headset } = window;
+      const { position } = seerob.pose("operator/head");
+      window.seen.push({ position, drawn: { ...seerob.drawn } });
+      headset.activeSession.requestAnimationFrame(note);
+    };
+    window.headset.activeSession.requestAnimationFrame(note);
+  });
+  const visited = (point) => page.evaluate((p) => window.seerob.visited(p), point);
+  const leap = minus(await visited([5, 0, 0]), await visited([0, 0, 0]));
+  assert.ok(Math.abs(length(leap) - 5) < 1e-3);
+  await page.evaluate(() => {
+    const { headset } = window;
+    for (const [i, each] of [headset, headset.controllers.left, headset.controllers.right].entries()) {
+      const [x, y, z] = each.position.vec3;
+      window.put(i, [x + 5, y, z]);
+    }
+  });
+  const after = plus(before.position, leap);
+  await page.waitForFunction(
+    (p) => Math.hypot(...p.map((v, i) => v - seerob.pose("operator/head").position[i])) < 0.25,
+    after,
+    { timeout: 120_000 },
+  );
+  // The table is behind then.
+  await page.waitForFunction((each) => each.every((n) => window.seerob.drawn[n] === "within"), names, {
+    timeout: 120_000,
+  });
+  const seen = await page.evaluate(() => window.seen);
+  const away = ({ position }) =>
+    Math.min(length(minus(position, before.position)), length(minus(position, after)));
+  for (const one of seen) {
+    const verdicts = names.map((name) => one.drawn[name]);
+    assert.notEqual(one.drawn.speed, "exceeded", JSON.stringify(one));
+    if (away(one) > 0.25) assert.deepEqual(verdicts, ["undecided", "undecided"], JSON.stringify(one));
+  }
+  assert.ok(seen.some(({ drawn }) => names.every((name) => drawn[name] === "undecided")));
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);
 });
 

@@ -209,6 +209,7 @@ export class Connection {
 
   private begin(scene: Scene, shared: SharedArrayBuffer | null): void {
     this.pending = null;
+    this.asked = true;
     this.form = null;
     beginScene(scene);
     this.posted = shared ? null : new PostedPoses((buffer) => this.send({ kind: "recycle", buffer }));

@@ -123,8 +123,9 @@ function begin(scene: Scene): void {
   if (mayShare && !asksShared) {
     asksShared = new SharedArrayBuffer(asks.byteLength);
     asks = new Int32Array(asksShared);
-    asks[PANELS] = 1;
   }
+  // What panels were sent last the page may have thrown away with the scene before.
+  Atomics.store(asks, PANELS, 1);
   post({ kind: "scene", scene, shared, asks: asksShared });
 }
 
@@ -249,7 +250,7 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "asks":
       asks[DRAWN] = message.drawn;
-      asks[PANELS] = message.panels;
+      if (message.panels === 1) asks[PANELS] = 1;
       deliver();
       return;
     case "recycle":

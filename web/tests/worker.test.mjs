@@ -106,6 +106,13 @@ test("what has another form is told once the page has drawn the one before it, a
   assert.equal(readPoses(told("form")[1].id)[0], FRAMES + 2);
 });
 
+test("of another scene panels get the first figures, whatever became of those before", () => {
+  const frames = told("frame").length;
+  hear({ type: "scene", nodes: [{ name: "a" }], criteria: [], period: 0.01 });
+  hear({ type: "snapshot", seq: 1, t: 0.01, poses: new Uint8Array(28), results: [result(1)] });
+  assert.equal(told("frame").length, frames + 1);
+});
+
 test("numbers of a form are those of the value it is filled from, and nothing else passes for it", () => {
   const shown = (x, { radius = 1, verdict = "within", look = [0.1, 0.2, 0.3], hits = [0] } = {}) => ({
     t: x,

@@ -26,10 +26,10 @@ def test_what_is_undecided_at_first_says_what_it_was_later():
     first = "nothing heard yet (first at 0.00 s)"
     assert shown(silent) == first
     low, high = result(0.5, Verdict.WITHIN), result(0.75, None)
-    assert shown(silent, low, high, low) == f"{first}; undecided 25 % of the time, else max 0.75 at 0.20 s"
+    assert shown(silent, low, high, low) == f"{first}; where decided, max 0.75 at 0.20 s"
     # A figure that is undecided itself is none of the rest.
     assert shown(result(0.9, Verdict.UNDECIDED, "late"), low) == (
-        "late (first at 0.00 s); undecided 50 % of the time, else max 0.5 at 0.10 s"
+        "late (first at 0.00 s); where decided, max 0.5 at 0.10 s"
     )
 
 

@@ -322,20 +322,18 @@ def extreme(series: Series) -> str:
 
 
 def _otherwise(series: Series) -> str:
-    """Say the rest of a result that is undecided at times: ``; undecided 5 % of the time, else …``."""
+    """Say the rest of a result that is undecided at times: ``; where decided, max 0.84 m/s at 12.31 s``."""
     import numpy as np
 
-    from seerob.outputs.sentences import percent
     from seerob.recording.series import CODES
 
-    share = series.shares().get(Verdict.UNDECIDED, 0.0)
     values = np.where(series.verdicts == CODES[Verdict.UNDECIDED], np.nan, series.values)
     if series.verdict is not Verdict.UNDECIDED or np.isnan(values).all():
         return ""
     what, k = ("max", np.nanargmax(values)) if series.at_most else ("min", np.nanargmin(values))
     shown = against(float(values[k]), None, series.unit, at_most=series.at_most).value
     text = f"{what} {with_unit(shown, series.unit)} at {series.t[k]:.2f} s"
-    return f"; undecided {percent(share)} of the time, else {text}"
+    return f"; where decided, {text}"
 
 
 def results_json(summary: Summary, **more: object) -> str:

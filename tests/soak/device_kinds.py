@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import time
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 
 from free_ports import free_port
 from seerob.app.emulation.background import Emulator
+from seerob.app.emulation.message_sender import MessageSender
 from seerob.app.emulation.motions import swing
 from seerob.core.page_messages import Tracking
 from seerob.devices.live.headset_offers import Offers, read
@@ -246,6 +248,26 @@ def kinect(_):
     return Made(server, Kinect(human="anna", link=Link.WEBSOCKET, host=HERE, port=server.port, timeout=1.0))
 
 
+class PoseLandmarker(MessageSender):
+    """A program that runs MediaPipe on a camera, as `examples/clients/mediapipe_camera.py` does."""
+
+    def message(self, k):
+        """The result number ``k``."""
+        from sources.test_mediapipe import bent, landmarks, said
+
+        return json.dumps(said(landmarks(bent()) + 1e-5 * (k % 5), self.t(k))).encode()
+
+
+def mediapipe(patch):
+    from seerob.devices.sources.mediapipe import Mediapipe
+    from seerob.workstation.workstation import Pose
+
+    patch.setattr("seerob.devices.sources.mediapipe.SILENCE", SILENCE)
+    port, at = free_port(), Pose(position=(0.0, 0.0, 1.0))
+    source = Mediapipe(human="anna", port=port, at=at, timeout=1.0)
+    return Made(PoseLandmarker(to=(HERE, port), rate=60.0).start(), source)
+
+
 class Page(Emulator):
     """The page that a headset shows: offers what it sees, seventy times a second, until it is closed.
 
@@ -287,6 +309,6 @@ FOREIGN = (opcua, opcua_robot, mqtt, foxglove)
 OWN = (
     *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),
     *(modbus, siemens_web, web, web_http),
-    *(natnet, vrpn, mvn, rokoko, vive, kinect, headset),
+    *(natnet, vrpn, mvn, rokoko, vive, kinect, mediapipe, headset),
 )
 KINDS = {make.__name__: make for make in (*OWN, *FOREIGN)}

@@ -161,6 +161,14 @@ def test_a_real_portrait_shows_the_head_and_no_trunk():
     assert np.isfinite(orientations[0, LAYOUT.names.index("head")]).all()
 
 
+def test_a_landmark_without_a_visibility_is_not_seen():
+    values = landmarks(bent())
+    values[LANDMARKS.index("left_knee"), 3] = np.nan
+    _, _, confidence = camera_points(values[None])
+    assert np.flatnonzero(confidence[0] == 0).tolist() == [LANDMARKS.index("left_knee")]
+    assert any("no visibility" in text for _, text in remarks([Result(t=0.0, people=(values,))]))
+
+
 def played(tmp_path, name, text, **more):
     (tmp_path / name).write_text(text)
     return MediapipeRecording(human="anna", file=name, **{"at": AHEAD} | more).open(tmp_path, TARGET)

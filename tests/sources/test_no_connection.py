@@ -26,7 +26,7 @@ from seerob.workstation.source import Source, Target
 GIVEN = dict(host="127.0.0.1", url="opc.tcp://127.0.0.1:9", robot="arm", human="op", user="u",
              password_env="SEEROB_P")
 MORE = {"web": {"url": "ws://127.0.0.1:9/x"}, "siemens_web": {"url": "http://127.0.0.1:9"},
-        "kinect": {"at": {"position": (0, 0, 1)}}}
+        "kinect": {"at": {"position": (0, 0, 1)}}, "mediapipe": {"at": {"position": (0, 0, 1)}}}
 async def heard(source, target):
     with contextlib.suppress(Exception):
         await asyncio.wait_for(anext(source.listen(target)), 1)

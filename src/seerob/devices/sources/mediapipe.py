@@ -23,7 +23,7 @@ from seerob.devices.capture.options import MEDIAPIPE
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.listening import Contact, contact_of
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.live_messages import Sieve, from_datagrams
+from seerob.protocols.links.live_messages import SILENCE, Sieve, from_datagrams
 from seerob.protocols.tracking.mediapipe import LAYOUT, PORT, Result, camera_points, centred, decode_message
 from seerob.workstation.source import Opened, PostureError, Target
 from seerob.workstation.workstation import Pose
@@ -74,7 +74,7 @@ class Mediapipe(CaptureStream, frozen=True, kw_only=True):
     def results(self) -> AsyncGenerator[tuple[float, Result], None]:
         """What is sent, as it arrives."""
         sieve = Sieve(decode_message, "MediaPipe")
-        return from_datagrams(sieve, self.bind, self.port, self.sender or None)
+        return from_datagrams(sieve, self.bind, self.port, self.sender or None, SILENCE)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Listen for a second: how many pictures, and whether one person is in them."""
@@ -129,5 +129,5 @@ def remarks(heard: list[Result]) -> list[tuple[str, str]]:
     elif most > 1:
         said.append(("warning", "several persons, without a number: they count as not seen (num_poses = 1)"))
     if any(np.isnan(person[:, 3]).any() for result in heard for person in result.people):
-        said.append(("assumed", "it sends no visibility: landmarks that are only predicted count as seen"))
+        said.append(("warning", "it sends no visibility: such landmarks count as not seen"))
     return said

@@ -181,14 +181,14 @@ def camera_points(values: Array) -> tuple[Array, Array, Array]:
     Returns:
         In the order of `LAYOUT`, positions of landmarks about the middle of the hips [m], shape (n, 36, 3);
         orientations of segments, forward, up, right, w first, shape (n, 36, 4), NaN for landmarks;
-        confidences 0 or 1, shape (n, 36), where a visibility that nobody says counts as seen.
+        confidences 0 or 1, shape (n, 36): 0 also where nobody says a visibility.
     """
     count, n = len(values), len(LANDMARKS)
     positions = np.full((count, n + len(SEGMENTS), 3), np.nan)
     positions[:, :n] = values[..., :3] @ BODY_FROM_OPTICAL.T
     orientations = np.full((count, n + len(SEGMENTS), 4), np.nan)
     confidence = np.ones((count, n + len(SEGMENTS)))
-    confidence[:, :n] = np.where(np.isnan(values[..., 3]) | (values[..., 3] >= VISIBLE), 1.0, 0.0)
+    confidence[:, :n] = np.where(values[..., 3] >= VISIBLE, 1.0, 0.0)
     at = {name: positions[:, row] for row, name in enumerate(LANDMARKS)}
     hips, shoulders, ears = (
         (at[f"left_{part}"] + at[f"right_{part}"]) / 2 for part in ("hip", "shoulder", "ear")

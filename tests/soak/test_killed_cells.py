@@ -142,7 +142,7 @@ def test_what_depends_on_a_killed_device_is_undecided_within_its_time_out_and_no
 @pytest.mark.parametrize(
     ("cell", "relies"),
     [
-        ("niryo_picking", {"tool speed"}),
+        ("niryo_picking", {"tool speed", "arm energy", "effective mass"}),
         ("two_places", {"tool speed"}),
         ("giant_niryo", {"fastest point", "robot – operator", "robot over the belt"}),
     ],

@@ -145,9 +145,7 @@ def test_what_a_belt_carries_presses_on_it_as_mujoco_tells_and_lags_no_more_than
     piece = loose._pieces["blank"]
     velocity = np.zeros(6)
     mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_BODY, piece.body, velocity, 0)
-    loose._bodies.xfrc[:] = 0.0
+    loose._xfrc[:] = 0.0
     loose._rub(piece, np.array([0.2, 0.0, 0.0]), loose._normal[0, 0], 1.0)
     slip = velocity[3:] - (0.2, 0.0, 0.0)
-    np.testing.assert_allclose(
-        loose._bodies.xfrc[piece.body, :2], -0.5 * 0.8 * slip[:2], rtol=1e-6, atol=1e-12
-    )
+    np.testing.assert_allclose(loose._xfrc[piece.body, :2], -0.5 * 0.8 * slip[:2], rtol=1e-6, atol=1e-12)

@@ -6,7 +6,6 @@ The formulae are those of `seerob.twin.machines.loose`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,76 +17,6 @@ from seerob.kernels.posture_fit import logarithm
 Indices = NDArray[np.int64]
 PYRAMIDAL = 0
 """``mjCONE_PYRAMIDAL``"""
-
-
-class Bodies(NamedTuple):
-    """Of all of MuJoCo's bodies, as in ``MjData``."""
-
-    xpos: Array
-    """[m]"""
-    xmat: Array
-    """Shape (n, 9)."""
-    ximat: Array
-    """Shape (n, 9)."""
-    xipos: Array
-    """[m]"""
-    cvel: Array
-    """[rad/s, m/s]"""
-    subtree_com: Array
-    """[m]"""
-    root: NDArray[np.int32]
-    """``MjModel.body_rootid``"""
-    xfrc: Array
-    """``xfrc_applied`` [N, N·m]; added to."""
-    gravity: Array
-    """[m/s²]"""
-
-
-class Piece(NamedTuple):
-    """A workpiece."""
-
-    body: int
-    """MuJoCo's."""
-    com: Array
-    """Centre of mass in its frame [m], shape (3,)."""
-    moments: Array
-    """Principal ones about it [kg·m²], shape (3,)."""
-    inertia: float
-    """The largest of them."""
-    mass: float
-    """[kg]"""
-    pulled: float
-    """Mass by which a spring is as stiff as it is [kg]."""
-    radius: float
-    """Of the ball that contains it [m]."""
-    friction: float
-    """Its coefficient."""
-
-
-class Spring(NamedTuple):
-    """What pulls a workpiece."""
-
-    carrier: int
-    """Body that it is fixed to."""
-    fixed: Array
-    """Where in its frame it pulls to, shape (4, 4); moved on while it ``reels``."""
-    omega: float
-    """Natural frequency [rad/s]."""
-    firm: bool
-    """Whether the carrier feels moments."""
-    reels: bool
-    """Whether the workpiece is still on its way."""
-
-
-class Ends(NamedTuple):
-    """How far a spring goes."""
-
-    near: float
-    """Distance of the carrier at which a workpiece is there [m], beside its radius."""
-    fastest: float
-    """No spring makes it faster [m/s]."""
-    quickest: float
-    """Nor turn faster [rad/s]."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -115,27 +44,47 @@ def _at_most(v: Array, most: float) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def pull(bodies: Bodies, piece: Piece, spring: Spring, reel: float, ends: Ends) -> tuple[float, bool]:
+def pull(
+    xpos: Array, xmat: Array, ximat: Array, xipos: Array, cvel: Array, subtree_com: Array,
+    root: NDArray[np.int32], xfrc: Array, gravity: Array, ipos: Array, inertia: Array, body: int,
+    carrier: int, fixed: Array, mass: float, pulled: float, radius: float, omega: float, firm: bool,
+    reels: bool, reel: float, near: float, fastest: float, quickest: float,
+) -> tuple[float, bool]:  # fmt: skip
     """Add the forces of a spring that pulls a workpiece to ``xfrc``.
 
     Args:
-        bodies: Where all are.
-        piece: Who is pulled.
-        spring: By whom.
-        reel: How far it is reeled in at this step [m].
-        ends: Of every spring.
+        xpos: Of all of MuJoCo's bodies [m], as in ``MjData``; so are the next five.
+        xmat: Shape (n, 9).
+        ximat: Shape (n, 9).
+        xipos: [m]
+        cvel: [rad/s, m/s]
+        subtree_com: [m]
+        root: ``MjModel.body_rootid``.
+        xfrc: ``MjData.xfrc_applied`` [N, N·m]; added to.
+        gravity: [m/s²]
+        ipos: Centre of mass of the workpiece in its frame [m], shape (3,).
+        inertia: Its principal moments [kg·m²], shape (3,).
+        body: The workpiece.
+        carrier: Body that the spring is fixed to.
+        fixed: Where in its frame the spring pulls to, shape (4, 4); moved on while it ``reels``.
+        mass: Of the workpiece [kg].
+        pulled: Mass by which the spring is as stiff as it is [kg].
+        radius: Of the ball that contains the workpiece [m].
+        omega: Natural frequency [rad/s].
+        firm: Whether the carrier feels moments.
+        reels: Whether the workpiece is still on its way.
+        reel: How far the spring is reeled in at this step [m].
+        near: Distance of the carrier at which it is there [m], beside ``radius``.
+        fastest: No spring makes it faster [m/s].
+        quickest: Nor turn faster [rad/s].
 
     Returns:
         How far the workpiece is from where it is pulled to [m], and whether it is still on its way.
     """
-    xpos, xipos, cvel, xfrc = bodies.xpos, bodies.xipos, bodies.cvel, bodies.xfrc
-    subtree_com, root = bodies.subtree_com, bodies.root
-    body, carrier, fixed, omega = piece.body, spring.carrier, spring.fixed, spring.omega
-    reels, firm = spring.reels, spring.firm
     R, H, axes = (
-        bodies.xmat[carrier].copy().reshape(3, 3),
-        bodies.xmat[body].copy().reshape(3, 3),
-        bodies.ximat[body].copy().reshape(3, 3),
+        xmat[carrier].copy().reshape(3, 3),
+        xmat[body].copy().reshape(3, 3),
+        ximat[body].copy().reshape(3, 3),
     )
     wanted, to = np.zeros((3, 3)), np.zeros(3)
     for i in range(3):
@@ -146,10 +95,10 @@ def pull(bodies: Bodies, piece: Piece, spring: Spring, reel: float, ends: Ends) 
                 wanted[i, j] += R[i, k] * fixed[k, j]
     for i in range(3):
         for k in range(3):
-            to[i] += wanted[i, k] * piece.com[k]
+            to[i] += wanted[i, k] * ipos[k]
     if reels:
         away = to - xpos[carrier]
-        far, least = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2), piece.radius + ends.near
+        far, least = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2), radius + near
         rest = max(far - reel, least)
         if far > least:
             away *= rest / far - 1
@@ -166,19 +115,19 @@ def pull(bodies: Bodies, piece: Piece, spring: Spring, reel: float, ends: Ends) 
     gap, turn = to - xipos[body], np.empty(3)
     logarithm(wanted, H, turn)
     speed += 0.5 * omega * gap
-    _at_most(speed, ends.fastest)
+    _at_most(speed, fastest)
     spin += 0.5 * omega * turn
-    _at_most(spin, ends.quickest)
+    _at_most(spin, quickest)
     spin -= cvel[body, :3]
     torque, local = np.zeros(3), np.zeros(3)
     for i in range(3):
         for k in range(3):
             local[i] += axes[k, i] * spin[k]
-        local[i] *= 2 * omega * piece.moments[i]
+        local[i] *= 2 * omega * inertia[i]
     for i in range(3):
         for k in range(3):
             torque[i] += axes[i, k] * local[k]
-    force = 2 * omega * piece.pulled * (speed - own) - piece.mass * bodies.gravity
+    force = 2 * omega * pulled * (speed - own) - mass * gravity
     for i in range(3):
         xfrc[body, i] += force[i]
         xfrc[body, 3 + i] += torque[i]
@@ -243,22 +192,32 @@ def pressed(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def drag(bodies: Bodies, piece: Piece, rides: Array, normal: Array, dt: float) -> None:
+def drag(
+    xipos: Array, cvel: Array, subtree_com: Array, root: NDArray[np.int32], xfrc: Array, body: int,
+    rides: Array, normal: Array, mass: float, friction: float, inertia: float, radius: float, dt: float,
+) -> None:  # fmt: skip
     """Add the friction of a surface that runs to ``xfrc``.
 
     Args:
-        bodies: Where all are.
-        piece: Who is dragged.
+        xipos: As of `pull`, like those that follow until ``body``.
+        cvel: [rad/s, m/s]
+        subtree_com: [m]
+        root: ``MjModel.body_rootid``.
+        xfrc: [N, N·m]; added to.
+        body: The workpiece.
         rides: Velocity of the surface [m/s], shape (3,).
         normal: Force on the workpiece [N], shape (3,).
+        mass: Of the workpiece [kg].
+        friction: Its coefficient.
+        inertia: Its largest moment [kg·m²].
+        radius: Of the ball that contains it [m].
         dt: Of a step [s].
     """
-    cvel, xfrc, body, mass = bodies.cvel, bodies.xfrc, piece.body, piece.mass
     pressure = math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
     if pressure == 0.0:
         return
     slip = np.empty(3)
-    _velocity(cvel[body], bodies.subtree_com[bodies.root[body]], bodies.xipos[body], slip)
+    _velocity(cvel[body], subtree_com[root[body]], xipos[body], slip)
     along, spin = 0.0, 0.0
     for i in range(3):
         slip[i] -= rides[i]
@@ -266,9 +225,9 @@ def drag(bodies: Bodies, piece: Piece, rides: Array, normal: Array, dt: float) -
         spin += cvel[body, i] * normal[i] / pressure
     for i in range(3):
         slip[i] -= along * normal[i] / pressure
-    fast, most = math.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2), piece.friction * pressure
+    fast, most = math.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2), friction * pressure
     pull = min(most, 0.5 * mass * fast / dt) / fast if fast > 0 else 0.0
-    turn = math.copysign(min(0.5 * most * piece.radius, 0.5 * piece.inertia * abs(spin) / dt), spin)
+    turn = math.copysign(min(0.5 * most * radius, 0.5 * inertia * abs(spin) / dt), spin)
     for i in range(3):
         xfrc[body, i] -= pull * slip[i]
         xfrc[body, 3 + i] -= turn * normal[i] / pressure

@@ -64,7 +64,6 @@ picture throws nothing away; our choice, beyond what hands at work do."""
 NEAR = 0.25
 """A hand whose wrist is no farther from a workpiece's surface takes it where it is [m]: a hand's length and
 what a ball about the workpiece has too much; our choice."""
-ENDS = kernel.Ends(0.5 * NEAR, FASTEST, QUICKEST)
 FARTHEST = 3.0
 """From farther nothing is taken [m]; our choice."""
 REEL = 1.5
@@ -108,9 +107,17 @@ class _Piece:
     """Columns of its joints in ``qpos``, shape (6,)."""
     v: Indices
     """In ``qvel``, shape (6,)."""
+    mass: float
     torn: float
-    bound: kernel.Piece
-    """The workpiece with its masses [kg] and sizes [m], for compiled loops."""
+    radius: float
+    """Of the ball about its centre of mass that contains it [m]."""
+    friction: float
+    com: Array
+    """Centre of mass in its frame [m], shape (3,)."""
+    moments: Array
+    """Principal ones about it [kg·m²], shape (3,)."""
+    inertia: float
+    """The largest of them."""
     hands: dict[str, _Spring] = field(default_factory=dict)
     place: str = ""
     """Where it lies, or whose spring pulls it."""
@@ -187,10 +194,9 @@ class Loose:
         self._riding = False
         """Whether anything lay on a surface that runs at the step before."""
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
-        self._bodies = kernel.Bodies(
-            data.xpos, data.xmat, data.ximat, data.xipos, data.cvel, data.subtree_com, physics.body_rootid,
-            data.xfrc_applied, physics.opt.gravity,
-        )  # fmt: skip
+        self._placed = data.xpos, data.xmat, data.ximat
+        self._moving = data.xipos, data.cvel, data.subtree_com, physics.body_rootid
+        self._xfrc, self._gravity = data.xfrc_applied, physics.opt.gravity
         self._back: list[tuple[_Piece, str]] = []
         """What is put into the pose of a place at the next tick."""
         self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
@@ -217,7 +223,7 @@ class Loose:
         self._pull(piece, _Spring(0, np.eye(4)), self._mj.opt.timestep)
         self._pressed()
         self._rub(piece, np.zeros(3), np.zeros(3), self._mj.opt.timestep)
-        self._bodies.xfrc[:] = 0.0
+        self._xfrc[:] = 0.0
 
     def bodies(self) -> frozenset[int]:
         """Bodies of all of them, by index."""
@@ -234,7 +240,7 @@ class Loose:
         while self._waiting and self._waiting[0].t <= t + SLACK:
             self._grab(self._waiting.popleft(), t)
         if self._pulls:
-            self._bodies.xfrc[:] = 0.0
+            self._xfrc[:] = 0.0
             self._pulls = False
         if self._running:
             self._drag(t, dt)
@@ -290,13 +296,22 @@ class Loose:
 
     def _rub(self, piece: _Piece, rides: Array, normal: Array, dt: float) -> None:
         """Set the friction on a surface that runs at a velocity [m/s] and presses it with a force [N]."""
-        kernel.drag(self._bodies, piece.bound, rides, normal, dt)
+        xipos, cvel, subtree_com, root = self._moving
+        kernel.drag(
+            xipos, cvel, subtree_com, root, self._xfrc, piece.body, rides, normal, piece.mass,
+            piece.friction, piece.inertia, piece.radius, dt,
+        )  # fmt: skip
 
     def _pull(self, piece: _Piece, spring: _Spring, dt: float) -> float:
         """Set the forces of a spring; how far the workpiece is from where it pulls [m]."""
-        omega = self._firm if spring.firm else self._omega
-        pulls = kernel.Spring(spring.carrier, spring.carrier_from_piece, omega, spring.firm, spring.reels)
-        gap, reels = kernel.pull(self._bodies, piece.bound, pulls, REEL * dt, ENDS)
+        xpos, xmat, ximat = self._placed
+        xipos, cvel, subtree_com, root = self._moving
+        gap, reels = kernel.pull(
+            xpos, xmat, ximat, xipos, cvel, subtree_com, root, self._xfrc, self._gravity, piece.com,
+            piece.moments, piece.body, spring.carrier, spring.carrier_from_piece, piece.mass,
+            min(piece.mass, HEAVY), piece.radius, self._firm if spring.firm else self._omega, spring.firm,
+            spring.reels, REEL * dt, 0.5 * NEAR, FASTEST, QUICKEST,
+        )  # fmt: skip
         spring.reels = bool(reels)
         return float(gap)
 
@@ -331,7 +346,7 @@ class Loose:
         com = self._mj.body_ipos[piece.body]
         shift = (wanted - here)[:3, :3] @ com + (wanted - here)[:3, 3]
         turn = float(np.linalg.norm(_rotation_vector(wanted[:3, :3] @ here[:3, :3].T)))
-        return float(length(shift)) + 2 * piece.bound.radius * math.sin(0.5 * turn)
+        return float(length(shift)) + 2 * piece.radius * math.sin(0.5 * turn)
 
     def _grab(self, sample: GrabSample, t: float) -> None:
         hand = sample.target
@@ -350,7 +365,7 @@ class Loose:
             what = f"no loose workpiece {sample.piece!r}" if piece is None else f"no hand {hand!r}"
             self.events.append(Event(t=t, what="refused", piece=sample.piece, by=hand, reason=what))
             return
-        far = float(np.linalg.norm(self._data.xipos[piece.body] - self._data.xpos[body])) - piece.bound.radius
+        far = float(np.linalg.norm(self._data.xipos[piece.body] - self._data.xpos[body])) - piece.radius
         if not far <= FARTHEST:
             reason = f"{far:.2f} m away: nothing is taken from farther than {FARTHEST:g} m"
             self._say(t, "refused", piece, by=hand, reason=reason)
@@ -391,7 +406,7 @@ class Loose:
 
     def radius(self, name: str) -> float:
         """Of the ball about the centre of mass of a workpiece that contains it [m]."""
-        return self._pieces[name].bound.radius
+        return self._pieces[name].radius
 
     def held_by(self, gripper: str) -> str:
         """What a gripper holds; empty for nothing."""
@@ -607,12 +622,20 @@ def _piece(model: Model, name: str, torn: float) -> _Piece:
     own = [b for b in model.bodies if b.owner == name]
     reach = [float(np.linalg.norm(b.corners - com, axis=1).max(initial=0.0)) + b.radius for b in own]
     table = next(piece for piece in model.workstation.workpieces if piece.name == name)
-    mass, moments = float(model.mj.body_mass[body]), model.mj.body_inertia[body].copy()
-    bound = kernel.Piece(
-        body, com.copy(), moments, float(moments.max()), mass, min(mass, HEAVY), max(reach, default=0.0),
+    return _Piece(
+        name,
+        own[0].index,
+        body,
+        mechanism.q_address,
+        mechanism.v_address,
+        float(model.mj.body_mass[body]),
+        torn,
+        max(reach, default=0.0),
         table.friction,
-    )  # fmt: skip
-    return _Piece(name, own[0].index, body, mechanism.q_address, mechanism.v_address, torn, bound)
+        com.copy(),
+        model.mj.body_inertia[body].copy(),
+        float(model.mj.body_inertia[body].max()),
+    )
 
 
 def _fixed(model: Model, place: Place) -> tuple[int, Array, float]:

@@ -11,7 +11,9 @@ from oracles.pinocchio_oracle import index_of, pinocchio_model
 from seerob.app import cli
 from seerob.core.errors import InputError
 from seerob.description.robots import library
-from seerob.session.identification import Known, Regressor, base_parameters, identify, parameters, weighed
+from seerob.session.identification.identify import Known, identify
+from seerob.session.identification.regressor import Regressor, base_parameters
+from seerob.session.identification.robot_file import parameters, weighed
 from seerob.twin.controller_check import ControllerLog
 from test_explanation import motion
 

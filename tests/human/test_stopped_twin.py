@@ -24,7 +24,8 @@ from seerob.session.run import Judge
 from seerob.session.station import Station
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
-from seerob.twin.state import Hearing, State
+from seerob.twin.state import State
+from seerob.twin.validity.hearing import Hearing
 from worst_between import one_by_one
 
 POST = {"name": "post", "at": {"position": [1.0, -0.2, 0.9]}, "shape": {"box": [0.05, 0.05, 0.05]}}

@@ -21,8 +21,8 @@ from seerob.criteria.safety.velocity import Velocity
 from seerob.session.permissible.ceilings import By, Ceiling, Method, ceilings_of, governing
 from seerob.session.permissible.witness import Posed, Witness
 from seerob.twin.accuracy.tracking_error import TrackingError
-from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import BonesHeard
+from seerob.twin.state import State
+from seerob.twin.validity.hearing import BonesHeard, Hearing
 
 PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
 GATE = '[[variables]]\nname = "gate/open"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'

@@ -41,7 +41,8 @@ from seerob.twin.spans import (
     Speeding,
     Turning,
 )
-from seerob.twin.state import VARIABLE, State
+from seerob.twin.state import State
+from seerob.workstation.variables import VARIABLE
 
 MOST = 32
 """Instants that are looked at between two ticks, of one criterion: spans of 10 ms are halved to less than

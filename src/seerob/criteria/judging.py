@@ -23,8 +23,9 @@ from seerob.criteria.plan import Plan, Together, Whole
 from seerob.criteria.plausible_places import PlausiblePlaces
 from seerob.criteria.question import Bound, Kept, Question, held_names, question_of, worded
 from seerob.model.model import Model
-from seerob.twin.state import VARIABLE, State
+from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
+from seerob.workstation.variables import VARIABLE
 
 SHIFT = 28800.0
 """How much later it is looked again at whom no source moves [s]: a shift of eight hours. Own choice."""

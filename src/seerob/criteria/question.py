@@ -18,8 +18,9 @@ from seerob.criteria.figure import Twin
 from seerob.criteria.scoring.phases import entered_for, turns
 from seerob.model.model import Model
 from seerob.recording.series import INFORMS
-from seerob.twin.state import VARIABLE, State
+from seerob.twin.state import State
 from seerob.twin.states import Reasons
+from seerob.workstation.variables import VARIABLE
 
 UNBOUNDED = "nothing bounds it between the instants at which it was asked; between_samples can accept that"
 

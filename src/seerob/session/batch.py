@@ -613,7 +613,7 @@ def _walked(
 def _foresee(
     model: Model, motion: Motion, state: State, name: str, t: Array
 ) -> tuple[Array, Array, str] | None:
-    """Tell what a robot or human does ahead (`seerob.twin.state.Foresee`): the motion says it."""
+    """Tell what a robot or human does ahead (`seerob.twin.motion.Foresee`): the motion says it."""
     if name in motion.unforeseen:
         return None
     rows = np.searchsorted(motion.t, t - SLACK)

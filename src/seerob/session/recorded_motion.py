@@ -18,9 +18,9 @@ from seerob.session.known_motion import known_motion
 from seerob.session.opening import coarse
 from seerob.session.run import Feed, engine_of
 from seerob.twin.spans import Path
-from seerob.twin.state import Hearing, State
+from seerob.twin.state import State
 from seerob.twin.states import Motion, Seen
-from seerob.twin.validity.hearing import Heard
+from seerob.twin.validity.hearing import Heard, Hearing
 
 
 def recorded(model: Model, feed: Feed, end: float) -> Motion:

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from seerob.outputs.film import Film
     from seerob.session.batch import Batch
     from seerob.session.explanation import Explanation
-    from seerob.session.identification import Identified, Known
+    from seerob.session.identification.identify import Identified, Known
     from seerob.session.permissible import evaluation
     from seerob.session.permissible.evaluation import PermissibleSpeed, Say, Wish
     from seerob.session.permissible.joint_limits import Given
@@ -435,7 +435,7 @@ class Station:
             UnknownName: There is no such robot.
         """
         from seerob.model.mounting.specification import pose_matrix
-        from seerob.session.identification import NOTHING_KNOWN, identify
+        from seerob.session.identification.identify import NOTHING_KNOWN, identify
 
         found = self.model.robot(robot)
         if not found.alone or found.carried:

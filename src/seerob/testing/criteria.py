@@ -23,9 +23,9 @@ from seerob.model.model import Mechanism, Model
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
 from seerob.twin.spans import Points
-from seerob.twin.state import VARIABLE, State
+from seerob.twin.state import State
 from seerob.twin.validity.hearing import BonesHeard
-from seerob.workstation.variables import Kind, Value, Variable
+from seerob.workstation.variables import VARIABLE, Kind, Value, Variable
 
 TICKS = 18
 TIMEOUT = 4

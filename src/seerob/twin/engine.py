@@ -55,8 +55,8 @@ from seerob.twin.moving_base import moved_by_poses
 from seerob.twin.mujoco_addresses import POSES, addresses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
-from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import EVERYWHERE, NOWHERE, BonesHeard, Heard
+from seerob.twin.state import State
+from seerob.twin.validity.hearing import EVERYWHERE, NOWHERE, BonesHeard, Heard, Hearing
 from seerob.workstation.variables import VARIABLE
 
 DEFAULT_TIMEOUT = 0.2
@@ -511,7 +511,7 @@ class Engine:
         return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
 
     def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
-        """Tell what a robot or human will do (`seerob.twin.state.Foresee`): by its file, or it stands."""
+        """Tell what a robot or human will do (`seerob.twin.motion.Foresee`): by its file, or it stands."""
         hearing, mechanism = self._hearings[name], self.model.mechanisms[name]
         if name in self._loose.names:
             return None

@@ -15,7 +15,7 @@ from seerob.core.errors import InputError
 if TYPE_CHECKING:
     from seerob.description.description import Description
     from seerob.description.robots.library import Entry
-    from seerob.session.identification import Known
+    from seerob.session.identification.identify import Known
 
 HELP = "list robots and tools that can be named, with what is known of each; fetch a published description"
 EXAMPLE = "seerob robots"
@@ -198,7 +198,7 @@ def _known(options: argparse.Namespace) -> Known:
     Raises:
         InputError: A constant, a mass, its tolerance or its source is missing or makes no sense.
     """
-    from seerob.session.identification import NOTHING_KNOWN, Known
+    from seerob.session.identification.identify import NOTHING_KNOWN, Known
 
     command = "seerob robots identify"
     if options.constants is None and options.payload is None:
@@ -226,7 +226,7 @@ def _known(options: argparse.Namespace) -> Known:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from seerob.session.identification import robot_table, weighed
+    from seerob.session.identification.robot_file import robot_table, weighed
 
     known = _known(options)
     if options.output is not None:

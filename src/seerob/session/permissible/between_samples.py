@@ -35,7 +35,8 @@ from seerob.model.model import Model
 from seerob.session.permissible.evaluation import PermissibleSpeed, Sources
 from seerob.session.permissible.moving_joints import KinematicChain, MovingJoints, chains_of
 from seerob.session.permissible.path import GivenMotion
-from seerob.twin.state import Hearing, State
+from seerob.twin.state import State
+from seerob.twin.validity.hearing import Hearing
 
 ROUNDING = 1e-7
 """Taken off distances and added to speeds [m, m/s]: the error of poses and distances is far below."""

@@ -13,8 +13,8 @@ from seerob.core.samples import Placing
 from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
-from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import EVERYWHERE, BonesHeard
+from seerob.twin.state import State
+from seerob.twin.validity.hearing import EVERYWHERE, BonesHeard, Hearing
 from seerob.workstation.variables import Value
 
 

@@ -32,7 +32,8 @@ from seerob.model.mounting.machines import AWAY, BODY, FINGERS, OFF, RESTING
 from seerob.twin.attachments import Columns
 from seerob.twin.machines.following import ON_ITS_WAY
 from seerob.twin.machines.loose import Loose
-from seerob.twin.state import Hearing, State
+from seerob.twin.state import State
+from seerob.twin.validity.hearing import Hearing
 from seerob.workstation.tables.machines import Fingers
 from seerob.workstation.workstation import Machine, Workpiece
 

@@ -17,9 +17,8 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from websockets.sync.client import connect
 
-from seerob.app.console import lan
-from seerob.app.console.lan import qr_code, reverse_port
-from seerob.app.console.visiting import add_page
+from seerob.app.console import visiting
+from seerob.app.console.visiting import add_page, qr_code, reverse_port
 from seerob.app.server import certificates, connection
 from seerob.app.server.access import Tokens
 from seerob.app.server.player import Player
@@ -234,10 +233,10 @@ def test_a_certificate_s_own_name_is_what_others_ask_for(folder, tmp_path, monke
         for host, codes in (("cell.plant.example", (200, 503)), ("other.plant.example", (403,))):
             headers = {"Host": f"{host}:{server.port}"}
             assert httpx.get(server.url, verify=False, headers=headers).status_code in codes
-    monkeypatch.setattr(lan, "address_for_others", lambda: "192.0.2.7")
-    assert lan.name_for_others(given.names) == "cell.plant.example"
-    assert lan.name_for_others(("192.0.2.7", "cell.plant.example")) == "192.0.2.7"
-    assert lan.name_for_others(("localhost", "127.0.0.1")) == "192.0.2.7"
+    monkeypatch.setattr(visiting, "address_for_others", lambda: "192.0.2.7")
+    assert visiting.name_for_others(given.names) == "cell.plant.example"
+    assert visiting.name_for_others(("192.0.2.7", "cell.plant.example")) == "192.0.2.7"
+    assert visiting.name_for_others(("localhost", "127.0.0.1")) == "192.0.2.7"
 
 
 def test_who_begins_tls_and_does_not_go_on_is_counted_and_cut(tls, monkeypatch):

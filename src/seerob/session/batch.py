@@ -28,8 +28,7 @@ from seerob.criteria.criterion import Criterion, EvaluateMany
 from seerob.criteria.judging import Judge
 from seerob.criteria.question import Question, held_names, question_of, worded
 from seerob.model.model import Model
-from seerob.outputs.notebook import batch_html
-from seerob.outputs.over_time import plotted
+from seerob.outputs.notebook import batch_html, plotted
 from seerob.recording import frames
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, INFORMS, ONE_INSTANT, STILL

@@ -20,9 +20,8 @@ from seerob.outputs.sink import Sink
 from seerob.workstation import naming
 from seerob.workstation.allowed import NOTHING, Allowed, Named, named_outside
 from seerob.workstation.conversion import convert, tables
-from seerob.workstation.emulator import Emulator
 from seerob.workstation.plausibility.ranges import unknown
-from seerob.workstation.source import Source
+from seerob.workstation.source import Emulator, Source
 from seerob.workstation.tables.controller_zones import zones_of
 from seerob.workstation.workstation import PLUGINS, TABLES, Robot, Workstation, locate
 

@@ -27,8 +27,7 @@ from seerob.description.capture.fitting import Fitter
 from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.receivers import Clock
 from seerob.model.model import Model
-from seerob.outputs.notebook import results_html
-from seerob.outputs.over_time import plotted
+from seerob.outputs.notebook import plotted, results_html
 from seerob.outputs.sink import BeginsAtEnd, KeepsResults, Sends, Writer
 from seerob.recording.frames import criterion_series
 from seerob.recording.result_log import ResultLog

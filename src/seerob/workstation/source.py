@@ -310,3 +310,11 @@ class TakesWaypoints(Protocol):
 
     def waypoint_target(self, description: Description) -> WaypointTarget | None:
         """What its waypoints are of; None where they are a file's."""
+
+
+class Emulator(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of the options of what stands for a device: one file, one class, one ``kind``.
+
+    A workstation file may say which emulators stand for its devices. They are started on demand only
+    (``seerob run --emulated``), each in a process of its own.
+    """

@@ -17,7 +17,7 @@ from seerob.app.emulation.wire import Faults
 from seerob.core.errors import InputError
 from seerob.core.host_name import check_host
 from seerob.core.transforms import Array
-from seerob.workstation.emulator import Emulator
+from seerob.workstation.source import Emulator
 
 if TYPE_CHECKING:
     from seerob.app.emulation.motions import Motion

@@ -30,10 +30,10 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
-from seerob.app.server import camera_route, trust
+from seerob.app.server import trust
 from seerob.app.server.access import Role, Tokens, Visits
-from seerob.app.server.board_route import BoardFinder
 from seerob.app.server.cad_route import Bringing
+from seerob.app.server.camera_routes import BoardFinder, newest_picture
 from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
 from seerob.app.server.connection import Doorstep, PromptLoop, PromptRequests, WholeBinaryFrames
@@ -151,7 +151,7 @@ def build(
         return trust.answer(tls, request.url.path)
 
     async def camera(request: Request) -> Response:
-        return await camera_route.answer(cameras, request)
+        return await newest_picture(cameras, request)
 
     async def cad(request: Request) -> Response:
         if bringing is None:

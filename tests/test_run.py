@@ -374,6 +374,43 @@ def test_a_clock_that_falls_behind_slips_by_what_was_lost():
     assert clock.slipped == before
 
 
+def test_pages_are_told_how_far_a_live_run_is_behind_and_when_it_fell(tmp_path):
+    station = cell(tmp_path)
+    clock = Clock()
+    told = []
+
+    def progress(t):
+        if t == pytest.approx(0.05):
+            clock.slipped += 0.4
+
+    class Looks:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def share(self, log):
+            self.log = log
+
+        def write(self, snapshot, samples):
+            told.append(self.log.so_far(whole=False))
+
+    road.run(
+        station.model,
+        pump(moving(), 0.01),
+        bound=bind(station.model),
+        scene=station.scene(),
+        end=0.2,
+        writers=[Looks()],
+        clock=clock,
+        progress=progress,
+    )
+    assert told[0].slipped < told[-1].slipped >= 0.4
+    assert told[-1].slipped_at is not None
+    assert told[-1].slipped_at >= 0.05
+
+
 @pytest.mark.parametrize("fails", [False, True])
 def test_what_takes_long_begins_when_no_tick_comes_any_more_and_before_any_writer_is_closed(tmp_path, fails):
     told = []

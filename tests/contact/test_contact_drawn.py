@@ -60,6 +60,13 @@ def test_an_edge_that_the_mesh_does_not_resolve_is_shown(tmp_path: Path) -> None
     assert max(abs(np.subtract(ball.center, (0.0, 2.0, 0.0)))) == pytest.approx(0.05)
 
 
+def test_an_unknown_edge_is_undecided_where_the_area_is_exceeded_by_what_is_known(tmp_path: Path) -> None:
+    result = bent(tmp_path, trimesh.creation.box([0.1, 0.1, 0.1]), "contact_area = { FLAT }\n", speed=2.0)
+    assert result.verdict == "exceeded"
+    (ball,) = balls(result)
+    assert (ball.label, ball.verdict) == ("edge radius unknown", "undecided")
+
+
 @pytest.mark.parametrize(
     "given", ["contact_area = { FLAT, probe = 1e-5 }\n", "contact_radius = { probe = 0.002 }\n"]
 )

@@ -2,6 +2,7 @@
 
 import "uplot/dist/uPlot.min.css";
 import "./look/index.css";
+import { effect } from "@preact/signals";
 import { h, render } from "preact";
 import { Matrix4 } from "three";
 import { connectCompany, others, ownDevice, ownHuman } from "./company";
@@ -14,7 +15,9 @@ import { App } from "./panels/App";
 import { type Actions, ActionsContext } from "./panels/app_context";
 import { placeIn, whereIs } from "./scene/carried";
 import { OwnPresence } from "./scene/own_presence";
+import { LOOKS, roomLook } from "./scene/room_look";
 import { Viewer } from "./scene/viewer";
+import { theme } from "./theme";
 import { TimeControl } from "./time_control";
 import { cameraShown } from "./view/camera";
 import { film } from "./view/film";
@@ -65,6 +68,9 @@ declare global {
 const page = document.getElementById("page")!;
 
 function begin(element: HTMLElement): void {
+  effect(() => {
+    roomLook.value = LOOKS[theme.value];
+  });
   const viewer = new Viewer(element);
   const connection = new Connection({
     scene: (scene, poses) => void viewer.begin(scene, poses),

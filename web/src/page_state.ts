@@ -124,6 +124,16 @@ export const runState = computed<State>(() => {
   return worst === "close" ? "within" : worst;
 });
 
+/** For so long after the run fell behind it is said to be falling [s of run time]. */
+const FALLS_S = 3;
+
+/** How much later than real time a live run is [s], and whether it falls behind just now; null when it never did. */
+export const behind = computed<{ lost: number; now: boolean } | null>(() => {
+  const told = soFar.value;
+  if (!told || told.slipped <= 0) return null;
+  return { lost: told.slipped, now: reach.value.end - (told.slipped_at ?? 0) < FALLS_S };
+});
+
 /** Nodes of the selection, by full name. */
 export const selectedNodes = computed<ReadonlySet<string>>(() => {
   const chosen = selection.value;

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "18c2a812f85ee360";
+export const SCHEMA = "298a222e73facaef";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -656,6 +656,10 @@ export interface SoFar {
   criteria: Record<string, CriterionSoFar>;
   /** Whether that is all of the run. */
   whole: boolean;
+  /** How much later than real time a live run is by now, because it fell behind [s]. */
+  slipped: number;
+  /** Run time at which it fell behind last [s]; None when it never did. */
+  slipped_at: number | null;
   /** What happened to loose workpieces, the newest 200 at most. */
   events: Event[];
 }

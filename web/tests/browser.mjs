@@ -54,6 +54,7 @@ export async function openBrowser({ width = 960, height = 640, flags = [] } = {}
     env: MESA ? { ...process.env, EGL_PLATFORM: "surfaceless" } : process.env,
     ignoreDefaultArgs: ["--headless"],
     viewport: { width, height },
+    colorScheme: "dark",
   });
   // For whatever is waited for: a loaded machine takes long, and a test that fails may.
   context.setDefaultTimeout(240_000);

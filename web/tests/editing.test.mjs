@@ -72,7 +72,7 @@ async function add(group, values, kind) {
   await page.getByLabel("Add", { exact: true }).selectOption(group);
   if (kind) await page.getByLabel("kind").selectOption(kind);
   for (const [name, value] of Object.entries(values))
-    await fill(page.locator(".adding").getByLabel(name), value);
+    await fill(page.locator(".adding").getByLabel(name).first(), value);
   await page.getByRole("button", { name: "Add", exact: true }).click();
   await page.locator(".adding").waitFor({ state: "detached" });
 }
@@ -129,6 +129,32 @@ base = { position = [0, 0, 0] }`;
   await page.getByRole("tab", { name: "Criteria" }).click();
   await page.waitForSelector('tr[data-criterion="minimum distance robot – operator"]');
   await page.getByRole("tab", { name: "Edit" }).click();
+});
+
+test("a shape is fields: its kind is chosen, sizes have names, and what is wrong is said beside it", async () => {
+  const begun = saved();
+  await pick("table");
+  const shape = page.locator('[data-field="shape"]');
+  assert.equal(await shape.getByLabel("box z").inputValue(), "0.74");
+  await shape.getByLabel("One of box").selectOption("cylinder");
+  await fill(shape.getByLabel("cylinder radius"), "0.3");
+  await fill(shape.getByLabel("cylinder height"), "-1");
+  await shape.locator(".mistake", { hasText: "larger than 0" }).waitFor();
+  await fill(shape.getByLabel("cylinder height"), "0.7");
+  await shape.locator(".mistake").waitFor({ state: "detached" });
+  await review("Save");
+  const round = "shape = { cylinder = [0.3, 0.7] }";
+  assert.equal(saved(), begun.replace("shape = { box = [0.8, 1.4, 0.74] }", round));
+  await pick("scanner");
+  await page.locator('[data-field="corners"]').getByLabel("Add: corners").click();
+  await page.locator('[data-field="corners"] .one-item').nth(4).waitFor();
+  await page.getByLabel("Take away: corners 5").click();
+  await page.locator('[data-field="corners"] .one-item').nth(4).waitFor({ state: "detached" });
+  for (let k = 0; k < 5; k += 1) await page.getByRole("button", { name: "Undo" }).click();
+  await pick("table");
+  await shape.getByLabel("box z").waitFor();
+  await review("Save");
+  assert.equal(saved(), begun);
 });
 
 test("what is dragged by a handle is where it was put, in steps, and undo gives back the file byte for byte", async () => {

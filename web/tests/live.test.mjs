@@ -221,6 +221,13 @@ test("a page that comes late has the whole past, in lanes and plots on one axis 
   await late.close();
 });
 
+test("a live run that falls behind real time is said to, and by how much", async () => {
+  assert.equal(await page.locator(".source").innerText(), "live");
+  await served.tell("slip");
+  await page.locator(".source.source-slow", { hasText: "live – 1.3 s behind real time" }).waitFor();
+  await page.locator(".source.source-live", { hasText: "live – 1.3 s behind real time" }).waitFor();
+});
+
 test("a live run that falls silent is said to be silent, and nothing stays green", async () => {
   await served.tell("freeze");
   await page.waitForSelector(".pill.state-off");

@@ -166,6 +166,8 @@ def main() -> None:
                 frozen.set()
             case "go":
                 frozen.clear()
+            case "slip" if live.log is not None:
+                live.log.slip(live.log.slipped + 1.25)
             case "finish":
                 frozen.set()
                 live.finish()

@@ -78,6 +78,10 @@ class SoFar(Struct, frozen=True, kw_only=True, tag="so_far"):
     criteria: dict[str, CriterionSoFar]
     whole: bool = False
     """Whether that is all of the run."""
+    slipped: float = 0.0
+    """How much later than real time a live run is by now, because it fell behind [s]."""
+    slipped_at: float | None = None
+    """Run time at which it fell behind last [s]; None when it never did."""
     events: tuple[Event, ...] = ()
     """What happened to loose workpieces, the newest 200 at most."""
 

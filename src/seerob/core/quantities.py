@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta, Struct
 
@@ -51,9 +51,16 @@ def split(key: str) -> tuple[str, str, float] | None:
     return next(splits(key), None)
 
 
-def unit(symbol: str, **limits: Any) -> Any:
-    """Metadata of a quantity, for keys with a suffix, messages, documentation and the schema."""
-    return Meta(extra={"unit": symbol}, extra_json_schema={"x-unit": symbol}, **limits)
+def unit(symbol: str, *, parts: tuple[str, ...] = (), **limits: Any) -> Any:
+    """Metadata of a quantity, for keys with a suffix, messages, documentation and the schema.
+
+    Args:
+        symbol: Its unit in SI.
+        parts: What each of several numbers is, for forms.
+        **limits: As of ``msgspec.Meta``.
+    """
+    named = {"x-parts": parts} if parts else {}
+    return Meta(extra={"unit": symbol}, extra_json_schema={"x-unit": symbol, **named}, **limits)
 
 
 Length = Annotated[float, unit("m", gt=0, le=1000)]
@@ -96,8 +103,15 @@ PathName = Annotated[
 ]
 
 
+Alternatives = tuple[tuple[tuple[str, ...], ...], ...]
+"""Groups of alternatives: the keys of each."""
+
+
 class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of every table."""
+
+    one_of: ClassVar[Alternatives] = ()
+    """Of which groups of alternatives a table has one."""
 
 
 class Pose(Table, frozen=True, kw_only=True):

@@ -72,6 +72,10 @@ class ResultLog(Mapping[str, Series]):
         """Run time of the first snapshot [s]."""
         self.end: float | None = None
         """Run time of the last snapshot [s]."""
+        self.slipped = 0.0
+        """How much later than real time a live run is by now [s]."""
+        self.slipped_at: float | None = None
+        """Run time at which it fell behind last [s]; None when it never did."""
         for criterion in criteria:
             self._begin(criterion.name, criterion.unit, criterion.at_most, criterion.between)
 
@@ -121,6 +125,11 @@ class ResultLog(Mapping[str, Series]):
             self._bones.setdefault(name, BoneErrors()).add(bones, snapshot.t)
         self._worse = tuple(worse)
         return self._worse
+
+    def slip(self, slipped: float) -> None:
+        """Note how much later than real time the run is by now [s]."""
+        if slipped > self.slipped:
+            self.slipped, self.slipped_at = slipped, self.end
 
     def break_off(self, reason: str) -> None:
         """Note why the run ended before it was over: nothing of it is known to be within."""
@@ -216,6 +225,8 @@ class ResultLog(Mapping[str, Series]):
             decided=self.decided,
             criteria=criteria,
             whole=whole,
+            slipped=self.slipped,
+            slipped_at=self.slipped_at,
             events=tuple(self.events[-TOLD:]),
         )
 

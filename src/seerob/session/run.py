@@ -467,6 +467,7 @@ def run(
                 if stop():
                     break
                 if clock is not None:
+                    log.slip(clock.slipped)
                     clock.wait(t + model.workstation.engine.tick)
         except KeyboardInterrupt:  # somebody has seen enough
             raise

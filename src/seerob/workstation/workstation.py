@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta, Struct, field
 
 from seerob.core.errors import InputError
 from seerob.core.quantities import (
+    Alternatives,
     Coordinate,
     Density,
     Length,
@@ -198,6 +199,8 @@ class Body(_Table, frozen=True, kw_only=True):
 class Thing(_Table, frozen=True, kw_only=True):
     """What a tool, a workpiece and a part have in common: a shape and where it is."""
 
+    one_of: ClassVar[Alternatives] = ((("mesh",), ("shape",)),)
+
     name: PathName
     """Its name, by which criteria and sources ask for it."""
     mesh: str | None = None
@@ -274,6 +277,8 @@ class Mounted(Thing, frozen=True, kw_only=True):
 class Tool(Mounted, frozen=True, kw_only=True):
     """Something mounted on a robot, real or virtual: it changes the twin's masses and torques."""
 
+    one_of = ((("mesh",), ("shape",), ("model",)),)
+
     model: (
         Annotated[str, Meta(pattern=r"^library:[a-z0-9_]+$", description="library: and the name of a tool")]
         | None
@@ -330,6 +335,8 @@ class Part(Thing, frozen=True, kw_only=True):
 
 class Machine(Thing, frozen=True, kw_only=True):
     """Something that moves: an axis, a door, a turntable, what a belt carries, a cart, a gripper."""
+
+    one_of = (*Thing.one_of, (("slide",), ("turn",), ("belt",), ("vehicle",), ("route",), ("grip",)))
 
     on: str | None = None
     """Machine, link or tool that carries it, such as ``ur10/tool0``; stands in the world when not given."""
@@ -395,6 +402,8 @@ class SweptArea(_Table, frozen=True, kw_only=True):
 
 class Area(Thing, frozen=True, kw_only=True):
     """A safety area: a shape that is watched, not touched."""
+
+    one_of = ((("mesh",), ("shape",), ("swept",)),)
 
     swept: SweptArea | None = None
     """Instead of a mesh or a shape: what something sweeps."""

@@ -19,12 +19,20 @@ export interface Schema {
   items?: Schema | false;
   prefixItems?: Schema[];
   default?: unknown;
+  examples?: unknown[];
+  minItems?: number;
   $defs?: Record<string, Schema>;
   "x-unit"?: string;
+  /** What each of several numbers is. */
+  "x-parts"?: string[];
+  /** Groups of alternatives of which a table has one: the keys of each. */
+  "x-one-of"?: string[][][];
 }
 
 export interface Field {
   name: string;
+  /** Its key in SI. */
+  base: string;
   schema: Schema;
   required: boolean;
   unit: string;
@@ -108,9 +116,37 @@ export function fields(one: Schema, table: Table): Field[] {
     const value = given(property);
     const unit = base === name ? (value["x-unit"] ?? "") : name.slice(base.length + 1).replaceAll("_", "/");
     const about = base === name ? (value.description ?? "") : "";
-    shown.set(base, { name, schema: value, required: required.has(base), unit, about });
+    const parts = given(one.properties?.[base] ?? {})["x-parts"];
+    const whole = parts ? { ...value, "x-parts": parts } : value;
+    shown.set(base, { name, base, schema: whole, required: required.has(base), unit, about });
   }
   return [...shown.values()].sort((a, b) => Number(b.required) - Number(a.required));
+}
+
+/** Of alternatives of which a table has one: which, and the keys that the table has of each. */
+export function alternatives(one: Schema, table: Table): { chosen: number; keys: string[][] }[] {
+  const keysOf = (base: string): string[] =>
+    Object.entries(one.properties ?? {})
+      .filter(([name, property]) => name in table && baseOf(name, property) === base)
+      .map(([name]) => name);
+  return (one["x-one-of"] ?? []).map((group) => {
+    const keys = group.map((bases) => bases.flatMap(keysOf));
+    return { chosen: keys.findIndex(({ length }) => length > 0), keys };
+  });
+}
+
+/** A value to begin with, as the schema gives an example of it; undefined where it gives none. */
+export function example(one: Schema, name: string): unknown {
+  const property = one.properties?.[name];
+  return property && (given(property).examples?.[0] ?? begun(given(property)));
+}
+
+// A table of alternatives, of which the first one has an example: a shape is a box until another is chosen.
+function begun(one: Schema): Table | undefined {
+  const first = one["x-one-of"]?.[0]?.[0];
+  if (!first || (one.required ?? []).length > 0) return undefined;
+  const values = first.map((key): [string, unknown] => [key, example(one, key)]);
+  return values.every(([, value]) => value !== undefined) ? Object.fromEntries(values) : undefined;
 }
 
 // `limit_mm` is described as `limit in mm`, and comes behind `limit`.

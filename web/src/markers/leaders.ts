@@ -8,7 +8,7 @@ import {
   LineSegments,
   Vector3,
 } from "three";
-import { NEUTRAL_COLOR } from "../verdicts";
+import { colorOf, once } from "../scene/materials";
 import { type Caption, depthOf } from "./caption";
 import type { View } from "./view";
 
@@ -27,13 +27,15 @@ export class Leaders {
   constructor() {
     this.places.setUsage(DynamicDrawUsage);
     const geometry = new BufferGeometry().setAttribute("position", this.places);
-    const material = new LineBasicMaterial({
-      color: NEUTRAL_COLOR,
-      transparent: true,
-      opacity: 0.7,
-      depthTest: false,
-      depthWrite: false,
-      toneMapped: false,
+    const material = once("leader none", () => {
+      const look = {
+        transparent: true,
+        opacity: 0.7,
+        depthTest: false,
+        depthWrite: false,
+        toneMapped: false,
+      };
+      return new LineBasicMaterial({ color: colorOf("none"), ...look });
     });
     this.object = new LineSegments(geometry, material);
     this.object.frustumCulled = false;

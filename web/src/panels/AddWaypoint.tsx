@@ -11,7 +11,7 @@ import { said, word } from "../words";
 import { useActions } from "./app_context";
 import { Choice } from "./Choice";
 import { MistakeList } from "./MistakeList";
-import { SchemaForm } from "./SchemaForm";
+import { type Put, putInto, SchemaForm } from "./SchemaForm";
 
 /** How far a place begins above where the tool point is, along the z of its frame [m]. */
 const ABOVE = 0.05;
@@ -97,9 +97,8 @@ function WaypointForm({ of, close }: { of: Taught; close: () => void }) {
     point: entrySchema("waypoints", {}),
     source: entrySchema("sources", { kind: "waypoints" }),
   };
-  const put = (table: typeof point) => (key: string, value: unknown) => {
-    const { [key]: _, ...rest } = table.value;
-    table.value = value === undefined ? rest : { ...table.value, [key]: value };
+  const put = (table: typeof point) => (puts: readonly Put[]) => {
+    table.value = putInto(table.value, puts);
   };
   const add = async (): Promise<void> => {
     const source = { kind: "waypoints", robot: of.robot, ...figures.value, points: [point.value] };

@@ -31,7 +31,7 @@ import { Bringing } from "./Bringing";
 import { Choice } from "./Choice";
 import { MistakeList } from "./MistakeList";
 import { Review } from "./Review";
-import { NameChoices, SchemaForm } from "./SchemaForm";
+import { NameChoices, putInto, SchemaForm } from "./SchemaForm";
 
 const GROUPS: readonly [group: string, title: string, one: string][] = [
   ["robots", word("Robots"), word("robot")],
@@ -274,11 +274,13 @@ function EntryForm({ entry }: { entry: Entry }) {
           table={table}
           path={path}
           without={at === null ? [] : [at]}
-          onChange={(key, value) =>
+          onChange={(puts) =>
             void change(
-              value === undefined
-                ? { kind: "remove", path: [...path, key], value: null }
-                : set([...path, key], value),
+              ...puts.map(([keys, value]) =>
+                value === undefined
+                  ? { kind: "remove", path: [...path, ...keys], value: null }
+                  : set([...path, ...keys], value),
+              ),
             )
           }
         />
@@ -450,9 +452,8 @@ function Adding({ group, close }: { group: string; close: () => void }) {
           schema={form}
           table={table.value}
           path={path}
-          onChange={(key, value) => {
-            const { [key]: _, ...rest } = table.value;
-            table.value = value === undefined ? rest : { ...table.value, [key]: value };
+          onChange={(puts) => {
+            table.value = putInto(table.value, puts);
           }}
         />
       )}

@@ -3,6 +3,7 @@
 import { notRun, onTrial } from "../editing/draft";
 import { against, percent, withUnit } from "../figures";
 import {
+  behind,
   elsewhere,
   frame,
   hello,
@@ -56,14 +57,23 @@ function SourceState() {
       : isLive.value
         ? stale.value
           ? said("live – nothing heard")
-          : onTrial.value
-            ? said("live – a draft, not recorded")
-            : said("live")
+          : behind.value
+            ? said("live – {s} s behind real time", {
+                s: (Math.ceil(10 * behind.value.lost) / 10).toFixed(1),
+              })
+            : onTrial.value
+              ? said("live – a draft, not recorded")
+              : said("live")
         : said("replay"),
   }[state];
-  const look = lost || stale.value ? "off" : isLive.value ? "live" : "replay";
+  const look = lost || stale.value ? "off" : !isLive.value ? "replay" : behind.value?.now ? "slow" : "live";
+  const why = behind.value
+    ? said(
+        "This machine is too slow for the workstation: what is heard while the run falls behind is late, and what rests on it undecided.",
+      )
+    : (hello.value?.server ?? "");
   return (
-    <div class={`source source-${look}`} title={lost ? reason : (hello.value?.server ?? "")} role="status">
+    <div class={`source source-${look}`} title={lost ? reason : why} role="status">
       <span class="dot" aria-hidden="true" />
       {words}
       {lost && reason !== "" && <span class="source-reason">{reason}</span>}

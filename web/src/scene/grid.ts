@@ -1,14 +1,23 @@
 // The floor: a line per half metre, stronger per metre, and the two horizontal axes of the world.
 
 import { BufferGeometry, Float32BufferAttribute, Group, LineBasicMaterial, LineSegments } from "three";
+import { roomLook } from "./room_look";
 
 const HALF = 6;
 
 export function makeGrid(): Group {
   const grid = new Group();
   grid.name = "grid";
-  grid.add(lines(0.5, 0x1b232e), lines(1, 0x2a3646), axis([1, 0, 0], 0xa8475c), axis([0, 0, -1], 0x4c8f6a));
+  const [half, whole, x, y] = roomLook.peek().grid;
+  grid.add(lines(0.5, half), lines(1, whole), axis([1, 0, 0], x), axis([0, 0, -1], y));
   return grid;
+}
+
+/** Give it the colours of the room as it looks now. */
+export function recolorGrid(grid: Group): void {
+  const colors = roomLook.peek().grid;
+  for (const [k, part] of grid.children.entries())
+    ((part as LineSegments).material as LineBasicMaterial).color.setHex(colors[k]!);
 }
 
 function lines(pitch: number, color: number): LineSegments {

@@ -12,17 +12,16 @@ import {
   MeshStandardMaterial,
   type MeshStandardMaterialParameters,
   PointsMaterial,
+  ShaderMaterial,
   type WebGLProgramParametersWithUniforms,
 } from "three";
-import { DOUBT_COLOR, NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
 import { drawnBySoftware } from "./effort";
+import { roomLook, type Tone } from "./room_look";
 
-export type Tone = Verdict | "none";
-
-/** Colour of a verdict or of none, sRGB. */
+/** Colour of a verdict, of none or of doubt in the room as it looks now, sRGB. */
 export function colorOf(tone: Tone): number {
-  return tone === "none" ? NEUTRAL_COLOR : VERDICT_COLORS[tone];
+  return roomLook.peek().tones[tone];
 }
 
 // UNDECIDED is hatched on the screen, so that it differs in more than colour.
@@ -123,6 +122,18 @@ function byTone<K extends string>(...kinds: K[]): Record<K, Record<Tone, string>
 
 const made = new Map<string, Material>();
 
+/** Give shared materials the colours of the room as it looks now; the second word of a key is the tone. */
+export function recolor(): void {
+  const { tones } = roomLook.peek();
+  for (const [key, material] of made) {
+    const tone = tones[key.split(" ")[1] as Tone];
+    if (tone === undefined) continue;
+    if (material instanceof ShaderMaterial) material.uniforms.tone!.value.setHex(tone);
+    else (material as MeshBasicMaterial).color.setHex(tone);
+    if (material instanceof MeshStandardMaterial) material.emissive.setHex(tone);
+  }
+}
+
 /** A material that is made when it is first needed and shared from then on. */
 export function once(key: string, make: () => Material): Material {
   let material = made.get(key);
@@ -194,7 +205,7 @@ export function bodyMaterial(verdict: Verdict | null): Material | Material[] {
 
 /** The shared material of a body that may be elsewhere: no colour of its own, and seen through. */
 export function doubtMaterial(): Material[] {
-  return bothSides("doubt", { color: DOUBT_COLOR, roughness: 0.9, opacity: 0.8 });
+  return bothSides("body doubt", { color: colorOf("doubt"), roughness: 0.9, opacity: 0.8 });
 }
 
 // Seen through and hatched: the far side before the near one, for the two groups of `drawnTwice`. three.js makes

@@ -17,9 +17,9 @@ import {
   WebGLRenderer,
 } from "three";
 import { drawnBySoftware, Sharpness } from "./effort";
-import { makeGrid } from "./grid";
+import { makeGrid, recolorGrid } from "./grid";
+import { roomLook } from "./room_look";
 
-const BACKGROUND = 0x10151c;
 /** Pictures per second below which pixels are made larger, and the largest of them, by processor and by graphics card. */
 const LEAST_RATE = { software: 24, hardware: 45 };
 const LEAST_SHARPNESS = { software: 0.6, hardware: 1 };
@@ -35,6 +35,8 @@ export class Stage {
   /** Everything that is given in world coordinates: z up, metres. */
   readonly world = new Group();
   readonly grid = makeGrid();
+  private readonly ground = new Color(roomLook.peek().ground);
+  private readonly fog = new Fog(roomLook.peek().ground, 14, 40);
   /** Makes the projection, in place of one by the element's shape. */
   project: (() => void) | null = null;
   private dirty = true;
@@ -59,8 +61,8 @@ export class Stage {
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     element.append(this.renderer.domElement);
-    this.scene.background = new Color(BACKGROUND);
-    this.scene.fog = new Fog(BACKGROUND, 14, 40);
+    this.scene.background = this.ground;
+    this.scene.fog = this.fog;
     this.world.rotation.x = -Math.PI / 2;
     this.rig.add(this.camera);
     this.scene.add(this.world, this.rig, this.grid);
@@ -78,6 +80,15 @@ export class Stage {
   /** The bodies moved: their shadows are out of date. */
   moved(): void {
     this.renderer.shadowMap.needsUpdate = true;
+    this.dirty = true;
+  }
+
+  /** Take the colours of the room as it looks now. */
+  recolor(): void {
+    const { ground } = roomLook.peek();
+    this.ground.setHex(ground);
+    this.fog.color.setHex(ground);
+    recolorGrid(this.grid);
     this.dirty = true;
   }
 

@@ -3,7 +3,8 @@
 
 import { BackSide, Color, type Material, ShaderMaterial } from "three";
 import type { Verdict } from "../wire";
-import { colorOf, once, type Tone } from "./materials";
+import { colorOf, once } from "./materials";
+import type { Tone } from "./room_look";
 
 const VERTEX = `
 varying vec3 vAcross;

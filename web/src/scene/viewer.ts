@@ -36,8 +36,10 @@ import { CameraView } from "./camera_view";
 import { Companions } from "./companions";
 import { DoubtCaptions } from "./doubt_captions";
 import { Gizmo } from "./gizmo";
+import { recolor } from "./materials";
 import { Outline } from "./outline";
 import { nodeAlong, pickOnClick } from "./picking";
+import { roomLook } from "./room_look";
 import { Stage } from "./stage";
 import { Viewpoint } from "./viewpoint";
 import { hides } from "./volumes";
@@ -381,6 +383,11 @@ export class Viewer {
     effect(() => {
       void [selection.value, selectedNodes.value];
       this.emphasize();
+    });
+    effect(() => {
+      void roomLook.value;
+      recolor();
+      this.stage.recolor();
     });
     effect(() => {
       this.bodies.hide(hidden.value);

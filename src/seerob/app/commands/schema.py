@@ -107,6 +107,8 @@ def _add_suffixes(definition: dict[str, Any], kind: type[msgspec.Struct]) -> Non
             keys = [field.name, *(f"{field.name}_{suffix}" for suffix in suffixes)]
             replaced.add(field.name)
             either.append({"oneOf": [{"required": [key]} for key in keys]})
+    if one_of := getattr(kind, "one_of", ()):
+        definition["x-one-of"] = one_of
     definition["required"] = [name for name in required if name not in replaced]
     if either:
         definition["allOf"] = either
@@ -119,6 +121,7 @@ def _without_limits(entry: Any) -> Any:
         "exclusiveMinimum",
         "exclusiveMaximum",
         "default",
+        "examples",
         "x-unit",
         "description",
     )

@@ -324,25 +324,30 @@ class ContactMarkers:
         patch = self._patch(part, row, judged)
         if patch is None:
             return arrow, lit
-        point, label = patch
+        point, label, verdict = patch
         center = tuple((at.x + at.R @ point).tolist())
-        return arrow, lit, Sphere(center=center, radius=BALL, label=label, verdict=part.verdict)
+        return arrow, lit, Sphere(center=center, radius=BALL, label=label, verdict=verdict)
 
-    def _patch(self, part: Result, row: int, judged: Judged) -> tuple[Array, str] | None:
-        """Where a pressure governs, or is open because the mesh does not resolve an edge: there, in words."""
+    def _patch(self, part: Result, row: int, judged: Judged) -> tuple[Array, str, Verdict | None] | None:
+        """Where a pressure governs, or is open because the mesh does not resolve an edge: there, in words.
+
+        What is unknown is UNDECIDED, also where the area is exceeded by another body or a force.
+        """
         shape, column = self._shapes[row], self._columns.get(part.name)
         if shape is None or column is None or part.limit is None:
             return None
         if math.isnan(judged.speeds.pressure[row, column]):
             edges = shape.unknown_at
-            return None if edges is None or not len(edges) else (edges[0], "edge radius unknown")
+            if edges is None or not len(edges):
+                return None
+            return edges[0], "edge radius unknown", Verdict.UNDECIDED
         if judged.speeds.governing[row, column] != Governing.PRESSURE:
             return None
         patch = self._least_patch(shape, row, column, bool(judged.clamped[row, column]))
         if patch is None:
             return None
         radius = float(shape.radii[patch, 0])
-        return shape.points[patch], f"edge radius {figures.figure(radius * 1e3, 'mm')}"
+        return shape.points[patch], f"edge radius {figures.figure(radius * 1e3, 'mm')}", part.verdict
 
     def _least_patch(self, shape: ContactShape, row: int, column: int, clamped: bool) -> int | None:
         """The patch that permits the least force on any area of a region; None of a flat surface."""

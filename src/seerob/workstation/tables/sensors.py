@@ -96,6 +96,8 @@ class Mat(Table, frozen=True, kw_only=True):
 class Sensor(Table, frozen=True, kw_only=True):
     """A protective device: what it sees is computed, what nobody said of it stays unknown."""
 
+    one_of = ((("laser_scanner",), ("light_curtain",), ("pressure_mat",)),)
+
     name: Name
     at: Pose = Pose()
     """Pose in the world, or in the frame that carries it."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from seerob.core.quantities import Coordinate, Corners, Length, Table, unit
+from msgspec import Meta
+
+from seerob.core.quantities import Coordinate, Corners, Table, unit
 from seerob.core.shapes import check_polygon
 
 MAX_SIZE = 1000.0
@@ -14,17 +16,29 @@ MAX_SIZE = 1000.0
 class Shape(Table, frozen=True, kw_only=True):
     """A simple shape instead of a mesh file, centred at the origin of its frame."""
 
-    box: Annotated[tuple[float, float, float], unit("m")] | None = None
+    one_of = ((("box",), ("sphere",), ("cylinder",), ("capsule",), ("polygon", "height")),)
+
+    box: (
+        Annotated[tuple[float, float, float], unit("m", parts=("x", "y", "z"), examples=[(0.5, 0.5, 0.5)])]
+        | None
+    ) = None
     """Edge lengths [m]."""
-    sphere: Length | None = None
+    sphere: Annotated[float, unit("m", gt=0, le=1000, examples=[0.25])] | None = None
     """Radius [m]."""
-    cylinder: Annotated[tuple[float, float], unit("m")] | None = None
+    cylinder: (
+        Annotated[tuple[float, float], unit("m", parts=("radius", "height"), examples=[(0.25, 0.5)])] | None
+    ) = None
     """Radius and height along z [m]."""
-    capsule: Annotated[tuple[float, float], unit("m")] | None = None
+    capsule: (
+        Annotated[tuple[float, float], unit("m", parts=("radius", "length"), examples=[(0.15, 0.5)])] | None
+    ) = None
     """Radius, and length along z between the centres of its two half balls [m]."""
-    polygon: Corners | None = None
+    polygon: Annotated[Corners, Meta(examples=[[(0, 0), (1, 0), (1, 1), (0, 1)]])] | None = None
     """Corners (x, y) of a floor plan, in either sense, concave or not, extruded along z [m]; not centred."""
-    height: Annotated[tuple[Coordinate, Coordinate], unit("m")] | None = None
+    height: (
+        Annotated[tuple[Coordinate, Coordinate], unit("m", parts=("lower", "upper"), examples=[(0, 1)])]
+        | None
+    ) = None
     """Lower and upper end along z of what is extruded from ``polygon`` [m]."""
 
     def __post_init__(self) -> None:

@@ -3,10 +3,12 @@
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from seerob import load
 from seerob.core.errors import InputError
 from seerob.core.samples import GrabSample, JointSample
+from seerob.kernels import loose as kernel
 from seerob.recording.format import Tick
 from seerob.twin.engine import Engine
 
@@ -254,3 +256,41 @@ def test_the_same_grabs_move_everything_the_same_bit_for_bit(tmp_path):
     one, other = (carried(tmp_path) for _ in range(2))
     assert one.state.poses() == other.state.poses()
     assert one.events == other.events
+
+
+def test_a_spring_pulls_as_its_formulae_say():
+    rng, n, body, carrier, omega = np.random.default_rng(3), 4, 2, 3, 31.0
+    xpos, xipos, com = rng.normal(size=(3, n, 3))
+    xmat, ximat = (Rotation.random(n, rng=seed).as_matrix().reshape(n, 9).copy() for seed in (1, 2))
+    cvel, gravity = rng.normal(size=(n, 6)), np.array([0.0, 0.0, -9.81])
+    bodies = kernel.Bodies(
+        xpos, xmat, ximat, xipos, cvel, com, np.arange(n, dtype=np.int32), np.zeros((n, 6)), gravity
+    )
+    ipos, moments, mass, pulled, fastest, quickest = rng.normal(size=3), rng.uniform(1, 2, 3), 1.7, 1.0, 4, 20
+    figures = np.array([mass, pulled, 0.1, 0.4, 2.0, 0.1, fastest, quickest])
+    piece, fixed = kernel.Piece(ipos, moments, figures), np.eye(4)
+    fixed[:3, :3], fixed[:3, 3] = Rotation.random(rng=4).as_matrix(), rng.normal(size=3)
+    tables = kernel.BODIES.rows(bodies), kernel.PIECE.rows(piece)
+    gap, reels = kernel.pull(*tables, body, carrier, fixed, omega, True, False, 0.0)
+
+    R = xmat[carrier].reshape(3, 3)
+    wanted, to = R @ fixed[:3, :3], xpos[carrier] + R @ (fixed[:3, 3] + fixed[:3, :3] @ ipos)
+    off = Rotation.from_matrix(wanted @ xmat[body].reshape(3, 3).T).as_rotvec()
+
+    def velocity(i, at):
+        return cvel[i, 3:] + np.cross(cvel[i, :3], at - com[i])
+
+    def at_most(v, most):
+        return v * min(1.0, most / np.linalg.norm(v))
+
+    speed = at_most(velocity(carrier, to) + 0.5 * omega * (to - xipos[body]), fastest)
+    spin = at_most(cvel[carrier, :3] + 0.5 * omega * off, quickest)
+    force = 2 * omega * pulled * (speed - velocity(body, xipos[body])) - mass * gravity
+    axes = ximat[body].reshape(3, 3)
+    torque = axes @ (2 * omega * moments * (axes.T @ (spin - cvel[body, :3])))
+    lever = xipos[body] - xipos[carrier]
+    on_carrier = -np.concatenate([force, np.cross(lever, force) + torque])
+    assert bodies.xfrc[body] == pytest.approx(np.concatenate([force, torque]), rel=1e-9, abs=1e-9)
+    assert bodies.xfrc[carrier] == pytest.approx(on_carrier, rel=1e-9, abs=1e-9)
+    assert not bodies.xfrc[:2].any()
+    assert (gap, reels) == (pytest.approx(np.linalg.norm(to - xipos[body])), False)

@@ -6,17 +6,65 @@ The formulae are those of `seerob.twin.machines.loose`.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
 from seerob.kernels.posture_fit import logarithm
 
 Indices = NDArray[np.int64]
 PYRAMIDAL = 0
 """``mjCONE_PYRAMIDAL``"""
+MASS, PULLED, RADIUS, FRICTION, LARGEST, NEAR, FASTEST, QUICKEST = range(8)
+"""Where `Piece.figures` has what."""
+
+
+class Bodies(NamedTuple):
+    """Of all of MuJoCo's bodies, as `MjData` and `MjModel` have it."""
+
+    xpos: Array
+    """[m], shape (n, 3)."""
+    xmat: Array
+    """Shape (n, 9)."""
+    ximat: Array
+    """Shape (n, 9)."""
+    xipos: Array
+    """[m], shape (n, 3)."""
+    cvel: Array
+    """[rad/s, m/s], shape (n, 6)."""
+    subtree_com: Array
+    """[m], shape (n, 3)."""
+    root: NDArray[np.int32]
+    """``MjModel.body_rootid``, shape (n,)."""
+    xfrc: Array
+    """``MjData.xfrc_applied`` [N, N·m], shape (n, 6)."""
+    gravity: Array
+    """[m/s²], shape (3,)."""
+
+
+BODIES = Layout(Bodies, [*[(np.float64, 2)] * 6, (np.int32, 1), (np.float64, 2), (np.float64, 1)])
+
+
+class Piece(NamedTuple):
+    """What of a workpiece is the same at all instants."""
+
+    ipos: Array
+    """Centre of mass in its frame [m], shape (3,)."""
+    inertia: Array
+    """Principal moments about it [kg·m²], shape (3,)."""
+    figures: Array
+    """Its mass, the mass by which a spring is as stiff as it is [kg], the radius of the ball about its centre
+    of mass that contains it [m], its coefficient of friction, the largest of its moments [kg·m²]; how near
+    its carrier, beside that radius, a spring has it where it is [m], and how fast a spring makes it at the
+    most [m/s], [rad/s]; shape (8,)."""
+
+
+PIECE = Layout(Piece, [(np.float64, 1)] * 3)
+_bodies_in, _piece_in = BODIES.read, PIECE.read
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -45,42 +93,29 @@ def _at_most(v: Array, most: float) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def pull(
-    xpos: Array, xmat: Array, ximat: Array, xipos: Array, cvel: Array, subtree_com: Array,
-    root: NDArray[np.int32], xfrc: Array, gravity: Array, ipos: Array, inertia: Array, body: int,
-    carrier: int, fixed: Array, mass: float, pulled: float, radius: float, omega: float, firm: bool,
-    reels: bool, reel: float, near: float, fastest: float, quickest: float,
+    bodies: Indices, piece: Indices, body: int, carrier: int, fixed: Array, omega: float, firm: bool,
+    reels: bool, reel: float,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Add the forces of a spring that pulls a workpiece to ``xfrc``.
+    """Add the forces of a spring that pulls a workpiece to ``MjData.xfrc_applied``.
 
     Args:
-        xpos: Of all of MuJoCo's bodies [m], as in ``MjData``; so are the next five.
-        xmat: Shape (n, 9).
-        ximat: Shape (n, 9).
-        xipos: [m]
-        cvel: [rad/s, m/s]
-        subtree_com: [m]
-        root: ``MjModel.body_rootid``.
-        xfrc: ``MjData.xfrc_applied`` [N, N·m]; added to.
-        gravity: [m/s²]
-        ipos: Centre of mass of the workpiece in its frame [m], shape (3,).
-        inertia: Its principal moments [kg·m²], shape (3,).
+        bodies: Of `BODIES`; forces are added to its ``xfrc``.
+        piece: Of `PIECE`.
         body: The workpiece.
         carrier: Body that the spring is fixed to.
         fixed: Where in its frame the spring pulls to, shape (4, 4); moved on while it ``reels``.
-        mass: Of the workpiece [kg].
-        pulled: Mass by which the spring is as stiff as it is [kg].
-        radius: Of the ball that contains the workpiece [m].
         omega: Natural frequency [rad/s].
         firm: Whether the carrier feels moments.
         reels: Whether the workpiece is still on its way.
         reel: How far the spring is reeled in at this step [m].
-        near: Distance of the carrier at which it is there [m], beside ``radius``.
-        fastest: No spring makes it faster [m/s].
-        quickest: Nor turn faster [rad/s].
 
     Returns:
         How far the workpiece is from where it is pulled to [m], and whether it is still on its way.
     """
+    xpos, xmat, ximat, xipos, cvel, subtree_com, root, xfrc, gravity = _bodies_in(bodies, 0)
+    ipos, inertia, figures = _piece_in(piece, 0)
+    mass, pulled, radius = figures[MASS], figures[PULLED], figures[RADIUS]
+    near, fastest, quickest = figures[NEAR], figures[FASTEST], figures[QUICKEST]
     R, H, axes = (
         xmat[carrier].copy().reshape(3, 3),
         xmat[body].copy().reshape(3, 3),
@@ -192,27 +227,21 @@ def pressed(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def drag(
-    xipos: Array, cvel: Array, subtree_com: Array, root: NDArray[np.int32], xfrc: Array, body: int,
-    rides: Array, normal: Array, mass: float, friction: float, inertia: float, radius: float, dt: float,
-) -> None:  # fmt: skip
-    """Add the friction of a surface that runs to ``xfrc``.
+def drag(bodies: Indices, piece: Indices, body: int, rides: Array, normal: Array, dt: float) -> None:
+    """Add the friction of a surface that runs to ``MjData.xfrc_applied``.
 
     Args:
-        xipos: As of `pull`, like those that follow until ``body``.
-        cvel: [rad/s, m/s]
-        subtree_com: [m]
-        root: ``MjModel.body_rootid``.
-        xfrc: [N, N·m]; added to.
+        bodies: Of `BODIES`; forces are added to its ``xfrc``.
+        piece: Of `PIECE`.
         body: The workpiece.
         rides: Velocity of the surface [m/s], shape (3,).
         normal: Force on the workpiece [N], shape (3,).
-        mass: Of the workpiece [kg].
-        friction: Its coefficient.
-        inertia: Its largest moment [kg·m²].
-        radius: Of the ball that contains it [m].
         dt: Of a step [s].
     """
+    all_, own = _bodies_in(bodies, 0), _piece_in(piece, 0)
+    xipos, cvel, subtree_com, root, xfrc = all_.xipos, all_.cvel, all_.subtree_com, all_.root, all_.xfrc
+    mass, radius = own.figures[MASS], own.figures[RADIUS]
+    friction, inertia = own.figures[FRICTION], own.figures[LARGEST]
     pressure = math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
     if pressure == 0.0:
         return

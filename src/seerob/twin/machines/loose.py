@@ -107,17 +107,13 @@ class _Piece:
     """Columns of its joints in ``qpos``, shape (6,)."""
     v: Indices
     """In ``qvel``, shape (6,)."""
-    mass: float
     torn: float
     radius: float
     """Of the ball about its centre of mass that contains it [m]."""
-    friction: float
-    com: Array
-    """Centre of mass in its frame [m], shape (3,)."""
-    moments: Array
-    """Principal ones about it [kg·m²], shape (3,)."""
-    inertia: float
-    """The largest of them."""
+    bound: kernel.Piece
+    """Keeps the arrays of its table."""
+    table: Indices
+    """Of `seerob.kernels.loose.PIECE`."""
     hands: dict[str, _Spring] = field(default_factory=dict)
     place: str = ""
     """Where it lies, or whose spring pulls it."""
@@ -194,9 +190,13 @@ class Loose:
         self._riding = False
         """Whether anything lay on a surface that runs at the step before."""
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
-        self._placed = data.xpos, data.xmat, data.ximat
-        self._moving = data.xipos, data.cvel, data.subtree_com, physics.body_rootid
-        self._xfrc, self._gravity = data.xfrc_applied, physics.opt.gravity
+        self._xfrc = data.xfrc_applied
+        self._bodies = kernel.Bodies(
+            data.xpos, data.xmat, data.ximat, data.xipos, data.cvel, data.subtree_com, physics.body_rootid,
+            self._xfrc, physics.opt.gravity,
+        )  # fmt: skip
+        """Keeps the arrays of its table."""
+        self._table = kernel.BODIES.rows(self._bodies)
         self._back: list[tuple[_Piece, str]] = []
         """What is put into the pose of a place at the next tick."""
         self._waiting: deque[GrabSample] = deque(maxlen=WAITING)
@@ -296,21 +296,13 @@ class Loose:
 
     def _rub(self, piece: _Piece, rides: Array, normal: Array, dt: float) -> None:
         """Set the friction on a surface that runs at a velocity [m/s] and presses it with a force [N]."""
-        xipos, cvel, subtree_com, root = self._moving
-        kernel.drag(
-            xipos, cvel, subtree_com, root, self._xfrc, piece.body, rides, normal, piece.mass,
-            piece.friction, piece.inertia, piece.radius, dt,
-        )  # fmt: skip
+        kernel.drag(self._table, piece.table, piece.body, rides, normal, dt)
 
     def _pull(self, piece: _Piece, spring: _Spring, dt: float) -> float:
         """Set the forces of a spring; how far the workpiece is from where it pulls [m]."""
-        xpos, xmat, ximat = self._placed
-        xipos, cvel, subtree_com, root = self._moving
         gap, reels = kernel.pull(
-            xpos, xmat, ximat, xipos, cvel, subtree_com, root, self._xfrc, self._gravity, piece.com,
-            piece.moments, piece.body, spring.carrier, spring.carrier_from_piece, piece.mass,
-            min(piece.mass, HEAVY), piece.radius, self._firm if spring.firm else self._omega, spring.firm,
-            spring.reels, REEL * dt, 0.5 * NEAR, FASTEST, QUICKEST,
+            self._table, piece.table, piece.body, spring.carrier, spring.carrier_from_piece,
+            self._firm if spring.firm else self._omega, spring.firm, spring.reels, REEL * dt,
         )  # fmt: skip
         spring.reels = bool(reels)
         return float(gap)
@@ -622,19 +614,23 @@ def _piece(model: Model, name: str, torn: float) -> _Piece:
     own = [b for b in model.bodies if b.owner == name]
     reach = [float(np.linalg.norm(b.corners - com, axis=1).max(initial=0.0)) + b.radius for b in own]
     table = next(piece for piece in model.workstation.workpieces if piece.name == name)
+    mass, moments = float(model.mj.body_mass[body]), model.mj.body_inertia[body].copy()
+    radius = max(reach, default=0.0)
+    figures = np.empty(8)
+    figures[[kernel.MASS, kernel.PULLED, kernel.RADIUS]] = mass, min(mass, HEAVY), radius
+    figures[[kernel.FRICTION, kernel.LARGEST]] = table.friction, moments.max()
+    figures[[kernel.NEAR, kernel.FASTEST, kernel.QUICKEST]] = 0.5 * NEAR, FASTEST, QUICKEST
+    bound = kernel.Piece(com.copy(), moments, figures)
     return _Piece(
         name,
         own[0].index,
         body,
         mechanism.q_address,
         mechanism.v_address,
-        float(model.mj.body_mass[body]),
         torn,
-        max(reach, default=0.0),
-        table.friction,
-        com.copy(),
-        model.mj.body_inertia[body].copy(),
-        float(model.mj.body_inertia[body].max()),
+        radius,
+        bound,
+        kernel.PIECE.rows(bound),
     )
 
 

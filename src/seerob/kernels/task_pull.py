@@ -11,42 +11,65 @@ frequency, and what one joint cannot do others help with.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
 from seerob.kernels.posture_fit import logarithm
 
 Indices = NDArray[np.int64]
 
 
+class Bones(NamedTuple):
+    """What of a person is the same at all instants: b bodies that m joints move."""
+
+    bodies: Indices
+    """MuJoCo's bodies that the joints move, parents first, shape (b,)."""
+    up: Indices
+    """Row of each one's parent among them, -1 for none, shape (b,)."""
+    mass: Array
+    """Of each [kg], shape (b,)."""
+    inertia: Array
+    """Principal moments [kg·m²], shape (b, 3)."""
+    dof: Indices
+    """Degree of freedom of each joint, shape (m,)."""
+    at: Indices
+    """Row of the body of each joint, shape (m,)."""
+    joint: Indices
+    """MuJoCo's joints, shape (m,)."""
+    turns: NDArray[np.bool_]
+    """Whether each turns; otherwise it slides, shape (m,)."""
+
+
+BONES = Layout(
+    Bones, [*[(np.int64, 1)] * 2, (np.float64, 1), (np.float64, 2), *[(np.int64, 1)] * 3, (np.bool_, 1)]
+)
+_bones_in = BONES.read
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def torques(
-    bodies: Indices, up: Indices, mass: Array, inertia: Array, x: Array, R: Array, wanted_x: Array,
-    wanted_R: Array, dof: Indices, at: Indices, joint: Indices, turns: NDArray[np.bool_], anchor: Array,
-    axis: Array, omega: float, out: Array,
+    bones: Indices, x: Array, R: Array, wanted_x: Array, wanted_R: Array, anchor: Array, axis: Array,
+    omega: float, out: Array,
 ) -> None:  # fmt: skip
     """Writes the torque of each joint into ``out``.
 
     Args:
-        bodies: MuJoCo's bodies that the joints move, parents first, shape (b,).
-        up: Row of each one's parent among them, -1 for none, shape (b,).
-        mass: Of each [kg], shape (b,).
-        inertia: Principal moments [kg·m²], shape (b, 3).
+        bones: Of `BONES`.
         x: World positions of all centres of mass [m], ``MjData.xipos``.
         R: World from principal axes, ``MjData.ximat`` as (n, 9).
         wanted_x: As ``x``, of where the bones are to be.
         wanted_R: As ``R``.
-        dof: Degree of freedom of each joint, for ``out``, shape (m,).
-        at: Row of the body of each joint, shape (m,).
-        joint: MuJoCo's joints, shape (m,).
-        turns: Whether each turns; otherwise it slides, shape (m,).
         anchor: ``MjData.xanchor`` [m].
         axis: ``MjData.xaxis``.
         omega: Natural frequency [rad/s].
-        out: Torques [N·m or N] of all degrees of freedom; only those of ``dof`` are written.
+        out: Torques [N·m or N] of all degrees of freedom; only those of the person are written.
     """
+    bodies, up, mass, inertia, dof, at, joint, turns = _bones_in(bones, 0)
     count = len(bodies)
     force, moment = np.zeros((count, 3)), np.zeros((count, 3))
     turned, own = np.empty(3), np.empty(3)

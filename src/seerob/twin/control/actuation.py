@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.task_pull import torques
+from seerob.kernels.task_pull import BONES, Bones, torques
 from seerob.model.model import Mechanism
 from seerob.workstation.workstation import Engine as Options
 
@@ -33,17 +33,19 @@ class TaskPull:
             bandwidth: Of every bone [Hz].
         """
         self._omega = 2 * np.pi * bandwidth
-        self._bodies = np.sort(mechanism.mj_bodies).astype(np.int64)
-        row = {int(body): k for k, body in enumerate(self._bodies)}
-        self._up = np.array([row.get(int(mj.body_parentid[b]), -1) for b in self._bodies], np.int64)
-        self._mass = mj.body_mass[self._bodies].copy()
-        self._inertia = mj.body_inertia[self._bodies].copy()
-        self._dof = mechanism.v_address.astype(np.int64)
-        self._joint = mj.dof_jntid[self._dof].astype(np.int64)
-        self._at = np.array([row[int(b)] for b in mj.jnt_bodyid[self._joint]], np.int64)
-        self._turns = mj.jnt_type[self._joint] == mujoco.mjtJoint.mjJNT_HINGE
+        bodies = np.sort(mechanism.mj_bodies).astype(np.int64)
+        row = {int(body): k for k, body in enumerate(bodies)}
+        up = np.array([row.get(int(mj.body_parentid[b]), -1) for b in bodies], np.int64)
+        dof = mechanism.v_address.astype(np.int64)
+        joint = mj.dof_jntid[dof].astype(np.int64)
+        at = np.array([row[int(b)] for b in mj.jnt_bodyid[joint]], np.int64)
+        turns = mj.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+        mass, inertia = mj.body_mass[bodies].copy(), mj.body_inertia[bodies].copy()
+        self._bones = Bones(bodies, up, mass, inertia, dof, at, joint, turns)
+        """Keeps the arrays of its table."""
+        self._table = BONES.rows(self._bones)
         driven = mj.jnt_dofadr[mj.actuator_trnid[:, 0]]
-        self._actuators = np.flatnonzero(np.isin(driven, self._dof))
+        self._actuators = np.flatnonzero(np.isin(driven, dof))
         self._driven = driven[self._actuators]
         self._places = mj.jnt_qposadr[mj.actuator_trnid[self._actuators, 0]]
         mj.actuator_biasprm[self._actuators, 1] = 0.0
@@ -60,8 +62,7 @@ class TaskPull:
         """
         mujoco.mj_kinematics(mj, data)
         torques(
-            self._bodies, self._up, self._mass, self._inertia, data.xipos, data.ximat, wanted.xipos,
-            wanted.ximat, self._dof, self._at, self._joint, self._turns, data.xanchor, data.xaxis,
+            self._table, data.xipos, data.ximat, wanted.xipos, wanted.ximat, data.xanchor, data.xaxis,
             self._omega, self._torques,
         )  # fmt: skip
         rows = self._driven

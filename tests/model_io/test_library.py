@@ -10,8 +10,11 @@ import pytest
 from oracles import pinocchio_oracle as oracle
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Origin
+from seerob.core.transforms import transform
+from seerob.description.description import Description, Joint, JointKind, Link, base_from_links
 from seerob.description.loader import load_robot
 from seerob.description.robots import library
+from seerob.description.robots.farthest import farthest
 
 RNG = np.random.default_rng(7)
 
@@ -91,3 +94,30 @@ def test_ur5e_reference_vectors():
     qd = np.radians([30, -20, 40, 10, 0, 0])
     assert oracle.kinetic_energy(model, q, qd) == pytest.approx(0.370339, abs=5e-7)
     assert np.linalg.norm(J_v @ qd) == pytest.approx(0.418520, abs=5e-7)
+
+
+@pytest.mark.parametrize("name", [name for name in library.names() if name.startswith("lbr_iisy")])
+def test_a_reach_that_is_computed_is_that_of_a_maker_who_measures_to_the_flange(name):
+    robot, said = library.load(name), library.entry(name).reach
+    assert farthest(robot) == pytest.approx(said.value, abs=1e-3)
+
+
+def test_no_position_reaches_farther_than_what_is_computed_nor_one_of_a_plane_arm_less():
+    rng = np.random.default_rng(2)
+    for name in ("ur10", "fr3", "niryo_one"):
+        robot = library.load(name)
+        joints, most = robot.joints(), 0.0
+        for _ in range(200):
+            q = {joint.name: rng.uniform(joint.lower, joint.upper) for joint in joints}
+            poses = base_from_links(robot, q)
+            x, y, _ = poses[robot.tip][:3, 3]
+            most = max(most, np.hypot(x, y))
+        assert 0.5 * farthest(robot) < most < farthest(robot)
+    # Three links of 0.4, 0.3 and 0.2 m about parallel axes; the second elbow may not be straighter than 90°.
+    links = [Link("base", None, np.eye(4))]
+    for k, (length, low) in enumerate([(0.0, -3.0), (0.4, -3.0), (0.3, 0.5 * np.pi)]):
+        joint = Joint(f"j{k}", JointKind.REVOLUTE, np.array([0, 0, 1.0]), lower=low, upper=3.0)
+        links.append(Link(f"l{k}", links[-1].name, transform(position=(length, 0, 0)), (joint,)))
+    links.append(Link("tip", "l2", transform(position=(0.2, 0, 0))))
+    arm = Description("plane", tuple(links), tip="tip", source="made here")
+    assert farthest(arm) == pytest.approx(0.4 + np.hypot(0.3, 0.2), abs=1e-6)

@@ -117,6 +117,35 @@ def test_documents_that_name_others_are_followed(tmp_path):
     assert {name for name, _ in found.left_out} == {"gone.3dxml", "line/right"}
 
 
+def test_until_edition_3_a_format_of_its_own_says_where_the_surface_is(tmp_path):
+    """As converters still write it, with the surface in the document of its product."""
+    polygons = surface(BOX).partition("<Root")[2].replace("</Root></XMLRepresentation>", "</AssociatedXML>")
+    part = (
+        product(1, "block") + '<ReferenceRep id="5"/><InstanceRep id="4"><IsAggregatedBy>1</IsAggregatedBy>'
+        "<IsInstanceOf>urn:3DXML:Reference:loc:5</IsInstanceOf></InstanceRep>"
+        '<RepFormat format="TESSELLATED" owner="5" associatedFile="urn:3DXML:Representation:loc:9"/>'
+    )
+    inner = f'<GeometricRepresentationSet><Representation id="9"><AssociatedXML{polygons}</Representation>'
+    part = structure(part).replace("</Model_3dxml>", f"{inner}</GeometricRepresentationSet></Model_3dxml>")
+    place = f"{UNTURNED} 100 0 0"
+    line = product(1, "line") + instance(2, "left", 1, "urn:3DXML:Reference:ext:part.3dxml#1", place)
+    found = read(packed(tmp_path / "a.3dxml", main__3dxml=structure(line), part__3dxml=part))
+    assert (found.names(), found.left_out) == (["line/left"], ())
+    assert np.vstack(list(corners(found))).min(axis=0) == pytest.approx([0.1, 0, 0], abs=1e-12)
+
+
+def test_an_unpacked_document_has_its_surfaces_beside_it(tmp_path):
+    file = tmp_path / "a.3dxml"
+    file.write_text(structure(LINE))
+    with pytest.raises(InputError, match="holds no triangles"):
+        read(file)
+    (tmp_path / "block.3DRep").write_text(surface(BOX))
+    assert read(file).names() == ["line/left", "line/right"]
+    file.write_text(structure(LINE.replace("block.3DRep", "../block.3DRep")))
+    with pytest.raises(InputError, match="outside its own folder"):
+        read(file)
+
+
 def test_what_only_catia_reads_is_answered_with_the_export(tmp_path):
     file = tmp_path / "a.3dxml"
     with pytest.raises(InputError, match="XML tessellation"):

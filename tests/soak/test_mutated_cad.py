@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seerob.app.importing import reading
 from seerob.app.importing.folder import Densities, files
 from seerob.app.importing.plant import Made
 from seerob.core.errors import InputError
+from seerob.description.cad import reading
 from seerob.description.cad.recognised import recognised
 from seerob.description.formats import automationml
 from soak.forked import forked

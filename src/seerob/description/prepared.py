@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
-from seerob.description.mesh import MAX_BYTES, file_content, load_meshes
+from seerob.description.cad.reading import as_one
+from seerob.description.mesh import MAX_BYTES, READERS, file_content, load_meshes
 from seerob.description.shapes import detail
 from seerob.description.shapes.mesh_bodies import is_closed
 
@@ -55,6 +56,8 @@ class PreparedFile:
     meshes: tuple[PreparedMesh, ...]
     findings: tuple[Finding, ...]
     files: dict[str, bytes]
+    deviation: float = 0.0
+    """How far the real surface may lie outside the meshes [m], as far as the file's reader knows."""
 
     @property
     def size(self) -> int:
@@ -112,7 +115,11 @@ def prepared(
 
 
 def _made(path: Path, units: str | None, up: str | None, triangles: int) -> PreparedFile:
-    loaded = load_meshes(path, units=units, up=up)
+    deviation = 0.0
+    if path.suffix.lower() in READERS:
+        loaded = load_meshes(path, units=units, up=up)
+    else:
+        loaded, deviation = as_one(path, units=units, up=up)
     made = tuple(
         PreparedMesh(
             named.name,
@@ -124,7 +131,7 @@ def _made(path: Path, units: str | None, up: str | None, triangles: int) -> Prep
         )
         for named in loaded.meshes
     )
-    return PreparedFile(made, loaded.findings, loaded.files)
+    return PreparedFile(made, loaded.findings, loaded.files, deviation)
 
 
 # -- from start to start ----------------------------------------------------------------------
@@ -153,7 +160,7 @@ def _write(file: Path, found: PreparedFile) -> None:
         for each in found.meshes
     ]
     said = [[f.level, f.subject, f.text, list(f.holds)] for f in found.findings]
-    text = json.dumps({"meshes": rows, "findings": said}).encode()
+    text = json.dumps({"meshes": rows, "findings": said, "deviation": found.deviation}).encode()
     arrays["about"] = np.frombuffer(text, np.uint8)
     with contextlib.suppress(OSError):  # a folder that is full, or may not be written
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -173,7 +180,7 @@ def _read(file: Path, name: str, content: bytes) -> PreparedFile | None:
         Finding(level=level, subject=subject, text=text, holds=tuple(holds))
         for level, subject, text, holds in about["findings"]
     )
-    return PreparedFile(meshes, findings, {name: content})
+    return PreparedFile(meshes, findings, {name: content}, about.get("deviation", 0.0))
 
 
 def _mesh(row: dict[str, Any], array: Callable[[str], NDArray[Any]]) -> PreparedMesh:

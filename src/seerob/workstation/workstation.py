@@ -204,7 +204,8 @@ class Thing(_Table, frozen=True, kw_only=True):
     name: PathName
     """Its name, by which criteria and sources ask for it."""
     mesh: str | None = None
-    """STL, OBJ, PLY, OFF, glTF, COLLADA or 3MF file."""
+    """STL, OBJ, PLY, OFF, glTF, COLLADA or 3MF file; or any other that ``seerob import`` reads (STEP, IGES,
+    3DXML, USD, SDF, URDF, MJCF), as one rigid thing."""
     shape: Shape | None = None
     """A simple shape, when there is no mesh file."""
     units: str | None = None

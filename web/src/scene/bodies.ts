@@ -3,10 +3,13 @@
 import {
   Box3,
   type BufferGeometry,
+  Frustum,
   Group,
   LineSegments,
+  Matrix4,
   Mesh,
   type Object3D,
+  type PerspectiveCamera,
   Quaternion,
   Vector3,
 } from "three";
@@ -14,7 +17,8 @@ import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Doubts, doubtOf } from "../doubts";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
-import { type Crowd, crowdsOf, type Dressed } from "./crowds";
+import { coarser } from "./coarser";
+import { type Crowd, crowdsOf, type Dressed, type Sight } from "./crowds";
 import { drawnBySoftware } from "./effort";
 import { featureEdges, turnOutward } from "./feature_edges";
 import {
@@ -52,8 +56,10 @@ const sharp = new WeakMap<BufferGeometry, BufferGeometry>();
 function withNormals(geometry: BufferGeometry): BufferGeometry {
   let made = sharp.get(geometry);
   if (!made) {
-    made = geometry.toNonIndexed();
-    made.computeVertexNormals();
+    const apart = geometry.toNonIndexed();
+    apart.computeVertexNormals();
+    // Corners of a flat face are worked out once.
+    made = Object.keys(apart.attributes).length === 2 ? coarser(apart, 0) : apart;
     sharp.set(geometry, made);
   }
   return made;
@@ -236,7 +242,7 @@ export class Bodies {
     this.generation += 1;
     const generation = this.generation;
     this.root.clear();
-    for (const { drawn } of this.crowds) drawn.dispose();
+    for (const crowd of this.crowds) crowd.dispose();
     this.crowds = [];
     this.posed = new Float32Array();
     this.byName.clear();
@@ -271,7 +277,8 @@ export class Bodies {
     );
     if (generation === this.generation) {
       this.crowds = crowdsOf(this.list);
-      for (const { drawn } of this.crowds) this.root.add(drawn);
+      for (const { levels } of this.crowds) for (const { drawn } of levels) this.root.add(drawn);
+      this.seenFrom.elements.fill(0);
     }
     return failed;
   }
@@ -302,6 +309,34 @@ export class Bodies {
       body.follow();
     }
     return moved;
+  }
+
+  private readonly sight: Sight = { eye: new Vector3(), frustum: new Frustum(), pixel: 0 };
+  private readonly toScreen = new Matrix4();
+  private readonly seenFrom = new Matrix4();
+
+  /**
+   * Draw those that are many no finer than one sees them.
+   *
+   * @param camera Its matrices up to date.
+   * @param pixel Size of a pixel of the screen one metre away [m]; 0 where all are drawn as they are.
+   */
+  arrange(camera: PerspectiveCamera, pixel: number): void {
+    if (this.crowds.length === 0) return;
+    const { sight, toScreen, seenFrom } = this;
+    const close = pixel > 0 && drawnBySoftware();
+    if (close) {
+      toScreen.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
+      toScreen.multiply(this.root.matrixWorld);
+    } else toScreen.identity();
+    const anew = sight.pixel !== pixel || !toScreen.equals(seenFrom);
+    if (anew) {
+      seenFrom.copy(toScreen);
+      sight.pixel = pixel;
+      sight.frustum.setFromProjectionMatrix(toScreen);
+      this.root.worldToLocal(camera.getWorldPosition(sight.eye));
+    }
+    for (let k = 0; k < this.crowds.length; k += 1) this.crowds[k]!.arrange(close ? sight : null, anew);
   }
 
   /** Show them over the real cell, or in a room of their own. */

@@ -195,6 +195,9 @@ export class Viewer {
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
     this.view.margins = !this.stage.renderer.xr.isPresenting;
     camera.updateWorldMatrix(true, false);
+    // Through a real camera and in a headset pixels have another size.
+    const plain = this.view.margins && this.through === null;
+    this.bodies.arrange(camera, plain ? this.view.pixel : 0);
     this.fillVolumes();
     // Two figures for one thing at one instant would look like an error.
     const { told } = this;

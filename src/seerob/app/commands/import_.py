@@ -106,10 +106,11 @@ def _before(folder: Path) -> dict[str, Any] | None:
 
 
 def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: dict[str, Any] | None) -> Exit:
-    from seerob.app.importing import reading
     from seerob.app.importing.folder import densities, densities_of_table, files
     from seerob.app.importing.picture import FILE, picture
     from seerob.app.importing.revision import under_former_root
+    from seerob.app.importing.wanted import wanted
+    from seerob.description.cad import reading
 
     if options.densities is not None:
         # Of the table the figures are kept, for the next revision.
@@ -133,7 +134,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
     renamed = ""
     if before is not None:
         assembly, renamed = under_former_root(assembly, before)
-    assembly = reading.wanted(
+    assembly = wanted(
         assembly,
         patterns=options.without,
         smaller=options.smaller,

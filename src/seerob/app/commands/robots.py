@@ -33,6 +33,12 @@ MISSING = (
 """What may be missing, and which criteria are UNDECIDED without it."""
 
 
+COMPUTED = (
+    "reach that is computed from kinematics and limits: how far the origin of the tip gets from the first "
+    "axis; makers measure to other points"
+)
+
+
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("--all", action="store_true", help="published descriptions of hands and walkers, too")
@@ -72,6 +78,7 @@ def run(options: argparse.Namespace) -> int:
     _tools()
     _descriptions(options.all)
     _packages()
+    OUT.print(f"~: {COMPUTED}", style="dim", markup=False)
     OUT.print("missing: what is UNDECIDED without it, unless the workstation file gives it", style="bold")
     for what, criteria in MISSING:
         OUT.print(f"  {what:<16} {criteria}", markup=False)
@@ -137,9 +144,11 @@ def _tools() -> None:
 
 
 def _figures(entry: Entry, robot: Description) -> str:
+    from seerob.description.robots.farthest import farthest
+
     masses = [link.inertial.mass for link in robot.links if link.inertial is not None]
     texts = (
-        "?" if entry.reach is None else f"{entry.reach.value:.3g} m",
+        f"~{farthest(robot):.2f} m" if entry.reach is None else f"{entry.reach.value:.3g} m",
         "?" if entry.payload is None else f"{entry.payload.value:.3g} kg",
         f"{sum(masses):.3g} kg" if masses else "?",
     )

@@ -191,9 +191,10 @@ def _limit() -> None:
 def _read(file: Path, folder: Path, under: str, options: Mapping[str, str], former: Mapping[str, Any]) -> str:
     """Write meshes and the table of a file; name of the table."""
     from seerob.app.console.terminal import cache_folder
-    from seerob.app.importing import reading
     from seerob.app.importing.folder import densities, files
+    from seerob.app.importing.wanted import wanted
     from seerob.core.files.whole_file import whole_file
+    from seerob.description.cad import reading
     from seerob.description.cad.recognised import recognised
     from seerob.description.mesh import MAX_BYTES, file_content
 
@@ -216,7 +217,7 @@ def _read(file: Path, folder: Path, under: str, options: Mapping[str, str], form
         cache=cache_folder(),
         progress=say,
     )
-    assembly = reading.wanted(
+    assembly = wanted(
         assembly,
         patterns=asked["without"],
         smaller=asked["smaller"],

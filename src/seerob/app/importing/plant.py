@@ -7,12 +7,12 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from seerob.app.importing import reading
 from seerob.app.importing.folder import Densities, Files, files, place, table_text
 from seerob.core.errors import InputError
 from seerob.core.extras import MissingPackage
 from seerob.core.printable import printable
 from seerob.core.snapshot import Finding
+from seerob.description.cad import reading
 from seerob.description.cad.collada_kinematics import MARK
 from seerob.description.cad.names import plain_name
 from seerob.description.cad.recognised import recognised

@@ -116,7 +116,9 @@ class _Archive:
     def content(self, name: str) -> bytes:
         """Bytes of a file of the archive; empty when there is none of the name."""
         if self.archive is None:
-            return self.source.data if name == self.source.path.name else b""
+            if name == self.source.path.name:
+                return self.source.data
+            return self.source.beside(name) or b""
         entry = self.entries.get(name.lower())
         if entry is None:
             return b""
@@ -159,6 +161,7 @@ class _Archive:
 
         def key(text: str | None) -> _Key:
             where, _, identity = unquote((text or "").strip()).rpartition("#")
+            identity = identity.rpartition(":loc:")[2]
             file = where.rpartition(":")[2]
             if file and file not in self.documents:
                 others.append(file)
@@ -179,12 +182,13 @@ class _Archive:
             elif tag == "InstanceRep":
                 surface = key(element.findtext("{*}IsInstanceOf"))
                 self.product(key(element.findtext("{*}IsAggregatedBy"))).surfaces.append(surface)
-            elif tag == "ReferenceRep":
-                file = unquote(element.get("associatedFile", ""))
-                where, _, inside = file.rpartition("#")
+            elif tag in ("ReferenceRep", "RepFormat") and element.get("associatedFile"):
+                # Until edition 3 a format of its own said where the surface of its owner is.
+                own = (name, element.get("owner", own[1]))
+                where, _, inside = unquote(element.get("associatedFile", "")).rpartition("#")
                 self.files[own] = (where or inside).rpartition(":")[2]
-                if (where and not self.files[own]) or "Reference:loc" in file:
-                    self.files[own] = f"#{inside}"
+                if (where and not self.files[own]) or ":loc" in (where or inside):
+                    self.files[own] = f"#{inside.rpartition(':loc:')[2]}"
             elif tag == "Representation":
                 self.inner[own] = element
         return others

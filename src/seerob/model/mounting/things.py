@@ -107,8 +107,9 @@ def load_thing(
         files = loaded.files
         single = len(loaded.meshes) == 1
         own_color = thing.color is not None
+        deviation = max(thing.deviation, loaded.deviation)
         pieces = tuple(
-            _piece("" if single else m.name, m, thing.deviation, color if own_color else None, most)
+            _piece("" if single else m.name, m, deviation, color if own_color else None, most)
             for m in loaded.meshes
         )
         source = f"shape of {thing.mesh}"
@@ -119,7 +120,7 @@ def load_thing(
                 findings += (_hole(thing, path),)
             else:
                 # Split by colour or by name, none of the pieces has an inside; all of them together do.
-                inside = Solid(mesh=detail.physics_mesh(around), deviation=thing.deviation)
+                inside = Solid(mesh=detail.physics_mesh(around), deviation=deviation)
                 pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
     elif known is not None:
         visual = known.visual if thing.color is None else tuple(replace(m, color=color) for m in known.visual)

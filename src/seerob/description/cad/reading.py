@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +10,23 @@ import numpy as np
 from seerob.core.errors import InputError
 from seerob.core.printable import printable
 from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Finding
 from seerob.description.cad import described, scene, sdf, step, threedxml, usd
-from seerob.description.cad.assembly import Assembly, baked, without, without_numbers
-from seerob.description.mesh import FARTHEST, MAX_BYTES, MAX_FACES, file_content
+from seerob.description.cad.assembly import NOTHING, Assembly, baked
+from seerob.description.cad.recognised import recognised
+from seerob.description.description import base_from_links
+from seerob.description.mesh import (
+    FARTHEST,
+    MAX_BYTES,
+    MAX_FACES,
+    LoadedMeshes,
+    NamedMesh,
+    by_color,
+    file_content,
+)
 from seerob.description.mesh_files import MeshSource
+from seerob.description.shapes.glb import solid_mesh
+from seerob.description.shapes.mesh_bodies import joined
 
 TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 """Formats besides mesh files whose surfaces are triangles already, by the ending that `recognised` says."""
@@ -72,46 +85,58 @@ def read(
     return _near(found, file)
 
 
-def wanted(
-    assembly: Assembly,
-    *,
-    patterns: Sequence[str] = (),
-    smaller: float | None = None,
-    unreachable: float | None = None,
-    triangles: int | None = None,
-) -> Assembly:
-    """The assembly without what the user leaves out.
+def as_one(path: Path, *, units: str | None = None, up: str | None = None) -> tuple[LoadedMeshes, float]:
+    """All that a CAD file or a description holds, as one rigid thing, and its deviation [m].
+
+    Mechanisms are as the file shows them, by the shapes that distances go by.
 
     Args:
-        assembly: With rigid places.
-        patterns: Full names of parts that go, with wildcards.
-        smaller: Parts smaller than this in every direction go [mm].
-        unreachable: Parts inside of others that nothing thicker can touch go [mm].
-        triangles: Most of each part on the screen; only looked at.
+        path: The file, of any format that `read` takes.
+        units: As `read` takes it.
+        up: As `read` takes it.
 
     Raises:
-        InputError: A pattern is nobody's name, a number is out of bounds, or nothing is left.
+        InputError: As `read` raises it; or something of it could not be brought.
     """
-    for key, given in (("--smaller", smaller), ("--unreachable", unreachable)):
-        if given is not None and not 0 < given <= 1e4:
-            raise InputError.at(key, "", f"{given:g} mm", "more than 0 and at most 10000 mm")
-    if triangles is not None and not 100 <= triangles <= MAX_FACES:
-        what = f"{triangles} triangles"
-        raise InputError.at("--triangles", "", what, "at least 100 are needed to show a shape")
-    try:
-        kept = without(assembly, patterns, None if smaller is None else smaller * 1e-3)
-    except ValueError as error:
-        names = ", ".join(assembly.names()[:5])
-        raise InputError.at("--without", "", str(error), f"full names, as {names}") from None
-    if unreachable is None:
-        return kept
-    from seerob.app.importing.unreachable import unreachable as inside_of
+    ending = recognised(path, file_content(path, MAX_BYTES))
+    if ending in (".aml", ".amlx"):
+        raise InputError.at(path, "", "is a plant, not one thing", "seerob import makes a workstation of it")
+    assembly = read(path, ending, units=units, up=up)
+    lost = [f"{name}: {why}" for name, why in assembly.left_out if not why.startswith(NOTHING)]
+    if lost:
+        what = f"cannot be brought whole: {'; '.join(lost)}"
+        raise InputError.at(path, "", printable(what)[:500], "export it anew, or import it: docs/import.md")
+    parts = tuple(_parts(assembly))
+    if not parts:
+        raise InputError.at(path, "", "holds no surface", "export solids or surfaces")
+    deviation = max((shape.deviation for shape in assembly.shapes), default=0.0)
+    findings = assembly.findings
+    for moving in assembly.mechanisms:
+        text = "its joints do not move: it is one rigid thing, as the file shows it"
+        findings += (Finding(level="note", subject=moving.description.name, text=text),)
+    return LoadedMeshes(parts, findings, assembly.files), deviation
 
-    try:
-        inside = inside_of(kept, unreachable * 1e-3)
-    except ValueError as error:
-        raise InputError.at("--unreachable", "", f"{unreachable:g} mm", str(error)) from None
-    return without_numbers(kept, inside, f"--unreachable {unreachable:g}; inside of others")
+
+def _parts(assembly: Assembly) -> Iterator[NamedMesh]:
+    """Each instance and each link, where it is."""
+    for name, instance in zip(assembly.names(), assembly.instances, strict=True):
+        pieces = [m.moved(instance.world_from_shape) for m in assembly.shapes[instance.shape].pieces]
+        yield from _named(name, pieces)
+    for moving in assembly.mechanisms:
+        robot = moving.description
+        q = dict(zip((joint.name for joint in robot.joints()), moving.q, strict=False))
+        poses = base_from_links(robot, q)
+        for link in robot.links:
+            place = moving.world_from_base @ poses[link.name]
+            for solid in link.solids:
+                mesh = solid_mesh(solid) if solid.mesh is None else solid.mesh
+                yield from _named(link.name, [mesh.moved(place)])
+
+
+def _named(name: str, pieces: list[Mesh]) -> Iterator[NamedMesh]:
+    whole, _ = joined(pieces)
+    if len(whole.faces):
+        yield NamedMesh(name, whole, by_color(pieces))
 
 
 def _near(assembly: Assembly, file: Path) -> Assembly:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,15 +15,16 @@ from seerob.core.snapshot import Highlight, Level, Result, Row, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.figure import Figure, Shown, verdict_of
 from seerob.criteria.scoring.score_rows import (
-    ANGLES_OF,
     BONES_OF,
+    Component,
     Edges,
     Ends,
     component_rows,
+    components_of,
     total_row,
 )
 from seerob.criteria.scoring.spans import Ints, Span, Thresholds
-from seerob.description.humans.angles import SIDED, Angles
+from seerob.description.humans.angles import Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.recording.answers import Flags
 
@@ -70,7 +70,8 @@ class Method:
 class Scored(NamedTuple):
     """What a score of one instant was made from."""
 
-    angles: Angles
+    angles: Angles | None
+    """None where only the scores are kept."""
     components: Ends
     """Score of each component as it was measured."""
     spread: Ends | None
@@ -132,6 +133,12 @@ def score(
         open=bool(missing),
         beside=Scored(angles, ends, wide),
     )
+
+
+def of_posture(figure: Figure, angles: Angles | None) -> Figure:
+    """Return the same score of one posture, of another one with the same component scores."""
+    found: Scored = figure.beside
+    return replace(figure, beside=Scored(angles, found.components, found.spread))
 
 
 def _score_of_many(
@@ -202,17 +209,10 @@ def shown(
         thresholds: For the bands that are shown.
     """
     angles, ends, wide = cast("Scored", figure.beside)
-    found, edges = _said(method, human, limit, ends, wide, verdict), _edges(method, thresholds)
-    return replace(
-        found,
-        parts=(*found.parts, *_parts(ends, wide, angles)),
-        rows=(
-            *found.rows,
-            *component_rows(
-                ends, wide, angles, human=human, least=method.least, most=method.most, edges=edges
-            ),
-        ),
-    )
+    assert angles is not None
+    found = _said(method, human, limit, ends, wide, verdict)
+    parts, rows = component_rows(_components(method, thresholds, human, ends, wide), angles)
+    return replace(found, parts=(*found.parts, *parts), rows=(*found.rows, *rows))
 
 
 @lru_cache(maxsize=4096)
@@ -265,9 +265,19 @@ def _said(
     )
 
 
-@lru_cache(maxsize=64)
-def _edges(method: Method, thresholds: Thresholds) -> Edges:
-    return method.edges(thresholds)
+@lru_cache(maxsize=4096)
+def _components(
+    method: Method, thresholds: Thresholds, human: str, measured: Ends, spread: Ends | None
+) -> tuple[Component, ...]:
+    """Likewise, with the bands of the angles."""
+    return components_of(
+        measured,
+        spread,
+        human=human,
+        least=method.least,
+        most=method.most,
+        edges=method.edges(thresholds),
+    )
 
 
 Grands = tuple[tuple[int, ...], tuple[int, ...]]
@@ -367,39 +377,3 @@ def _reason(
     if value is not None:
         parts.append(method.level(value))
     return "; ".join(parts)
-
-
-def _parts(components: Ends, spread: Ends | None, angles: Angles) -> list[Result]:
-    found = []
-    for (key, lows, highs), (_, least, most) in zip(components, spread or components, strict=True):
-        sided = len(lows) > 1
-        for i, (low, high) in enumerate(zip(lows, highs, strict=True)):
-            shown = _shown(angles, ANGLES_OF.get(key, ()), i if sided else None)
-            found.append(
-                Result(
-                    name=f"{SIDES[i]} {key}" if sided else key,
-                    value=float(low) if low == high else None,
-                    verdict=None if low == high else Verdict.UNDECIDED,
-                    reason=shown if low == high else "; ".join(filter(None, ("not assessed", shown))),
-                    interval=None if spread is None and low == high else (float(least[i]), float(most[i])),
-                )
-            )
-    return found
-
-
-def _shown(angles: Angles, names: Sequence[str], side: int | None) -> str:
-    words = []
-    for name in names:
-        values = angles.listed[name]
-        label = name.replace("_", " ")
-        if side is not None and name in SIDED:
-            words.append(f"{label} {_degrees(values[side])}")
-        elif name in SIDED:
-            words += [f"{own} {label} {_degrees(x)}" for own, x in zip(SIDES, values, strict=True)]
-        else:
-            words.append(f"{label} {_degrees(values)}")
-    return ", ".join(words)
-
-
-def _degrees(angle: float) -> str:
-    return "not measured" if math.isnan(angle) else f"{round(math.degrees(angle))}°"

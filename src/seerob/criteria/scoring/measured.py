@@ -89,6 +89,13 @@ SHORT = 0.01
 """A lever that is longer turns rounding by less than a hundredth of a degree."""
 
 
+def error_of(accuracy: Accuracy, *names: str) -> float:
+    """The largest accuracy of some angles [rad]."""
+    if type(accuracy) is not float and isinstance(accuracy, Mapping):
+        return max(accuracy.get(name, 0.0) for name in names)
+    return float(accuracy)
+
+
 class Measured:
     """Angles of postures, each known to its accuracy.
 
@@ -103,10 +110,7 @@ class Measured:
 
     def error(self, *names: str) -> float:
         """The largest accuracy of some angles [rad]."""
-        accuracy = self._accuracy
-        if type(accuracy) is not float and isinstance(accuracy, Mapping):
-            return max(accuracy.get(name, 0.0) for name in names)
-        return float(accuracy)
+        return error_of(self._accuracy, *names)
 
     def graded(
         self, name: str, score: Callable[[Array], Ints], *, within: tuple[int, int], neutral: float = 0.0

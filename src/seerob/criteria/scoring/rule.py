@@ -18,6 +18,7 @@ from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion, not_adult
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.criteria.scoring.bands import Bands
 from seerob.criteria.scoring.basis import (
     ACCURACY_NOTE,
     PROJECTION_NOTE,
@@ -29,7 +30,7 @@ from seerob.criteria.scoring.basis import (
 )
 from seerob.criteria.scoring.handled import NOTHING, Handled, bind_handled
 from seerob.criteria.scoring.held_work import GAP, WorkDetection, WorkMonitor
-from seerob.criteria.scoring.judgement import Method, score, shown, together
+from seerob.criteria.scoring.judgement import Method, of_posture, score, shown, together
 from seerob.criteria.scoring.measured import Accuracy, ArmPolicy, JointAccuracy, accuracy_of
 from seerob.criteria.scoring.phases import P, Phase, check_order, phase_at, phases_of, shared_phases
 from seerob.criteria.scoring.spans import Span, Thresholds
@@ -38,6 +39,9 @@ from seerob.description.humans.skeleton import BONES
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State
+
+MOST_SCORES = 4096
+"""Postures of which scores are kept, one for all in the same bands."""
 
 
 def bone_rows(model: Model, human: Mechanism) -> list[int]:
@@ -223,10 +227,25 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
                 f"at most {GAP:g} s, or none",
             )
 
+        bands = None
+        if watch is None and ArmPolicy(self.arm) is ArmPolicy.PROJECTION:
+            bands = Bands(self.METHOD.edges(self.thresholds), self.thresholds, error)
+        known = dict[tuple[tuple[int, ...], int, Handled], Figure]()
+        """By the bands of a posture, the phase and what is held."""
+
         def scored(handled: Handled, angles: Angles, phase: Phase) -> Figure:
+            cells = None if bands is None or angles.trunk_flexion.ndim else bands.of(angles)
+            found = None if cells is None else known.get((cells, id(phase), handled))
+            if found is not None:
+                return of_posture(found, angles)
             measured = self.components(angles, phase, watch=watch, handled=handled)
             spread = None if error is None else self.components(angles, phase, error, watch, handled)
-            return score(self.METHOD, angles, measured, spread, self.limit)
+            found = score(self.METHOD, angles, measured, spread, self.limit)
+            if cells is not None:
+                if len(known) == MOST_SCORES:
+                    known.clear()
+                known[cells, id(phase), handled] = of_posture(found, None)  # phases live as long
+            return found
 
         def compute(twin: Twin) -> Figure:
             angles = read(twin)

@@ -6,12 +6,14 @@ A band of a method is what an angle falls into, for whoever reads the score.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import pairwise
+from typing import Any, NamedTuple
 
-from seerob.core.snapshot import Aspect, Row, RowState, Verdict
-from seerob.criteria.scoring.spans import Thresholds, fallen, reached
+from seerob.core.snapshot import Aspect, Result, Row, RowState, Verdict
+from seerob.criteria.scoring.spans import ROUNDING, Thresholds
 from seerob.description.humans.angles import SIDED, Angles
 from seerob.description.humans.skeleton import SIDES
 
@@ -55,11 +57,33 @@ NEUTRAL = {"elbow_flexion": math.radians(80)}
 
 def band_of(angle: float, edges: Sequence[float], neutral: float = 0.0) -> str:
     """``20° to 45°`` of an angle [rad]; empty for one that is not measured or has no bands."""
-    if not edges or math.isnan(angle):
-        return ""
-    # An edge belongs to the stricter side, which is the one away from the neutral posture.
-    at = sum(reached(angle, edge) if edge >= neutral else not fallen(angle, edge) for edge in edges)
-    return _bands(tuple(edges))[at]
+    return "" if not edges or math.isnan(angle) else _banded(tuple(edges), neutral).of(angle)
+
+
+class _Banded(NamedTuple):
+    """Bands of an angle.
+
+    An edge belongs to the stricter side, which is the one away from the neutral posture, as `reached` and
+    `fallen` have it.
+    """
+
+    at: list[float]
+    """Where a band begins that has its edge [rad], increasing."""
+    past: list[float]
+    """Where one begins that has not."""
+    names: tuple[str, ...]
+
+    def of(self, angle: float) -> str:
+        """Band of an angle that is measured [rad]."""
+        return self.names[bisect_right(self.at, angle) + bisect_left(self.past, angle)]
+
+
+@cache
+def _banded(edges: tuple[float, ...], neutral: float) -> _Banded:
+    # What `reached(angle, edge)` and `not fallen(angle, edge)` compare with.
+    at = sorted(edge - ROUNDING if edge else ROUNDING for edge in edges if edge >= neutral)
+    past = sorted(edge + ROUNDING if edge else -ROUNDING for edge in edges if edge < neutral)
+    return _Banded(at, past, _bands(edges))
 
 
 @cache
@@ -94,47 +118,104 @@ Ends = tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...]
 """Components with their least and greatest score: of both sides, or one for both."""
 
 
-def component_rows(
+class Seen(NamedTuple):
+    """An angle of one side, as it is shown."""
+
+    name: str
+    side: int | None
+    """Index of its side; None of an angle that has none."""
+    label: str
+    """``right knee flexion``."""
+    bands: _Banded | None
+
+
+class Component(NamedTuple):
+    """What is shown of a component and side, but for its angles."""
+
+    row: Row
+    part: Result
+    missing: str
+    """What the reason of the part begins with."""
+    angles: tuple[Seen, ...]
+
+
+def components_of(
     components: Ends,
     spread: Ends | None,
-    angles: Angles,
     *,
     human: str,
     least: Mapping[str, int],
     most: Mapping[str, int],
     edges: Edges,
-) -> tuple[Row, ...]:
-    """A row per component and side.
+) -> tuple[Component, ...]:
+    """What is shown of each component and side, as long as its scores stay.
 
     Args:
         components: Scores as they were measured.
         spread: The same within the accuracy, in the same order; None when that is not known.
-        angles: Of the posture.
         human: Whose bones.
         least: Least score of each component.
         most: Greatest score of each component.
         edges: Bands of the angles.
     """
-    rows = []
+    found = []
     for (key, lows, highs), (_, widest, highest) in zip(components, spread or components, strict=True):
         sided = len(lows) > 1
         for i, (low, high) in enumerate(zip(lows, highs, strict=True)):
             side = SIDES[i] if sided else ""
             known = low == high
-            rows.append(
-                Row(
-                    name=key,
-                    side=side,
-                    state=RowState.JUDGED if known else RowState.NOT_ASSESSED,
-                    value=float(low) if known else None,
-                    scale=(float(least[key]), float(most[key])),
-                    interval=None if spread is None and known else (float(widest[i]), float(highest[i])),
-                    reason="" if known else "not measured or not entered",
-                    bones=_bones(human, key, side),
-                    aspects=aspects(angles, ANGLES_OF.get(key, ()), i if sided else None, edges),
-                )
+            value = float(low) if known else None
+            interval = None if spread is None and known else (float(widest[i]), float(highest[i]))
+            row = Row(
+                name=key,
+                side=side,
+                state=RowState.JUDGED if known else RowState.NOT_ASSESSED,
+                value=value,
+                scale=(float(least[key]), float(most[key])),
+                interval=interval,
+                reason="" if known else "not measured or not entered",
+                bones=_bones(human, key, side),
             )
-    return tuple(rows)
+            part = Result(
+                name=f"{SIDES[i]} {key}" if sided else key,
+                value=value,
+                verdict=None if known else Verdict.UNDECIDED,
+                interval=interval,
+            )
+            seen = _seen(ANGLES_OF.get(key, ()), i if sided else None, edges)
+            found.append(Component(row, part, "" if known else "not assessed", seen))
+    return tuple(found)
+
+
+def component_rows(components: Sequence[Component], angles: Angles) -> tuple[list[Result], list[Row]]:
+    """Parts of a result and its rows, one per component and side.
+
+    Args:
+        components: What is shown of them whatever the angles.
+        angles: Of the posture.
+    """
+    parts, rows, listed = list[Result](), list[Row](), angles.listed
+    for row, part, missing, seen in components:
+        shown, words = _aspects(listed, seen), [missing] if missing else []
+        said = ", ".join([f"{each.name} {_degrees(each.value)}" for each in shown])
+        words += [said] if said else []
+        parts.append(
+            Result(
+                name=part.name, value=part.value, verdict=part.verdict, interval=part.interval,
+                reason="; ".join(words),
+            )
+        )  # fmt: skip
+        rows.append(
+            Row(
+                name=row.name, side=row.side, state=row.state, value=row.value, scale=row.scale,
+                interval=row.interval, reason=row.reason, bones=row.bones, aspects=shown,
+            )
+        )  # fmt: skip
+    return parts, rows
+
+
+def _degrees(angle: float | None) -> str:
+    return "not measured" if angle is None else f"{round(math.degrees(angle))}°"
 
 
 @cache
@@ -177,24 +258,30 @@ def total_row(
 
 def aspects(angles: Angles, names: Sequence[str], side: int | None, edges: Edges) -> tuple[Aspect, ...]:
     """Angles with the bands that they fall into; of both sides where a component has none."""
+    return _aspects(angles.listed, _seen(names, side, edges))
+
+
+def _seen(names: Sequence[str], side: int | None, edges: Edges) -> tuple[Seen, ...]:
     found = []
     for name in names:
-        values = angles.listed[name]
-        label = name.replace("_", " ")
+        label, ends = name.replace("_", " "), edges.get(name, ())
+        bands = _banded(tuple(ends), NEUTRAL.get(name, 0.0)) if ends else None
         if name not in SIDED:
-            pairs = [(label, values)]
+            found.append(Seen(name, None, label, bands))
         elif side is not None:
-            pairs = [(label, values[side])]
+            found.append(Seen(name, side, label, bands))
         else:
-            pairs = [(f"{own} {label}", x) for own, x in zip(SIDES, values, strict=True)]
-        for text, value in pairs:
-            measured = value == value  # noqa: PLR0124 - not a NaN
-            found.append(
-                Aspect(
-                    name=text,
-                    value=value if measured else None,
-                    unit="rad",
-                    band=band_of(value, edges.get(name, ()), NEUTRAL.get(name, 0.0)),
-                )
-            )
+            found += [Seen(name, i, f"{own} {label}", bands) for i, own in enumerate(SIDES)]
+    return tuple(found)
+
+
+def _aspects(listed: Mapping[str, Any], seen: Sequence[Seen]) -> tuple[Aspect, ...]:
+    found = []
+    for name, side, label, bands in seen:
+        value = listed[name] if side is None else listed[name][side]
+        if value != value:  # noqa: PLR0124 - a NaN
+            found.append(Aspect(name=label, unit="rad"))
+        else:
+            band = "" if bands is None else bands.of(value)
+            found.append(Aspect(name=label, value=value, unit="rad", band=band))
     return tuple(found)

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 
-from seerob.core.interrupted import stopped
+from seerob.app.console.interruption import stopped
 
 
 def program() -> int:

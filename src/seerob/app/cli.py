@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 
-from seerob.app.console.interruption import Interrupts
+from seerob.app.console.interruption import Interrupts, stopped
 from seerob.app.console.terminal import Exit, Leaves, Parser, PrintableLines
 from seerob.core.errors import SeerobError, ended_by
-from seerob.core.interrupted import stopped
 from seerob.core.printable import printable
 
 COMMANDS = (

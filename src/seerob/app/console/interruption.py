@@ -10,6 +10,8 @@ import time
 from types import FrameType, TracebackType
 from typing import Any, Self
 
+EXIT = 3
+"""Exit code of a program that Ctrl-C ended."""
 _LATER = 0.002
 """After which a lost interrupt comes again [s]: whatever destroyed the object is over by then, mostly."""
 
@@ -95,3 +97,12 @@ class Stopped:
     def __call__(self) -> bool:
         """Whether to stop."""
         return self._asked
+
+
+def stopped() -> int:
+    """Say that the program was stopped; its exit code."""
+    # An interrupt inside text that a library had run makes the interpreter end by a signal instead of with
+    # our exit code, until other text is run.
+    eval("0")  # noqa: S307
+    sys.stderr.write("stopped\n")
+    return EXIT

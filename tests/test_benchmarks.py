@@ -101,3 +101,11 @@ def test_the_price_of_checks_against_strangers_is_a_share_of_a_tick_and_of_a_sta
     said = smoke("price_of_checks")
     assert "a tick of" in said
     assert "a start of" in said
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_processor_time_and_memory_of_a_listening_process_are_measured(smoke):
+    said = smoke("listeners").splitlines()[-1].split()
+    assert said[0] == "rtde"
+    assert 0 < float(said[1].rstrip("%")) < 100
+    assert 5 < float(said[4]) < 200

@@ -721,3 +721,9 @@ def test_of_a_robot_that_measures_no_velocities_a_loop_is_found(live, rates, err
         found.append(looking.find(sample))
     assert [k for k, why in enumerate(found) if why] == ([*range(109, 150)] if told else [])
     assert not told or "says its last 10 positions again" in found[109]
+
+
+def test_two_samples_of_one_instant_from_a_device_without_a_clock_end_nothing():
+    looked = Contradictions(None)
+    for t, q in ((1.0, 0.1), (1.0, 0.2), (1.01, 0.3), (1.02, 0.3), (1.2, 0.3)):
+        assert looked.find(JointSample(source="", seq=0, t=t, target="arm", q=(q,))) == ""

@@ -41,6 +41,7 @@ class Hangs:
         ("rtde", False),
         ("fri", False),
         ("drfl", True),
+        ("dobot", True),
         ("modbus_robot", True),
         ("rosbridge", True),
     ],

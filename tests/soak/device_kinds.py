@@ -76,6 +76,14 @@ def drfl(patch):
     return Made(DrflSender(swing(SIX), to=(HERE, port)).start(), Drfl(robot="arm", port=port))
 
 
+def dobot(_):
+    from seerob.app.emulators.dobot import DobotServer
+    from seerob.devices.sources.dobot import Dobot
+
+    server = DobotServer(swing(SIX)).start()
+    return Made(server, Dobot(robot="arm", host=HERE, port=server.port))
+
+
 def modbus_robot(_):
     from seerob.app.emulators.modbus import ModbusServer, program
     from seerob.devices.sources.modbus_robot import ModbusRobot
@@ -307,7 +315,7 @@ def headset(patch):
 FOREIGN = (opcua, opcua_robot, mqtt, foxglove)
 """Their servers are processes of their own, which are killed with SIGKILL."""
 OWN = (
-    *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),
+    *(rtde, fri, drfl, dobot, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),
     *(modbus, siemens_web, web, web_http),
     *(natnet, vrpn, mvn, rokoko, vive, kinect, mediapipe, headset),
 )

@@ -196,6 +196,8 @@ class GrabSample(SampleBase, frozen=True, kw_only=True, tag="grab"):
 
 
 Sample = JointSample | PoseSample | BodySample | SignalSample | GrabSample
+NO_PLACE = (SignalSample, GrabSample)
+"""What says of nothing where it is."""
 
 
 def printable_sample(sample: Sample) -> Sample:

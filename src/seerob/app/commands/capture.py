@@ -24,7 +24,7 @@ HELP = "make a workstation of a recorded person, let the twin follow it, and exp
 EXAMPLE = "seerob capture bvh session.bvh --mass 72 --sex female -o my_session"
 
 _TABLES = """
-# Scores ask for what no posture shows (loads, support, repetition): give it in [[phases]].
+# Scores ask for what no posture shows (loads, support, repetition): give it in [[phases]], as --ask does.
 [[ergonomics]]
 kind = "rula"
 human = {human}
@@ -46,6 +46,8 @@ def add(sub: argparse.ArgumentParser) -> None:
     add_person(sub)
     sub.add_argument("-o", "--output", type=Path, required=True, help="folder to make the workstation in")
     sub.add_argument("--json", action="store_true", help="results as JSON on standard output")
+    text = "ask on the terminal for what no posture shows (loads, grips, cycle, phases), as the rules need it"
+    sub.add_argument("--ask", action="store_true", help=text)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,6 +61,8 @@ def run(options: argparse.Namespace) -> int:
     if options.output.exists():
         raise InputError.at(options.output, "", "exists already", "give another folder with -o")
     text = _workstation(options, Path(options.file))
+    if options.ask:
+        text = _with_phases(text, options)
     try:
         with whole_folder(options.output) as working:
             (working / FILE_NAME).write_text(text, encoding="utf-8")
@@ -91,6 +95,37 @@ def _workstation(options: argparse.Namespace, recording: Path) -> str:
     source = [f"{key} = {toml_value(value)}" for key, value in given.items()]
     head = [f"title = {toml_value(recording.stem)}", "", table, "", "[[sources]]", *source, ""]
     text = "\n".join(head) + _TABLES.format(human=toml_value(options.name))
+    _, problems = convert_workstation(tomllib.loads(text), COMMAND)
+    if problems:
+        raise InputError(problems)
+    return text
+
+
+def _with_phases(text: str, options: argparse.Namespace) -> str:
+    """The workstation file with the phases that are entered; its comments stay.
+
+    Raises:
+        InputError: Nobody is there to answer, or an answer does not fit the others.
+    """
+    import tomllib
+
+    from seerob.app.console.phase_questions import ask_phases, needed, on_a_terminal
+    from seerob.app.console.terminal import STATUS
+    from seerob.core.page_messages import Change
+    from seerob.core.plugin import load
+    from seerob.session.reading import BASES, convert_workstation
+    from seerob.workstation.editing import changed
+
+    base = BASES["ergonomics"]
+    rules = [load("ergonomics", each["kind"], base) for each in tomllib.loads(text)["ergonomics"]]
+    captured = reader(options, COMMAND).read(Path(options.file))
+
+    def tell(said: str) -> None:
+        STATUS.print(said, markup=False)
+
+    phases = ask_phases(needed(rules), (captured.count - 1) / captured.rate, on_a_terminal, tell)
+    changes = [Change(kind="add", path=("phases",), value={**p, "human": options.name}) for p in phases]
+    text = changed(text.encode(), changes, FILE_NAME)[0].decode()
     _, problems = convert_workstation(tomllib.loads(text), COMMAND)
     if problems:
         raise InputError(problems)

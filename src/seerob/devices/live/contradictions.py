@@ -23,16 +23,16 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import zip_longest
 from numbers import Real
+from operator import le, lt, sub
 from typing import NamedTuple, get_args
 
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.samples import (
+    NO_PLACE,
     BodySample,
-    GrabSample,
     JointSample,
     PoseSample,
     Quality,
@@ -105,86 +105,123 @@ class _Motion(NamedTuple):
     qd: tuple[float, ...]
     way: tuple[float, ...]
     """Integral of the velocity [rad or m]."""
+    speed: tuple[float, ...]
+    """Magnitude of the velocity."""
     length: tuple[float, ...]
-    """Integral of its magnitude."""
+    """Integral of that [rad or m]."""
 
 
 class _Standing:
-    """One joint of which it is told whether it stands to the last bit.
+    """Of each joint, whether it stands to the last bit.
+
+    Lists by joint, and one loop in which what moves costs little: this runs for every packet of every source.
 
     Args:
-        unit: ``rad`` or ``m``.
+        units: ``rad`` or ``m``, of each joint.
     """
 
-    def __init__(self, unit: str) -> None:
-        self._unit = unit
-        self._q, self._since, self._seen = math.nan, -math.inf, -math.inf
-        """Position, when it was said first and last."""
-        self._step, self._interval, self._speed = 0.0, math.inf, 0.0
-        """Way and time to it [rad or m, s]; the speed before that."""
-        self._longest = math.inf
-        self._finest = math.inf
-        """Least step of its digits that was seen [rad or m]."""
-        self._rate = self._way = self._fastest = 0.0
-        """Velocity said last; what they come to while it stands, and the largest of them."""
-        self._window = -math.inf
-        self._looked, self._dead = False, ""
+    def __init__(self, units: Sequence[str]) -> None:
+        many = len(units)
+        self._units = units
+        self._seen = -math.inf
+        """When anything was said last [s]."""
+        self._q, self._since = [math.nan] * many, [-math.inf] * many
+        """Positions, and when they were said first."""
+        self._step, self._interval = [0.0] * many, [math.inf] * many
+        """Way and time to it [rad or m, s]."""
+        self._step_before, self._interval_before = [0.0] * many, [math.inf] * many
+        """Those of the way before."""
+        self._finest = [math.inf] * many
+        self._rate = [0.0] * many
+        """Velocity said last."""
+        self._stands = [False] * many
+        self._way, self._fastest, self._window = [0.0] * many, [0.0] * many, [0.0] * many
+        """What velocities come to while it stands, and the largest of them, since when [s]."""
+        self._looked, self._dead = [False] * many, [""] * many
+
+    def __len__(self) -> int:
+        return len(self._q)
 
     @property
     def finest(self) -> float:
-        """Least step of its digits that was seen [rad or m]."""
-        return self._finest
+        """Least step of the digits of any joint that was seen [rad or m]."""
+        return min(self._finest, default=math.inf)
 
-    def add(self, t: float, q: float, qd: float | None, jitter: float) -> str:
-        """Why it cannot stand as it is said to; empty when it may.
+    def add(self, t: float, q: Sequence[float], qd: Sequence[float] | None, jitter: float) -> str:
+        """Why the first of those joints cannot stand that are said to; empty when each may.
 
         Args:
             t: [s]
-            q: Position [rad or m].
-            qd: Velocity [rad/s or m/s]; None where the device measures none.
+            q: Positions [rad or m].
+            qd: Velocities [rad/s or m/s]; None where the device measures none.
             jitter: By which the time between two samples may be off [s].
         """
-        rate, self._rate = self._rate, qd or 0.0
         before, self._seen = self._seen, t
-        if q != self._q:
-            self._move(t, q)
-            return ""
-        if t - self._window > SPAN:
-            self._window, self._way, self._fastest = t, 0.0, 0.0
-        self._way += 0.5 * (t - before) * (rate + self._rate)
-        self._fastest = max(self._fastest, abs(rate), abs(self._rate))
-        if abs(self._way) > HELD[0] + LAG * self._fastest:
-            said = f"{self._rate:.3g} {self._unit}/s"
-            return f"the velocity of {{}} is not zero while the joint stands still to the last bit: {said}"
-        if not self._looked and t - self._since > HELD[1] * self._longest:
-            self._looked, self._dead = True, self._stopped_dead(jitter)
-        return self._dead
+        rates, self._rate = self._rate, [0.0] * len(q) if qd is None else [*qd]
+        places, self._q = self._q, [*q]
+        steps, intervals, since, finests = self._step, self._interval, self._since, self._finest
+        found = ""
+        for k, (x, place) in enumerate(zip(q, places, strict=True)):
+            if x == place:
+                why = self._stand(k, t, before, rates[k], jitter)
+                found = found or why
+                continue
+            last = steps[k]
+            self._step_before[k], self._interval_before[k] = last, intervals[k]
+            step = x - place
+            if math.isnan(step):
+                steps[k], intervals[k] = 0.0, math.inf
+            else:
+                way = abs(step)
+                change = abs(way - abs(last))
+                if ROUNDED < way < finests[k]:
+                    finests[k] = way
+                if ROUNDED < change < finests[k]:
+                    finests[k] = change
+                steps[k], intervals[k] = step, t - since[k]
+            since[k], self._stands[k] = t, False
+        return found
 
-    def _move(self, t: float, q: float) -> None:
-        step, interval = q - self._q, t - self._since
-        self._speed = self._step / self._interval
-        self._longest = max(interval, self._interval)
-        if math.isnan(step):
-            self._step, self._interval = 0.0, math.inf
-        else:
-            seen = (abs(step), abs(abs(step) - abs(self._step)))
-            self._finest = min([self._finest, *(way for way in seen if way > ROUNDED)])
-            self._step, self._interval = step, interval
-        self._q, self._since, self._window = q, t, t
-        self._way = self._fastest = 0.0
-        self._looked, self._dead = False, ""
+    def _stand(self, k: int, t: float, before: float, rate: float, jitter: float) -> str:
+        """Say what `add` does, of one joint that is where it was.
 
-    def _stopped_dead(self, jitter: float) -> str:
+        Args:
+            k: Which.
+            t: [s]
+            before: When it was said the time before [s].
+            rate: Its velocity then.
+            jitter: As of `add`.
+        """
+        now = self._rate[k]
+        if not self._stands[k]:
+            self._stands[k], self._window[k], self._way[k], self._fastest[k] = True, self._since[k], 0.0, 0.0
+            self._looked[k], self._dead[k] = False, ""
+        if t - self._window[k] > SPAN:
+            self._window[k], self._way[k], self._fastest[k] = t, 0.0, 0.0
+        self._way[k] += 0.5 * (t - before) * (rate + now)
+        self._fastest[k] = max(self._fastest[k], abs(rate), abs(now))
+        if abs(self._way[k]) > HELD[0] + LAG * self._fastest[k]:
+            said = f"{now:.3g} {self._units[k]}/s"
+            what = "is not zero while the joint stands still to the last bit"
+            return f"the velocity of joint {k + 1} {what}: {said}"
+        longest = max(self._interval[k], self._interval_before[k])
+        if not self._looked[k] and t - self._since[k] > HELD[1] * longest:
+            self._looked[k], self._dead[k] = True, self._stopped_dead(k, jitter)
+        return self._dead[k]
+
+    def _stopped_dead(self, k: int, jitter: float) -> str:
         """Whether it would have had to brake harder than any joint can."""
-        speed, way = abs(self._speed), abs(self._step)
-        if self._step * self._speed <= 0 or way < STEPS * self._finest:
+        step, passed, unit = self._step_before[k], self._interval_before[k], self._units[k]
+        told, way = step / passed if passed else math.copysign(math.inf, step), abs(self._step[k])
+        speed = abs(told)
+        if self._step[k] * told <= 0 or way < STEPS * self._finest[k]:
             return ""
-        least = max(speed * self._interval - way, 2 * self._finest, FINEST[self._unit]) + speed * jitter
-        if speed**2 <= 2 * HARDEST[self._unit] * least:
+        least = max(speed * self._interval[k] - way, 2 * self._finest[k], FINEST[unit]) + speed * jitter
+        if speed**2 <= 2 * HARDEST[unit] * least:
             return ""
         return (
-            f"{{}} stands to the last bit right after {speed:.3g} {self._unit}/s, which nothing brakes so: "
-            "its last sample again and again?"
+            f"joint {k + 1} stands to the last bit right after {speed:.3g} {unit}/s, "
+            "which nothing brakes so: its last sample again and again?"
         )
 
 
@@ -267,6 +304,11 @@ class Contradictions:
             for unit, limit in zip(units, limits, strict=False)
         ]
         self._noise = [NOISE[unit] for unit in units]
+        self._resolved = 0
+        self._close: list[float] = []
+        """Of each joint, a difference of way and velocity that no anchor contradicts [rad or m]."""
+        self._never = 0.0, 0.0
+        """Speed and noise that each joint may have [rad/s and rad, or m/s and m]."""
         stated = () if target is None else target.acceleration
         self._quickest = stated * len(units) if len(stated) == 1 else stated
         self._gains = [
@@ -278,7 +320,8 @@ class Contradictions:
         self._at = -math.inf
         self._anchors: deque[_Motion] = deque(maxlen=ANCHORS)
         self._newest: _Motion | None = None
-        self._bounds: list[tuple[float, float]] = []
+        self._least: list[float] = []
+        self._most: list[float] = []
         """Of each joint, between which its positions less the integral of its velocity lie at the anchors."""
         self._slowest: list[float] = []
         """Of each joint, least speed at an anchor [rad/s or m/s]."""
@@ -286,13 +329,13 @@ class Contradictions:
         """Whose velocities are off by a factor, as is known since the last anchor."""
         self._places: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=ANCHORS + 1)
         """Instants [s] and positions of a device that gives no velocities."""
-        self._standing: list[_Standing] = []
+        self._standing = _Standing(())
         self._scales: list[_Scale] = []
         self._repeats = _Repeats()
 
     def find(self, sample: Sample) -> str:
         """Why this sample and those before it are no one motion; empty when they may be."""
-        if isinstance(sample, SignalSample | GrabSample):
+        if isinstance(sample, NO_PLACE):
             return ""
         t = sample.t if sample.t_device is None else sample.t_device
         step, before = t - self._at, self._before
@@ -303,7 +346,7 @@ class Contradictions:
             self._anchors.clear()
             self._places.clear()
             self._newest = None
-            self._standing = []
+            self._standing = _Standing(())
             before = None
         if isinstance(sample, JointSample):
             self._resolve(len(sample.q))
@@ -313,7 +356,7 @@ class Contradictions:
             again = ""
             if self._live and (sample.qd is None or sample.qd_error is not None):
                 # Measured velocities say more, and simulators that tell them repeat themselves exactly.
-                again = self._repeats.add(sample.q, min((j.finest for j in self._standing), default=math.inf))
+                again = self._repeats.add(sample.q, self._standing.finest)
             return jump or differs or hangs or again
         if isinstance(sample, PoseSample):
             return _moved(before, sample, step) if isinstance(before, PoseSample) else ""
@@ -321,11 +364,19 @@ class Contradictions:
 
     def _resolve(self, joints: int) -> None:
         """Bounds of joints that the robot does not have: as those of one that turns, as fast as any."""
+        if joints <= self._resolved:
+            return
+        self._resolved = joints
         self._units += ["rad"] * (joints - len(self._units))
         self._fastest += [FASTEST["rad"]] * (joints - len(self._fastest))
         self._noise += [NOISE["rad"]] * (joints - len(self._noise))
+        self._close = [CLOSE * noise for noise in self._noise]
+        self._never = min(self._fastest, default=0.0), min(self._noise, default=0.0)
 
     def _leap(self, before: JointSample, sample: JointSample, step: float) -> str:
+        fastest, noise = self._never
+        if max(map(abs, map(sub, sample.q, before.q)), default=0.0) <= fastest * step + noise:
+            return ""
         bounds = zip(before.q, sample.q, self._fastest, self._noise, strict=False)
         for k, (a, b, fastest, noise) in enumerate(bounds):
             if abs(b - a) > fastest * step + noise:
@@ -343,20 +394,22 @@ class Contradictions:
         if last is None or len(last.q) != len(q):
             zeros = (0.0,) * len(q)
             self._anchors.clear()
-            self._newest = _Motion(t, q, qd, zeros, zeros)
+            self._newest = _Motion(t, q, qd, zeros, tuple(map(abs, qd)), zeros)
             self._anchor(self._newest)
             return ""
-        half, near = 0.5 * (t - last.t), True
-        way, length = [], []
-        rows = zip(q, qd, last.qd, last.way, last.length, self._bounds, self._noise, strict=False)
-        for x, b, a, went, far, (low, high), noise in rows:
-            way.append(went := went + half * (a + b))
-            length.append(far + half * (abs(a) + abs(b)))
-            near = near and x - went - low < CLOSE * noise and high - (x - went) < CLOSE * noise
+        half, speed = 0.5 * (t - last.t), tuple(map(abs, qd))
+        way = tuple([went + half * (a + b) for went, a, b in zip(last.way, last.qd, qd, strict=True)])
+        length = tuple(
+            [far + half * (a + b) for far, a, b in zip(last.length, last.speed, speed, strict=True)]
+        )
+        off = [*map(sub, q, way)]
+        # What is no number is not near.
+        near = all(map(lt, map(sub, off, self._least), self._close)) and all(
+            map(lt, map(sub, self._most, off), self._close)
+        )
         if self._gains and near:
-            speeds = zip(qd, self._slowest, self._gains, strict=False)
-            near = all(abs(b) - slowest <= gain for b, slowest, gain in speeds)
-        now = self._newest = _Motion(t, q, qd, tuple(way), tuple(length))
+            near = all(map(le, map(sub, speed, self._slowest), self._gains))
+        now = self._newest = _Motion(t, q, qd, way, speed, length)
         found = ""
         for then in () if near else self._anchors:
             if t - then.t <= SPAN and (found := self._differ(then, now) or self._hurries(then, now)):
@@ -373,10 +426,9 @@ class Contradictions:
             *[[a - went for a, went in zip(then.q, then.way, strict=True)] for then in self._anchors],
             strict=True,
         )
-        self._bounds = [(min(lag), max(lag)) for lag in lags]
-        self._slowest = [
-            min(map(abs, rates)) for rates in zip(*[then.qd for then in self._anchors], strict=True)
-        ]
+        columns = [*lags]
+        self._least, self._most = [*map(min, columns)], [*map(max, columns)]
+        self._slowest = [*map(min, zip(*[then.speed for then in self._anchors], strict=True))]
 
     def _scale(self, then: _Motion, now: _Motion) -> None:
         if len(self._scales) != len(now.q):
@@ -389,16 +441,11 @@ class Contradictions:
     def _hangs(self, sample: JointSample, t: float) -> str:
         """Whether a joint that moved stands to the last bit, as nothing that brakes does."""
         if len(self._standing) != len(sample.q):
-            self._standing = [_Standing(unit) for unit in self._units[: len(sample.q)]]
+            self._standing = _Standing(self._units[: len(sample.q)])
         if sample.qd is not None and len(sample.qd) != len(sample.q):
             return ""
-        rates: Sequence[float | None] = sample.qd or ()
         jitter = LOOSE if sample.t_device is None else 0.0
-        found = ""
-        for k, (joint, q, qd) in enumerate(zip_longest(self._standing, sample.q, rates)):
-            if (why := joint.add(t, q, qd, jitter if self._live else math.inf)) and not found:
-                found = why.format(f"joint {k + 1}")
-        return found
+        return self._standing.add(t, sample.q, sample.qd, jitter if self._live else math.inf)
 
     def _hurries(self, then: _Motion, now: _Motion) -> str:
         """Whether a joint gets faster more quickly than it can; one that brakes may, it is stopped."""

@@ -9,10 +9,10 @@ the velocity is :math:`\sigma_v = \frac{\sigma}{T}\sqrt{\frac{12 (2n-1)(8n-11)}{
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Sequence
 from operator import mul
-from statistics import median
 
 SAMPLES = 7
 """That the parabola is fitted to."""
@@ -67,10 +67,12 @@ class Differentiator:
         self._times: deque[float] = deque(maxlen=SAMPLES)
         self._values: deque[tuple[float, ...]] = deque(maxlen=SAMPLES)
         self._noise = PositionNoise()
+        self._weights: list[float] = []
+        """Of the newest slope [1/s]."""
 
     def error(self) -> tuple[float, ...] | None:
         """How far the newest velocities may be off by the noise of positions [rad/s or m/s], shape (n,)."""
-        return self._noise.speed_error(self._times) if len(self._times) > 2 else None
+        return self._noise.error_by(self._weights) if len(self._times) > 2 else None
 
     def add(self, t: float, values: tuple[float, ...]) -> tuple[float, ...] | None:
         """Velocities at the newest sample; None until there are three, and again after a gap.
@@ -90,7 +92,7 @@ class Differentiator:
         self._noise.add(t, values)
         if len(self._times) < 3:
             return None
-        weights = end_weights(self._times)
+        weights = self._weights = end_weights(self._times)
         return tuple([sum(map(mul, weights, column)) for column in zip(*self._values, strict=True)])
 
 
@@ -101,6 +103,8 @@ class PositionNoise:
         self._times: deque[float] = deque(maxlen=4)
         self._values: deque[tuple[float, ...]] = deque(maxlen=4)
         self._found: deque[list[float]] = deque(maxlen=REMEMBERED)
+        self._sorted: list[list[float]] = []
+        """What was found, of each value, ascending: its median is asked for at every sample."""
 
     def add(self, t: float, values: tuple[float, ...]) -> None:
         """Take what came.
@@ -115,6 +119,7 @@ class PositionNoise:
             self._values.clear()
             self._times.clear()
             self._found.clear()
+            self._sorted.clear()
         self._times.append(t)
         self._values.append(values)
         if len(self._times) < 4:
@@ -123,7 +128,17 @@ class PositionNoise:
         weights = [1 / math.prod(a - b for b in self._times if b != a) for a in self._times]
         size = math.sqrt(sum(map(mul, weights, weights)))
         columns = zip(*self._values, strict=True)
-        self._found.append([abs(sum(map(mul, weights, column))) / size for column in columns])
+        differences = (abs(sum(map(mul, weights, column))) / size for column in columns)
+        found = [
+            math.inf if math.isnan(x) else x for x in differences
+        ]  # by what is no number, nothing is told
+        oldest = self._found[0] if len(self._found) == REMEMBERED else None
+        self._found.append(found)
+        self._sorted = self._sorted or [[] for _ in found]
+        for k, (ordered, new) in enumerate(zip(self._sorted, found, strict=True)):
+            if oldest is not None:
+                del ordered[bisect_left(ordered, oldest[k])]
+            insort(ordered, new)
 
     def speed_error(self, times: Sequence[float]) -> tuple[float, ...] | None:
         """How far a slope of the parabola through values at instants may be off at the last of them.
@@ -134,9 +149,15 @@ class PositionNoise:
         Returns:
             [rad/s or m/s], shape (n,); None as long as nothing is told of the noise.
         """
+        return self.error_by(end_weights(times)) if self._found else None
+
+    def error_by(self, weights: Sequence[float]) -> tuple[float, ...] | None:
+        """Say what `speed_error` does, by the weights of that slope (`end_weights`) [1/s]."""
         if not self._found:
             return None
-        weights = end_weights(times)
         by = DEVIATIONS * math.sqrt(sum(map(mul, weights, weights)))
-        few = len(self._found) < FEW
-        return tuple([by * (max(c) if few else 1.4826 * median(c)) for c in zip(*self._found, strict=True)])
+        if len(self._found) < FEW:
+            return tuple([by * ordered[-1] for ordered in self._sorted])
+        half, odd = divmod(len(self._found), 2)
+        middles = [o[half] if odd else 0.5 * (o[half - 1] + o[half]) for o in self._sorted]
+        return tuple([by * (1.4826 * middle) for middle in middles])

@@ -9,8 +9,9 @@ nobody judged what was done meanwhile.
 from __future__ import annotations
 
 import math
+from functools import cache, cached_property
 
-from seerob.core.samples import BodySample, GrabSample, JointSample, Sample, SignalSample
+from seerob.core.samples import NO_PLACE, BodySample, JointSample, Sample
 
 TOGETHER = 0.02
 """Samples that arrive within this time may be of one tick, of which the newest is taken [s]."""
@@ -37,13 +38,13 @@ class HeldBack:
 
     def __init__(self, behind: float) -> None:
         self._behind = behind
-        self._taken: Said = {}
+        self._taken = _Told(None)
         """By the last sample that a run has taken."""
         self._missed: dict[str, tuple[float, float]] = {}
         """Least and largest by those since then that none may have taken."""
         self._since = math.inf
         """When the first of those arrived [s]."""
-        self._last: Said = {}
+        self._last = _Told(None)
         self._t = self._host = -math.inf
         """When the last one was so, and when it arrived [s]."""
         self._late = -math.inf
@@ -61,12 +62,12 @@ class HeldBack:
         since = host - self._late
         together = since <= TOGETHER and since < FASTER * (t - self._t)
         # Before any was taken nothing is judged.
-        if together or (waits and self._taken):
-            self._miss(self._last)
+        if together or (waits and self._taken.said):
+            self._miss(self._last.said)
             self._since = min(self._since, self._host)
         elif not waits:
             self._begin()
-        self._last, self._t, self._host = said_by(sample), t, host
+        self._last, self._t, self._host = _Told(sample), t, host
         self._late = host if host - t > self._behind else -math.inf
         if not (together or host - self._since > HELD_UP) or not any(map(self._beyond, self._missed)):
             return ""
@@ -86,18 +87,45 @@ class HeldBack:
     def _beyond(self, what: str) -> bool:
         """Whether any that was missed lies beyond what the last that was taken and the newest say."""
         low, high = self._missed[what]
-        ends = [each[what] for each in (self._taken, self._last) if what in each]
+        ends = [each.said[what] for each in (self._taken, self._last) if what in each.said]
         room = SPEED if what.startswith(RATE) else PLACE
         return not ends or not (min(ends) - room <= low and high <= max(ends) + room)
 
 
+class _Told:
+    """A sample, and what it says once that is asked: of most samples nobody does.
+
+    Args:
+        sample: None before there is one.
+    """
+
+    def __init__(self, sample: Sample | None) -> None:
+        self._sample = sample
+
+    @cached_property
+    def said(self) -> Said:
+        """By what it is about."""
+        return {} if self._sample is None else said_by(self._sample)
+
+
+@cache
+def _names(joints: int) -> tuple[str, ...]:
+    return tuple(map(str, range(joints)))
+
+
+@cache
+def _rates(joints: int) -> tuple[str, ...]:
+    return tuple(f"{RATE}{j}" for j in range(joints))
+
+
 def said_by(sample: Sample) -> Said:
     """What a sample says of places and speeds; nothing of signals and grabs, which are told one by one."""
-    if isinstance(sample, SignalSample | GrabSample):
+    if isinstance(sample, NO_PLACE):
         return {}
     if isinstance(sample, JointSample):
-        found = {f"{j}": value for j, value in enumerate(sample.q)}
-        return found | {f"{RATE}{j}": value for j, value in enumerate(sample.qd or ())}
+        found = dict(zip(_names(len(sample.q)), sample.q, strict=True))
+        qd = sample.qd or ()
+        return found | dict(zip(_rates(len(qd)), qd, strict=True))
     found = {}
     for point in sample.points if isinstance(sample, BodySample) else (sample,):
         name, turn = getattr(point, "name", ""), point.wxyz

@@ -35,7 +35,7 @@ from seerob.core.errors import InputError, SeerobError
 from seerob.core.extras import need
 from seerob.core.host_name import check_host, check_url
 from seerob.core.printable import printable
-from seerob.core.samples import BodySample, GrabSample, JointSample, Quality, Sample, SignalSample, key
+from seerob.core.samples import NO_PLACE, BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding, SourceLine
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock, Instant
@@ -494,10 +494,11 @@ class Listener:
         """
         if not math.isfinite(sample.t):
             raise SeerobError(f"it yields a sample without the time of its arrival (t is {sample.t})")
-        if isinstance(sample, SignalSample | GrabSample):
+        if isinstance(sample, NO_PLACE):
             self._news(replace(sample, source=self.name), sample.t, self.drives)
             return
-        sample = replace(sample, source=self.name)
+        if isinstance(sample, BodySample):  # whose key says who sees it
+            sample = replace(sample, source=self.name)
         host, what = sample.t, key(sample)
         heard = Instant(host)
         if sample.t_device is not None:
@@ -535,7 +536,12 @@ class Listener:
         if reason and quality is Quality.GOOD:
             quality = Quality.DEGRADED
         reason = reason and f"{self.name}: {reason}"
-        self._news(replace(sample, t=heard.t, quality=quality, reason=reason, late=late), host, quiet=False)
+        seq = 0 if (last := self._posted.get(what)) is None else last.seq + 1
+        self._heard(host, sample.t_device)
+        sample = self._posted[what] = replace(
+            sample, source=self.name, seq=seq, t=heard.t, quality=quality, reason=reason, late=late
+        )
+        self._post(sample)
 
     def _news(self, sample: Sample, host: float, quiet: bool) -> None:
         """Post what is new.
@@ -546,15 +552,19 @@ class Listener:
             quiet: It is not what this source is listened to for.
         """
         if not quiet:
-            self._arrivals.add(host, sample.t_device)
-            if self._up is False:
-                _log.warning("%s: heard again", self.name)
-            self._up = True
+            self._heard(host, sample.t_device)
         # Counted for what it is about alone: what is heard of variables meanwhile makes up for no sample
         # of the robot that is missing.
         last = self._posted.get(key(sample))
         sample = self._posted[key(sample)] = replace(sample, seq=0 if last is None else last.seq + 1)
         self._post(sample)
+
+    def _heard(self, host: float, device: float | None) -> None:
+        """Count news that arrived at ``host`` [s], stamped ``device`` [s]."""
+        self._arrivals.add(host, device)
+        if self._up is False:
+            _log.warning("%s: heard again", self.name)
+        self._up = True
 
     def _invalidate(self, what: tuple[str, ...], reason: str) -> None:
         """Say again what was said last, with a doubt: whoever has taken it would not know."""
@@ -627,7 +637,7 @@ class _Person:
 
 def _content(sample: Sample) -> int:
     """What tells a sample's content from that of others."""
-    if isinstance(sample, SignalSample | GrabSample):
+    if isinstance(sample, NO_PLACE):
         return 0
     said: tuple[tuple[float, ...] | None, ...]
     if isinstance(sample, JointSample):

@@ -76,7 +76,8 @@ test("a coarser shape has fewer corners, and none of its points is off by more t
     return Array.from({ length: at.count }, (_, k) => Math.hypot(at.getX(k), at.getY(k), at.getZ(k)));
   };
   const counts = [0, 0.02, 0.1, 0.25].map((cell) => {
-    const made = coarser(ball, cell);
+    const { shape: made, off } = coarser(ball, cell);
+    assert.ok(off <= cell * Math.sqrt(3) && off >= cell / 2, `${off} m of a cell of ${cell}`);
     made.computeBoundingBox();
     // Corners stay on the surface; triangles between them sag by less than a cell.
     assert.ok(radius(made).every((r) => Math.abs(r - 0.5) < 1e-6));
@@ -84,7 +85,7 @@ test("a coarser shape has fewer corners, and none of its points is off by more t
       [made.boundingBox.min, -0.5],
       [made.boundingBox.max, 0.5],
     ])
-      for (const x of one.toArray()) assert.ok(Math.abs(x - other) <= cell * Math.sqrt(3) + 1e-6);
+      for (const x of one.toArray()) assert.ok(Math.abs(x - other) <= off + 1e-6);
     return made.index.count / 3;
   });
   // A pole of a ball has triangles without area.

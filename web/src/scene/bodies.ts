@@ -59,7 +59,7 @@ function withNormals(geometry: BufferGeometry): BufferGeometry {
     const apart = geometry.toNonIndexed();
     apart.computeVertexNormals();
     // Corners of a flat face are worked out once.
-    made = Object.keys(apart.attributes).length === 2 ? coarser(apart, 0) : apart;
+    made = Object.keys(apart.attributes).length === 2 ? coarser(apart, 0).shape : apart;
     sharp.set(geometry, made);
   }
   return made;

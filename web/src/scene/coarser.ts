@@ -2,14 +2,20 @@
 
 import { BufferAttribute, BufferGeometry } from "three";
 
+/** A surface, and how far a point of the one that it was made of may be from where it is now [m]. */
+export interface Coarser {
+  shape: BufferGeometry;
+  off: number;
+}
+
 /**
  * Corners that lie in one cell of a grid, and of which the triangles face alike, made one.
  *
  * @param surface Triangles with normals.
  * @param cell Edge of a cell [m]; 0 makes one of corners that are equal, and changes nothing that is drawn.
- * @returns Triangles with an index. No point of the surface is farther than the diagonal of a cell from it.
+ * @returns Triangles with an index; no point is off by more than the diagonal of a cell.
  */
-export function coarser(surface: BufferGeometry, cell: number): BufferGeometry {
+export function coarser(surface: BufferGeometry, cell: number): Coarser {
   const at = surface.getAttribute("position");
   const normal = surface.getAttribute("normal");
   const index = surface.getIndex();
@@ -18,6 +24,7 @@ export function coarser(surface: BufferGeometry, cell: number): BufferGeometry {
   const kept: number[] = [];
   const sums: number[] = [];
   const made = new Uint32Array(corners);
+  let off = 0;
   for (let k = 0; k < corners; k += 1) {
     const i = index ? index.getX(k) : k;
     const [x, y, z] = [at.getX(i), at.getY(i), at.getZ(i)];
@@ -33,6 +40,8 @@ export function coarser(surface: BufferGeometry, cell: number): BufferGeometry {
       kept.push(x, y, z);
       sums.push(0, 0, 0);
     }
+    const first = 3 * number;
+    off = Math.max(off, Math.hypot(x - kept[first]!, y - kept[first + 1]!, z - kept[first + 2]!));
     for (const [j, n] of [a, b, c].entries()) sums[3 * number + j]! += n;
     made[k] = number;
   }
@@ -49,7 +58,7 @@ export function coarser(surface: BufferGeometry, cell: number): BufferGeometry {
   fewer.setAttribute("position", new BufferAttribute(new Float32Array(kept), 3));
   fewer.setAttribute("normal", new BufferAttribute(new Float32Array(sums), 3));
   fewer.setIndex(new BufferAttribute(new Uint32Array(triangles), 1));
-  return fewer;
+  return { shape: fewer, off };
 }
 
 /** Which of the six directions of the axes a normal is nearest to. */

@@ -12,7 +12,7 @@ import {
   Sphere,
   type Vector3,
 } from "three";
-import { coarser } from "./coarser";
+import { type Coarser, coarser } from "./coarser";
 import { drawnBySoftware } from "./effort";
 import { ownMaterial } from "./materials";
 
@@ -22,7 +22,7 @@ const MANY_TRIANGLES = 200;
 /** Layer of what no camera sees, and rays meet all the same. Masks of higher ones are no small integers to V8. */
 export const ALONE_LAYER = 28;
 /** Cells of coarser shapes, as shares of the radius of the whole. */
-const CELLS = [0.07, 0.2, 0.5];
+const CELLS = [0.06, 0.1, 0.16, 0.25, 0.5];
 /** A coarser shape that has not so much fewer corners is none. */
 const WORTH = 0.7;
 
@@ -145,10 +145,10 @@ export class Crowd {
   }
 }
 
-const shapes = new WeakMap<BufferGeometry, { shape: BufferGeometry; off: number }[]>();
+const shapes = new WeakMap<BufferGeometry, Coarser[]>();
 
 /** A shape and coarser ones of it, with how far these are off [m]; of all crowds that have it. */
-function shapesOf(shape: BufferGeometry): { shape: BufferGeometry; off: number }[] {
+function shapesOf(shape: BufferGeometry): Coarser[] {
   let known = shapes.get(shape);
   if (!known) {
     known = [{ shape, off: 0 }];
@@ -156,10 +156,8 @@ function shapesOf(shape: BufferGeometry): { shape: BufferGeometry; off: number }
     if (drawnBySoftware() && plain && shape.hasAttribute("normal")) {
       if (!shape.boundingSphere) shape.computeBoundingSphere();
       for (const share of CELLS) {
-        const cell = share * shape.boundingSphere!.radius;
-        const made = coarser(shape, cell);
-        if (cost(made) > WORTH * cost(known.at(-1)!.shape)) continue;
-        known.push({ shape: made, off: Math.sqrt(3) * cell });
+        const made = coarser(shape, share * shape.boundingSphere!.radius);
+        if (cost(made.shape) <= WORTH * cost(known.at(-1)!.shape)) known.push(made);
       }
     }
     shapes.set(shape, known);

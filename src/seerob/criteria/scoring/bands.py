@@ -25,7 +25,7 @@ NEAR = 1e-9
 _UPRIGHT = 1.5
 """A plane in which something is seen is this far away at most [rad]: its lever is `SHORT` nowhere."""
 _RAISED = 2.99
-"""Likewise of an arm above the hanging one [rad]."""
+"""An arm is above the hanging one by so much at most [rad], where its lever is `SHORT` nowhere."""
 assert math.cos(_UPRIGHT) > SHORT
 assert 1.0 + math.cos(_RAISED) > SHORT
 _LIMITS = {

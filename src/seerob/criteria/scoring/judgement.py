@@ -269,7 +269,7 @@ def _said(
 def _components(
     method: Method, thresholds: Thresholds, human: str, measured: Ends, spread: Ends | None
 ) -> tuple[Component, ...]:
-    """Likewise, with the bands of the angles."""
+    """Scores of the components of postures in the same bands of the angles, made once for all of them."""
     return components_of(
         measured,
         spread,

@@ -1,9 +1,9 @@
 import { defineConfig } from "vite";
-import { typedMatrices } from "./three_matrices";
+import { withoutGarbage } from "./three_garbage";
 
 // The scene for notebooks, beside the page: one module, with all that it needs in it.
 export default defineConfig({
-  plugins: [typedMatrices()],
+  plugins: [withoutGarbage()],
   publicDir: false,
   build: {
     lib: { entry: "src/notebook.ts", formats: ["es"], fileName: () => "notebook.js" },

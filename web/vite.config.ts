@@ -1,10 +1,10 @@
 import { defineConfig } from "vite";
-import { typedMatrices } from "./three_matrices";
+import { withoutGarbage } from "./three_garbage";
 
 // The built page is served by seerob's own server and shipped in the wheel; nothing is inlined, so
 // that a Content-Security-Policy of 'self' is enough.
 export default defineConfig({
-  plugins: [typedMatrices()],
+  plugins: [withoutGarbage()],
   base: "/",
   build: {
     outDir: "../src/seerob/app/server/page",

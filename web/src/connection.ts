@@ -91,13 +91,7 @@ export class Connection {
 
   /** To be called once per display frame: passes on numbers that came and asks for those that are due. */
   tick(time: number): void {
-    if (this.pending) {
-      this.numbersAt = time;
-      frame.value = this.pending;
-      if (ownDevice.peek() !== "desk") now.value = this.pending.t;
-      this.pending = null;
-      this.asked = false;
-    }
+    if (this.pending) this.publish(this.pending, time);
     const numbers = this.numbers?.read();
     if (numbers && this.form) {
       this.heard = numbers[1]!;
@@ -114,6 +108,15 @@ export class Connection {
       Atomics.store(this.asks, DRAWN, this.drawnId);
       if (due) Atomics.store(this.asks, PANELS, 1);
     }
+  }
+
+  /** Give panels, of the page or in the room, what they asked for. */
+  private publish(heard: Frame, time: number): void {
+    this.numbersAt = time;
+    this.pending = null;
+    this.asked = false;
+    frame.value = heard;
+    if (ownDevice.peek() !== "desk") now.value = heard.t;
   }
 
   private due(time: number): boolean {

@@ -97,8 +97,10 @@ test("what one points at is selected with the trigger", async () => {
   await pictures(page, 4);
   await page.evaluate(() => window.headset.controllers.right.updateButtonValue("trigger", 0));
   await pictures(page, 4);
-  await page.locator(".properties h2").waitFor({ timeout: 240_000 });
+  // Nobody in the room sees panels: none of them is drawn until one is back.
+  assert.equal(await page.locator(".criteria, .plots, .properties h2, output.pill").count(), 0);
   await leave();
+  await page.locator(".properties h2").waitFor({ timeout: 240_000 });
 });
 
 const pressIn = (label) => pressInRoom(page, label, [0, 1.2, 0]);

@@ -12,6 +12,8 @@ import { HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { serve } from "./served.mjs";
 
 const SECONDS = Number(process.argv[2] ?? 10);
+/** Until V8 has compiled what each picture does [s]. */
+const WARM = 25;
 const WHERE = process.argv.includes("--where");
 const BODIES = 50;
 /** Of the cell itself. */
@@ -100,14 +102,27 @@ async function traced() {
   return { slots: slots.map(({ ms }) => ms), collected: collected.length };
 }
 
+/** Functions that write figures, in the page or in the room: four times a second, not once per picture. */
+const FIGURES = ["publish", "paint"];
+
 /**
- * Bytes by function, of what is done for a picture, of what comes by message, and of the rest: panels and plots, at
- * their own pace. What the browser makes of a call is the caller's, of an emulator's or this measurement's nobody's.
+ * Bytes by function, of what is done for a picture, of three.js's own drawing in it, of figures that are written in it,
+ * of what comes by message, and of the rest: panels and plots, at their own pace. What the browser makes of a call is
+ * the caller's, of an emulator's or this measurement's nobody's.
  */
 function allocated(head) {
-  const into = { picture: new Map(), heard: new Map(), panels: new Map(), theirs: new Map() };
+  const into = {
+    picture: new Map(),
+    drawing: new Map(),
+    figures: new Map(),
+    heard: new Map(),
+    panels: new Map(),
+    theirs: new Map(),
+  };
   const walk = ({ callFrame: { url, functionName, lineNumber }, selfSize, children }, part, ours) => {
-    const within = functionName === "timed" ? "picture" : functionName.endsWith("onmessage") ? "heard" : part;
+    let within = functionName === "timed" ? "picture" : functionName.endsWith("onmessage") ? "heard" : part;
+    if (within === "picture" && functionName.endsWith(".render")) within = "drawing";
+    if (within === "picture" && FIGURES.includes(functionName)) within = "figures";
     // Functions of the browser's own have no line.
     const own = url.includes("/assets/") || (url === "" && lineNumber < 0 && (ours || within === "heard"));
     const to = into[own ? within : "theirs"];
@@ -159,7 +174,7 @@ async function spent(pictures) {
 }
 
 async function measure(name) {
-  await page.waitForTimeout(4000);
+  await page.waitForTimeout(1000 * WARM);
   const { slots, collected } = await traced();
   await page.evaluate(() => {
     window.cost.n = 0;
@@ -191,13 +206,13 @@ async function measure(name) {
       `  script per picture  mean ${mean.toFixed(2)}, ${both(slots)} of processor time (${collected} collections in ${slots.length} pictures)\n` +
       `  ${sent} snapshots sent, ${skipped} replaced before they were\n` +
       `  age when offered ${both(ages.slice(-100 * SECONDS).map((s) => 1000 * s))}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
-      `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
+      `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("drawing")} by three.js's own drawing, ${kilobytes("figures")} by figures written then, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
   );
   if (!WHERE) return;
   process.stdout.write("  whose the time is, ms per picture by the clock\n");
   for (const [whose, ms] of (await spent(count)).slice(0, 24))
     process.stdout.write(`    ${ms.toFixed(3).padStart(8)} ${whose}\n`);
-  for (const part of ["picture", "heard", "panels"]) {
+  for (const part of ["picture", "drawing", "figures", "heard", "panels"]) {
     process.stdout.write(`  ${part}\n`);
     const most = [...parts[part]].sort((a, b) => b[1] - a[1]).slice(0, 30);
     for (const [key, bytes] of most)

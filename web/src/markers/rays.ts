@@ -34,18 +34,21 @@ export class RaysDrawn implements Drawn<Rays> {
     const { starts, ends, hits, filled, verdict } = marker;
     const several = starts.length === ends.length;
     const count = starts.length > 0 ? ends.length : 0;
-    HIT.clear();
-    for (let k = 0; k < hits.length; k += 1) if (hits[k]! < count) HIT.add(hits[k]!);
+    if (hit.length < count) hit = new Uint8Array(2 * count);
+    hit.fill(0, 0, count);
+    for (let k = 0; k < hits.length; k += 1) if (hits[k]! < count) hit[hits[k]!] = 1;
+    let met = 0;
+    for (let i = 0; i < count; i += 1) met += hit[i]!;
     const between = filled ? Math.max(count - 1, 0) : 0;
-    const passing = begin(this.passing.geometry, 2 * (count - HIT.size));
-    const hitting = begin(this.hitting.geometry, 2 * HIT.size);
-    const dots = begin(this.dots.geometry, HIT.size);
+    const passing = begin(this.passing.geometry, 2 * (count - met));
+    const hitting = begin(this.hitting.geometry, 2 * met);
+    const dots = begin(this.dots.geometry, met);
     const sheet = begin(this.sheet.geometry, between * (several ? 6 : 3));
     let [p, h, d, s] = [0, 0, 0, 0];
     for (let i = 0; i < count; i += 1) {
       const start = several ? starts[i]! : starts[0]!;
       const end = ends[i]!;
-      if (HIT.has(i)) {
+      if (hit[i] === 1) {
         h = put(hitting, h, start, end);
         d = put(dots, d, end);
       } else p = put(passing, p, start, end);
@@ -67,7 +70,7 @@ export class RaysDrawn implements Drawn<Rays> {
 }
 
 /** Beams that hit, of the marker that is drawn. */
-const HIT = new Set<number>();
+let hit = new Uint8Array();
 
 // In place as long as it fits: a scanner has hundreds of beams in every frame.
 function begin(geometry: BufferGeometry, points: number): Float32Array {

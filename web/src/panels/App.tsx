@@ -2,6 +2,7 @@
 
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { ownDevice } from "../company";
 import { notRun } from "../editing/draft";
 import { scene } from "../page_state";
 import { type Column, folded, order, timeAbove, widths } from "../view/kept";
@@ -29,6 +30,8 @@ import { ViewTools } from "./ViewTools";
 export function App({ room }: { room: (element: HTMLElement) => void }) {
   const place = useRef<HTMLDivElement>(null);
   const plots = usePlotCount();
+  // Whoever is in the room sees no panel of the page: none is drawn, and none grows old.
+  const away = ownDevice.value !== "desk";
   useEffect(() => room(place.current!), [room]);
   useEffect(
     () =>
@@ -52,37 +55,43 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <TopBar />
       <aside class="left" aria-label={said("Scene and properties")}>
         <Grip panel="left" name={said("Scene and properties")} />
-        <SceneTree />
+        {!away && <SceneTree />}
         {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls can be reached by keys */}
         <section class="selection scroll" aria-label={said("Properties")} tabIndex={0}>
-          <Properties />
+          {!away && <Properties />}
         </section>
         <Splitter panel="left" name={said("Scene and properties")} />
       </aside>
       <main class="centre">
         <div class="room" ref={place} />
         <ViewTools />
-        <MeasureNote />
-        <ProbeNote />
-        <ReachNote />
-        <CameraNote />
-        <Legend />
-        <VisitedInstant />
-        <Strayed />
+        {!away && (
+          <>
+            <MeasureNote />
+            <ProbeNote />
+            <ReachNote />
+            <CameraNote />
+            <Legend />
+            <VisitedInstant />
+            <Strayed />
+          </>
+        )}
       </main>
-      <RightSide />
+      {away ? <aside class="right" /> : <RightSide />}
       <footer class="bottom">
         <Grip panel="bottom" name={said("Plots and time")} />
-        {!notRun.value && <Plots count={plots} />}
+        {!away && !notRun.value && <Plots count={plots} />}
         <div class="time-row">
-          {notRun.value ? (
+          {away ? (
+            <p class="not-run">{said("You are in the room: what these panels say hangs there.")}</p>
+          ) : notRun.value ? (
             <p class="not-run">{said("Nothing is run: this is where everybody begins.")}</p>
           ) : (
             <TransportBar />
           )}
-          <PageTools />
+          {!away && <PageTools />}
         </div>
-        {!notRun.value && <Timeline />}
+        {!away && !notRun.value && <Timeline />}
       </footer>
       <Keys />
     </div>

@@ -1,5 +1,6 @@
 // What is shown, from where, and what the run came to.
 
+import { ownDevice } from "../company";
 import { notRun, onTrial } from "../editing/draft";
 import { against, percent, withUnit } from "../figures";
 import {
@@ -40,7 +41,7 @@ export function TopBar() {
       <Company />
       <HeadsetOffer />
       <SourceState />
-      <StatusPill />
+      {ownDevice.value === "desk" && <StatusPill />}
     </header>
   );
 }

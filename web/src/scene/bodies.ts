@@ -7,6 +7,7 @@ import {
   Group,
   LineSegments,
   Matrix4,
+  type Material,
   Mesh,
   type Object3D,
   type PerspectiveCamera,
@@ -25,7 +26,6 @@ import {
   bodyMaterial,
   doubtMaterial,
   drawnTwice,
-  glow,
   lineMaterial,
   markerMaterial,
   occluderMaterial,
@@ -63,6 +63,10 @@ function withNormals(geometry: BufferGeometry): BufferGeometry {
     sharp.set(geometry, made);
   }
   return made;
+}
+
+function worn(given: Material | Material[], glow: number): Material | Material[] {
+  return Array.isArray(given) ? given.map((each) => ownMaterial(each, glow)) : ownMaterial(given, glow);
 }
 
 export class Body {
@@ -116,15 +120,12 @@ export class Body {
         continue;
       }
       const given = part.material;
-      // Its own copy: bodies that share a mesh are selected one by one.
-      part.material = Array.isArray(part.material)
-        ? part.material.map(ownMaterial)
-        : ownMaterial(part.material);
+      part.material = worn(given, 0);
       if (drawnBySoftware() && !part.geometry.hasAttribute("normal")) {
         part.geometry = withNormals(part.geometry);
       }
       drawnTwice(part.geometry);
-      this.meshes.push({ mesh: part, own: part.material, given, local: part.matrixWorld.clone() });
+      this.meshes.push({ mesh: part, given, local: part.matrixWorld.clone() });
     }
     this.extent.setFromObject(model);
     this.group.add(model);
@@ -194,7 +195,7 @@ export class Body {
       fill.material = smooth ? veilMaterial(verdict) : markerMaterial("volume", verdict);
       edges.material = lineMaterial(verdict);
     }
-    for (const { mesh, own } of this.meshes) {
+    for (const { mesh, given } of this.meshes) {
       // Where it may be elsewhere the eye cannot tell: that is drawn over the real one, too.
       mesh.renderOrder = this.occludes ? FIRST : 0;
       mesh.castShadow = mesh.receiveShadow = !this.occludes;
@@ -202,8 +203,8 @@ export class Body {
       else if (this.doubted) mesh.material = doubtMaterial();
       else if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
       else if (this.painted !== undefined) mesh.material = bodyMaterial(this.painted);
-      else mesh.material = this.worn === undefined ? own : scoreMaterial(this.worn);
-      for (const material of [own].flat()) glow(material, this.lit ? SELECTED_GLOW : 0);
+      else if (this.worn !== undefined) mesh.material = scoreMaterial(this.worn);
+      else mesh.material = worn(given, this.lit ? SELECTED_GLOW : 0);
     }
     this.follow();
   }
@@ -387,9 +388,14 @@ export class Bodies {
 
   /** Colour bodies by scores, and only those; whether one has another colour now. */
   color(tints: ReadonlyMap<string, number>): boolean {
-    const before = this.list.map((body) => body.tint);
-    for (const body of this.list) body.color(tints.get(body.node.name));
-    return this.list.some((body, k) => body.tint !== before[k]);
+    let other = false;
+    for (let k = 0; k < this.list.length; k += 1) {
+      const body = this.list[k]!;
+      const before = body.tint;
+      body.color(tints.get(body.node.name));
+      if (body.tint !== before) other = true;
+    }
+    return other;
   }
 
   /** Colour the bodies that verdicts are about, and only those. */

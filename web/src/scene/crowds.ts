@@ -29,7 +29,6 @@ const WORTH = 0.7;
 /** A mesh of a body that may be drawn with others. */
 export interface Dressed {
   mesh: Mesh;
-  own: Material | Material[];
   /** As it came, equal for bodies of one shape. */
   given: Material | Material[];
   /** Where it is in its body's frame. */

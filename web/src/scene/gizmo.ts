@@ -32,7 +32,6 @@ export class Gizmo {
     this.controls.setSpace("local");
     this.controls.setSize(0.8);
     stage.world.add(this.handle);
-    stage.scene.add(this.controls.getHelper());
     this.controls.addEventListener("change", () => stage.invalidate());
     this.controls.addEventListener("objectChange", () => this.carry());
     this.controls.addEventListener("dragging-changed", ({ value }) => {
@@ -67,6 +66,8 @@ export class Gizmo {
     const { entry } = this;
     if (!entry || !frameOf(entry, this.bodies, this.frame)) {
       this.controls.detach();
+      // Hidden handles, too, are turned to the eye in each picture.
+      this.controls.getHelper().removeFromParent();
       this.stage.invalidate();
       return;
     }
@@ -75,6 +76,7 @@ export class Gizmo {
     this.handle.quaternion.identity();
     this.handle.updateMatrixWorld();
     this.controls.attach(this.handle);
+    this.stage.scene.add(this.controls.getHelper());
     this.stage.invalidate();
   }
 

@@ -87,17 +87,45 @@ function solid({ own = 0, roughness = 0.7, ...look }: Solid): Material {
   return material;
 }
 
-/** A body's own copy of the material that it came with. */
-export function ownMaterial(given: Material): Material {
+/** Materials of bodies by their look; those with pictures, by the one that they came with. */
+const alike = new Map<string, Material>();
+const pictured = new WeakMap<Material, Map<number, Material>>();
+
+/**
+ * The material of bodies that came with one of this look, shared by all of them: three.js tells the graphics card of a
+ * material once for all that wear it.
+ *
+ * @param glow Light that it gives off, sRGB; 0 for none.
+ */
+export function ownMaterial(given: Material, glow = 0): Material {
+  const look = lookOf(given);
+  const key = `${look} ${glow}`;
+  const known = look === null ? pictured.get(given)?.get(glow) : alike.get(key);
+  if (known) return known;
+  const material = madeOwn(given);
+  if (material instanceof MeshStandardMaterial) {
+    if (glow > 0) material.emissive.setHex(glow);
+  } else if (material.userData.glow instanceof Color) material.userData.glow.setHex(glow);
+  if (look !== null) alike.set(key, material);
+  else pictured.set(given, (pictured.get(given) ?? new Map()).set(glow, material));
+  return material;
+}
+
+function madeOwn(given: Material): Material {
   if (!drawnBySoftware() || !(given instanceof MeshStandardMaterial)) return given.clone();
   const { color, map, side, transparent, opacity, alphaTest, vertexColors } = given;
   return solid({ color, map, side, transparent, opacity, alphaTest, vertexColors });
 }
 
-/** Let a material of one's own give off light, sRGB; 0 for none. */
-export function glow(material: Material, color: number): void {
-  if (material instanceof MeshStandardMaterial) material.emissive.setHex(color);
-  else if (material.userData.glow instanceof Color) material.userData.glow.setHex(color);
+/** What a material without pictures looks like; null for others. */
+function lookOf(given: Material): string | null {
+  if (!(given instanceof MeshStandardMaterial) || given.type !== "MeshStandardMaterial") return null;
+  const { map, normalMap, roughnessMap, metalnessMap, emissiveMap, aoMap, alphaMap } = given;
+  if (map || normalMap || roughnessMap || metalnessMap || emissiveMap || aoMap || alphaMap) return null;
+  const { color, emissive, emissiveIntensity, roughness, metalness, flatShading } = given;
+  const { side, transparent, opacity, alphaTest, vertexColors, depthWrite } = given;
+  const seen = [color.r, color.g, color.b, emissive.getHex(), emissiveIntensity, roughness, metalness];
+  return [...seen, flatShading, side, transparent, opacity, alphaTest, vertexColors, depthWrite].join(" ");
 }
 
 /** `volume` is the far side of a closed surface alone, so that it covers nothing that is inside. */

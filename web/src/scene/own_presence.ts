@@ -9,6 +9,7 @@ const EVERY_MS = 1000 / 30;
 /** What moves less is no news: share of a metre of the visitor. */
 const LEAST = 1e-4;
 const FLOATS = 7;
+const NOTHING = new Uint8Array();
 
 /** What a visit in the room knows of its visitor, in the space of the rig; false for what is not there. */
 export interface Sighted {
@@ -31,6 +32,13 @@ export class OwnPresence {
   private readonly rigTurn = new Quaternion();
   private readonly fromRig = new Matrix4();
   private readonly upright = new Quaternion();
+  private readonly beamBytes = new Uint8Array(this.beam.buffer);
+  private readonly message: Presence = {
+    type: "presence",
+    poses: new Uint8Array(this.poses.buffer),
+    points: NOTHING,
+    laser: NOTHING,
+  };
   private at = Number.NEGATIVE_INFINITY;
   private pointed = false;
 
@@ -73,14 +81,12 @@ export class OwnPresence {
       this.to.applyMatrix4(this.fromRig).toArray(this.beam, 3);
     }
     this.place();
-    // Copies: the worker gets them by message.
-    const bytes = (numbers: Float32Array, n: number) => new Uint8Array(numbers.slice(0, n).buffer);
-    this.send({
-      type: "presence",
-      poses: bytes(poses, poses.length),
-      points: bytes(this.points, 3 * points),
-      laser: bytes(this.beam, points_at ? 6 : 0),
-    });
+    // The worker gets copies, by message.
+    const { message } = this;
+    if (message.points!.byteLength !== 12 * points)
+      message.points = new Uint8Array(this.points.buffer, 0, 12 * points);
+    message.laser = points_at ? this.beamBytes : NOTHING;
+    this.send(message);
   }
 
   private put(row: number, position: Vector3, turn: Quaternion): void {

@@ -60,7 +60,7 @@ export class Board extends Panel {
     return changed;
   }
 
-  protected draw(): void {
+  protected paint(): void {
     const { brush } = this;
     const { width, height } = PIXELS;
     const whole: State = stale.peek() ? "missing" : runState.peek();

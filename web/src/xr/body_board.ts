@@ -62,7 +62,7 @@ export class BodyBoard extends Panel {
     return changed;
   }
 
-  protected draw(): void {
+  protected paint(): void {
     this.write(BodyBoard.headline(), 28, 62, INK, "bold 36px sans-serif", PIXELS.width - 56);
     if (stale.peek()) return;
     for (const [k, view] of VIEWS.entries()) this.figure(view, k);

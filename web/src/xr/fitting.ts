@@ -142,7 +142,7 @@ export class Fitting extends Panel {
     return !same;
   }
 
-  protected draw(): void {
+  protected paint(): void {
     this.lines.forEach((line, k) => {
       const [ink, font] = k === 0 ? [INK, "bold 54px sans-serif"] : [INK, "36px sans-serif"];
       this.write(line, 28, 78 + 66 * k, ink, font, PIXELS.width - 56);

@@ -38,7 +38,7 @@ export abstract class Panel {
     this.brush.clearRect(0, 0, width, height);
     this.brush.fillStyle = "rgba(13, 19, 28, 0.92)";
     this.brush.fillRect(0, 0, width, height);
-    this.draw();
+    this.paint();
     this.texture.needsUpdate = true;
   }
 
@@ -51,7 +51,7 @@ export abstract class Panel {
   /** Whether anything is to be drawn anew; asked once per drawing. */
   protected abstract news(): boolean;
 
-  protected abstract draw(): void;
+  protected abstract paint(): void;
 
   protected write(text: string, x: number, y: number, color: string, font: string, most?: number): void {
     this.brush.font = font;

@@ -27,7 +27,7 @@ export class PlotPanel extends Panel {
     return true; // time goes on
   }
 
-  protected draw(): void {
+  protected paint(): void {
     const name = PlotPanel.shown();
     const unit = rows.peek().find(({ info }) => info.name === name)?.info.unit ?? "";
     this.line(name ? `${name}${unit ? ` [${unit}]` : ""}` : "no criterion", 28, 52, "bold 38px sans-serif");

@@ -26,7 +26,7 @@ export class ReviewPanel extends Panel {
     return changed;
   }
 
-  protected draw(): void {
+  protected paint(): void {
     const now = draft.peek();
     const lines = now?.diff.split("\n").slice(2).filter(Boolean) ?? [];
     const title = lines.length > 0 ? `What changes in ${now?.file}` : "Nothing is changed";

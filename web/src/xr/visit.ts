@@ -265,7 +265,8 @@ export class Visit implements Sighted {
     board.mesh.lookAt(this.at);
     // One above the other, over the board.
     let top = board.mesh.position.y + 0.5 * board.height;
-    for (const panel of this.aside) {
+    for (let k = 0; k < this.aside.length; k += 1) {
+      const panel = this.aside[k]!;
       if (!panel.mesh.visible) continue;
       panel.mesh.position.copy(board.mesh.position).y = top + 0.5 * panel.height + GAP;
       panel.mesh.lookAt(this.at);
@@ -274,7 +275,7 @@ export class Visit implements Sighted {
     this.vignette.update(this.moved && vignette.value === "on", this.elapsed);
     menu.update();
     board.update(time);
-    for (const panel of this.aside) panel.update(time);
+    for (let k = 0; k < this.aside.length; k += 1) this.aside[k]!.update(time);
     if (measuring.peek()) this.ruler.tell();
     this.viewer.stage.invalidate();
   }

@@ -10,10 +10,12 @@ import pytest
 from msgspec import structs
 
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
-from seerob.core.samples import Quality
+from seerob.core.samples import BodyPoint, BodySample, Quality
 from seerob.core.verdict import Verdict
 from seerob.criteria.judging import Judge
 from seerob.criteria.plausible_places import AGAIN, LASTS, PlausiblePlaces, _no_farther
+from seerob.description.humans.manikin import build
+from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.devices.sources.csv import Csv
 from seerob.devices.sources.joint_angles import JointAngleFile
 from seerob.devices.sources.keyframes import Keyframes
@@ -41,6 +43,8 @@ between = ["arm", "op"]
 limit = 0.1
 """
 )
+
+PERSON = build(name="op", stature=1.75, mass=75, sex="male")
 
 LIVE = 'kind = "ros_tcp"\nrobot = "arm"\nhost = "127.0.0.1"'
 
@@ -265,3 +269,26 @@ def test_it_waits_for_whom_a_device_or_a_capture_places(tmp_path, source, waits)
     model = made(tmp_path, CELL, {"arm.urdf": two_r()}).model
     asked = PlausiblePlaces(replace(model, workstation=structs.replace(model.workstation, sources=(source,))))
     assert asked.waits is waits
+
+
+@pytest.mark.parametrize(("seen", "told"), [(("head", "left_hand", "right_hand"), True), (BONES, False)])
+def test_whose_legs_nobody_sees_is_told_to_be_fitted(tmp_path, seen, told):
+    """Feet that nobody sees are where the file's stature has them: `at.position` is not what is wrong."""
+    stage = made(tmp_path, CELL, {"arm.urdf": two_r()})
+    human = stage.model.mechanisms["op"]
+    engine = Engine(stage.model, driven={"op": 1.0}, live={"op"})
+    looked, found = PlausiblePlaces(stage.model), None
+    for k in range(3):
+        q = human.home.copy()
+        q[2] += 1.0
+        places = bone_poses(PERSON, q)[1] + [3.0, 0, 0]
+        points = tuple(
+            BodyPoint(name=bone, bone=bone, position=tuple(places[BONES.index(bone)].tolist()))
+            for bone in seen
+        )
+        engine.take([BodySample(source="mvn", target="op", seq=k, t=0.01 * k, points=points)])
+        state = engine.start() if k == 0 else engine.tick()
+        found = looked.at(state) or found
+    (finding,) = found
+    assert "humans[0].feet" in finding.text
+    assert ("fit the person to the wearer" in finding.text) is told

@@ -61,6 +61,8 @@ declare global {
       inRoom(point: [number, number, number]): [number, number, number] | null;
       /** What the visitor is asked to do so that it is known where the room lies; empty where nothing is asked. */
       readonly asked: string[];
+      /** What the panels in the visitor's room say; empty without a visit. */
+      readonly panels: string[];
     };
   }
 }
@@ -155,6 +157,9 @@ function begin(element: HTMLElement): void {
     },
     button: (label) => visit?.button(label) ?? null,
     inRoom: (point) => visit?.inRoom(point) ?? null,
+    get panels() {
+      return visit?.panels ?? [];
+    },
     get asked() {
       if (visit?.registering?.active) return visit.registering.lines;
       return visit?.fitting?.mesh.visible ? visit.fitting.lines : [];

@@ -128,7 +128,7 @@ async function carry(point, by, high = 0.5) {
 }
 
 const status = (word) =>
-  page.waitForFunction((w) => document.querySelector(".edit-bar [role=status]")?.textContent === w, word, {
+  page.waitForFunction((w) => window.seerob.panels.includes(w), word, {
     polling: 50,
   });
 
@@ -195,7 +195,7 @@ test("a waypoint is taught by carrying the tool, and refused where the arm does 
   assert.ok(Math.hypot(...off) < 1e-3, `${text} is ${off} beside where the tool was let go`);
   await carry(await at("ur10/wrist_3_link"), [4, 0, 0]);
   await page.waitForFunction(
-    () => /cannot be brought/.test(document.querySelector(".editor")?.textContent),
+    () => window.seerob.panels.some((line) => /cannot be brought/.test(line)),
     null,
     {
       polling: 50,
@@ -219,14 +219,10 @@ test("the ruler asks the engine for the least distance of two surfaces", { timeo
   const corner = 0.3 * Math.sin(Math.PI / 6) + 0.4 * Math.cos(Math.PI / 6);
   const x = 0.3 * Math.cos(Math.PI / 6) - 0.4 * Math.sin(Math.PI / 6);
   const least = Math.hypot(1.1 - corner, Math.max(0, Math.abs(x) - 0.1));
-  await page.waitForFunction(
-    () => /\d\sm/.test(document.querySelector(".measure-note strong")?.textContent),
-    null,
-    {
-      polling: 50,
-    },
-  );
-  const said = await page.evaluate(() => document.querySelector(".measure-note strong").textContent);
+  await page.waitForFunction(() => window.seerob.panels.some((line) => /^\d[\d.]*\sm$/.test(line)), null, {
+    polling: 50,
+  });
+  const said = await page.evaluate(() => window.seerob.panels.find((line) => /^\d[\d.]*\sm$/.test(line)));
   assert.ok(Math.abs(Number.parseFloat(said) - least) < 1e-3, `${said} instead of ${least} m`);
   await press("ruler");
   assert.deepEqual([browser.complaints, browser.outside], [[], []]);

@@ -209,9 +209,9 @@ test("touches put the twin where the cell is, and what was undecided is decided"
     const [, right] = window.headset.activeSession.inputSources;
     right.gripSpace[IWER.P_SPACE].emulated = false;
   });
-  const verdict = () => page.evaluate(() => document.querySelector("tr[data-criterion]")?.textContent ?? "");
+  const verdict = () => page.evaluate(() => window.seerob.panels[0] ?? "");
   await page.waitForFunction(
-    () => document.body.textContent.includes("nobody found out where the room of this headset lies"),
+    () => window.seerob.panels.some((line) => line.includes("nobody found out where the room")),
     null,
     { timeout: 240_000 },
   );
@@ -261,7 +261,7 @@ test("touches put the twin where the cell is, and what was undecided is decided"
   }
   assert.equal(await page.evaluate(() => window.seerob.occludes("table")), true);
   await page.waitForFunction(
-    () => !document.body.textContent.includes("nobody found out where the room of this headset lies"),
+    () => !window.seerob.panels.some((line) => line.includes("nobody found out where the room")),
     null,
     { timeout: 240_000 },
   );

@@ -141,13 +141,11 @@ const at = (name) => page.evaluate((n) => window.seerob.pose(n)?.position ?? nul
 const trigger = (value) =>
   page.evaluate((v) => window.headset.controllers.right.updateButtonValue("trigger", v), value);
 const events = () =>
-  page.evaluate(() => [...document.querySelectorAll(".events li")].map((line) => line.textContent));
+  page.evaluate(() => window.seerob.panels.filter((line) => /^\d+\.\d\d s {2}/.test(line)));
 const happened = (what) =>
-  page.waitForFunction(
-    (text) => [...document.querySelectorAll(".events li")].some((line) => line.textContent.includes(text)),
-    what,
-    { polling: 50 },
-  );
+  page.waitForFunction((text) => window.seerob.panels.some((line) => line.includes(text)), what, {
+    polling: 50,
+  });
 
 /** The right hand at a point of the world (y up); a palm's length short of what it is to take. */
 async function reach(point, short = 0.1) {

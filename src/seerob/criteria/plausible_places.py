@@ -12,14 +12,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from msgspec import structs
+
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
 from seerob.model.mounting.in_place import BELOW, FEET, placed
 from seerob.twin.state import State
+from seerob.twin.validity.hearing import Hearing
 from seerob.workstation.plausibility.ranges import Quantity, canonical, findings, scaled
 
+LEGS = frozenset(f"{side}_{bone}" for side in ("left", "right") for bone in ("thigh", "shank", "foot"))
 AGAIN = 1.0
 """Period at which what is implausible, and where feet are, is asked again [s] of run time."""
 LASTS = 3.0
@@ -50,6 +54,8 @@ class PlausiblePlaces:
         self._plausible: set[str] = set()
         self._off: dict[str, float] = {}
         """Whose feet left what they stood on, and when [s] of run time."""
+        self._hearings: Mapping[str, Hearing] = {}
+        """As they were last."""
         self._found: tuple[Finding, ...] = ()
         self._due = 0.0
 
@@ -69,6 +75,7 @@ class PlausiblePlaces:
         for name in new:
             self._waiting.discard(name)
             self._where[name] = state.joint_positions(self._model.mechanisms[name])
+        self._hearings = state.hearings
         before, self._due = self._found, state.t + AGAIN
         self._found = tuple(self._implausible(self._now(state), state.t, feet=not new and not self._found))
         return None if self._found == before else self._found
@@ -96,12 +103,27 @@ class PlausiblePlaces:
             if again and quantity.kind not in (FEET, BELOW):
                 continue
             implausible = [f for f in findings([quantity], ()) if f.holds]
+            if unfitted := self._unfitted(quantity, t):
+                implausible = [structs.replace(f, text=f.text + unfitted) for f in implausible]
             if not implausible or self._confirmed(quantity):
                 self._plausible.add(key)
                 self._off.pop(key, None)
             elif not again or t - self._off.setdefault(key, t) >= LASTS:
                 found += implausible
         return found
+
+    def _unfitted(self, quantity: Quantity, t: float) -> str:
+        """What to do about feet that no device sees: they are where a body of the file's stature has them."""
+        (name,) = quantity.about[:1]
+        hearing = self._hearings.get(name)
+        if quantity.kind not in (FEET, BELOW) or hearing is None:
+            return ""
+        if not set(hearing.unobserved(t)) >= LEGS:
+            return ""
+        return (
+            f"; no device sees the legs of {name}, which are as long as the stature in the file says: fit "
+            "the person to the wearer (calibration; in a headset 'fit me' at the wrist) or give their stature"
+        )
 
     def _confirmed(self, quantity: Quantity) -> bool:
         return any(

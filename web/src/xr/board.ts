@@ -3,15 +3,20 @@
 import { computed, effect } from "@preact/signals";
 import { asking, draft, mayEdit, refused } from "../editing/draft";
 import { against, withUnit } from "../figures";
+import { shortened } from "../format";
 import { runState, stale } from "../page_state";
 import { orderedRows } from "../row_order";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
+import { language, said, told, word } from "../words";
 import { INK, Panel } from "./panel";
 
 /** Letters of a criterion are 11 mm high, to be read at arm's length. */
 const PIXELS = { width: 1080, height: 720 };
 const ROW_PX = 54;
 const MARGIN_PX = 28;
+/** Characters of the reason why a criterion without a figure is undecided, and how wide they are at most. */
+const REASON = 60;
+const REASON_PX = 560;
 const COLORS: Record<State, string> = {
   exceeded: "#ff8fa6",
   undecided: "#fbe36a",
@@ -22,12 +27,12 @@ const COLORS: Record<State, string> = {
 };
 
 /** What became of the workstation file that is edited; empty where this page may not. */
-const edits = computed(() => {
+export const edits = computed(() => {
   if (!mayEdit.value) return "";
   const wrong = refused.value?.mistakes[0];
-  if (wrong) return [wrong.key, wrong.what, wrong.remedy].filter(Boolean).join(": ");
-  if (asking.value) return "checking …";
-  return draft.value?.diff ? "not saved" : "saved";
+  if (wrong) return [wrong.key, told(wrong.what), told(wrong.remedy)].filter(Boolean).join(": ");
+  if (asking.value) return said("checking …");
+  return said(draft.value?.diff ? word("not saved") : word("saved"));
 });
 
 export class Board extends Panel {
@@ -37,7 +42,7 @@ export class Board extends Panel {
   constructor() {
     super(PIXELS);
     this.forget = effect(() => {
-      void [orderedRows.value, runState.value, stale.value, edits.value];
+      void [orderedRows.value, runState.value, stale.value, edits.value, language.value];
       this.changed = true;
     });
   }
@@ -50,7 +55,12 @@ export class Board extends Panel {
           ? against(result.value, result.limit, result.unit, result.at_most)
           : null;
       const limit = shown && result?.limit !== null ? ` / ${shown.limit}` : "";
-      return { state, text: info.name, figure: shown ? withUnit(`${shown.value}${limit}`, info.unit) : "" };
+      const why = result && state === "undecided" ? shortened(told(result.reason), REASON) : "";
+      return {
+        state,
+        text: info.name,
+        figure: shown ? withUnit(`${shown.value}${limit}`, info.unit) : why,
+      };
     });
   }
 
@@ -64,7 +74,9 @@ export class Board extends Panel {
     const { brush } = this;
     const { width, height } = PIXELS;
     const whole: State = stale.peek() ? "missing" : runState.peek();
-    const headline = stale.peek() ? "NO CURRENT DATA" : `${STATE_ICONS[whole]} run: ${STATE_WORDS[whole]}`;
+    const headline = stale.peek()
+      ? said("NO CURRENT DATA")
+      : `${STATE_ICONS[whole]} ${said("run: {state}", { state: said(STATE_WORDS[whole]) })}`;
     this.write(headline, MARGIN_PX, 62, COLORS[whole], "bold 46px sans-serif");
     const room = Math.floor((height - 110) / ROW_PX);
     const lines = stale.peek() ? [] : Board.lines();
@@ -72,12 +84,12 @@ export class Board extends Panel {
       const y = 130 + i * ROW_PX;
       this.write(STATE_ICONS[state], MARGIN_PX, y, COLORS[state], "bold 38px sans-serif");
       brush.textAlign = "right";
-      this.write(figure, width - MARGIN_PX, y, COLORS[state], "36px sans-serif");
-      const left = width - 3 * MARGIN_PX - 60 - brush.measureText(figure).width;
+      this.write(figure, width - MARGIN_PX, y, COLORS[state], "36px sans-serif", REASON_PX);
+      const left = width - 3 * MARGIN_PX - 60 - Math.min(brush.measureText(figure).width, REASON_PX);
       brush.textAlign = "left";
       this.write(text, MARGIN_PX + 52, y, INK, "36px sans-serif", left);
     });
-    const more = lines.length > room ? `and ${lines.length - room} more` : "";
+    const more = lines.length > room ? said("and {n} more", { n: lines.length - room }) : "";
     const below = [more, edits.peek()].filter(Boolean).join(" · ");
     this.write(below, MARGIN_PX, height - 14, "#aab6c6", "28px sans-serif", width - 2 * MARGIN_PX);
   }

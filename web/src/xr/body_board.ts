@@ -6,6 +6,7 @@ import { HEIGHT, outlines, sideAtRight, type View, WIDTH } from "../body_map/fig
 import { aspect, contacts, only } from "../body_map/shown";
 import { percent } from "../figures";
 import { frame, stale } from "../page_state";
+import { language, said, told, word } from "../words";
 import { INK, Panel } from "./panel";
 
 const PIXELS = { width: 1080, height: 1180 };
@@ -37,7 +38,7 @@ export class BodyBoard extends Panel {
     super(PIXELS);
     this.forget = effect(() => {
       // What they come to is computed when it is drawn.
-      void [frame.value, aspect.value, only.value, stale.value];
+      void [frame.value, aspect.value, only.value, stale.value, language.value];
       this.changed = true;
     });
   }
@@ -45,15 +46,16 @@ export class BodyBoard extends Panel {
   /** What stands above the figures. */
   static headline(): string {
     const { judged, governing, open } = contacts.peek();
-    if (stale.peek()) return "NO CURRENT DATA";
-    if (!judged) return "no criterion judges contacts";
-    if (open !== null && !governing) return `UNDECIDED: ${open}`;
-    if (!governing) return "nothing that moves is within reach";
+    if (stale.peek()) return said("NO CURRENT DATA");
+    if (!judged) return said("no criterion judges contacts");
+    if (open !== null && !governing) return `${said("UNDECIDED")}: ${told(open)}`;
+    if (!governing) return said("nothing that moves is within reach");
     const { row } = governing;
     const share = shareOf(row, aspect.peek());
-    const amount = share === null ? "" : `, ${percent(share, "up")} of the permissible speed`;
-    const side = row.side ? `${row.side} ` : "";
-    return `${side}${row.name}: ${LOOK_WORDS[lookAt(governing, aspect.peek(), open !== null)]}${amount}`;
+    const amount =
+      share === null ? "" : `, ${said("{share} of the permissible speed", { share: percent(share, "up") })}`;
+    const side = row.side ? `${told(row.side)} ` : "";
+    return `${side}${told(row.name)}: ${said(LOOK_WORDS[lookAt(governing, aspect.peek(), open !== null)])}${amount}`;
   }
 
   protected news(): boolean {
@@ -103,8 +105,14 @@ export class BodyBoard extends Panel {
       if (sign) this.write(sign, spot.x, spot.y, "#ffffff", "bold 8px sans-serif");
     }
     const right = sideAtRight(view);
-    this.write(right === "left" ? "right" : "left", 24, HEIGHT - 8, "#aab6c6", "11px sans-serif");
-    this.write(right, WIDTH - 24, HEIGHT - 8, "#aab6c6", "11px sans-serif");
+    this.write(
+      said(right === "left" ? word("right") : word("left")),
+      24,
+      HEIGHT - 8,
+      "#aab6c6",
+      "11px sans-serif",
+    );
+    this.write(said(right), WIDTH - 24, HEIGHT - 8, "#aab6c6", "11px sans-serif");
     brush.restore();
   }
 }

@@ -5,6 +5,7 @@ import { effect } from "@preact/signals";
 import { Matrix4 } from "three";
 import { ask, draft, mayEdit } from "../editing/draft";
 import { tracked } from "../page_state";
+import { said, told, word } from "../words";
 import { INK, Panel } from "./panel";
 
 const PIXELS = { width: 1080, height: 420 };
@@ -22,10 +23,13 @@ const MOST_OFF = 0.3;
 type Step = "floor" | "ready" | "stand" | "waits" | "done";
 
 const WORDS: Record<Step, readonly string[]> = {
-  floor: ["Where is your floor?", "Lay a controller on it, and pull the trigger of the other one."],
-  ready: ["Stand upright, look ahead", "Arms to the sides, palms down."],
-  stand: ["Stand still", ""],
-  waits: ["Looking at it…", ""],
+  floor: [
+    word("Where is your floor?"),
+    word("Lay a controller on it, and pull the trigger of the other one."),
+  ],
+  ready: [word("Stand upright, look ahead"), word("Arms to the sides, palms down.")],
+  stand: [word("Stand still"), ""],
+  waits: [word("Looking at it…"), ""],
   done: ["", ""],
 };
 
@@ -75,17 +79,20 @@ export class Fitting extends Panel {
     const answer = tracked.peek();
     if (this.step === "ready") {
       const left = Math.ceil((READY_MS - (this.now - this.since)) / 1000);
-      return [...WORDS.ready, `${Math.max(left, 1)}`];
+      return [...WORDS.ready.map((each) => said(each)), `${Math.max(left, 1)}`];
     }
-    if (this.step !== "done") return [...WORDS[this.step]];
+    if (this.step !== "done") return WORDS[this.step].map((each) => said(each));
     if (answer?.fits == null) return [];
-    const title = answer.fits ? "It fits" : "It does not fit: again";
+    const title = said(answer.fits ? word("It fits") : word("It does not fit: again"));
     const taller =
       answer.taller == null
         ? ""
-        : `You are ${(100 * answer.taller).toFixed(0)} % as tall as ${this.human} of the file.`;
-    const save = this.stature() === null ? "" : "“my stature” at the wrist puts yours into the file.";
-    return [title, ...cut(answer.found), taller, save].filter(Boolean);
+        : said("You are {share} % as tall as {name} of the file.", {
+            share: (100 * answer.taller).toFixed(0),
+            name: this.human,
+          });
+    const save = this.stature() === null ? "" : said("“my stature” at the wrist puts yours into the file.");
+    return [title, ...cut(told(answer.found)), taller, save].filter(Boolean);
   }
 
   /** The visitor's stature [m], where that can be put into the file and is not there; else null. */

@@ -24,6 +24,7 @@ import { hitAlong, nodeOf } from "../scene/picking";
 import type { Stage } from "../scene/stage";
 import type { Viewer } from "../scene/viewer";
 import { type Measuring, measuring, withFace } from "../view/measure";
+import { said } from "../words";
 
 /** Letters of the ruler are 16 mm high. */
 const TEXT = { width: 0.22, height: 0.05, pixels: 512 };
@@ -69,7 +70,10 @@ export class Ruler {
     this.line.geometry.setFromPoints([a, b]);
     this.line.visible = true;
     this.words.position.copy(a).lerp(b, 0.5);
-    const far = this.points.length === 2 ? `${(1000 * a.distanceTo(b)).toFixed(0)} mm as drawn` : "to …";
+    const far =
+      this.points.length === 2
+        ? said("{far} mm as drawn", { far: (1000 * a.distanceTo(b)).toFixed(0) })
+        : said("to …");
     this.write(far);
     return true;
   }
@@ -97,10 +101,10 @@ export class Ruler {
     const [a, b] = now?.picks ?? [];
     if (!now || !a) return;
     const value = now.result?.value;
-    if (!b) this.write("to …");
+    if (!b) this.write(said("to …"));
     else if (now.refusal !== "" || (now.result && value == null))
       this.write(now.refusal || now.result!.reason);
-    else this.write(value == null ? "measuring …" : distance(value));
+    else this.write(value == null ? said("measuring …") : distance(value));
   }
 
   private write(text: string): void {

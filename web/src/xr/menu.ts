@@ -5,6 +5,8 @@ import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, type Raycaster, 
 /** Size of a button in the room [m]: no smaller than a finger hits. */
 const BUTTON = { width: 0.066, height: 0.046 };
 const COLUMNS = 4;
+/** Least time between two looks at what stands on buttons [ms]. */
+const EVERY_MS = 100;
 /** Pixels per metre: letters are 9 mm high, to be read at arm's length. */
 const SHARP = 2600;
 
@@ -24,6 +26,7 @@ export class Menu {
   /** What is drawn of each button: its words, whether it is on, whether it is pointed at. */
   private readonly labels: string[] = [];
   private readonly lit: boolean[] = [];
+  private lookedAt = Number.NEGATIVE_INFINITY;
   private drawn = -1;
   private pointed = -1;
 
@@ -62,7 +65,10 @@ export class Menu {
   }
 
   /** Draw what has changed. */
-  update(): void {
+  update(time: number): void {
+    // What stands on buttons changes seldom; where one points, at any time.
+    if (this.pointed === this.drawn && Math.abs(time - this.lookedAt) < EVERY_MS) return;
+    this.lookedAt = time;
     if (!this.news()) return;
     const { brush } = this;
     const [w, h] = [BUTTON.width * SHARP, BUTTON.height * SHARP];

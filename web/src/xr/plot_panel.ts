@@ -3,6 +3,7 @@
 import { now, rows, selection, soFar, traces } from "../page_state";
 import { eventLine } from "../panels/event_line";
 import { orderedRows } from "../row_order";
+import { said } from "../words";
 import { INK, Panel } from "./panel";
 
 const PIXELS = { width: 1080, height: 640 };
@@ -30,7 +31,12 @@ export class PlotPanel extends Panel {
   protected paint(): void {
     const name = PlotPanel.shown();
     const unit = rows.peek().find(({ info }) => info.name === name)?.info.unit ?? "";
-    this.line(name ? `${name}${unit ? ` [${unit}]` : ""}` : "no criterion", 28, 52, "bold 38px sans-serif");
+    this.line(
+      name ? `${name}${unit ? ` [${unit}]` : ""}` : said("no criterion"),
+      28,
+      52,
+      "bold 38px sans-serif",
+    );
     const trace = name === null ? undefined : traces.get(name);
     const end = now.peek();
     if (trace && Number.isFinite(end)) this.curve(trace, end);

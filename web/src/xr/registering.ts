@@ -16,6 +16,7 @@ import {
 import { registered, scene } from "../page_state";
 import type { Viewer } from "../scene/viewer";
 import type { Register, Registered } from "../wire";
+import { said, told, word } from "../words";
 import { cornersIn, type Look, look, mayLook } from "./camera_look";
 
 /** Size in the room [m] and on the canvas [px]. */
@@ -123,46 +124,54 @@ export class Registering {
     const name = this.landmark?.name ?? "";
     const words: Record<Step, string[]> = {
       sweep: [
-        "Where is the tip of your controller?",
-        "Put it on a fixed point, hold the trigger,",
-        "turn the controller about it for 3 s. Stick up or down: other ways.",
+        said("Where is the tip of your controller?"),
+        said("Put it on a fixed point, hold the trigger,"),
+        said("turn the controller about it for 3 s. Stick up or down: other ways."),
       ],
       strapped: [
-        `Strap it to what carries ${name}`,
-        "In several poses of the robot, standing: trigger of the other one.",
-        "Squeeze begins anew, stick up or down: other ways, A ends.",
+        said("Strap it to what carries {name}", { name }),
+        said("In several poses of the robot, standing: trigger of the other one."),
+        said("Squeeze begins anew, stick up or down: other ways, A ends."),
       ],
       known: [
-        `Lay it at ${name}, upright, along its x`,
-        "Pull the trigger of the other one.",
-        "Stick aside: another landmark, up or down: other ways, A ends.",
+        said("Lay it at {name}, upright, along its x", { name }),
+        said("Pull the trigger of the other one."),
+        said("Stick aside: another landmark, up or down: other ways, A ends."),
       ],
       seen: mayLook(this.session)
         ? [
-            `Look at the board at ${name}`,
-            "Hold still: trigger or tap, from three places or more.",
-            "Squeeze takes the last one back, A or a long press ends, stick: other ways.",
+            said("Look at the board at {name}", { name }),
+            said("Hold still: trigger or tap, from three places or more."),
+            said("Squeeze takes the last one back, A or a long press ends, stick: other ways."),
           ]
         : [
-            "No picture of this device’s camera",
-            "Its browser hands none over (WebXR: camera-access).",
-            "Stick up or down: other ways.",
+            said("No picture of this device’s camera"),
+            said("Its browser hands none over (WebXR: camera-access)."),
+            said("Stick up or down: other ways."),
           ],
       touch: [
-        `Touch ${name} with the tip`,
-        "Hold still and pull the trigger. Squeeze takes the last one back,",
-        "the stick chooses another landmark, A ends.",
+        said("Touch {name} with the tip", { name }),
+        said("Hold still and pull the trigger. Squeeze takes the last one back,"),
+        said("the stick chooses another landmark, A ends."),
       ],
-      check: [`Touch ${name} with the tip`, "It checks what was kept from another session.", ""],
-      align: ["Does it fit?", "Sticks move the twin by 1 mm and 0.1°; A ends.", ""],
+      check: [
+        said("Touch {name} with the tip", { name }),
+        said("It checks what was kept from another session."),
+        "",
+      ],
+      align: [said("Does it fit?"), said("Sticks move the twin by 1 mm and 0.1°; A ends."), ""],
       done: ["", "", ""],
     };
     const lines = [...words[this.step]];
     if (known?.error != null)
-      lines.push(`off by ${(1e3 * known.error).toFixed(1)} mm at ${known.tool} (95 %)`);
+      lines.push(
+        said("off by {off} mm at {tool} (95 %)", { off: (1e3 * known.error).toFixed(1), tool: known.tool }),
+      );
     if (known && known.landmarks.length > 0)
-      lines.push(`${known.landmarks.length} ${this.step === "seen" ? "looks" : "touched"}`);
-    lines.push(this.said || known?.doubt || "");
+      lines.push(
+        said(this.step === "seen" ? word("{n} looks") : word("{n} touched"), { n: known.landmarks.length }),
+      );
+    lines.push(told(this.said || known?.doubt || ""));
     return lines;
   }
 
@@ -222,13 +231,13 @@ export class Registering {
     if (!this.active || this.waits || this.step === "align") return;
     this.pressedAt = this.now;
     if (this.step === "seen") this.looks = mayLook(this.session);
-    else if (inputSource.hand) this.said = "take a controller: a finger is not good enough";
+    else if (inputSource.hand) this.said = word("take a controller: a finger is not good enough");
     else if (this.step === "strapped" || this.step === "known") {
       // Whoever pulled its own trigger would move it.
       this.hand = this.other(inputSource.handedness);
       this.pressed = { hand: this.hand, since: this.now, poses: [] };
     } else if (this.step !== "sweep" && inputSource.handedness !== this.hand)
-      this.said = "use the controller that you turned about its tip";
+      this.said = word("use the controller that you turned about its tip");
     else {
       this.hand = inputSource.handedness;
       this.pressed = { hand: this.hand, since: this.now, poses: [] };
@@ -249,7 +258,7 @@ export class Registering {
     const { landmark } = this;
     if (seen && landmark) void this.tellLook(seen, landmark.name, landmark.board);
     else {
-      this.said = "this device hands over no picture of its camera";
+      this.said = word("this device hands over no picture of its camera");
       this.write();
     }
   }
@@ -257,7 +266,7 @@ export class Registering {
   private async tellLook(seen: Look, landmark: string, board: string): Promise<void> {
     const pose = new Float32Array(this.inRoom(seen.pose));
     this.waits = true;
-    this.said = "looking …";
+    this.said = word("looking …");
     this.write();
     const corners = await cornersIn(seen, board);
     this.waits = false;
@@ -346,7 +355,7 @@ export class Registering {
     const { poses } = this.pressed!;
     this.pressed = null;
     if (poses.length === 0) {
-      this.said = "the controller was not seen: turn to it, and try again";
+      this.said = word("the controller was not seen: turn to it, and try again");
       this.write();
       return;
     }

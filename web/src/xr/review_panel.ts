@@ -2,6 +2,7 @@
 
 import { effect } from "@preact/signals";
 import { draft } from "../editing/draft";
+import { language, said } from "../words";
 import { INK, Panel } from "./panel";
 
 const PIXELS = { width: 1080, height: 720 };
@@ -15,7 +16,7 @@ export class ReviewPanel extends Panel {
   constructor() {
     super(PIXELS);
     this.forget = effect(() => {
-      void draft.value;
+      void [draft.value, language.value];
       this.changed = true;
     });
   }
@@ -29,7 +30,10 @@ export class ReviewPanel extends Panel {
   protected paint(): void {
     const now = draft.peek();
     const lines = now?.diff.split("\n").slice(2).filter(Boolean) ?? [];
-    const title = lines.length > 0 ? `What changes in ${now?.file}` : "Nothing is changed";
+    const title =
+      lines.length > 0
+        ? said("What changes in {file}", { file: now?.file ?? "" })
+        : said("Nothing is changed");
     this.write(title, 28, 52, INK, "bold 38px sans-serif");
     const room = Math.floor((PIXELS.height - 110) / ROW_PX);
     // The newest end of a long one; the desk scrolls.
@@ -39,7 +43,13 @@ export class ReviewPanel extends Panel {
       this.write(line, 28, 100 + k * ROW_PX, ink, "26px monospace", PIXELS.width - 56);
     });
     if (shown.length < lines.length)
-      this.write(`${lines.length - shown.length} lines before`, 740, 52, "#fbe36a", "28px sans-serif");
+      this.write(
+        said("{n} lines before", { n: lines.length - shown.length }),
+        740,
+        52,
+        "#fbe36a",
+        "28px sans-serif",
+      );
   }
 
   override dispose(): void {

@@ -19,7 +19,18 @@ import {
 import { ownScale } from "../company";
 import { ask, draft, mayEdit } from "../editing/draft";
 import { gizmoMode } from "../editing/handles";
-import { hidden, isLive, lookingAt, overReality, registered, rows, scene, transport } from "../page_state";
+import {
+  hidden,
+  isLive,
+  lookingAt,
+  overReality,
+  registered,
+  rows,
+  scene,
+  soFar,
+  transport,
+} from "../page_state";
+import { eventLine } from "../panels/event_line";
 import { ALONE_LAYER } from "../scene/crowds";
 import type { Sighted } from "../scene/own_presence";
 import { nodeAlong } from "../scene/picking";
@@ -27,7 +38,8 @@ import type { Viewer } from "../scene/viewer";
 import type { TimeControl } from "../time_control";
 import { mayMeasure, measuring, toggleMeasure } from "../view/measure";
 import type { Register, Tracking } from "../wire";
-import { Board } from "./board";
+import { said, word } from "../words";
+import { Board, edits } from "./board";
 import { BodyBoard } from "./body_board";
 import { isOn, leftHanded, seated, smooth, sound, tone, turnOver, vignette } from "./comfort";
 import { Designing } from "./designing";
@@ -273,7 +285,7 @@ export class Visit implements Sighted {
       top += panel.height + GAP;
     }
     this.vignette.update(this.moved && vignette.value === "on", this.elapsed);
-    menu.update();
+    menu.update(time);
     board.update(time);
     for (let k = 0; k < this.aside.length; k += 1) this.aside[k]!.update(time);
     if (measuring.peek()) this.ruler.tell();
@@ -427,25 +439,25 @@ export class Visit implements Sighted {
   private items(): Item[] {
     const { time, ruler, ghost, section } = this;
     const choice = (words: string, of: typeof smooth): Item => ({
-      label: () => words,
+      label: () => said(words),
       on: () => isOn(of),
       press: () => turnOver(of),
     });
     return [
       { label: () => "− 1 s", press: () => time.seekBy(-1) },
-      { label: () => (isPlaying() ? "hold" : "play"), press: () => time.toggle() },
+      { label: () => said(isPlaying() ? word("hold") : word("play")), press: () => time.toggle() },
       { label: () => "+ 1 s", press: () => time.seekBy(1) },
       {
-        label: () => (isLive.peek() ? "now" : "begin"),
+        label: () => said(isLive.peek() ? word("now") : word("begin")),
         press: () => (isLive.peek() ? time.follow() : time.begin()),
       },
-      { label: () => "last limit", press: () => time.violation(false) },
-      { label: () => "next limit", press: () => time.violation(true) },
-      { label: () => "ghost", on: () => ghost.on, press: () => ghost.turnOver() },
-      showing("plot", this.plot),
-      showing("body map", this.bodyMap),
+      { label: () => said("last limit"), press: () => time.violation(false) },
+      { label: () => said("next limit"), press: () => time.violation(true) },
+      { label: () => said("ghost"), on: () => ghost.on, press: () => ghost.turnOver() },
+      showing(word("plot"), this.plot),
+      showing(word("body map"), this.bodyMap),
       {
-        label: () => "ruler",
+        label: () => said("ruler"),
         on: () => this.measures,
         press: () => {
           this.measures = !this.measures;
@@ -456,7 +468,7 @@ export class Visit implements Sighted {
         },
       },
       {
-        label: () => "section",
+        label: () => said("section"),
         on: () => section.on,
         press: () => {
           // Across the way one looks, half a metre ahead.
@@ -466,19 +478,19 @@ export class Visit implements Sighted {
         },
       },
       {
-        label: () => "laser",
+        label: () => said("laser"),
         on: () => this.shines,
         press: () => {
           this.shines = !this.shines;
         },
       },
       ...this.fits(),
-      choice("sound", sound),
-      choice("smooth", smooth),
-      choice("vignette", vignette),
-      choice("seated", seated),
-      choice("left hand", leftHanded),
-      { label: () => "leave", press: () => void this.session.end() },
+      choice(word("sound"), sound),
+      choice(word("smooth"), smooth),
+      choice(word("vignette"), vignette),
+      choice(word("seated"), seated),
+      choice(word("left hand"), leftHanded),
+      { label: () => said("leave"), press: () => void this.session.end() },
     ];
   }
 
@@ -488,12 +500,12 @@ export class Visit implements Sighted {
     if (!fitting) return [];
     return [
       {
-        label: () => "fit me",
+        label: () => said("fit me"),
         on: () => fitting.active,
         press: () => fitting.begin(),
       },
       {
-        label: () => (fitting.stature() === null ? "hide" : "my stature"),
+        label: () => said(fitting.stature() === null ? word("hide") : word("my stature")),
         press: () => {
           fitting.keepStature();
           fitting.mesh.visible = false;
@@ -507,7 +519,7 @@ export class Visit implements Sighted {
     const { designing, review } = this;
     return [
       {
-        label: () => "design",
+        label: () => said("design"),
         on: () => designing.on,
         press: () => {
           designing.on = !designing.on;
@@ -515,36 +527,44 @@ export class Visit implements Sighted {
         },
       },
       {
-        label: () => "turn",
+        label: () => said("turn"),
         on: () => gizmoMode.value === "turn",
         press: () => {
           gizmoMode.value = gizmoMode.peek() === "turn" ? "move" : "turn";
         },
       },
       {
-        label: () => "teach",
+        label: () => said("teach"),
         on: () => designing.teaches,
         press: () => {
           designing.teaches = !designing.teaches;
           designing.on ||= designing.teaches;
         },
       },
-      { label: () => "undo", press: () => void ask("undo") },
-      { label: () => "redo", press: () => void ask("redo") },
-      showing("review", review),
+      { label: () => said("undo"), press: () => void ask("undo") },
+      { label: () => said("redo"), press: () => void ask("redo") },
+      showing(word("review"), review),
       {
         // Nobody saves what they have not seen.
-        label: () => (review.mesh.visible ? "save" : "review, then save"),
+        label: () => said(review.mesh.visible ? word("save") : word("review, then save")),
         press: () => {
           if (review.mesh.visible) void ask("save");
           else review.mesh.visible = true;
         },
       },
       {
-        label: () => (draft.value?.runs ? "stop" : "run"),
+        label: () => said(draft.value?.runs ? word("stop") : word("run")),
         press: () => void ask(draft.peek()?.runs ? "stop" : "run"),
       },
     ];
+  }
+
+  /** What its panels tell of: why criteria are as they are, the file, the ruler, and all that happened. */
+  get panels(): string[] {
+    const lines = rows.peek().map(({ info, result }) => `${info.name}: ${result?.reason ?? ""}`);
+    const file = said(draft.peek()?.diff ? word("not saved") : word("saved"));
+    const events = soFar.peek()?.events ?? [];
+    return [...lines, edits.peek(), file, this.ruler.text, ...events.map(eventLine)];
   }
 
   /** Where the middle of a button of the menu is in the world; null where there is none. */
@@ -713,7 +733,7 @@ export class Visit implements Sighted {
 
 function showing(words: string, { mesh }: Panel): Item {
   return {
-    label: () => words,
+    label: () => said(words),
     on: () => mesh.visible,
     press: () => {
       mesh.visible = !mesh.visible;

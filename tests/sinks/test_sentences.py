@@ -2,9 +2,13 @@
 
 from types import SimpleNamespace
 
-from seerob.core.snapshot import Finding
+import numpy as np
+
+from seerob.core.snapshot import Finding, Verdict
 from seerob.outputs.report.page import _unasked
-from seerob.outputs.sentences import listed, shortened
+from seerob.outputs.sentences import _reasons, listed, shortened
+from seerob.outputs.words import speaking
+from seerob.recording.series import CODES
 
 
 def test_a_text_that_is_too_long_keeps_its_begin_and_its_end_where_the_figure_is():
@@ -30,3 +34,11 @@ def test_the_opening_names_whom_no_criterion_asks_about():
     (said,) = _unasked(SimpleNamespace(scene=SimpleNamespace(findings=(asked, other))))
     assert "nothing of second" in said
     assert _unasked(SimpleNamespace(scene=SimpleNamespace(findings=(asked,)))) == []
+
+
+def test_reasons_for_doubt_are_told_in_the_language_of_the_report():
+    codes = np.array([CODES[Verdict.UNDECIDED]] * 2)
+    series = SimpleNamespace(verdicts=codes, reasons=["no part moves", "no part moves"])
+    with speaking("de"):
+        assert _reasons(series) == "Grund: kein Teil bewegt sich."
+    assert _reasons(series) == "Reason: no part moves."

@@ -225,8 +225,9 @@ def about(series: Series) -> list[str]:
             )
         )  # fmt: skip
     if series.asked:
-        said.append(f"{series.asked[0].upper()}{series.asked[1:]}.")
-    if gap := series.gap():
+        asked = told(series.asked)
+        said.append(f"{asked[0].upper()}{asked[1:]}.")
+    if gap := told(series.gap()):
         said.append(f"{gap[0].upper()}{gap[1:]}.")
     if part := covered(series):
         said.append(f"{part[0].upper()}{part[1:]}.")
@@ -292,7 +293,8 @@ def _reasons(series: Series) -> str:
                 reason or spoken_as("no reason given")
             )
     most = sorted(seen.values(), key=len, reverse=True)
-    texts = [alike[0] + (" and alike" if len(set(alike)) > 1 else "") for alike in most[:3]]
-    more = f"; and {len(most) - 3} more" if len(most) > 3 else ""
+    alike = spoken_as(" and alike")
+    texts = [told(one[0]) + (alike if len(set(one)) > 1 else "") for one in most[:3]]
+    more = spoken_as("; and {n} more", n=len(most) - 3) if len(most) > 3 else ""
     head = spoken_as("Reason") if len(most) == 1 else spoken_as("Reasons")
     return f"{head}: {'; '.join(texts)}{more}."

@@ -168,7 +168,14 @@ def bone_errors(people: Mapping[str, BoneErrors]) -> Html | None:
     return joined([tag("h4", said("Tracking of bones")), table(head, rows), tag("p", text, class_="lead")])
 
 
-HEAD = ("link or thing", "mass", "mass is", "moves", "moves as one with", "from, or why")
+HEAD = (
+    word("link or thing"),
+    word("mass"),
+    word("mass is"),
+    word("moves"),
+    word("moves as one with"),
+    word("from, or why"),
+)
 
 
 def total(rows: Sequence[LinkMass]) -> str:
@@ -178,21 +185,24 @@ def total(rows: Sequence[LinkMass]) -> str:
     moving = sum(row.mass or 0.0 for row in known if row.moves)
     unknown = [row.name for row in rows if row.mass is None]
     if unknown and not whole_of_it:
-        return "unknown"
-    text = f"{number(whole_of_it, 'kg')}, of which {number(moving, 'kg')} move"
-    return f"at least {text}; unknown: {', '.join(unknown)}" if unknown else text
+        return said("unknown")
+    both = {"all": number(whole_of_it, "kg"), "moving": number(moving, "kg")}
+    if not unknown:
+        return said("{all}, of which {moving} move", **both)
+    return said("at least {all}, of which {moving} move; unknown: {names}", **both, names=", ".join(unknown))
 
 
 def cells(row: LinkMass) -> list[str]:
     """One row of the table, in the order of `HEAD`."""
     mass = "unknown" if row.mass is None else number(row.mass, "kg")
     why = "; ".join(filter(None, (row.note, row.source)))
-    return [row.name, mass, WHO[row.origin], "yes" if row.moves else "no", row.merged or "–", why or "–"]
+    moves = word("yes") if row.moves else word("no")
+    return [row.name, mass, WHO[row.origin], moves, row.merged or "–", why or "–"]
 
 
 def _shown(row: LinkMass) -> list[str | Html]:
-    name, mass, *rest = cells(row)
-    return [name, whole(mass), *rest]
+    name, mass, origin, moves, merged, why = cells(row)
+    return [name, whole(mass), said(origin), said(moves), merged, told(why)]
 
 
 def weighed(scene: Scene) -> tuple[MechanismInfo, ...]:
@@ -208,8 +218,11 @@ def masses(scene: Scene) -> Html | None:
         [
             joined(
                 [
-                    tag("h4", f"Masses of {mechanism.name}: {total(mechanism.masses)}"),
-                    table(HEAD, map(_shown, mechanism.masses)),
+                    tag(
+                        "h4",
+                        said("Masses of {name}: {total}", name=mechanism.name, total=total(mechanism.masses)),
+                    ),
+                    table([said(title) for title in HEAD], map(_shown, mechanism.masses)),
                 ]
             )
             for mechanism in weighed(scene)

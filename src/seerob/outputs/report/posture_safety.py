@@ -17,6 +17,7 @@ from seerob.core.transforms import Array
 from seerob.description.humans.body_areas import area_in
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.palette import WORD
+from seerob.outputs.words import said
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES, Series
 
@@ -148,7 +149,7 @@ def posture_safety_section(scene: Scene, log: ResultLog) -> Html | None:
         ]
     if not parts:
         return None
-    text = (
+    text = said(
         "The same instants: those at which a score is highest, or most of a limit is used. In brackets "
         "how much of its limit is used; 100 % is the limit. – is not known or not assessed."
     )

@@ -12,6 +12,7 @@ from seerob.core.figures import figure
 from seerob.core.snapshot import CriterionInfo, Level
 from seerob.outputs.html import Html, joined, table, tag
 from seerob.outputs.sentences import percent
+from seerob.outputs.words import said, word
 from seerob.outputs.workbook import Cell
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import Series
@@ -114,19 +115,24 @@ def spread_over_time(info: CriterionInfo | None, series: Series) -> Html | None:
         return None
     marks = [(f"P{p}", at) for p, at in found.percentiles]
     rows = [
-        [name, figure(at.value, series.unit), f"{at.t:.2f} s"]
-        for name, at in (("least", found.minimum), *marks, ("largest", found.maximum))
+        [said(name), figure(at.value, series.unit), f"{at.t:.2f} s"]
+        for name, at in ((word("least"), found.minimum), *marks, (word("largest"), found.maximum))
     ]
     levels = [[s.name, percent(s.share), f"{s.longest:.2f} s"] for s in found.levels]
     return joined(
         [
-            tag("h4", "Over time"),
-            table(["", "value", "first at"], rows),
-            table(["level", "share of time", "longest stretch"], levels) if levels else None,
+            tag("h4", said("Over time")),
+            table(["", said("value"), said("first at")], rows),
+            table([said("level"), said("share of time"), said("longest stretch")], levels)
+            if levels
+            else None,
             tag(
                 "p",
-                f"Coverage {percent(found.coverage)} of the evaluated ticks; their mean, "
-                f"{figure(found.mean, series.unit)}, hides what stands above.",
+                said(
+                    "Coverage {share} of the evaluated ticks; their mean, {mean}, hides what stands above.",
+                    share=percent(found.coverage),
+                    mean=figure(found.mean, series.unit),
+                ),
                 class_="lead",
             ),
         ]

@@ -55,7 +55,7 @@ class PlausiblePlaces:
         self._off: dict[str, float] = {}
         """Whose feet left what they stood on, and when [s] of run time."""
         self._hearings: Mapping[str, Hearing] = {}
-        """As they were last."""
+        """What is known of everybody, by name, of the last instant that was looked at."""
         self._found: tuple[Finding, ...] = ()
         self._due = 0.0
 

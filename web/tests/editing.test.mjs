@@ -203,6 +203,51 @@ test("what is dragged by a handle is where it was put, in steps, and undo gives 
   assert.equal(saved(), begun);
 });
 
+test("a coordinate keeps what is being typed while others edit, and two angles entered at once are both kept", async () => {
+  const begun = saved();
+  await pick("operator");
+  const y = page.getByLabel("y [m]");
+  const stature = page.locator('[data-field="stature"]').getByRole("textbox");
+  await y.fill("0.25");
+  await page.evaluate(() => {
+    window.answers = 0;
+    new MutationObserver(() => {
+      window.answers += 1;
+    }).observe(document.querySelector(".edit-bar [role=status]"), {
+      childList: true,
+      subtree: true,
+      characterData: true,
+    });
+    const field = document.querySelector('[data-field="stature"] input');
+    field.value = "1.8";
+    for (const kind of ["input", "change"]) field.dispatchEvent(new Event(kind, { bubbles: true }));
+  });
+  await page.waitForFunction(() => window.answers >= 2);
+  await status(page, /^not saved/);
+  assert.equal(await stature.inputValue(), "1.8");
+  assert.equal(await y.inputValue(), "0.25");
+  await page.evaluate(() => {
+    const fields = document.querySelectorAll(".numbers input");
+    for (const [k, value] of [
+      [3, "10"],
+      [4, "20"],
+    ]) {
+      fields[k].value = value;
+      for (const kind of ["input", "change"]) fields[k].dispatchEvent(new Event(kind, { bubbles: true }));
+    }
+  });
+  await y.press("Enter");
+  await status(page, /^not saved/);
+  await review("Save");
+  const round = "at = { position = [3, 0.25, 0], rpy_deg = [10, 20, 0] }";
+  const place = "at = { position = [3, 0, 0] }";
+  assert.equal(saved(), begun.replace("stature = 1.75", "stature = 1.8").replace(place, round));
+  for (let k = 0; k < 4; k += 1) await page.getByRole("button", { name: "Undo" }).click();
+  await page.waitForFunction(() => document.querySelectorAll(".numbers input")[1].value === "0");
+  await review("Save");
+  assert.equal(saved(), begun);
+});
+
 test("the first waypoint of a robot brings its source, whose figures nobody assumes; the next is a place", async () => {
   const begun = saved();
   const added = page.locator(".adding");

@@ -39,7 +39,7 @@ export interface Entry {
 export const draft = signal<Draft | null>(null);
 /** What was refused last, and what was asked for; null once something is accepted. */
 export const refused = signal<{ changes: readonly Change[]; mistakes: readonly Mistake[] } | null>(null);
-/** Whether the server is being asked. */
+/** Whether the server is being asked, or will be once it has answered. */
 export const asking = signal(false);
 
 /** Whether this page may edit the file. */
@@ -139,9 +139,24 @@ export function lostDraft(): void {
     answer({ type: "edited", id, accepted: false, revision: 0, mistakes: [{ key: "", what, remedy: "" }] });
 }
 
-/** Ask for an edit once those before it are answered; whether it was accepted. */
-export function ask(action: string, changes: Change[] = []): Promise<boolean> {
-  const next = queue.then(() => askNow(action, changes));
+/**
+ * Ask for an edit once those before it are answered; whether it was accepted.
+ *
+ * What is made of what the file has is made only then: those before may have changed that.
+ */
+export function ask(action: string, changes: Change[] | (() => Change[]) = []): Promise<boolean> {
+  return inTurn(() => askNow(action, typeof changes === "function" ? changes() : changes));
+}
+
+let inQueue = 0;
+
+function inTurn<Answer>(deed: () => Promise<Answer>): Promise<Answer> {
+  inQueue += 1;
+  asking.value = true;
+  const next = queue.then(deed).finally(() => {
+    inQueue -= 1;
+    asking.value = inQueue > 0;
+  });
   queue = next;
   return next;
 }
@@ -154,21 +169,17 @@ async function askNow(action: string, changes: Change[]): Promise<boolean> {
 
 /** Ask for the changes that a CAD file makes, which the server keeps under a number. */
 export function askBrought(brought: number): Promise<Edited> {
-  const next = queue.then(() => answered({ action: "change", changes: [], brought }));
-  queue = next;
-  return next;
+  return inTurn(() => answered({ action: "change", changes: [], brought }));
 }
 
 async function answered(asked: Pick<Edit, "action" | "changes" | "brought">): Promise<Edited> {
   last += 1;
   const id = last;
-  asking.value = true;
   const answer = await new Promise<Edited>((resolve) => {
     waiting.set(id, resolve);
     send({ type: "edit", id, revision: draft.value?.revision ?? 0, ...asked });
   });
   waiting.delete(id);
-  asking.value = waiting.size > 0;
   return answer;
 }
 

@@ -32,6 +32,7 @@ import { Choice } from "./Choice";
 import { MistakeList } from "./MistakeList";
 import { Review } from "./Review";
 import { NameChoices, putInto, SchemaForm } from "./SchemaForm";
+import { TypedInput } from "./TypedInput";
 
 const GROUPS: readonly [group: string, title: string, one: string][] = [
   ["robots", word("Robots"), word("robot")],
@@ -311,6 +312,12 @@ function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
   const place = placing(entry);
   const scale = lengthUnit.value === "mm" ? 1000 : 1;
   const [length, angle] = STEPS[steps.value];
+  // Of the entry as it is when it is asked: two angles typed at once are both kept.
+  const put = (changes: (now: Entry) => Change[]): void =>
+    void ask("change", () => {
+      const now = entries.value.find((one) => named(one.path) === named(entry.path));
+      return now ? changes(now) : [];
+    });
   return (
     <fieldset class="place">
       <legend>
@@ -327,7 +334,7 @@ function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
             unit={lengthUnit.value}
             value={tidy(place.position.getComponent(k) * scale, 6)}
             step={(length || 0.001) * scale}
-            put={(value) => change(...setNumber(entry, "position", k, value / scale))}
+            put={(value) => put((now) => setNumber(now, "position", k, value / scale))}
           />
         ))}
         {TURNS.map((turn, k) => (
@@ -337,7 +344,7 @@ function PlaceForm({ entry, at }: { entry: Entry; at: string }) {
             unit="°"
             value={place.rpy[k]!}
             step={angle || 1}
-            put={(value) => change(...setNumber(entry, "rpy", k, value))}
+            put={(value) => put((now) => setNumber(now, "rpy", k, value))}
           />
         ))}
       </div>
@@ -361,23 +368,21 @@ interface NumberProps {
   unit: string;
   value: number;
   step: number;
-  put(value: number): Promise<boolean>;
+  put(value: number): void;
 }
 
 function NumberField({ name, unit, value, step, put }: NumberProps) {
+  const id = `place-${name}`;
   return (
-    <label>
+    <label for={id}>
       {name} <span class="unit">[{unit}]</span>
-      <input
+      <TypedInput
+        id={id}
         type="number"
         step={step}
-        value={value}
-        onChange={async (event) => {
-          const input = event.currentTarget;
-          const next = input.valueAsNumber;
-          // What is refused is not what the file has.
-          if (!Number.isFinite(next) || !(await put(next))) input.value = String(value);
-        }}
+        value={String(value)}
+        // What is no number, or refused, is not what the file has.
+        onEntered={(_, { valueAsNumber }) => Number.isFinite(valueAsNumber) && put(valueAsNumber)}
       />
     </label>
   );

@@ -7,6 +7,8 @@ import { asking } from "../editing/draft";
 
 interface Props {
   id?: string | undefined;
+  type?: "number";
+  step?: number;
   list?: string | undefined;
   title?: string | undefined;
   placeholder?: string | undefined;

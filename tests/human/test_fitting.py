@@ -15,6 +15,7 @@ from seerob.core.transforms import (
     wxyz_from_rotation,
 )
 from seerob.description.capture.fitting import Fitter, Pulls, pulls
+from seerob.description.humans.posture import lowest_sole
 from seerob.description.humans.skeleton import BONES, bone_poses
 from seerob.kernels import posture_fit as kernel
 
@@ -115,6 +116,42 @@ def test_joints_move_no_farther_than_they_can():
     reach = np.full(53, 0.05)
     found, _ = FITTER.fit(seen_of(after), before, reach=reach)
     assert np.abs(found - before).max() <= 0.05 + 1e-12
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("lift", [0.0, 0.3, 0.9])
+def test_who_raises_hands_of_which_alone_a_headset_sees_stays_on_the_floor(lift, turned):
+    """Nothing below the chest is seen: the legs do not swing forward, nor does the person float."""
+    R, p = FITTER.bones(FITTER.rest)
+    q, head = None, BONES.index("head")
+    for share in np.linspace(0, 1, 40):
+        points = [
+            BodyPoint(name=bone, bone=bone, position=tuple((p[BONES.index(bone)] + share * moved).tolist()))
+            for bone, moved in (
+                ("head", np.array([0.0, 0.0, -0.02])),
+                ("left_hand", np.array([0.3, 0.0, lift])),
+                ("right_hand", np.array([0.3, 0.0, lift])),
+            )
+        ]
+        if turned:
+            points.append(
+                BodyPoint(name="way", bone="head", wxyz=tuple(wxyz_from_rotation(R[head]).tolist()))
+            )
+        q, error = FITTER.fit(pulls(points, np.eye(4)), q)
+    assert np.abs(error[:, :3]).max() < 0.01
+    assert abs(lowest_sole(PERSON, q)) < 0.05
+
+
+def test_who_is_lower_than_somebody_who_stands_is_not_bent_until_the_feet_fit():
+    """Whether somebody sits, crouches or bows is not seen: no posture is made of which that looks known."""
+    _, p = FITTER.bones(FITTER.rest)
+    points = [
+        BodyPoint(name=bone, bone=bone, position=(*p[BONES.index(bone)][:2].tolist(), p[i, 2] - 0.4))
+        for bone in ("head", "left_hand", "right_hand")
+        for i in [BONES.index(bone)]
+    ]
+    q, _ = FITTER.fit(pulls(points, np.eye(4)), None)
+    assert lowest_sole(PERSON, q) < -0.3
 
 
 def test_errors_are_those_of_the_bones():

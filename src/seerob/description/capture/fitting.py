@@ -12,7 +12,7 @@ from seerob.core.samples import ORIENTATION_SCALE, POSITION_SCALE, BodyPoint
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.description.description import Description, JointKind
 from seerob.description.humans.posture import posture
-from seerob.description.humans.skeleton import AXES, BONES
+from seerob.description.humans.skeleton import AXES, BONES, JOINTS, without_side
 from seerob.kernels import posture_fit as kernel
 
 REST = 0.2
@@ -20,6 +20,10 @@ REST = 0.2
 TURN_REST = 0.7
 """Pull of the posture of rest on joints about a bone's own axis, in the measure of `REST`: a straight arm or
 leg hardly shows how it is turned."""
+UPRIGHT = 20.0
+"""Pull of the posture of rest on how the pelvis leans, and on its height where it is above that of somebody
+who stands, in the measure of `REST`, while nothing below the chest is seen; own choice: who raises both hands
+neither swings the legs forward nor leaves the floor. Who is lower may sit, crouch or bow: nobody knows."""
 KEEP = 6.0
 """Pull of the posture a `KEEP_TIME` before, in the same measure: it smooths what is hardly seen, such as
 how a forearm is turned, and hardly delays what is."""
@@ -129,6 +133,12 @@ class Fitter:
         turns = np.array([axis.axis == (0.0, 1.0, 0.0) for axis in AXES])
         # Where the person is and faces has no rest.
         self._w_rest = np.where(own_place, 0.0, np.where(turns, TURN_REST, REST) ** 2)
+        leans = np.isin(JOINTS, ["pelvis_list_right", "pelvis_tilt_back"])
+        self._height = JOINTS.index("pelvis_z")
+        self._w_upright = np.where(leans, UPRIGHT**2, self._w_rest)
+        legs = ("pelvis", "lumbar", "thigh", "shank", "foot", "toes")
+        self._below = np.array([without_side(bone) in legs for bone in BONES])
+        """Of each bone whether it is below the chest."""
         self._w_keep = np.where(own_place, 1e-4, KEEP**2)
         # Loops that are not kept yet are compiled now: a run that waits for them falls behind.
         nothing = pulls((), np.eye(4))
@@ -191,10 +201,14 @@ class Fitter:
         keep = self._w_keep * (0.0 if before is None else KEEP_TIME / max(since, 1e-3))
         lower, upper = np.maximum(self.lower, near - reach), np.minimum(self.upper, near + reach)
         rest, iterations = self.rest, FIRST_ITERATIONS if before is None else NEXT_ITERATIONS
+        below = self._below[seen.bone[(seen.wp > 0) | (seen.wo > 0)]].any()
+        w_rest = self._w_rest if below else self._w_upright.copy()
         for _ in range(1 + AGAIN):
-            beside = kernel.Beside(rest, self._w_rest, near.copy(), keep)
+            beside = kernel.Beside(rest, w_rest, near.copy(), keep)
             kernel.fit(q, lower, upper, beside, self._links, seen.of_links(), iterations, ENOUGH, error)
             rest, iterations = q.copy(), AGAIN_ITERATIONS
+            if not below and q[self._height] > self.rest[self._height]:
+                rest[self._height], w_rest[self._height] = self.rest[self._height], UPRIGHT**2
         return q, error
 
     def bones(self, q: Array) -> tuple[Array, Array]:

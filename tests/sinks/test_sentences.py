@@ -3,10 +3,11 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from seerob.core.snapshot import Finding, Verdict
 from seerob.outputs.report.page import _unasked
-from seerob.outputs.sentences import _reasons, listed, shortened
+from seerob.outputs.sentences import _reasons, _stretches, listed, shortened
 from seerob.outputs.words import speaking
 from seerob.recording.series import CODES
 
@@ -42,3 +43,14 @@ def test_reasons_for_doubt_are_told_in_the_language_of_the_report():
     with speaking("de"):
         assert _reasons(series) == "Grund: kein Teil bewegt sich."
     assert _reasons(series) == "Reason: no part moves."
+
+
+@pytest.mark.parametrize(
+    ("language", "one", "two"),
+    [("en", "one stretch;", "two stretches;"), ("de", "einem Abschnitt;", "2 Abschnitten;")],
+)
+def test_one_stretch_is_not_told_as_several(language, one, two):
+    with speaking(language):
+        for spans, said in (([(0.0, 1.0)], one), ([(0.0, 1.0), (2.0, 2.5)], two)):
+            series = SimpleNamespace(intervals=lambda _, spans=spans: spans)
+            assert said in _stretches(series, Verdict.UNDECIDED)

@@ -43,6 +43,8 @@ interface Sentence {
 }
 
 const MOST_KEPT = 4000;
+/** A sentence that begins with a value and has fewer letters of its own has to know its values too. */
+const OWN = 9;
 const sentences = new Map<string, readonly Sentence[]>();
 const kept = new Map<string, string>();
 
@@ -66,11 +68,14 @@ function toldIn(text: string, chosen: Exclude<Language, "en">): string {
 function translated(text: string, chosen: Exclude<Language, "en">): string {
   const whole = CATALOGUES[chosen][text];
   if (whole !== undefined) return whole;
-  for (const { words, pattern, translation } of sentencesOf(chosen)) {
+  for (const { words, own, pattern, translation } of sentencesOf(chosen)) {
     const match = text.includes(words) && pattern.exec(text);
     if (!match) continue;
     // A value may be a sentence itself; a name or a figure stays.
-    const values = match.slice(1).map((value) => (value.includes(" ") ? toldIn(value, chosen) : value));
+    const given = match.slice(1);
+    const values = given.map((value) => (value.includes(" ") ? toldIn(value, chosen) : value));
+    if (own < OWN && pattern.source.startsWith("^(") && !given.every((value, i) => known(value, values[i]!)))
+      continue;
     return translation.replace(/\{(\d+)\}/g, (_, place: string) => values[Number(place)]!);
   }
   if (text.includes("; "))
@@ -82,7 +87,7 @@ function translated(text: string, chosen: Exclude<Language, "en">): string {
     const parts = text.split(", ");
     const found = parts.map((each) => toldIn(each, chosen));
     // A list of words or names; of a sentence that no catalogue has no half is translated.
-    if (parts.every((each, i) => each !== found[i] || !each.includes(" "))) return found.join(", ");
+    if (parts.every((each, i) => known(each, found[i]!))) return found.join(", ");
   }
   const colon = text.indexOf(": ");
   if (colon >= 0 && !text.slice(0, colon).includes("("))
@@ -91,6 +96,11 @@ function translated(text: string, chosen: Exclude<Language, "en">): string {
   if (inside) return `${toldIn(inside[1]!, chosen)} (${toldIn(inside[2]!, chosen)})`;
   const figure = /^(\D*[^\d\s−-]) ([−-]?\d\S*)$/.exec(text);
   return figure ? `${toldIn(figure[1]!, chosen)} ${figure[2]}` : text;
+}
+
+/** Whether a part is translated, or is a name or the place in a standard, which stays. */
+function known(text: string, translation: string): boolean {
+  return text !== translation || !text.includes(" ") || /^(?:ISO|IEC|EN|DIN)\b/.test(text);
 }
 
 function sentencesOf(chosen: Exclude<Language, "en">): readonly Sentence[] {

@@ -34,5 +34,5 @@ def origin_finding(origin: MotionOrigin, subject: str, file: str) -> Finding:
         MotionOrigin.SIMULATOR: "a generic simulator",
         MotionOrigin.PLANNED: "a plan that was not executed",
     }[origin]
-    text = f"motion comes from {what}{named}: preliminary until it is confirmed on the controller"
+    text = f"motion comes from {what + named}: preliminary until it is confirmed on the controller"
     return Finding(level="assumed", subject=subject, text=text)

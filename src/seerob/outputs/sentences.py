@@ -248,7 +248,8 @@ def about(series: Series) -> list[str]:
         )
         said.append(spoken_as(text, value=reached(worst, series), t=f"{worst.t:.2f}"))
     if worst.interval is not None and worst.value is not None:
-        there = between(*worst.interval, series.unit)
+        low, high = between(*worst.interval, series.unit).split(" and ")
+        there = spoken_as("{low} and {high}", low=low, high=high)
         said.append(
             spoken_as(
                 "Given the tolerances of the inputs, the true value there is between {limits}.", limits=there
@@ -264,6 +265,8 @@ def about(series: Series) -> list[str]:
 def _stretches(series: Series, verdict: Verdict) -> str:
     found = series.intervals(verdict)
     longest = figure(max(b - a for a, b in found), "s")
+    if len(found) == 1:
+        return spoken_as("in one stretch; the longest lasted {longest}", longest=longest)
     return spoken_as(
         "in {counted}; the longest lasted {longest}",
         counted=counted(len(found), "stretch", "stretches"), n=len(found), longest=longest,

@@ -80,7 +80,7 @@ def evaluated(report: Report) -> Html:
         *(
             [
                 said("largest tracking error, {name}", name=e.name),
-                f"{number(e.error)} rad or m, {e.t:.2f} s",
+                f"{number(e.error)} {said('rad or m')}, {e.t:.2f} s",
             ]
             for e in log.tracking
         ),
@@ -151,8 +151,10 @@ def bone_errors(people: Mapping[str, BoneErrors]) -> Html | None:
     rows = [
         [
             str(name),
-            f"of the bones seen: {seen[str(name)]} of {len(BONES)}" if bone == "all" else str(bone),
-            str(what),
+            said("of the bones seen: {n} of {all}", n=seen[str(name)], all=len(BONES))
+            if bone == "all"
+            else str(bone),
+            told(str(what)),
             *(number(float(value), str(unit)) for value in (median, p95, largest) if value is not None),
             f"{float(t or 0.0):.2f} s",
         ]
@@ -160,8 +162,9 @@ def bone_errors(people: Mapping[str, BoneErrors]) -> Html | None:
     ]
     if not rows:
         return None
-    head = ["person", "bone", "what is missing", "median", "P95", "largest", "at"]
-    text = (
+    titles = (word("person"), word("bone"), word("what is missing"), word("median"), "P95", "largest", "at")
+    head = [said(title) for title in titles]
+    text = said(
         "How far the twin's bones are from where the devices see them: fit of the person's lengths, "
         "the controllers, and contacts together. Percentiles are good to half a per cent of themselves."
     )

@@ -17,7 +17,7 @@ from seerob.core.transforms import Array
 from seerob.description.humans.body_areas import area_in
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.palette import WORD
-from seerob.outputs.words import said
+from seerob.outputs.words import said, told
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import CODES, Series
 
@@ -142,7 +142,7 @@ def posture_safety_section(scene: Scene, log: ResultLog) -> Html | None:
     """The report's table; nothing where no person has both."""
     parts = []
     for one in sides(scene, log):
-        head_ = ["at", *(s.name for s in one.scores), *(s.name for s in one.measures), "where"]
+        head_ = [said("at"), *(s.name for s in one.scores), *(s.name for s in one.measures), said("where")]
         parts += [
             tag("h3", one.person),
             table(head_, [_line(one, row) for row in worst_rows(one)], class_="instants"),
@@ -165,10 +165,10 @@ def _line(one: Sides, row: list[Cell]) -> list[str | Html]:
         value, used, word, bone, area = row[k : k + 5]
         percent = "" if not isinstance(used, float) or math.isnan(used) else f" ({_percent(used)})"
         verdict = next((v for v in WORD if v is not None and v.value == word), None)
-        shown = f"{_figure(value, series.unit)}{percent}" + (f", {WORD[verdict]}" if verdict else "")
+        shown = f"{_figure(value, series.unit)}{percent}" + (f", {said(WORD[verdict])}" if verdict else "")
         cells.append(shown)
         if bone or area:
-            places[": ".join(filter(None, (str(bone), str(area))))] = None
+            places[": ".join(filter(None, (str(bone), told(str(area)))))] = None
     return [*cells, "; ".join(places) or "–"]
 
 
@@ -177,4 +177,4 @@ def _figure(value: Cell, unit: str) -> str:
 
 
 def _percent(used: float) -> str:
-    return "no distance left" if math.isinf(used) else rounded_up(100 * used, "%")
+    return said("no distance left") if math.isinf(used) else rounded_up(100 * used, "%")

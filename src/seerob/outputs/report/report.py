@@ -96,7 +96,7 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
     """Inputs with the names of their criteria: those of one origin, source and criteria are one row."""
     rows: dict[tuple[Origin, str], dict[str, dict[str, None]]] = {}
     for name, item in items:
-        value = item.value if isinstance(item.value, str) else number(item.value, item.unit)
+        value = told(item.value) if isinstance(item.value, str) else number(item.value, item.unit)
         what = told(item.name)
         text = what if value in ("", "–") else f"{what}: {value}"
         rows.setdefault((item.origin, item.source), {}).setdefault(text, {})[name] = None
@@ -113,13 +113,15 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
 
 UNKNOWN = "unknown: the workstation file is not at hand or cannot be read"
 ORIGINS = {
-    "controller": "measured: the real robot's controller",
-    "vendor_emulator": "the maker's own controller software, without the robot: preliminary",
-    "simulator": "a generic simulator: preliminary until it is confirmed on the controller",
-    "planned": "a planned path that nobody has executed: preliminary until it is confirmed on the controller",
-    "recording": "one of our recordings; what fed it is written there",
-    "live": "measured: a person captured as they move",
-    "file": "a captured person, as the file has it",
+    "controller": word("measured: the real robot's controller"),
+    "vendor_emulator": word("the maker's own controller software, without the robot: preliminary"),
+    "simulator": word("a generic simulator: preliminary until it is confirmed on the controller"),
+    "planned": word(
+        "a planned path that nobody has executed: preliminary until it is confirmed on the controller"
+    ),
+    "recording": word("one of our recordings; what fed it is written there"),
+    "live": word("measured: a person captured as they move"),
+    "file": word("a captured person, as the file has it"),
 }
 _ADDRESSES = ("file", "host", "url", "port", "address", "stream")
 
@@ -190,8 +192,11 @@ def _engine(table: object) -> tuple[tuple[str, str], ...]:
                 people=number(e.human_bandwidth, "Hz"),
             ),
         ),
-        (said("largest tracking error that is still judged"), f"{number(e.tracking_limit)} rad or m"),
-        (said("the same of people"), f"{number(e.human_tracking_limit)} rad or m"),
+        (
+            said("largest tracking error that is still judged"),
+            f"{number(e.tracking_limit)} {said('rad or m')}",
+        ),
+        (said("the same of people"), f"{number(e.human_tracking_limit)} {said('rad or m')}"),
         (said("gravity"), ", ".join(number(x) for x in e.gravity) + " m/s²"),
     )
 
@@ -212,7 +217,7 @@ def _source(entry: dict[str, object]) -> tuple[str, ...]:
     places = [str(rest[key]) for key in _ADDRESSES if key in rest]
     captured = "" if source is None else source.captured
     origin = getattr(source, "origin", None) or rest.get("origin") or captured or None
-    says = "this kind does not say: see what was assumed" if origin is None else str(origin)
+    says = word("this kind does not say: see what was assumed") if origin is None else str(origin)
     if source is None:
         timeout, end = str(rest.get("timeout", "unknown")), "unknown"
     else:
@@ -226,7 +231,7 @@ def _source(entry: dict[str, object]) -> tuple[str, ...]:
         name,
         drives or "–",
         " ".join([kind, *places]),
-        ORIGINS.get(says, says),
+        said(ORIGINS.get(says, says)),
         timeout,
         end,
     )

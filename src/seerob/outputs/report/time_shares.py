@@ -12,7 +12,7 @@ from seerob.core.figures import figure
 from seerob.core.snapshot import CriterionInfo, Level
 from seerob.outputs.html import Html, joined, table, tag
 from seerob.outputs.sentences import percent
-from seerob.outputs.words import said, word
+from seerob.outputs.words import said, told, word
 from seerob.outputs.workbook import Cell
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import Series
@@ -78,9 +78,9 @@ def distribution(series: Series, levels: Sequence[Level] = ()) -> Distribution |
         shares.append(Share(level.name, float(inside.mean()), _longest(t, inside)))
     if levels and (known & ~below).any():
         beyond = known & ~below
-        shares.append(Share("beyond", float(beyond.mean()), _longest(t, beyond)))
+        shares.append(Share(word("beyond"), float(beyond.mean()), _longest(t, beyond)))
     if levels and not known.all():
-        shares.append(Share("not assessed", float((~known).mean()), _longest(t, ~known)))
+        shares.append(Share(word("not assessed"), float((~known).mean()), _longest(t, ~known)))
     return Distribution(
         coverage=float(known.mean()),
         mean=float(there.mean()),
@@ -118,7 +118,7 @@ def spread_over_time(info: CriterionInfo | None, series: Series) -> Html | None:
         [said(name), figure(at.value, series.unit), f"{at.t:.2f} s"]
         for name, at in ((word("least"), found.minimum), *marks, (word("largest"), found.maximum))
     ]
-    levels = [[s.name, percent(s.share), f"{s.longest:.2f} s"] for s in found.levels]
+    levels = [[told(s.name), percent(s.share), f"{s.longest:.2f} s"] for s in found.levels]
     return joined(
         [
             tag("h4", said("Over time")),

@@ -60,15 +60,15 @@ _PLACE = re.compile(r"\{(\d+)\}")
 
 
 @cache
-def _sentences(language: str) -> tuple[tuple[str, re.Pattern[str], str], ...]:
-    """What the engine says with values in it, most of its own first: longest words, pattern, translation."""
+def _sentences(language: str) -> tuple[tuple[int, str, re.Pattern[str], str], ...]:
+    """What the engine says with values in it, most of its own first: own letters, longest, pattern, other."""
     found = []
     for text, translation in catalogue(language).items():
         words = _PLACE.split(text)[::2]
         if len(words) > 1:
             pattern = re.compile("([^;]+?)".join(map(re.escape, words)))
-            found.append((len("".join(words)), (max(words, key=len), pattern, translation)))
-    return tuple(each for _, each in sorted(found, key=lambda each: -each[0]))
+            found.append((len("".join(words)), max(words, key=len), pattern, translation))
+    return tuple(sorted(found, key=lambda each: -each[0]))
 
 
 def told(text: str) -> str:
@@ -81,6 +81,9 @@ def told(text: str) -> str:
     return text if language == "en" else _told(text, language)
 
 
+_OWN = 9
+"""A sentence that begins with a value and has fewer letters of its own has to know its values too."""
+_STANDARD = re.compile(r"(?:ISO|IEC|EN|DIN)\b")
 _IN_PARENTHESES = re.compile(r"(.+) \(([^()]+)\)")
 _OF_A_FIGURE = re.compile(r"([^\d]*[^\d\s−-]) ([−-]?\d\S*)")
 
@@ -90,17 +93,18 @@ def _told(text: str, language: str) -> str:
     found = catalogue(language).get(text)
     if found is not None:
         return found
-    for words, pattern, translation in _sentences(language):
+    for own, words, pattern, translation in _sentences(language):
         if words in text and (match := pattern.fullmatch(text)):
-            return _filled(translation, [_value(value, language) for value in match.groups()])
+            values = [_value(value, language) for value in match.groups()]
+            if own >= _OWN or pattern.pattern[0] != "(" or all(map(_known, match.groups(), values)):
+                return _filled(translation, values)
     if "; " in text:
         return "; ".join(_told(each, language) for each in text.split("; "))
     if ", " in text:
         parts = text.split(", ")
         parts_told = [_told(each, language) for each in parts]
         # A list of words or names; of a sentence that no catalogue has no half is translated.
-        known = all(a != b or " " not in a for a, b in zip(parts, parts_told, strict=True))
-        if known:
+        if all(map(_known, parts, parts_told)):
             return ", ".join(parts_told)
     about, colon, rest = text.partition(": ")
     if colon and "(" not in about:
@@ -110,6 +114,11 @@ def _told(text: str, language: str) -> str:
     if match := _OF_A_FIGURE.fullmatch(text):
         return f"{_told(match[1], language)} {match[2]}"
     return text
+
+
+def _known(text: str, translation: str) -> bool:
+    """Whether a part is translated, or is a name or the place in a standard, which stays."""
+    return text != translation or " " not in text or _STANDARD.match(text) is not None
 
 
 def _filled(translation: str, values: Sequence[str]) -> str:

@@ -96,6 +96,24 @@ def test_library_robot_is_pinocchios(tmp_path, name, loaded):
         close(kinetic_energy(M, qd), oracle.kinetic_energy(model, q, qd))
 
 
+@pytest.mark.parametrize("name", LIBRARY)
+def test_no_two_axes_of_a_library_robot_that_follow_one_another_lie_in_one_line(name):
+    """Files of makers have had that for a while: an arm that cannot rise."""
+    poses: dict[str | None, np.ndarray] = {None: np.eye(4)}
+    before = None
+    for link in library.load(name).links:
+        at = poses[link.name] = poses[link.parent] @ link.parent_from_link
+        for joint in link.joints:
+            axis = at[:3, :3] @ np.asarray(joint.axis)
+            through = at[:3, 3] + at[:3, :3] @ np.asarray(joint.anchor)
+            if before is not None:
+                apart = through - before[1]
+                assert np.linalg.norm(np.cross(axis, before[0])) > 0.1 or (
+                    np.linalg.norm(np.cross(apart, axis)) > 0.01
+                ), joint.name
+            before = axis, through
+
+
 def test_some_library_robot_has_unknown_masses_and_most_have_not(tmp_path):
     without = [n for n in LIBRARY if not any(k.inertial for k in library.load(n).links)]
     for name in without:

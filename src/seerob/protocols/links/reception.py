@@ -74,8 +74,8 @@ class Reception:
             raise
         now = time.monotonic()
         arrived = instant(stamp(said), now=now, wall=time.time_ns(), empty=self._empty)
-        if self._stream and len(data) < size:
-            self._empty = before  # nothing of it was left
+        # What is read later arrived later; of a stream nothing was left, either.
+        self._empty = max(before, arrived) if self._stream and len(data) < size else arrived
         return Received(arrived, data, sender)
 
 

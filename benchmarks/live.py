@@ -117,7 +117,8 @@ class Post:
             came = list(firsts.values()) if signals else said
             for k, (seq, instant, device) in enumerate(came):
                 together = k + 1 < len(came) and came[k + 1][1] == instant
-                found[source, signals, seq] = min(instant, written[device]) if together else instant
+                # Datagrams whose stamps are within the clock's resolution share an instant, too: theirs it is.
+                found[source, signals, seq] = min(instant, written.get(device, instant)) if together else instant
         return found
 
     def mailbox(self, written: dict[float, float], since: float) -> dict[str, list[float]]:

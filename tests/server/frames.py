@@ -1,7 +1,10 @@
 """A small scene, its snapshots, and a visitor, for the tests of the server."""
 
 import contextlib
+import select
 import socket
+import ssl
+import threading
 
 import msgspec
 import numpy as np
@@ -68,6 +71,40 @@ class Remembered:
         return next((s for s in reversed(self._snapshots) if s.t <= t), self._snapshots[0])
 
 
+class OneAtATime(ssl.SSLSocket):
+    """Read in one thread and written in another: OpenSSL serves one at a time, or loses what is written.
+
+    ``websockets`` does so without a lock, and so does Python up to 3.12 (python/cpython#124984).
+    """
+
+    def __new__(cls, *arguments, **options):
+        made = super().__new__(cls, *arguments, **options)
+        made.turn = threading.Lock()
+        return made
+
+    def recv(self, *arguments):
+        while True:
+            if not self.pending() and not select.select([self], [], [], self.gettimeout())[0]:
+                raise TimeoutError
+            with self.turn:
+                patience = self.gettimeout()
+                super().settimeout(0)
+                try:
+                    return super().recv(*arguments)
+                except ssl.SSLWantReadError:  # what came was no message
+                    continue
+                finally:
+                    super().settimeout(patience)
+
+    def settimeout(self, value):
+        with self.turn:
+            super().settimeout(value)
+
+    def sendall(self, *arguments):
+        with self.turn:
+            super().sendall(*arguments)
+
+
 class Visitor:
     """A page without a screen: decodes what comes and, unless told otherwise, acknowledges frames."""
 
@@ -88,7 +125,9 @@ class Visitor:
     def __init__(self, server, *, acknowledge=True, path="/ws", **options):
         options.setdefault("subprotocols", [wire.PROTOCOL])
         options.setdefault("open_timeout", PATIENCE)
-        scheme = "wss" if "ssl" in options else "ws"
+        scheme = "ws"
+        if "ssl" in options:
+            scheme, options["ssl"].sslsocket_class = "wss", OneAtATime
         self._open = connect(
             f"{scheme}://127.0.0.1:{server.port}{path}", compression=None, max_size=2**26, **options
         )

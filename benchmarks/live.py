@@ -116,9 +116,10 @@ class Post:
                 firsts.setdefault(one[1], one)
             came = list(firsts.values()) if signals else said
             for k, (seq, instant, device) in enumerate(came):
-                together = k + 1 < len(came) and came[k + 1][1] == instant
-                # Datagrams whose stamps are within the clock's resolution share an instant, too: theirs it is.
-                found[source, signals, seq] = min(instant, written.get(device, instant)) if together else instant
+                if k + 1 < len(came) and came[k + 1][1] == instant:
+                    # Datagrams may share an instant, too, and it is theirs.
+                    instant = min(instant, written.get(device, instant))
+                found[source, signals, seq] = instant
         return found
 
     def mailbox(self, written: dict[float, float], since: float) -> dict[str, list[float]]:

@@ -9,7 +9,7 @@ import pytest
 
 from seerob.core.snapshot import Verdict
 from seerob.outputs.palette import WORD
-from seerob.outputs.words import LANGUAGES, catalogue, said, speaking, spoken, told
+from seerob.outputs.words import LANGUAGES, alone, catalogue, said, speaking, spoken, told
 
 ROOT = Path(__file__).parents[1]
 LOADER = SourceFileLoader("missing_words", str(ROOT / "scripts/missing-words"))
@@ -110,3 +110,28 @@ def test_what_is_our_own_of_a_source_is_told_whole_and_what_is_not_is_left_whole
     with speaking(language):
         assert [text for text in map(told, SAID) if ENGLISH.search(text)] == []
         assert (told(cited), told(book)) == (cited, book)
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_names_stay_though_a_button_has_the_same_word(language):
+    single = {text for text in catalogue(language) if " " not in text and "{" not in text}
+    late = "not heard for 0.4 s (time-out 0.2 s)"
+    with speaking(language):
+        assert {text for text in single if told(text) != text} <= alone()
+        for name in sorted(missing.needed() & single - alone()):
+            assert told(name) == name
+            assert told(f"{name}: {late}") == f"{name}: {told(late)}" != f"{name}: {late}"
+            assert told(f"{name}, {name}_2") == f"{name}, {name}_2"
+        assert said("stop") != "stop"
+    # What the engine says as one word has to be among those that are told.
+    assert single - missing.needed() <= alone() <= single
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_pause_and_stop_differ_and_no_distance_is_no_more_of_it(language):
+    with speaking(language):
+        assert len({said(text).lower() for text in ("hold", "stop", "run")}) == 3
+        assert said("hold").lower() != said("Stop").lower()
+        assert said("no distance left") != "plus de distance"
+        accepted = next(text for text in catalogue(language) if text.startswith("accepted: "))
+        assert said("assumed").lower() not in said(accepted).lower()

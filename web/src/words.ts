@@ -1,6 +1,7 @@
 // Words in the language that was chosen. The engine speaks English; what it says is translated where it is shown, by
 // the sentence of its source that it was made from, as in `seerob.outputs.words`.
 
+import alone from "../../src/seerob/outputs/words/alone.txt?raw";
 import de from "../../src/seerob/outputs/words/de.json";
 import es from "../../src/seerob/outputs/words/es.json";
 import fr from "../../src/seerob/outputs/words/fr.json";
@@ -42,6 +43,8 @@ interface Sentence {
   translation: string;
 }
 
+/** Single words that the engine says. Any other, such as the label of a button, may be a name of the file and stays. */
+const ALONE: ReadonlySet<string> = new Set(alone.split("\n"));
 const MOST_KEPT = 4000;
 /** A sentence that begins with a value and has fewer letters of its own has to know its values too. */
 const OWN = 9;
@@ -67,7 +70,7 @@ function toldIn(text: string, chosen: Exclude<Language, "en">): string {
 
 function translated(text: string, chosen: Exclude<Language, "en">): string {
   const whole = CATALOGUES[chosen][text];
-  if (whole !== undefined) return whole;
+  if (whole !== undefined && (text.includes(" ") || ALONE.has(text))) return whole;
   for (const { words, own, pattern, translation } of sentencesOf(chosen)) {
     const match = text.includes(words) && pattern.exec(text);
     if (!match) continue;

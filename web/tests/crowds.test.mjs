@@ -22,6 +22,7 @@ const { coarser } = await load("scene/coarser");
 globalThis.location = { search: "?draw=light" };
 const light = await import(`${await built("scene/crowds")}?light`);
 light.crowdsOf([]);
+const { Levels } = await import(`${await built("scene/levels")}?light`);
 
 const shape = new BoxGeometry(1, 2, 3);
 const given = new MeshStandardMaterial();
@@ -105,7 +106,27 @@ test("without a graphics card far ones are coarser by less than a pixel, and wha
     new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
   );
   const pixel = 0.001;
-  crowd.arrange({ eye: new Vector3(), frustum, pixel }, true);
+  const sight = { eye: new Vector3(), frustum, pixel };
+  const count = () =>
+    crowd.levels.reduce((sum, { drawn: { count, geometry } }) => sum + count * geometry.index.count, 0);
+  crowd.arrange(sight, true);
+  // As it is until a coarser one is there, of which a little is made at each picture.
+  assert.deepEqual([crowd.levels.length, count()], [1, 4 * gear.index.count]);
+  let pictures = 0;
+  for (let before = -1; before !== pictures; ) {
+    before = pictures;
+    const [had, drawn] = [crowd.levels.length, count()];
+    let looks = 0;
+    const { now } = performance;
+    performance.now = () => looks++;
+    crowd.refine(1);
+    performance.now = now;
+    assert.ok(looks <= 2);
+    if (looks > 0) pictures += 1;
+    crowd.arrange(sight, false);
+    assert.ok(crowd.levels.length <= had + 1 && count() <= drawn);
+  }
+  assert.ok(pictures > crowd.levels.length, `${crowd.levels.length} shapes within ${pictures} pictures`);
   const place = new Matrix4();
   const drawn = crowd.levels.flatMap(({ drawn, off }) =>
     Array.from({ length: drawn.count }, (_, k) => {
@@ -120,6 +141,14 @@ test("without a graphics card far ones are coarser by less than a pixel, and wha
   assert.equal(counts[0], gear.index.count);
   assert.ok(counts[3] < 0.05 * counts[0]);
   assert.ok(counts[2] < counts[0]);
+  // None that nobody needs: those that are near are drawn as they are.
+  const [near] = light.crowdsOf(
+    [1, 1, 1, 1].map((x) => body(x, new SphereGeometry(0.9, 64, 32).deleteAttribute("uv"))),
+  );
+  near.arrange(sight, true);
+  near.refine(Number.POSITIVE_INFINITY);
+  near.arrange(sight, false);
+  assert.equal(near.levels.length, 1);
   // All of it, as it is, where nobody says from where one looks.
   crowd.arrange(null, true);
   assert.equal(crowd.levels[0].drawn.count, 5);
@@ -130,4 +159,29 @@ test("few of a shape, and what one sees through, are drawn one by one", () => {
   const clear = [0, 1, 2, 3].map((x) => body(x));
   for (const { meshes } of clear) meshes[0].given = new MeshStandardMaterial({ transparent: true });
   assert.equal(crowdsOf(clear).length, 0);
+});
+
+test("coarser shapes are made once of one that is shared, and given back with it", () => {
+  const ball = new SphereGeometry(0.5, 64, 32).deleteAttribute("uv");
+  const levels = Levels.of(ball);
+  while (levels.next < Number.POSITIVE_INFINITY) levels.work(Number.POSITIVE_INFINITY);
+  assert.equal(Levels.of(ball), levels);
+  assert.ok(levels.made.length > 3);
+  // How far the true corners are off, though each is made of the one before.
+  const at = ball.getAttribute("position");
+  for (const { shape, off, standIn } of levels.made.slice(1)) {
+    const there = shape.getAttribute("position");
+    const from = (k) => new Vector3().fromBufferAttribute(at, k);
+    const to = (k) => new Vector3().fromBufferAttribute(there, standIn[k]);
+    const far = Array.from({ length: at.count }, (_, k) => from(k).distanceTo(to(k)));
+    assert.ok(Math.abs(Math.max(...far) - off) < 1e-6);
+  }
+  const gone = [];
+  for (const { shape } of levels.made) shape.addEventListener("dispose", () => gone.push(shape));
+  Levels.drop(ball);
+  assert.deepEqual(
+    gone,
+    levels.made.slice(1).map(({ shape }) => shape),
+  );
+  assert.notEqual(Levels.of(ball), levels);
 });

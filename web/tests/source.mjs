@@ -31,3 +31,22 @@ export async function built(name) {
 export async function load(name) {
   return import(await built(name));
 }
+
+/** Modules of src that share what they both import, such as a signal. */
+export async function together(...names) {
+  const entry = Object.fromEntries(names.map((name) => [name.replaceAll("/", "_"), `${SOURCE}/${name}.ts`]));
+  const outDir = fs.mkdtempSync(path.join(folder, "together-"));
+  await build({
+    configFile: false,
+    logLevel: "error",
+    build: {
+      lib: { entry, formats: ["es"], fileName: (_, name) => `${name}.mjs` },
+      rolldownOptions: { output: { chunkFileNames: "[name].mjs" } },
+      outDir,
+      minify: false,
+      target: "es2022",
+    },
+  });
+  const files = Object.keys(entry).map((name) => path.join(outDir, `${name}.mjs`));
+  return Promise.all(files.map((file) => import(pathToFileURL(file).href)));
+}

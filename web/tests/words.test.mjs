@@ -114,6 +114,26 @@ test("what the engine says is told by the same catalogues as in the report, with
   language.value = "en";
 });
 
+test("a name stays as it is, though a button has the same word", () => {
+  const file = new URL("../../src/seerob/outputs/words/de.json", import.meta.url);
+  const labels = ["laser", "stop", "hold", "run", "section", "level", "ghost", "robot", "left", "Stop"];
+  const german = JSON.parse(fs.readFileSync(file, "utf8"));
+  for (const code of ["de", "fr", "es", "it"]) {
+    language.value = code;
+    const late = "not heard for 0.4 s (time-out 0.2 s)";
+    assert.notEqual(told(late), late);
+    for (const name of labels) {
+      assert.ok(name in german);
+      assert.equal(told(name), name);
+      assert.equal(told(`${name}: ${late}`), `${name}: ${told(late)}`);
+      assert.equal(told(`${name}, table`), `${name}, table`);
+    }
+    assert.notEqual(told("knee"), "knee");
+    assert.notEqual(said("stop"), "stop");
+  }
+  language.value = "en";
+});
+
 test("figures in sentences are in the chosen units, lengths without rounding", () => {
   const text = "0.3 to 0.50 m, at 1.6 m/s, of 0.02 m² and 0.05 rad or m; −0.1501 m; 12 kg; 1e-05 m; 35° away";
   assert.equal(spoken(text), text);

@@ -51,16 +51,17 @@ def split(key: str) -> tuple[str, str, float] | None:
     return next(splits(key), None)
 
 
-def unit(symbol: str, *, parts: tuple[str, ...] = (), **limits: Any) -> Any:
+def unit(symbol: str, *, parts: tuple[str, ...] = (), polygon: bool = False, **limits: Any) -> Any:
     """Metadata of a quantity, for keys with a suffix, messages, documentation and the schema.
 
     Args:
         symbol: Its unit in SI.
         parts: What each of several numbers is, for forms.
+        polygon: Whether a list is of the corners of a polygon, for forms: one more lies between two of them.
         **limits: As of ``msgspec.Meta``.
     """
-    named = {"x-parts": parts} if parts else {}
-    return Meta(extra={"unit": symbol}, extra_json_schema={"x-unit": symbol, **named}, **limits)
+    form = {"x-unit": symbol, **({"x-parts": parts} if parts else {}), **({"x-polygon": True} if polygon else {})}
+    return Meta(extra={"unit": symbol}, extra_json_schema=form, **limits)
 
 
 Length = Annotated[float, unit("m", gt=0, le=1000)]
@@ -76,7 +77,7 @@ Metres3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], unit("m")]
 Radians3 = Annotated[tuple[float, float, float], unit("rad")]
 Radians = Annotated[tuple[float, ...], unit("rad")]
 Corner = Annotated[tuple[Coordinate, Coordinate], unit("m")]
-Corners = Annotated[tuple[Corner, ...], unit("m", min_length=3, max_length=200)]
+Corners = Annotated[tuple[Corner, ...], unit("m", polygon=True, min_length=3, max_length=200)]
 """Corners (x, y) of a polygon [m]."""
 Share = Annotated[float, Meta(ge=0, le=1)]
 Tolerance = Annotated[float, Meta(ge=0, lt=1)]

@@ -145,7 +145,10 @@ export function lostDraft(): void {
  * What is made of what the file has is made only then: those before may have changed that.
  */
 export function ask(action: string, changes: Change[] | (() => Change[]) = []): Promise<boolean> {
-  return inTurn(() => askNow(action, typeof changes === "function" ? changes() : changes));
+  return inTurn(async () => {
+    const asked = typeof changes === "function" ? changes() : changes;
+    return (action === "change" && asked.length === 0) || askNow(action, asked);
+  });
 }
 
 let inQueue = 0;
@@ -184,6 +187,18 @@ async function answered(asked: Pick<Edit, "action" | "changes" | "brought">): Pr
 }
 
 export const change = (...changes: Change[]): Promise<boolean> => ask("change", changes);
+
+/** The place behind the last table of a list. */
+export const BEHIND = -1;
+
+/** What makes a value of the file another one, `undefined` none; nothing where it is that already. */
+export function changeTo(path: Path, value: unknown): Change[] {
+  if (path.at(-1) === BEHIND) return [{ kind: "add", path: path.slice(0, -1), value }];
+  let now: unknown = draft.value?.tables;
+  for (const key of path) now = (now as Record<string | number, unknown> | undefined)?.[key];
+  if (JSON.stringify(now) === JSON.stringify(value)) return [];
+  return [value === undefined ? { kind: "remove", path, value: null } : set(path, value)];
+}
 
 export const set = (path: Path, value: unknown): Change => ({ kind: "set", path, value });
 

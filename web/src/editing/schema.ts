@@ -19,12 +19,13 @@ export interface Schema {
   items?: Schema | false;
   prefixItems?: Schema[];
   default?: unknown;
-  examples?: unknown[];
   minItems?: number;
   $defs?: Record<string, Schema>;
   "x-unit"?: string;
   /** What each of several numbers is. */
   "x-parts"?: string[];
+  /** Whether a list is of the corners of a polygon. */
+  "x-polygon"?: boolean;
   /** Groups of alternatives of which a table has one: the keys of each. */
   "x-one-of"?: string[][][];
 }
@@ -133,20 +134,6 @@ export function alternatives(one: Schema, table: Table): { chosen: number; keys:
     const keys = group.map((bases) => bases.flatMap(keysOf));
     return { chosen: keys.findIndex(({ length }) => length > 0), keys };
   });
-}
-
-/** A value to begin with, as the schema gives an example of it; undefined where it gives none. */
-export function example(one: Schema, name: string): unknown {
-  const property = one.properties?.[name];
-  return property && (given(property).examples?.[0] ?? begun(given(property)));
-}
-
-// A table of alternatives, of which the first one has an example: a shape is a box until another is chosen.
-function begun(one: Schema): Table | undefined {
-  const first = one["x-one-of"]?.[0]?.[0];
-  if (!first || (one.required ?? []).length > 0) return undefined;
-  const values = first.map((key): [string, unknown] => [key, example(one, key)]);
-  return values.every(([, value]) => value !== undefined) ? Object.fromEntries(values) : undefined;
 }
 
 // `limit_mm` is described as `limit in mm`, and comes behind `limit`.

@@ -6,6 +6,7 @@ import {
   ask,
   asking,
   change,
+  changeTo,
   chosenEntry,
   draft,
   type Entry,
@@ -17,7 +18,6 @@ import {
   named,
   type Path,
   refused,
-  set,
   type Table,
 } from "../editing/draft";
 import { gizmoMode, lengthUnit, STEP_NAMES, STEPS, steps } from "../editing/handles";
@@ -276,13 +276,7 @@ function EntryForm({ entry }: { entry: Entry }) {
           path={path}
           without={at === null ? [] : [at]}
           onChange={(puts) =>
-            void change(
-              ...puts.map(([keys, value]) =>
-                value === undefined
-                  ? { kind: "remove", path: [...path, ...keys], value: null }
-                  : set([...path, ...keys], value),
-              ),
-            )
+            void ask("change", () => puts.flatMap(([keys, value]) => changeTo([...path, ...keys], value)))
           }
         />
       ) : (
@@ -382,7 +376,9 @@ function NumberField({ name, unit, value, step, put }: NumberProps) {
         step={step}
         value={String(value)}
         // What is no number, or refused, is not what the file has.
-        onEntered={(_, { valueAsNumber }) => Number.isFinite(valueAsNumber) && put(valueAsNumber)}
+        onEntered={(_, { valueAsNumber }) => {
+          if (Number.isFinite(valueAsNumber)) put(valueAsNumber);
+        }}
       />
     </label>
   );

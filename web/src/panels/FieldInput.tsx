@@ -1,8 +1,9 @@
 // A value of one field: a choice, a number, a word, some numbers side by side, or what has no form of its own, as JSON.
 
 import { type Field, given } from "../editing/schema";
+import { list, listed, number, oneNumber, sideBySide, type Typed } from "../editing/typed";
 import { said, word } from "../words";
-import { TypedInput } from "./TypedInput";
+import { TypedInput, TypedInputs } from "./TypedInput";
 
 interface InputProps {
   id: string;
@@ -18,14 +19,14 @@ const MOST_PARTS = 6;
 
 export function FieldInput({ id, field, value, bad, put, complain }: InputProps) {
   const { schema, required } = field;
-  const invalid = bad ? { "aria-invalid": true as const } : {};
+  const take = (typed: Typed): void => ("wrong" in typed ? complain(typed.wrong) : put(typed.value));
   const choices = schema.enum ?? (schema.const === undefined ? null : [schema.const]);
   if (choices || schema.type === "boolean") {
     const list = choices?.map(String) ?? ["true", "false"];
     return (
       <select
         id={id}
-        {...invalid}
+        {...(bad && { "aria-invalid": true as const })}
         value={value === undefined ? "" : String(value)}
         onChange={(event) => {
           const text = event.currentTarget.value;
@@ -47,44 +48,41 @@ export function FieldInput({ id, field, value, bad, put, complain }: InputProps)
     pair.length <= MOST_PARTS &&
     pair.every((one) => one.type === "string" || one.type === "number")
   ) {
-    const parts = Array.isArray(value) ? value : pair.map(() => "");
+    const parts = Array.isArray(value) ? value : [];
+    const names = pair.map((_, i) => schema["x-parts"]?.[i] ?? String(i + 1));
     return (
       <span class="parts">
-        {pair.map((one, i) => (
-          <TypedInput
-            key={i}
-            id={i === 0 ? id : undefined}
-            aria-label={`${field.name} ${schema["x-parts"]?.[i] ?? i + 1}`}
-            title={schema["x-parts"]?.[i]}
-            {...invalid}
-            list={one.type === "string" ? "names" : undefined}
-            value={String(parts[i] ?? "")}
-            onEntered={(_, input) => {
-              // As they stand there: the file may not have what was entered into another one just now.
-              const all = [...input.parentElement!.querySelectorAll("input")];
-              put(all.map(({ value: text }, k) => entered(text.trim(), pair[k]!.type === "number")));
-            }}
-          />
-        ))}
+        <TypedInputs
+          values={pair.map((_, i) => String(parts[i] ?? ""))}
+          looks={pair.map((one, i) => ({
+            id: i === 0 ? id : undefined,
+            "aria-label": `${field.name} ${names[i]}`,
+            title: schema["x-parts"]?.[i],
+            list: one.type === "string" ? "names" : undefined,
+          }))}
+          bad={bad}
+          onEntered={(texts) =>
+            take(
+              sideBySide(
+                texts,
+                pair.map(({ type }) => type === "number"),
+                names,
+              ),
+            )
+          }
+        />
       </span>
     );
   }
   const each = schema.items ? given(schema.items).type : undefined;
-  if (schema.type === "array" && (each === "number" || each === "string"))
+  if (schema.type === "array" && (each === "number" || each === "integer" || each === "string"))
     return (
       <TypedInput
         id={id}
-        {...invalid}
+        bad={bad}
         placeholder={placeholder(field)}
-        value={Array.isArray(value) ? value.join(", ") : ""}
-        onEntered={(text) => {
-          const parts = text.split(/[[\],;\s]+/).filter((part) => part !== "");
-          const wrong = parts.find((part) => each === "number" && !Number.isFinite(Number(part)));
-          if (wrong !== undefined) return complain(said("{text} is no number", { text: wrong }));
-          put(
-            parts.length === 0 ? undefined : parts.map((part) => (each === "number" ? Number(part) : part)),
-          );
-        }}
+        value={Array.isArray(value) ? listed(value) : ""}
+        onEntered={(text) => take(list(text, each !== "string"))}
       />
     );
   const isText = schema.type === "string";
@@ -92,7 +90,7 @@ export function FieldInput({ id, field, value, bad, put, complain }: InputProps)
   return (
     <TypedInput
       id={id}
-      {...invalid}
+      bad={bad}
       list={isText ? "names" : undefined}
       inputMode={isNumber ? "decimal" : undefined}
       placeholder={placeholder(field)}
@@ -103,27 +101,22 @@ export function FieldInput({ id, field, value, bad, put, complain }: InputProps)
             ? value
             : JSON.stringify(value)
       }
-      onEntered={(given) => {
-        const text = given.trim();
-        if (text === "") return put(undefined);
+      onEntered={(typed) => {
+        const text = typed.trim();
+        if (isNumber || text === "") return take(oneNumber(text));
         if (isText) return put(text);
+        // A quantity may also be a word, such as a percentile; lists and tables are written as JSON.
+        const value = number(text);
+        if (value !== null) return put(value);
         try {
-          put(JSON.parse(isNumber ? text.replace(",", ".") : text));
+          put(JSON.parse(text));
         } catch {
-          // A quantity may also be a word, such as a percentile; lists and tables are written as JSON.
-          if (/^[[{]/.test(text) || isNumber)
-            complain(isNumber ? said("{text} is no number", { text }) : said("not JSON"));
+          if (/^[[{]/.test(text)) complain(said("not JSON"));
           else put(text);
         }
       }}
     />
   );
-}
-
-/** A number where one is asked for, 0 while there is none; what else was typed is for the file's checks. */
-function entered(text: string, number: boolean): unknown {
-  if (!number) return text;
-  return Number.isFinite(Number(text)) ? Number(text) : text;
 }
 
 const looksStructured = (text: string): boolean => /^[[{"\d-]/.test(text);

@@ -3,11 +3,15 @@
 import { doubts } from "../doubts";
 import { scene, stale } from "../page_state";
 import { coloring, hasScores, shownScore } from "../posture/coloring";
+import { roomLook } from "../scene/room_look";
 import { said, word } from "../words";
 import { ScaleBar } from "./ScoreColors";
 import { StateBadge } from "./StateBadge";
 
 const SHOWN = ["within", "exceeded", "undecided", "none"] as const;
+
+/** A colour of the room, for style sheets. */
+const css = (color: number): string => `#${color.toString(16).padStart(6, "0")}`;
 
 export function Legend() {
   if (!scene.value || stale.value) return null;
@@ -20,7 +24,7 @@ export function Legend() {
           </li>
         ))}
         {doubts.value.size > 0 && (
-          <li class="doubt-key">
+          <li class="doubt-key" style={{ "--doubt": css(roomLook.value.tones.doubt) }}>
             <i aria-hidden="true" /> {said("may be elsewhere")}
           </li>
         )}

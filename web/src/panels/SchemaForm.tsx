@@ -2,9 +2,9 @@
 // as a shape, and lists, such as the corners of a field, are forms in it.
 
 import { useSignal } from "@preact/signals";
-import { useId } from "preact/hooks";
-import { mistakesAt, named, names, type Path, type Table } from "../editing/draft";
-import { alternatives, example, type Field, fields, given, type Schema } from "../editing/schema";
+import { useEffect, useId } from "preact/hooks";
+import { asking, BEHIND, mistakesAt, named, names, type Path, refused, type Table } from "../editing/draft";
+import { alternatives, type Field, fields, given, type Schema } from "../editing/schema";
 import { said } from "../words";
 import { FieldInput } from "./FieldInput";
 import { MistakeList } from "./MistakeList";
@@ -25,7 +25,8 @@ export function putInto(table: Table, puts: readonly Put[]): Table {
       inner = inner[key] as typeof inner;
     }
     const last = keys.at(-1)!;
-    if (value === undefined) delete inner[last];
+    if (last === BEHIND) (inner as unknown as unknown[]).push(value);
+    else if (value === undefined) delete inner[last];
     else inner[last] = value;
   }
   return next;
@@ -42,17 +43,40 @@ interface FormProps {
   onChange(puts: readonly Put[]): void;
 }
 
-export function SchemaForm({ schema, table, path, without = [], always = [], onChange }: FormProps) {
+/** An alternative that was chosen and that the table has not yet: what is typed of it, until it is accepted whole. */
+interface Begun {
+  bases: readonly string[];
+  /** Keys of the alternatives that it takes the place of, which hold until then. */
+  instead: readonly string[];
+  table: Table;
+}
+
+export function SchemaForm({ schema, table: own, path, without = [], always = [], onChange }: FormProps) {
   const more = useSignal<ReadonlySet<string>>(new Set());
-  const all = fields(schema, table).filter((field) => !without.includes(field.name));
+  const begun = useSignal<Begun | null>(null);
+  const { bases: chosen, instead }: Omit<Begun, "table"> = begun.value ?? { bases: [], instead: [] };
+  const kept = Object.entries(own).filter(([key]) => !instead.includes(key));
+  const table: Table = { ...Object.fromEntries(kept), ...begun.value?.table };
   const groups = (schema["x-one-of"] ?? []).map((group, k) => ({
     group,
-    ...alternatives(schema, table)[k]!,
+    ...alternatives(schema, own)[k]!,
   }));
+  const accepted = groups.some(
+    ({ group, chosen: at, keys }) => has(keys[at]) && group[at]!.every((base) => chosen.includes(base)),
+  );
+  useEffect(() => {
+    if (accepted) begun.value = null;
+  }, [accepted]);
+  const all = fields(schema, table).filter((field) => !without.includes(field.name));
   const isAlternative = new Set(groups.flatMap(({ group }) => group.flat()));
   const shown = all.filter(
     (f) =>
-      f.required || f.name in table || USUAL.has(f.name) || always.includes(f.name) || more.value.has(f.base),
+      f.required ||
+      f.name in table ||
+      USUAL.has(f.name) ||
+      always.includes(f.name) ||
+      more.value.has(f.base) ||
+      chosen.includes(f.base),
   );
   // Of a key that has no field here nobody else would say what is wrong with it.
   const beside = [...without, ...shown.map((field) => field.name)].flatMap((key) =>
@@ -60,45 +84,57 @@ export function SchemaForm({ schema, table, path, without = [], always = [], onC
   );
   const others = mistakesAt(path).filter((m) => !beside.includes(m) && m.key !== named(path));
   const rest = all.filter((f) => !shown.includes(f) && !isAlternative.has(f.base));
-  /** Of alternatives a table has one: what is given takes the others away. */
   const put = (field: Field, puts: readonly Put[]): void => {
-    const taken = groups
-      .filter(({ group }) => group.flat().includes(field.base))
-      .flatMap(({ group, keys }) => keys.filter((_, k) => !group[k]!.includes(field.base)).flat());
-    onChange([...taken.map((key): Put => [[key], undefined]), ...puts]);
+    const now = begun.value;
+    if (!now?.bases.includes(field.base)) {
+      onChange(puts);
+      return;
+    }
+    // Of alternatives a table has one: what is given takes the others away, once it is given whole.
+    const typed = putInto(now.table, puts);
+    begun.value = { ...now, table: typed };
+    if (fields(schema, typed).some(({ name, base }) => now.bases.includes(base) && !(name in typed))) return;
+    onChange([
+      ...now.instead.map((key): Put => [[key], undefined]),
+      ...Object.entries(typed).map(([key, value]): Put => [[key], value]),
+    ]);
   };
-  const choose = (group: string[][], bases: string[], keys: string[][]): void => {
-    const values = bases.map((base): Put => [[base], example(schema, base)]);
-    const others = [...more.value].filter((one) => !group.flat().includes(one));
-    // What is begun with an example is shown once the file has it; what is not, to be filled in.
-    if (values.every(([, value]) => value !== undefined)) {
-      more.value = new Set(others);
-      onChange([...keys.flat().map((key): Put => [[key], undefined]), ...values]);
-    } else more.value = new Set([...others, ...bases]);
+  const choose = (bases: string[], { group, chosen: at, keys }: (typeof groups)[number]): void => {
+    begun.value = group[at] === bases ? null : { bases, instead: keys.flat(), table: {} };
   };
   return (
     <div class="form">
       <MistakeList mistakes={others} keys />
-      {groups.map(({ group, chosen, keys }) => (
-        <div class="field" key={group.flat().join(" ")}>
+      {groups.map((one) => (
+        <div class="field" key={one.group.flat().join(" ")}>
           <span class="one-of">{said("one of")}</span>
           <select
-            aria-label={said("One of {keys}", { keys: group.map(([base]) => base).join(", ") })}
-            value={group[chosen]?.[0] ?? group.find(([base]) => more.value.has(base!))?.[0] ?? ""}
+            aria-label={said("One of {keys}", { keys: one.group.map(([base]) => base).join(", ") })}
+            value={
+              one.group.find(([base]) => chosen.includes(base!))?.[0] ?? one.group[one.chosen]?.[0] ?? ""
+            }
             onChange={(event) => {
-              const bases = group.find(([base]) => base === event.currentTarget.value);
-              if (bases) choose(group, bases, keys);
+              const bases = one.group.find(([base]) => base === event.currentTarget.value);
+              if (bases) choose(bases, one);
             }}
           >
             <option value="" disabled>
               {said("choose …")}
             </option>
-            {group.map(([base]) => (
+            {one.group.map(([base]) => (
               <option key={base} value={base}>
                 {base}
               </option>
             ))}
           </select>
+          {one.keys.flat().some((key) => instead.includes(key)) && (
+            <p class="kind">
+              {said("{old} holds until {new} is given", {
+                old: one.keys.flat().join(", "),
+                new: chosen.join(", "),
+              })}
+            </p>
+          )}
         </div>
       ))}
       {shown.map((field) => (
@@ -130,6 +166,8 @@ export function SchemaForm({ schema, table, path, without = [], always = [], onC
     </div>
   );
 }
+
+const has = (keys: readonly string[] | undefined): boolean => keys !== undefined && keys.length > 0;
 
 interface RowProps {
   field: Field;
@@ -171,16 +209,31 @@ function FieldRow({ field, value, path, onChange }: RowProps) {
         onChange={(puts) => onChange(puts.map(([keys, inner]) => [[name, ...keys], inner]))}
       />
     );
-  return <ValueRow field={field} value={value} path={path} onChange={onChange} />;
+  return (
+    <ValueRow field={field} value={value} path={own} onChange={(next) => onChange([[[field.name], next]])} />
+  );
 }
 
-function ValueRow({ field, value, path, onChange }: RowProps) {
+interface ValueProps {
+  field: Field;
+  value: unknown;
+  /** Where the value itself is. */
+  path: Path;
+  onChange(next: unknown): void;
+}
+
+function ValueRow({ field, value, path, onChange }: ValueProps) {
   const id = useId();
   const wrong = useSignal("");
-  const mistakes = mistakesAt([...path, field.name]);
+  const mistakes = mistakesAt(path);
+  useEffect(() => {
+    wrong.value = "";
+  }, [JSON.stringify(value)]);
   const put = (next: unknown): void => {
     wrong.value = "";
-    if (JSON.stringify(next) !== JSON.stringify(value)) onChange([[[field.name], next]]);
+    // What is awaited may make it another value than this one.
+    if (asking.peek() || JSON.stringify(next) !== JSON.stringify(value)) onChange(next);
+    else if (mistakes.length > 0) refused.value = null;
   };
   const bad = wrong.value !== "" || mistakes.length > 0;
   return (
@@ -208,6 +261,8 @@ function ValueRow({ field, value, path, onChange }: RowProps) {
 
 interface NestedProps {
   name: string;
+  /** What is taken away with it; its name, unless that is a number. */
+  what?: string;
   required: boolean;
   schema: Schema;
   /** `undefined` while the table has none: what is filled in is kept here until it is accepted. */
@@ -216,8 +271,11 @@ interface NestedProps {
   onChange(puts: readonly Put[]): void;
 }
 
-function NestedForm({ name, required, schema, value, path, onChange }: NestedProps) {
+function NestedForm({ name, what = name, required, schema, value, path, onChange }: NestedProps) {
   const begun = useSignal<Table>({});
+  useEffect(() => {
+    if (value !== undefined) begun.value = {};
+  }, [value === undefined]);
   const here = mistakesAt(path).filter(({ key }) => key === named(path));
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset in a grid is lower than what is in it
@@ -226,7 +284,7 @@ function NestedForm({ name, required, schema, value, path, onChange }: NestedPro
         {name}
         {required && <span aria-hidden="true"> *</span>}
         {value !== undefined && !required && (
-          <TakeAway what={name} onClick={() => onChange([[[], undefined]])} />
+          <TakeAway what={what} onClick={() => onChange([[[], undefined]])} />
         )}
       </p>
       <MistakeList mistakes={here} />
@@ -254,11 +312,38 @@ interface ListProps {
 
 function ListForm({ field, items, value, path, onChange }: ListProps) {
   const { name, unit, required } = field;
-  const adding = useSignal(false);
-  const here = mistakesAt(path).filter(({ key }) => key === named(path));
-  const whole = (next: unknown[]): void => {
-    adding.value = false;
-    onChange([[[], next.length > 0 || required ? next : undefined]]);
+  /** Rows that the list has not: what is typed of them is kept until it is accepted; the last may be empty. */
+  const begun = useSignal<readonly unknown[]>([]);
+  const had = useSignal(value.length);
+  useEffect(() => {
+    if (value.length > had.value) {
+      // Those that were asked for came first.
+      const given = begun.value.filter((one) => one !== undefined).slice(value.length - had.value);
+      begun.value = [...given, ...begun.value.filter((one) => one === undefined)];
+    }
+    had.value = value.length;
+  }, [value.length]);
+  const rows = [...value, ...begun.value];
+  const here = mistakesAt(path).filter(({ key }) => key === named(path) || rowIn(key, path) >= rows.length);
+  const whole = (next: unknown[]): void => onChange([[[], next.length > 0 || required ? next : undefined]]);
+  const take = (k: number): void => {
+    if (k < value.length) whole(value.filter((_, i) => i !== k));
+    else begun.value = begun.value.filter((_, i) => i !== k - value.length);
+  };
+  const put = (k: number, puts: readonly Put[]): void => {
+    if (puts.some(([keys, inner]) => keys.length === 0 && inner === undefined)) take(k);
+    else if (k < value.length) onChange(puts.map(([below, inner]) => [[k, ...below], inner]));
+    else {
+      const next = putInto(
+        { row: rows[k] },
+        puts.map(([below, inner]): Put => [["row", ...below], inner]),
+      ).row;
+      begun.value = begun.value.map((one, i) => (i === k - value.length ? next : one));
+      const given = begun.value.filter((one) => one !== undefined);
+      // Tables that are there stay as they are written.
+      if (items.properties && value.length > 0) onChange(given.map((one): Put => [[BEHIND], one]));
+      else whole([...value, ...given]);
+    }
   };
   const item = (k: number): Field => ({
     name: String(k + 1),
@@ -268,7 +353,6 @@ function ListForm({ field, items, value, path, onChange }: ListProps) {
     unit: "",
     about: "",
   });
-  const count = value.length + (adding.value ? 1 : 0);
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset in a grid is lower than what is in it
     <div role="group" aria-label={name} class="nested" data-field={name}>
@@ -277,38 +361,29 @@ function ListForm({ field, items, value, path, onChange }: ListProps) {
         {unit && <span class="unit"> [{unit}]</span>}
         {required && <span aria-hidden="true"> *</span>}
       </p>
-      <MistakeList mistakes={here} />
-      {Array.from({ length: count }, (_, k) => (
+      <MistakeList mistakes={here} keys={here.some(({ key }) => key !== named(path))} />
+      {rows.map((row, k) => (
         <div class="one-item" key={k}>
           {items.properties ? (
             <NestedForm
               name={String(k + 1)}
+              what={`${name} ${k + 1}`}
               required={false}
               schema={items}
-              value={value[k] as Table | undefined}
+              value={row as Table | undefined}
               path={[...path, k]}
-              onChange={(puts) => {
-                const [[keys, inner]] = puts as [Put];
-                if (k >= value.length) whole([...value, inner]);
-                else if (keys.length === 0) whole(value.filter((_, i) => i !== k));
-                else onChange(puts.map(([below, one]) => [[k, ...below], one]));
-              }}
+              onChange={(puts) => put(k, puts)}
             />
           ) : (
             <ValueRow
               field={item(k)}
-              value={value[k]}
-              path={path}
-              onChange={([put]) => {
-                const next = [...value];
-                if (put![1] === undefined) next.splice(k, 1);
-                else next[k] = put![1];
-                whole(next);
-              }}
+              value={row}
+              path={[...path, k]}
+              onChange={(next) => put(k, [[[], next]])}
             />
           )}
-          {k < value.length && !items.properties && (
-            <TakeAway what={`${name} ${k + 1}`} onClick={() => whole(value.filter((_, i) => i !== k))} />
+          {(row === undefined || !items.properties) && (
+            <TakeAway what={`${name} ${k + 1}`} onClick={() => take(k)} />
           )}
         </div>
       ))}
@@ -317,15 +392,22 @@ function ListForm({ field, items, value, path, onChange }: ListProps) {
         class="small"
         aria-label={said("Add: {what}", { what: name })}
         onClick={() => {
-          const next = between(value);
+          const next = field.schema["x-polygon"] ? between(value) : null;
           if (next) whole([...value, next]);
-          else adding.value = true;
+          else if (begun.value.at(-1) !== undefined || begun.value.length === 0)
+            begun.value = [...begun.value, undefined];
         }}
       >
         +
       </button>
     </div>
   );
+}
+
+/** Which row of a list a mistake is about; -1 for none. */
+function rowIn(key: string, path: Path): number {
+  const start = named(path);
+  return key.startsWith(start) ? Number(/^\[(\d+)\]/.exec(key.slice(start.length))?.[1] ?? -1) : -1;
 }
 
 function TakeAway({ what, onClick }: { what: string; onClick(): void }) {

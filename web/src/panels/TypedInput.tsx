@@ -1,11 +1,11 @@
-// A field that keeps what is being typed, and what was typed last until the server has answered: an answer about
-// another field comes in between.
+// A field that keeps what is being typed, what was typed last until the server has answered, and what was not taken
+// as long as something beside it says why.
 
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { asking } from "../editing/draft";
 
-interface Props {
+interface Look {
   id?: string | undefined;
   type?: "number";
   step?: number;
@@ -14,35 +14,83 @@ interface Props {
   placeholder?: string | undefined;
   inputMode?: "decimal" | undefined;
   "aria-label"?: string | undefined;
-  "aria-invalid"?: true;
+}
+
+interface Props extends Look {
+  /** Whether something beside it says what is wrong with it. */
+  bad?: boolean;
   /** What the file has. */
   value: string;
-  /** Told when somebody has ended typing; the input is given too, with those beside it. */
+  /** Told when somebody has ended typing. */
   onEntered(text: string, input: HTMLInputElement): void;
 }
 
-export function TypedInput({ value, onEntered, ...others }: Props) {
-  const typed = useSignal<string | null>(null);
-  const entered = useSignal(false);
-  const idle = !asking.value;
-  useEffect(() => {
-    if (!entered.value || !idle) return;
-    entered.value = false;
-    typed.value = null;
-  }, [value, idle, entered.value]);
+export function TypedInput({ value, bad = false, onEntered, ...look }: Props) {
   return (
-    <input
-      type="text"
-      {...others}
-      value={typed.value ?? value}
-      onInput={(event) => {
-        typed.value = event.currentTarget.value;
-        entered.value = false;
-      }}
-      onChange={(event) => {
-        onEntered(event.currentTarget.value, event.currentTarget);
-        entered.value = true;
-      }}
+    <TypedInputs
+      values={[value]}
+      looks={[look]}
+      bad={bad}
+      onEntered={([text], input) => onEntered(text!, input)}
     />
+  );
+}
+
+interface Several {
+  values: readonly string[];
+  looks: readonly Look[];
+  bad: boolean;
+  /** Told what stands in all of them when somebody has ended typing in one. */
+  onEntered(texts: string[], input: HTMLInputElement): void;
+}
+
+/** What becomes of what is typed: still typed, waits for the server, or neither. */
+type Phase = "typing" | "waits" | "rests";
+
+/** Fields of one value, side by side. */
+export function TypedInputs({ values, looks, bad, onEntered }: Several) {
+  const typed = useSignal<readonly (string | undefined)[]>([]);
+  const phase = useSignal<Phase>("rests");
+  /** How it was before somebody began to type. */
+  const before = useSignal<{ typed: readonly (string | undefined)[]; phase: Phase } | null>(null);
+  const idle = !asking.value;
+  const file = JSON.stringify(values);
+  useEffect(() => {
+    if (phase.value === "waits" && idle) phase.value = "rests";
+    if (phase.value === "rests" && !bad) typed.value = [];
+  }, [file, idle, bad, phase.value]);
+  useEffect(() => {
+    if (phase.value === "rests") typed.value = [];
+  }, [file]);
+  const texts = values.map((value, k) => typed.value[k] ?? value);
+  return (
+    <>
+      {texts.map((text, k) => (
+        <input
+          key={k}
+          type="text"
+          {...looks[k]}
+          {...(bad && { "aria-invalid": true as const })}
+          value={text}
+          onInput={(event) => {
+            if (phase.value !== "typing") before.value = { typed: typed.value, phase: phase.value };
+            phase.value = "typing";
+            typed.value = values.map((_, i) => (i === k ? event.currentTarget.value : typed.value[i]));
+          }}
+          onChange={(event) => {
+            phase.value = "waits";
+            before.value = null;
+            const all = texts.map((one, i) => (i === k ? event.currentTarget.value : one));
+            onEntered(all, event.currentTarget);
+          }}
+          onBlur={() => {
+            // Typed and taken away again: the browser tells of no change.
+            if (phase.value !== "typing" || !before.value) return;
+            typed.value = before.value.typed;
+            phase.value = before.value.phase;
+          }}
+        />
+      ))}
+    </>
   );
 }

@@ -22,6 +22,7 @@ import { coarser } from "./coarser";
 import { type Crowd, crowdsOf, type Dressed, type Sight } from "./crowds";
 import { drawnBySoftware } from "./effort";
 import { featureEdges, turnOutward } from "./feature_edges";
+import { Levels } from "./levels";
 import {
   bodyMaterial,
   doubtMaterial,
@@ -43,6 +44,9 @@ const FIRST = -1;
 /** What is no farther than this from where it was drawn last stands still: single precision, in metres and as a turn. */
 const STANDS = 1e-6;
 
+/** Time for coarser shapes in each picture [ms]. */
+const COARSER_MS = 4;
+
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
 
@@ -63,6 +67,18 @@ function withNormals(geometry: BufferGeometry): BufferGeometry {
     sharp.set(geometry, made);
   }
   return made;
+}
+
+/** Give back what a model takes of the graphics card, with the shapes that were made of its own. */
+function drop(model: Object3D): void {
+  model.traverse((part) => {
+    if (!(part instanceof Mesh)) return;
+    const { geometry } = part as Mesh;
+    for (const one of [geometry, sharp.get(geometry)]) {
+      if (one) Levels.drop(one);
+      one?.dispose();
+    }
+  });
 }
 
 function worn(given: Material | Material[], glow: number): Material | Material[] {
@@ -258,7 +274,7 @@ export class Bodies {
     const before = this.models;
     const models = new Map<string, Promise<Object3D>>();
     this.models = models;
-    await Promise.all(
+    const dressed = Promise.all(
       this.list.map(async (body) => {
         const hash = body.node.mesh;
         if (!hash) return;
@@ -276,9 +292,12 @@ export class Bodies {
         }
       }),
     );
+    // All that are needed have been asked for by now.
+    for (const [hash, model] of before) if (!models.has(hash)) void model.then(drop, () => {});
+    await dressed;
     if (generation === this.generation) {
       this.crowds = crowdsOf(this.list);
-      for (const { levels } of this.crowds) for (const { drawn } of levels) this.root.add(drawn);
+      for (const { root } of this.crowds) this.root.add(root);
       this.seenFrom.elements.fill(0);
     }
     return failed;
@@ -338,6 +357,8 @@ export class Bodies {
       this.root.worldToLocal(camera.getWorldPosition(sight.eye));
     }
     for (let k = 0; k < this.crowds.length; k += 1) this.crowds[k]!.arrange(close ? sight : null, anew);
+    const until = performance.now() + COARSER_MS;
+    for (let k = 0; k < this.crowds.length; k += 1) this.crowds[k]!.refine(until);
   }
 
   /** Show them over the real cell, or in a room of their own. */

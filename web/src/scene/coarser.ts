@@ -2,31 +2,49 @@
 
 import { BufferAttribute, BufferGeometry } from "three";
 
-/** A surface, and how far a point of the one that it was made of may be from where it is now [m]. */
+/** A surface, and how it stands for the true one. */
 export interface Coarser {
   shape: BufferGeometry;
+  /** How far a corner of the true one may be from where it is now [m]. */
   off: number;
+  /** The corner here that stands for each of the true one; left out where they are the same. */
+  standIn?: Uint32Array;
+}
+
+/** Corners between two looks at the clock. */
+const AT_ONCE = 2048;
+
+/** A coarser surface at once, as `coarsening` makes it bit by bit. */
+export function coarser(surface: BufferGeometry, cell: number): Coarser {
+  const work = coarsening(surface, { shape: surface, off: 0 }, cell);
+  for (;;) {
+    const step = work.next();
+    if (step.done) return step.value;
+  }
 }
 
 /**
- * Corners that lie in one cell of a grid, and of which the triangles face alike, made one.
+ * Corners that lie in one cell of a grid, and of which the triangles face alike, made one, some at each step.
  *
- * @param surface Triangles with normals.
+ * @param truth The surface that it is to stand for: triangles with normals.
+ * @param before What it is made of: that, or a coarser one of it.
  * @param cell Edge of a cell [m]; 0 makes one of corners that are equal, and changes nothing that is drawn.
- * @returns Triangles with an index; no point is off by more than the diagonal of a cell.
+ * @returns Triangles with an index; no corner of `before` is off by more than the diagonal of a cell.
  */
-export function coarser(surface: BufferGeometry, cell: number): Coarser {
-  const at = surface.getAttribute("position");
-  const normal = surface.getAttribute("normal");
-  const index = surface.getIndex();
-  const corners = index ? index.count : at.count;
+export function* coarsening(
+  truth: BufferGeometry,
+  before: Coarser,
+  cell: number,
+): Generator<undefined, Coarser> {
+  const { shape } = before;
+  const at = shape.getAttribute("position");
+  const normal = shape.getAttribute("normal");
   const numbers = new Map<string, number>();
   const kept: number[] = [];
   const sums: number[] = [];
-  const made = new Uint32Array(corners);
-  let off = 0;
-  for (let k = 0; k < corners; k += 1) {
-    const i = index ? index.getX(k) : k;
+  const made = new Uint32Array(at.count);
+  for (let i = 0; i < at.count; i += 1) {
+    if (i % AT_ONCE === AT_ONCE - 1) yield;
     const [x, y, z] = [at.getX(i), at.getY(i), at.getZ(i)];
     const [a, b, c] = [normal.getX(i), normal.getY(i), normal.getZ(i)];
     const key =
@@ -40,15 +58,30 @@ export function coarser(surface: BufferGeometry, cell: number): Coarser {
       kept.push(x, y, z);
       sums.push(0, 0, 0);
     }
-    const first = 3 * number;
-    off = Math.max(off, Math.hypot(x - kept[first]!, y - kept[first + 1]!, z - kept[first + 2]!));
     for (const [j, n] of [a, b, c].entries()) sums[3 * number + j]! += n;
-    made[k] = number;
+    made[i] = number;
   }
+  const index = shape.getIndex();
+  const corners = index ? index.count : at.count;
   const triangles: number[] = [];
   for (let k = 0; k + 2 < corners; k += 3) {
-    const [p, q, r] = [made[k]!, made[k + 1]!, made[k + 2]!];
+    if (k % (3 * AT_ONCE) === 0) yield;
+    const [p, q, r] = index
+      ? [made[index.getX(k)]!, made[index.getX(k + 1)]!, made[index.getX(k + 2)]!]
+      : [made[k]!, made[k + 1]!, made[k + 2]!];
     if (p !== q && q !== r && r !== p) triangles.push(p, q, r);
+  }
+  const own = truth.getAttribute("position");
+  const standIn = before.standIn ? new Uint32Array(own.count) : made;
+  let off = 0;
+  for (let i = 0; i < own.count; i += 1) {
+    if (i % (4 * AT_ONCE) === 0) yield;
+    const first = 3 * (before.standIn ? made[before.standIn[i]!]! : made[i]!);
+    standIn[i] = first / 3;
+    off = Math.max(
+      off,
+      Math.hypot(own.getX(i) - kept[first]!, own.getY(i) - kept[first + 1]!, own.getZ(i) - kept[first + 2]!),
+    );
   }
   for (let k = 0; k < sums.length; k += 3) {
     const size = Math.hypot(sums[k]!, sums[k + 1]!, sums[k + 2]!) || 1;
@@ -58,7 +91,7 @@ export function coarser(surface: BufferGeometry, cell: number): Coarser {
   fewer.setAttribute("position", new BufferAttribute(new Float32Array(kept), 3));
   fewer.setAttribute("normal", new BufferAttribute(new Float32Array(sums), 3));
   fewer.setIndex(new BufferAttribute(new Uint32Array(triangles), 1));
-  return { shape: fewer, off };
+  return { shape: fewer, off, standIn };
 }
 
 /** Which of the six directions of the axes a normal is nearest to. */

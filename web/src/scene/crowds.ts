@@ -4,7 +4,7 @@
 import {
   type BufferGeometry,
   type Frustum,
-  type Group,
+  Group,
   InstancedMesh,
   type Material,
   Matrix4,
@@ -12,8 +12,8 @@ import {
   Sphere,
   type Vector3,
 } from "three";
-import { type Coarser, coarser } from "./coarser";
 import { drawnBySoftware } from "./effort";
+import { Levels, triangles } from "./levels";
 import { ownMaterial } from "./materials";
 
 /** Fewer of one shape are drawn one by one, unless they have many triangles. */
@@ -21,11 +21,6 @@ const LEAST = 4;
 const MANY_TRIANGLES = 200;
 /** Layer of what no camera sees, and rays meet all the same. Masks of higher ones are no small integers to V8. */
 export const ALONE_LAYER = 28;
-/** Cells of coarser shapes, as shares of the radius of the whole. */
-const CELLS = [0.06, 0.1, 0.16, 0.25, 0.5];
-/** A coarser shape that has not so much fewer corners is none. */
-const WORTH = 0.7;
-
 /** A mesh of a body that may be drawn with others. */
 export interface Dressed {
   mesh: Mesh;
@@ -69,29 +64,28 @@ interface Level {
 }
 
 export class Crowd {
-  /** From the true shape to the coarsest one. */
-  readonly levels: Level[];
+  /** All of it, to be drawn. */
+  readonly root = new Group();
+  /** From the true shape to the coarsest one that there is. */
+  readonly levels: Level[] = [];
+  private readonly shapes: Levels;
+  private readonly material: Material;
   private changed = true;
+  /** Whether a coarser shape would do for one of its members. */
+  private wants = false;
   private readonly members: readonly Member[];
 
   /** Meshes that are drawn in one call; `members` has at least one. */
   constructor(members: readonly Pick<Member, "body" | "dressed">[]) {
     const { mesh, given } = members[0]!.dressed;
-    const material = ownMaterial(given as Material);
-    this.levels = shapesOf(mesh.geometry).map(({ shape, off }) => {
-      const drawn = new InstancedMesh(shape, material, members.length);
-      drawn.castShadow = drawn.receiveShadow = true;
-      drawn.frustumCulled = false;
-      drawn.raycast = () => {};
-      return { drawn, off };
-    });
+    this.material = ownMaterial(given as Material);
+    this.shapes = Levels.of(mesh.geometry);
     this.members = members.map((member) => ({
       ...member,
       place: new Matrix4(),
       ball: new Sphere(),
       within: true,
     }));
-    if (!mesh.geometry.boundingSphere) mesh.geometry.computeBoundingSphere();
     for (const member of this.members) {
       member.body.followers.push(() => this.follow(member));
       this.follow(member);
@@ -116,24 +110,41 @@ export class Crowd {
    * @param anew Whether that is another place than before.
    */
   arrange(sight: Sight | null, anew: boolean): void {
-    if (!anew && !this.changed) return;
-    this.changed = false;
-    for (const { drawn } of this.levels) drawn.count = 0;
+    const { levels, shapes } = this;
+    if (!anew && !this.changed && levels.length === shapes.made.length) return;
+    this.changed = this.wants = false;
+    while (levels.length < shapes.made.length) this.take(shapes.made[levels.length]!);
+    for (const { drawn } of levels) drawn.count = 0;
     for (const { within, place, ball } of this.members) {
       if (!within || (sight && !sight.frustum.intersectsSphere(ball))) continue;
-      const { drawn } = this.levels[sight ? this.levelOf(sight, ball) : 0]!;
+      const { drawn } = levels[sight ? this.levelOf(sight, ball) : 0]!;
       drawn.setMatrixAt(drawn.count, place);
       drawn.count += 1;
     }
-    for (const { drawn } of this.levels) {
+    for (const { drawn } of levels) {
       drawn.visible = drawn.count > 0;
       drawn.instanceMatrix.needsUpdate = drawn.visible;
     }
   }
 
+  private take({ shape, off }: { shape: BufferGeometry; off: number }): void {
+    const drawn = new InstancedMesh(shape, this.material, this.members.length);
+    drawn.castShadow = drawn.receiveShadow = true;
+    drawn.frustumCulled = false;
+    drawn.raycast = () => {};
+    this.root.add(drawn);
+    this.levels.push({ drawn, off });
+  }
+
+  /** Work on a coarser shape, where one would do, until a time [ms]; the finer one is drawn until it is there. */
+  refine(until: number): void {
+    if (this.wants && this.levels.length === this.shapes.made.length) this.shapes.work(until);
+  }
+
   // The coarsest of which no point is a pixel off.
   private levelOf({ eye, pixel }: Sight, { center, radius }: Sphere): number {
     const seen = pixel * Math.max(eye.distanceTo(center) - radius, 0);
+    if (seen >= this.shapes.next) this.wants = true;
     let level = this.levels.length - 1;
     while (level > 0 && this.levels[level]!.off > seen) level -= 1;
     return level;
@@ -143,33 +154,6 @@ export class Crowd {
     for (const { drawn } of this.levels) drawn.dispose();
   }
 }
-
-const shapes = new WeakMap<BufferGeometry, Coarser[]>();
-
-/** A shape and coarser ones of it, with how far these are off [m]; of all crowds that have it. */
-function shapesOf(shape: BufferGeometry): Coarser[] {
-  let known = shapes.get(shape);
-  if (!known) {
-    known = [{ shape, off: 0 }];
-    const plain = Object.keys(shape.attributes).every((name) => name === "position" || name === "normal");
-    if (drawnBySoftware() && plain && shape.hasAttribute("normal")) {
-      if (!shape.boundingSphere) shape.computeBoundingSphere();
-      for (const share of CELLS) {
-        const made = coarser(shape, share * shape.boundingSphere!.radius);
-        if (cost(made.shape) <= WORTH * cost(known.at(-1)!.shape)) known.push(made);
-      }
-    }
-    shapes.set(shape, known);
-  }
-  return known;
-}
-
-/** Corners that are looked up and those that are worked out. */
-const cost = (shape: BufferGeometry): number =>
-  triangles(shape) + (shape.index ? shape.getAttribute("position").count : 3 * triangles(shape));
-
-const triangles = (shape: BufferGeometry): number =>
-  (shape.index?.count ?? shape.getAttribute("position").count) / 3;
 
 /** Crowds among bodies. */
 export function crowdsOf(bodies: readonly Clad[]): Crowd[] {

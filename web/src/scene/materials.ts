@@ -158,8 +158,30 @@ export function recolor(): void {
     if (tone === undefined) continue;
     if (material instanceof ShaderMaterial) material.uniforms.tone!.value.setHex(tone);
     else (material as MeshBasicMaterial).color.setHex(tone);
-    if (material instanceof MeshStandardMaterial) material.emissive.setHex(tone);
+    // Who gives off no light does not begin to.
+    if (material instanceof MeshStandardMaterial && material.emissive.getHex() !== 0)
+      material.emissive.setHex(tone);
   }
+}
+
+/** How much of a ghost is seen: enough to stand out from the ground. */
+export const GHOSTLY = 0.5;
+
+/** The shared material of surfaces that point or mark; over everything, seen through, or neither. */
+export function markMaterial(kind: "solid" | "over" | "ghost"): Material {
+  const ghost = { transparent: true, opacity: GHOSTLY, depthWrite: false };
+  const look = { solid: {}, over: { depthTest: false }, ghost }[kind];
+  return once(`${kind} mark`, () => {
+    return new MeshBasicMaterial({ color: colorOf("mark"), toneMapped: false, ...look });
+  });
+}
+
+/** The shared material of lines that point or mark; over everything or not. */
+export function markLine(over: boolean): Material {
+  const look = { toneMapped: false, transparent: over, opacity: over ? 0.85 : 1, depthTest: !over };
+  return once(`${over ? "line-over" : "beam"} mark`, () => {
+    return new LineBasicMaterial({ color: colorOf("mark"), ...look });
+  });
 }
 
 /** A material that is made when it is first needed and shared from then on. */

@@ -1,28 +1,14 @@
 // What is selected: corner brackets around each body's own box.
 
-import {
-  type Box3,
-  BufferGeometry,
-  Float32BufferAttribute,
-  LineBasicMaterial,
-  LineSegments,
-  type Object3D,
-} from "three";
+import { type Box3, BufferGeometry, Float32BufferAttribute, LineSegments, type Object3D } from "three";
 import type { Bodies } from "./bodies";
+import { markLine } from "./materials";
 
-const COLOR = 0xffffff;
 /** Length of a bracket's arm as a share of the edge. */
 const ARM = 0.22;
 
 export class Outline {
   private drawn: LineSegments[] = [];
-  private readonly material = new LineBasicMaterial({
-    color: COLOR,
-    toneMapped: false,
-    transparent: true,
-    opacity: 0.85,
-    depthTest: false,
-  });
 
   constructor(private readonly bodies: Bodies) {}
 
@@ -35,7 +21,7 @@ export class Outline {
     for (const name of names) {
       const body = this.bodies.byName.get(name);
       if (!body || body.extent.isEmpty()) continue;
-      const lines = new LineSegments(brackets(body.extent), this.material);
+      const lines = new LineSegments(brackets(body.extent), markLine(true));
       lines.renderOrder = 5;
       lines.raycast = () => {};
       (body.group as Object3D).add(lines);

@@ -5,7 +5,8 @@ import { signal } from "@preact/signals";
 import { DOUBT_COLOR, NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
 
-export type Tone = Verdict | "none" | "doubt";
+/** `mark` is what points, measures or shows what is selected: it has no verdict, and stands out from the ground. */
+export type Tone = Verdict | "none" | "doubt" | "mark";
 
 /** Colours, sRGB. */
 export interface RoomLook {
@@ -18,13 +19,20 @@ export interface RoomLook {
 const DARK: RoomLook = {
   ground: 0x10151c,
   grid: [0x1b232e, 0x2a3646, 0xa8475c, 0x4c8f6a],
-  tones: { ...VERDICT_COLORS, none: NEUTRAL_COLOR, doubt: DOUBT_COLOR },
+  tones: { ...VERDICT_COLORS, none: NEUTRAL_COLOR, doubt: DOUBT_COLOR, mark: 0xffffff },
 };
 
 const LIGHT: RoomLook = {
   ground: 0xe3e8ee,
   grid: [0xd3dae2, 0xbac4cf, 0xb0506a, 0x3f8560],
-  tones: { within: 0x0f8b97, exceeded: 0xc11540, undecided: 0x8f7300, none: 0x4e5c6d, doubt: 0x6f7a88 },
+  tones: {
+    within: 0x0f8b97,
+    exceeded: 0xc11540,
+    undecided: 0x8f7300,
+    none: 0x4e5c6d,
+    doubt: 0x6f7a88,
+    mark: 0x141b25,
+  },
 };
 
 export const LOOKS = { dark: DARK, light: LIGHT };

@@ -54,7 +54,7 @@ export class BodyBoard extends Panel {
     const share = shareOf(row, aspect.peek());
     const amount =
       share === null ? "" : `, ${said("{share} of the permissible speed", { share: percent(share, "up") })}`;
-    const side = row.side ? `${told(row.side)} ` : "";
+    const side = row.side ? `${said(row.side)} ` : "";
     return `${side}${told(row.name)}: ${said(LOOK_WORDS[lookAt(governing, aspect.peek(), open !== null)])}${amount}`;
   }
 

@@ -1,18 +1,18 @@
 // Design in place: a hand takes what the workstation file has, moves or turns it and lets it go, as the handles on
 // the desk do; or it carries a robot's tool to where a waypoint is to be.
 
-import { Group, MathUtils, Matrix4, Mesh, MeshBasicMaterial, Quaternion, Vector3 } from "three";
+import { Group, MathUtils, Matrix4, Mesh, Quaternion, Vector3 } from "three";
 import { holding } from "../company";
 import { change, type Entry, entries, isPlaced, refused } from "../editing/draft";
 import { gizmoMode, STEPS, steps } from "../editing/handles";
 import { scene, select } from "../page_state";
 import { Carried, placeIn, whereIs } from "../scene/carried";
+import { markMaterial } from "../scene/materials";
 import type { Viewer } from "../scene/viewer";
 import type { Place, Taught } from "../wire";
 
 /** A hand is at a body that is no farther than this from its middle, by the box of the body [m]. */
 const AROUND = 0.08;
-const GHOST = 0x7ee7f1;
 const ONE = new Vector3(1, 1, 1);
 const AXES = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)] as const;
 
@@ -43,12 +43,6 @@ export class Designing {
   on = false;
   teaches = false;
   private readonly held = new Map<Hand, Held>();
-  private readonly material = new MeshBasicMaterial({
-    color: GHOST,
-    transparent: true,
-    opacity: 0.45,
-    depthWrite: false,
-  });
   // Made once: a picture allocates nothing of ours.
   private readonly inverse = new Matrix4();
   private readonly position = new Vector3();
@@ -129,7 +123,6 @@ export class Designing {
   /** Let go of everything; what is on its way to the file goes on. */
   end(): void {
     for (const [side, held] of this.held) this.forget(side, held);
-    this.material.dispose();
   }
 
   private forget(side: Hand, held: Held): void {
@@ -213,7 +206,7 @@ export class Designing {
       if (node.name !== of.tip.node && !(node.role === "tool" && node.mover === robot)) continue;
       group.traverse((part) => {
         if (!(part instanceof Mesh)) return;
-        const copy = new Mesh(part.geometry, this.material);
+        const copy = new Mesh(part.geometry, markMaterial("ghost"));
         copy.matrixAutoUpdate = false;
         this.inverse.copy(this.viewer.stage.world.matrixWorld).invert();
         copy.matrix.multiplyMatrices(this.inverse, part.matrixWorld);

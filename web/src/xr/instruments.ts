@@ -3,9 +3,9 @@
 import {
   BufferGeometry,
   CanvasTexture,
+  Color,
   Group,
   Line,
-  LineBasicMaterial,
   type Material,
   Mesh,
   MeshBasicMaterial,
@@ -20,6 +20,7 @@ import {
 import { select } from "../page_state";
 import { distance } from "../panels/MeasureNote";
 import type { Bodies } from "../scene/bodies";
+import { colorOf, markLine, markMaterial } from "../scene/materials";
 import { hitAlong, nodeOf } from "../scene/picking";
 import type { Stage } from "../scene/stage";
 import type { Viewer } from "../scene/viewer";
@@ -28,7 +29,6 @@ import { said } from "../words";
 
 /** Letters of the ruler are 16 mm high. */
 const TEXT = { width: 0.22, height: 0.05, pixels: 512 };
-const GHOST = 0x8fb7ff;
 
 /**
  * How far two things are from one another: the least distance of their surfaces as the engine has it, by what
@@ -38,7 +38,7 @@ export class Ruler {
   readonly root = new Group();
   private readonly line = new Line(
     new BufferGeometry().setFromPoints([new Vector3(), new Vector3()]),
-    new LineBasicMaterial({ color: 0xfbe36a, depthTest: false }),
+    markLine(true),
   );
   private readonly texture: CanvasTexture;
   private readonly words: Sprite;
@@ -113,7 +113,7 @@ export class Ruler {
     this.brush.clearRect(0, 0, canvas.width, canvas.height);
     this.brush.font = "bold 72px sans-serif";
     this.brush.textAlign = "center";
-    this.brush.fillStyle = "#fbe36a";
+    this.brush.fillStyle = new Color(colorOf("mark")).getStyle();
     this.brush.fillText(text, canvas.width / 2, 92, canvas.width);
     this.texture.needsUpdate = true;
     this.root.visible = true;
@@ -130,7 +130,6 @@ export class Ruler {
     this.texture.dispose();
     this.words.material.dispose();
     this.line.geometry.dispose();
-    this.line.material.dispose();
   }
 }
 
@@ -157,13 +156,6 @@ export class Section {
 /** Everybody as they are shown now, to stay while time goes elsewhere: the past beside the present. */
 export class Ghost {
   private shown: Object3D | null = null;
-  private readonly material = new MeshBasicMaterial({
-    color: GHOST,
-    transparent: true,
-    opacity: 0.28,
-    depthWrite: false,
-  });
-
   constructor(
     private readonly stage: Stage,
     private readonly bodies: Bodies,
@@ -184,7 +176,7 @@ export class Ghost {
       body.group.updateWorldMatrix(true, true);
       body.group.traverseVisible((part) => {
         if (!(part instanceof Mesh)) return;
-        const copy = new Mesh(part.geometry, this.material);
+        const copy = new Mesh(part.geometry, markMaterial("ghost"));
         copy.matrixAutoUpdate = false;
         copy.matrix.copy(part.matrixWorld);
         moving.add(copy);
@@ -198,11 +190,6 @@ export class Ghost {
     // Geometry is that of the bodies themselves.
     if (this.shown) this.stage.scene.remove(this.shown);
     this.shown = null;
-  }
-
-  dispose(): void {
-    this.clear();
-    this.material.dispose();
   }
 }
 

@@ -14,6 +14,7 @@ import {
   Vector3,
 } from "three";
 import { registered, scene } from "../page_state";
+import { markMaterial } from "../scene/materials";
 import type { Viewer } from "../scene/viewer";
 import type { Register, Registered } from "../wire";
 import { said, told, word } from "../words";
@@ -58,10 +59,7 @@ interface Restores {
 export class Registering {
   readonly panel: Mesh;
   /** Where the next landmark is, in the world. */
-  readonly mark = new Mesh(
-    new SphereGeometry(0.012, 16, 10),
-    new MeshBasicMaterial({ color: 0xfbe36a, depthTest: false }),
-  );
+  readonly mark = new Mesh(new SphereGeometry(0.012, 16, 10), markMaterial("over"));
   step: Step;
   /** Which tracking space it is; the server forgets what was known of another. */
   space = crypto.randomUUID();
@@ -202,10 +200,8 @@ export class Registering {
     this.session.removeEventListener("squeezestart", this.takeBack);
     this.texture.dispose();
     this.mark.removeFromParent();
-    for (const { geometry, material } of [this.panel, this.mark]) {
-      geometry.dispose();
-      (material as MeshBasicMaterial).dispose();
-    }
+    for (const { geometry } of [this.panel, this.mark]) geometry.dispose();
+    (this.panel.material as MeshBasicMaterial).dispose();
   }
 
   private get landmark() {

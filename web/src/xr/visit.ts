@@ -6,10 +6,8 @@ import {
   BufferGeometry,
   Group,
   Line,
-  LineBasicMaterial,
   Matrix4,
   Mesh,
-  MeshBasicMaterial,
   Quaternion,
   Raycaster,
   RingGeometry,
@@ -32,6 +30,7 @@ import {
 } from "../page_state";
 import { eventLine } from "../panels/event_line";
 import { ALONE_LAYER } from "../scene/crowds";
+import { markLine, markMaterial } from "../scene/materials";
 import type { Sighted } from "../scene/own_presence";
 import { nodeAlong } from "../scene/picking";
 import type { Viewer } from "../scene/viewer";
@@ -89,10 +88,10 @@ export async function sessionModes(): Promise<Mode[]> {
 
 /** What a visitor holds: a ball where the hand is, and a beam to where it points. */
 class Pointer {
-  readonly ball = new Mesh(new SphereGeometry(0.022, 16, 10), new MeshBasicMaterial({ color: 0xdbe3ee }));
+  readonly ball = new Mesh(new SphereGeometry(0.022, 16, 10), markMaterial("solid"));
   readonly beam = new Line(
     new BufferGeometry().setFromPoints([new Vector3(), new Vector3(0, 0, -1)]),
-    new LineBasicMaterial({ color: 0x7ee7f1 }),
+    markLine(false),
   );
   /** Where it points from, and which way, in the world. */
   readonly from = new Vector3();
@@ -113,7 +112,7 @@ export class Visit implements Sighted {
   private readonly pointers = { left: new Pointer(), right: new Pointer() };
   private readonly landing = new Mesh(
     new RingGeometry(0.16, 0.22, 32).rotateX(-Math.PI / 2),
-    new MeshBasicMaterial({ color: 0x7ee7f1 }),
+    markMaterial("solid"),
   );
   private readonly board = new Board();
   private readonly hands: Hands;
@@ -716,7 +715,8 @@ export class Visit implements Sighted {
     if (this.measures && measuring.peek()) toggleMeasure();
     viewer.stage.scene.remove(this.ruler.root);
     this.section.clear();
-    for (const each of [this.menu, ...this.aside, this.ruler, this.ghost, this.vignette]) each.dispose();
+    this.ghost.clear();
+    for (const each of [this.menu, ...this.aside, this.ruler, this.vignette]) each.dispose();
     rig.remove(things);
     rig.position.set(0, 0, 0);
     rig.quaternion.identity();

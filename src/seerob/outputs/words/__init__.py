@@ -75,10 +75,16 @@ def told(text: str) -> str:
     """What the engine says, in the language that is spoken; as it is where no catalogue has it.
 
     Sentences that are joined, in place of a value, in parentheses or about a name (``ur10: …``) are looked up
-    each by itself, and so is what stands before a figure.
+    each by itself, and so is what stands before a figure. A single word is a name unless it is of `alone`.
     """
     language = _language.get()
     return text if language == "en" else _told(text, language)
+
+
+@cache
+def alone() -> frozenset[str]:
+    """Single words that the engine says. Any other, such as the label of a button, may be a name and stays."""
+    return frozenset(files(__package__).joinpath("alone.txt").read_text("utf-8").split())
 
 
 _OWN = 9
@@ -91,7 +97,7 @@ _OF_A_FIGURE = re.compile(r"([^\d]*[^\d\s−-]) ([−-]?\d\S*)")
 @lru_cache(maxsize=4096)
 def _told(text: str, language: str) -> str:
     found = catalogue(language).get(text)
-    if found is not None:
+    if found is not None and (" " in text or text in alone()):
         return found
     for own, words, pattern, translation in _sentences(language):
         if words in text and (match := pattern.fullmatch(text)):

@@ -25,9 +25,9 @@ from seerob.criteria.contact.regions import (
     without_limit,
 )
 from seerob.description.humans import manikin
+from seerob.description.humans.body_areas import BODY_REGION
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import bone_poses, without_side
-from seerob.description.humans.skin import BODY_REGION
 from seerob.session.station import Station, load
 from seerob.twin.spans import Span
 from seerob.twin.state import State

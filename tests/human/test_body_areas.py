@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from seerob.description.humans import anthropometry
-from seerob.description.humans.body_areas import AREAS, area_in, body_area, in_front, outer_shoulder, words
+from seerob.description.humans.body_areas import AREAS, Borders, area_in, words
 from seerob.description.humans.skeleton import BONES
-from seerob.description.humans.skin import body_region, edges, skin
+from seerob.description.humans.skin import edges, skin
 from seerob.description.norms.body_limits import shipped
 
 MIRROR = np.array([1.0, 1.0, -1.0])
@@ -36,26 +36,27 @@ def test_all_29_areas_are_on_the_skin_and_in_their_region(sex, hand):
     region_of = {area.number: region.name for region in shipped().regions.values() for area in region.areas}
     found = set()
     for bone, point in on_skin(body):
-        area = body_area(bone, point, body=body, hand=hand)
-        if area is not None:
-            assert body_region(bone, point, body=body) == region_of[area.number], (bone, point, area)
-            found.add(area.number)
+        borders = Borders(bone, body=body, hand=hand)
+        number = borders.area(*point)
+        if number:
+            assert borders.region(*point) == region_of[number], (bone, point, number)
+            found.add(number)
     assert found == set(region_of) == set(range(1, 30))
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_shoulder_girdle_is_divided_by_its_own_line_and_across_its_middle(side):
     body = anthropometry.body(name="p", stature=1.7, mass=70, sex="female")
-    along = body.offset[f"{side}_upper_arm"]
+    along, borders = body.offset[f"{side}_upper_arm"], Borders(f"{side}_clavicle", body=body, hand="right")
     halfway, cross = along / 2, np.cross(along, [0.0, 1.0, 0.0])
     for far in (-0.1, 0.1):
         beyond = halfway + 0.01 * far * along + cross
-        assert outer_shoulder(f"{side}_clavicle", beyond, body) is (far > 0)
+        assert borders.outer_shoulder(*beyond.tolist()) is (far > 0)
         across = (
             np.array([1.0, 0.0, 0.0]) - along[0] / (along @ along) * along
         )  # perpendicular to it, forward
         for point in (0.2 * along + far * across, 0.9 * along + far * across):
-            assert in_front(f"{side}_clavicle", tuple(point.tolist()), body) is (far > 0)
+            assert borders.in_front(*point.tolist()) is (far > 0)
 
 
 def test_names_are_those_of_the_table():
@@ -68,11 +69,11 @@ def test_a_mirrored_point_of_a_left_handed_person_is_in_the_same_area():
     body = anthropometry.body(name="p", stature=1.7, mass=70, sex="male")
     for bone, point in on_skin(body):
         other = bone.replace("right_", "x_").replace("left_", "right_").replace("x_", "left_")
-        one = body_area(bone, point, body=body, hand="right")
-        two = body_area(other, point * MIRROR, body=body, hand="left")
+        one = Borders(bone, body=body, hand="right").area(*point)
+        two = Borders(other, body=body, hand="left").area(*(point * MIRROR))
         assert one == two
     assert {b for b in BONES if "foot" in b or "toes" in b} <= {
-        bone for bone, p in on_skin(body) if body_area(bone, p, body=body, hand="right") is None
+        bone for bone, p in on_skin(body) if not Borders(bone, body=body, hand="right").area(*p)
     }
 
 
@@ -80,8 +81,8 @@ def test_front_and_back_are_told_apart():
     body = anthropometry.body(name="p", stature=1.7, mass=70, sex="male")
 
     def at(bone, x, y, z=0.0):
-        area = body_area(bone, np.array([x, y, z]), body=body, hand="right")
-        return None if area is None else area.name
+        number = Borders(bone, body=body, hand="right").area(x, y, z)
+        return AREAS[number - 1].name if number else None
 
     assert at("thorax", 0.1, 0.1) == "sternum"
     assert at("thorax", 0.1, 0.1, 0.08) == "pectoral muscle"

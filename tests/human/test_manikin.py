@@ -15,6 +15,7 @@ from seerob.core.snapshot import Origin
 from seerob.description.description import Description, JointKind
 from seerob.description.humans import anthropometry, manikin, skin
 from seerob.description.humans.anthropometry import table
+from seerob.description.humans.body_areas import Borders
 from seerob.description.humans.skeleton import AXES, BONES, bone_poses
 
 SEXES, LENGTHS = ("male", "female"), ("drillis", "deleva")
@@ -316,16 +317,20 @@ def test_tip_is_the_dominant_hand():
 
 def test_body_regions():
     body = anthropometry.body(name="p", stature=1.75, mass=75, sex="male")
-    front, back = np.array([0.1, 0.05, 0.0]), np.array([-0.1, 0.05, 0.0])
-    assert skin.body_region("thorax", front, body=body) == "Chest"
-    assert skin.body_region("thorax", back, body=body) == "Back and shoulders"
-    assert skin.body_region("left_clavicle", front, body=body) == "Chest"
-    assert skin.body_region("left_clavicle", back, body=body) == "Back and shoulders"
-    assert skin.body_region("left_forearm", back, body=body) == "Lower arms and wrist joints"
-    assert skin.body_region("right_foot", front, body=body) is None
+    front, back = (0.1, 0.05, 0.0), (-0.1, 0.05, 0.0)
+
+    def region(bone, point):
+        return Borders(bone, body=body, hand="right").region(*point)
+
+    assert region("thorax", front) == "Chest"
+    assert region("thorax", back) == "Back and shoulders"
+    assert region("left_clavicle", front) == "Chest"
+    assert region("left_clavicle", back) == "Back and shoulders"
+    assert region("left_forearm", back) == "Lower arms and wrist joints"
+    assert region("right_foot", front) is None
     eye = body.length["head"] - 0.064 * 1.75
-    assert skin.body_region("head", np.array([0.08, eye - 1e-6, 0]), body=body) == "Face"
-    assert skin.body_region("head", np.array([0.08, eye + 1e-6, 0]), body=body) == "Skull and forehead"
+    assert region("head", (0.08, eye - 1e-6, 0)) == "Face"
+    assert region("head", (0.08, eye + 1e-6, 0)) == "Skull and forehead"
 
 
 def test_statures_are_in_order_and_unknown_ones_say_so():

@@ -15,9 +15,8 @@ from msgspec.structs import replace
 from seerob.core.snapshot import Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Evaluate
-from seerob.description.humans.body_areas import body_area, in_front, words
+from seerob.description.humans.body_areas import AREAS, Borders, words
 from seerob.description.humans.skeleton import BONES
-from seerob.description.humans.skin import body_region
 from seerob.model.model import Gap, Model
 from seerob.model.mounting.overrides import size
 from seerob.twin.state import State
@@ -83,15 +82,15 @@ class BodyPlaces:
     def __init__(self, model: Model) -> None:
         people = {human.name: human for human in model.workstation.humans}
         self._names = [each.name for each in model.bodies]
-        self._bones: dict[int, tuple[str, str]] = {}
-        """Body → person, bone."""
+        self._bones: dict[int, tuple[Borders, bool]] = {}
+        """Body that is a bone → its borders, and whether it is on the side of the dominant hand."""
         for index, each in enumerate(model.bodies):
             person, _, bone = each.name.rpartition("/")
             if each.role == "human" and person in people and bone in BONES:
-                self._bones[index] = person, bone
-        self._words: dict[tuple[int, str | None, bool, str | None], str] = {}
-        self._sizes = {name: size(human) for name, human in people.items()}
-        self._hands = {name: human.hand for name, human in people.items()}
+                hand = people[person].hand
+                borders = Borders(bone, body=size(people[person]), hand=hand)
+                self._bones[index] = borders, bone.startswith(f"{hand}_")
+        self._words: dict[tuple[int, str | None, bool, int], str] = {}
 
     def named(self, state: State, index: int, point: Array) -> str:
         """Name of a body, with the area that a point of it is in when it is a person's bone.
@@ -101,19 +100,16 @@ class BodyPlaces:
             index: Of the body.
             point: On its surface, in the world [m], shape (3,).
         """
-        if index not in self._bones:
+        bone = self._bones.get(index)
+        if bone is None:
             return self._names[index]
-        named: str = state.once(("place", index, point.tobytes()), lambda: self._named(state, index, point))
+        borders, dominant = bone
+        x, y, z = state.in_body(index, point, allow_estimated=True, strayed=True)
+        number, region, front = borders.area(x, y, z), borders.region(x, y, z), borders.in_front(x, y, z)
+        key = index, region, front, number
+        named = self._words.get(key)
+        if named is None:
+            area = AREAS[number - 1].name if number else None
+            named = words(self._names[index], region, front=front, dominant=dominant, area=area)
+            self._words[key] = named
         return named
-
-    def _named(self, state: State, index: int, point: Array) -> str:
-        person, bone = self._bones[index]
-        body, hand = self._sizes[person], self._hands[person]
-        local = state.in_body(index, point, allow_estimated=True, strayed=True)
-        area = body_area(bone, local, body=body, hand=hand)
-        region, front = body_region(bone, local, body=body), in_front(bone, local, body)
-        key = index, region, front, None if area is None else area.name
-        if key not in self._words:
-            dominant = bone.startswith(f"{hand}_")
-            self._words[key] = words(self._names[index], region, front=front, dominant=dominant, area=key[3])
-        return self._words[key]

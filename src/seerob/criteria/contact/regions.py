@@ -20,9 +20,9 @@ from seerob.core.shapes import Solid
 from seerob.core.snapshot import Input, Origin, Verdict
 from seerob.core.transforms import Array
 from seerob.description.humans import manikin
+from seerob.description.humans.body_areas import BODY_REGION
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import bone_poses, without_side
-from seerob.description.humans.skin import BODY_REGION
 from seerob.description.norms import body_limits
 from seerob.distance.least import DistanceKind, Per, Query, Survey
 from seerob.kernels.contact_speeds import reached

@@ -12,8 +12,8 @@ from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result
 from seerob.core.verdict import Verdict, keeps
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
+from seerob.description.humans.body_areas import BODY_REGION
 from seerob.description.humans.skeleton import without_side
-from seerob.description.humans.skin import BODY_REGION
 from seerob.description.norms import body_limits
 from seerob.description.norms.body_limits import BodyLimits, BodyRegion
 from seerob.description.norms.limit_inputs import table_input

@@ -9,10 +9,8 @@ written into reasons, and found in them again for tables.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from seerob.core.transforms import Array
 from seerob.description.humans.anthropometry import Body
 from seerob.description.humans.skeleton import without_side
 
@@ -64,6 +62,27 @@ class SkinArea:
     """With ``dominant`` or ``non-dominant`` where the table tells them apart."""
 
 
+BODY_REGION: dict[str, tuple[str | None, str | None]] = {
+    "pelvis": ("Pelvis", "Pelvis"),
+    "lumbar": ("Abdomen", "Back and shoulders"),
+    "thorax": ("Chest", "Back and shoulders"),
+    "neck": ("Neck", "Neck"),
+    "head": ("Face", "Skull and forehead"),
+    "clavicle": ("Chest", "Back and shoulders"),
+    "upper_arm": ("Upper arms and elbow joints", "Upper arms and elbow joints"),
+    "forearm": ("Lower arms and wrist joints", "Lower arms and wrist joints"),
+    "hand": ("Hands and fingers", "Hands and fingers"),
+    "thigh": ("Thighs and knees", "Thighs and knees"),
+    "shank": ("Lower legs", "Lower legs"),
+    "foot": (None, None),
+    "toes": (None, None),
+}
+"""Bone without side → body region of ISO/TS 15066:2016 Table A.3 in front and behind.
+
+The shoulder girdle counts in front as chest, its outer half as shoulder.
+Feet are in no region of that table. The face is the front of the head below the eyes.
+"""
+
 _NAMES = (
     "middle of forehead", "temple", "masticatory muscle", "neck muscle", "seventh neck muscle",
     "shoulder joint", "fifth lumbar vertebra", "sternum", "pectoral muscle", "abdominal muscle",
@@ -82,85 +101,87 @@ def eyes(body: Body) -> float:
     return body.length["head"] - (1 - EYE_HEIGHT) * body.stature
 
 
-def in_front(bone: str, point: Array | Sequence[float], body: Body) -> bool:
-    """Whether a point is before its bone; the shoulder girdle runs backward, and its own line divides it.
+class Borders:
+    """Where areas and regions on the skin of one bone end, bound once.
 
     Args:
         bone: Bone, with its side.
-        point: In the bone's frame [m], shape (3,).
-        body: The person.
-    """
-    if without_side(bone) != "clavicle":
-        return bool(point[0] > 0)
-    share, along = _along_clavicle(bone, point, body)
-    return bool(point[0] > share * along)
-
-
-def outer_shoulder(bone: str, point: Array | Sequence[float], body: Body) -> bool:
-    """Whether a point of a clavicle is nearer to the shoulder's joint than to the sternum.
-
-    Args:
-        bone: ``right_clavicle`` or ``left_clavicle``.
-        point: In the bone's frame [m], shape (3,).
-        body: The person.
-    """
-    return _along_clavicle(bone, point, body)[0] > 0.5
-
-
-def _along_clavicle(bone: str, point: Array | Sequence[float], body: Body) -> tuple[float, float]:
-    """Share of the way from sternum to shoulder joint that a point is beside, and x of all that way [m]."""
-    a, b, c = body.offset[bone.replace("clavicle", "upper_arm")].tolist()
-    x, y, z = map(float, point)
-    return (x * a + y * b + z * c) / (a * a + b * b + c * c), a
-
-
-def body_area(bone: str, point: Array | Sequence[float], *, body: Body, hand: str) -> SkinArea | None:
-    """Area of a point on the skin; None where the table has none.
-
-    Args:
-        bone: Bone, with its side.
-        point: In the bone's frame [m], shape (3,).
         body: The person.
         hand: Dominant side, ``right`` or ``left``.
     """
-    number = _number(bone, point, body, dominant=bone.startswith(f"{hand}_"))
-    return AREAS[number - 1] if number else None
 
+    def __init__(self, bone: str, *, body: Body, hand: str) -> None:
+        self._bone, self._length, self._eyes = without_side(bone), body.length, eyes(body)
+        self._dominant, self._left = bone.startswith(f"{hand}_"), bone.startswith("left_")
+        girdle = self._bone == "clavicle"
+        way = body.offset[bone.replace("clavicle", "upper_arm")].tolist() if girdle else (0.0, 0.0, 0.0)
+        a, b, c = self._way = way
+        self._square = a * a + b * b + c * c
 
-def _number(bone: str, point: Array | Sequence[float], body: Body, *, dominant: bool) -> int:
-    x, y, z = map(float, point)
-    front, length, plain = in_front(bone, point, body), body.length, without_side(bone)
-    outward = -z if bone.startswith("left_") else z
-    number = 0
-    match plain:
-        case "head":
-            number = _head(x, y, z, eyes(body))
-        case "neck" if not front:
-            middle = y < SEVENTH * length["neck"] and abs(z) < MIDDLE * length["chest_breadth"]
-            number = 5 if middle else 4
-        case "thorax" if front:
-            number = 8 if abs(z) < MIDDLE * length["chest_breadth"] else 9
-        case "clavicle" if front:
-            number = 6 if outer_shoulder(bone, point, body) else 9
-        case "lumbar" if front:
-            number = 10
-        case "lumbar" if y < length["lumbar"] / 2 and abs(z) < MIDDLE * length["hip_breadth"]:
-            number = 7
-        case "pelvis" if front:
-            number = 11
-        case "upper_arm" if not front:
-            number = 12 if y > -length["upper_arm"] / 2 else 13
-        case "forearm":
-            # With the palm forward the radius is on the outer side, and near the wrist under the skin.
-            radius = y < -length["forearm"] / 2 and outward > 0
-            number = 16 if front else 14 if radius else 15
-        case "hand":
-            number = _hand(front, outward, finger=y < -(1 - FINGERS) * length["hand"], dominant=dominant)
-        case "thigh" if front:
-            number = 26 if y > -(1 - KNEE) * length["thigh"] else 27
-        case "shank":
-            number = 28 if front else 29
-    return number
+    def in_front(self, x: float, y: float, z: float) -> bool:
+        """Whether a point is before the bone; the shoulder girdle runs backward, and its own line divides it.
+
+        Args:
+            x: In the bone's frame [m], as y and z.
+            y: Along the bone.
+            z: To the right.
+        """
+        if self._bone != "clavicle":
+            return x > 0
+        return x > self._along(x, y, z) * self._way[0]
+
+    def outer_shoulder(self, x: float, y: float, z: float) -> bool:
+        """Whether a point of a clavicle is nearer to the shoulder's joint than to the sternum."""
+        return self._along(x, y, z) > 0.5
+
+    def _along(self, x: float, y: float, z: float) -> float:
+        """Share of the way from sternum to shoulder joint that a point is beside."""
+        a, b, c = self._way
+        return (x * a + y * b + z * c) / self._square
+
+    def region(self, x: float, y: float, z: float) -> str | None:
+        """Region of ISO/TS 15066:2016 Table A.3 of a point on the skin; None where the table has none."""
+        front, behind = BODY_REGION[self._bone]
+        if self._bone == "head":
+            return front if x > 0 and y < self._eyes else behind
+        if self._bone == "clavicle" and self.outer_shoulder(x, y, z):
+            return behind
+        return front if self.in_front(x, y, z) else behind
+
+    def area(self, x: float, y: float, z: float) -> int:
+        """Number of the area of a point on the skin; 0 where the table has none; see `in_front`."""
+        front, length = self.in_front(x, y, z), self._length
+        number = 0
+        match self._bone:
+            case "head":
+                number = _head(x, y, z, self._eyes)
+            case "neck" if not front:
+                middle = y < SEVENTH * length["neck"] and abs(z) < MIDDLE * length["chest_breadth"]
+                number = 5 if middle else 4
+            case "thorax" if front:
+                number = 8 if abs(z) < MIDDLE * length["chest_breadth"] else 9
+            case "clavicle" if front:
+                number = 6 if self.outer_shoulder(x, y, z) else 9
+            case "lumbar" if front:
+                number = 10
+            case "lumbar" if y < length["lumbar"] / 2 and abs(z) < MIDDLE * length["hip_breadth"]:
+                number = 7
+            case "pelvis" if front:
+                number = 11
+            case "upper_arm" if not front:
+                number = 12 if y > -length["upper_arm"] / 2 else 13
+            case "forearm":
+                # With the palm forward the radius is on the outer side, and near the wrist under the skin.
+                radius = y < -length["forearm"] / 2 and (z < 0 if self._left else z > 0)
+                number = 16 if front else 14 if radius else 15
+            case "hand":
+                finger, outward = y < -(1 - FINGERS) * length["hand"], z < 0 if self._left else z > 0
+                number = _hand(front, outward=outward, finger=finger, dominant=self._dominant)
+            case "thigh" if front:
+                number = 26 if y > -(1 - KNEE) * length["thigh"] else 27
+            case "shank":
+                number = 28 if front else 29
+        return number
 
 
 def _head(x: float, y: float, z: float, height: float) -> int:
@@ -170,10 +191,10 @@ def _head(x: float, y: float, z: float, height: float) -> int:
     return 1 if x > 0 and y >= height else 0
 
 
-def _hand(front: bool, outward: float, *, finger: bool, dominant: bool) -> int:
+def _hand(front: bool, *, outward: bool, finger: bool, dominant: bool) -> int:
     if finger:
         first = 17 if front else 19
-    elif front and outward > 0:
+    elif front and outward:
         return 21
     else:
         first = 22 if front else 24

@@ -14,7 +14,7 @@ centimetres and belongs into the uncertainty of every distance.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -22,50 +22,12 @@ import numpy as np
 from seerob.core.shapes import Solid, capsule, dilated_rectangle
 from seerob.core.transforms import Array
 from seerob.description.humans.anthropometry import Body, table
-from seerob.description.humans.body_areas import eyes, in_front, outer_shoulder
 from seerob.description.humans.skeleton import without_side
 
 Vector = Array
 
 NEARLY = 1e-12
 """Share of a radius, far beyond rounding and far below what matters, within which halving begins to ask."""
-
-BODY_REGION: dict[str, tuple[str | None, str | None]] = {
-    "pelvis": ("Pelvis", "Pelvis"),
-    "lumbar": ("Abdomen", "Back and shoulders"),
-    "thorax": ("Chest", "Back and shoulders"),
-    "neck": ("Neck", "Neck"),
-    "head": ("Face", "Skull and forehead"),
-    "clavicle": ("Chest", "Back and shoulders"),
-    "upper_arm": ("Upper arms and elbow joints", "Upper arms and elbow joints"),
-    "forearm": ("Lower arms and wrist joints", "Lower arms and wrist joints"),
-    "hand": ("Hands and fingers", "Hands and fingers"),
-    "thigh": ("Thighs and knees", "Thighs and knees"),
-    "shank": ("Lower legs", "Lower legs"),
-    "foot": (None, None),
-    "toes": (None, None),
-}
-"""Bone without side → body region of ISO/TS 15066:2016 Table A.3 in front and behind.
-
-The shoulder girdle counts in front as chest, its outer half as shoulder.
-Feet are in no region of that table. The face is the front of the head below the eyes.
-"""
-
-
-def body_region(bone: str, point: Vector | Sequence[float], *, body: Body) -> str | None:
-    """Region of ISO/TS 15066:2016 Table A.3 of a point on the skin; None where the table has none.
-
-    Args:
-        bone: Bone, with its side.
-        point: In the bone's frame [m], shape (3,).
-        body: The person.
-    """
-    front, behind = BODY_REGION[without_side(bone)]
-    if bone == "head":
-        return front if in_front(bone, point, body) and point[1] < eyes(body) else behind
-    if without_side(bone) == "clavicle" and outer_shoulder(bone, point, body):
-        return behind
-    return front if in_front(bone, point, body) else behind
 
 
 def density(bone: str) -> float:

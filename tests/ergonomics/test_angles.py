@@ -1,5 +1,6 @@
 """Anatomical angles against the joints they come from, in a mirror, and turned about the vertical."""
 
+import sys
 from dataclasses import fields
 
 import numpy as np
@@ -137,3 +138,36 @@ def test_what_is_not_measured_is_not_assessed():
     assert np.isnan(found.neck_flexion)
     assert not np.isnan(found.trunk_flexion)
     assert np.isnan(made_angles().without(["thorax"]).shoulder_flexion).all()
+
+
+def test_a_posture_has_the_same_angles_alone_and_among_others_bit_for_bit():
+    R, x = bone_poses(PERSON, random_q(40))
+    every = angles(R[:, None], x[:, None])
+    for k in range(len(R)):
+        alone = angles(R[k], x[k])
+        for field in fields(Angles):
+            one, of_all = getattr(alone, field.name), getattr(every, field.name)[k, 0]
+            assert np.asarray(one).tobytes() == np.asarray(of_all).tobytes(), field.name
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_of_a_foot_that_is_nowhere_nobody_knows_which_is_lower(side):
+    R, x = bone_poses(PERSON, random_q(1)[0])
+    x[BONES.index(f"{side}_foot")] = np.nan
+    assert np.isnan(angles(R, x).foot_rise).all()
+
+
+def test_an_angle_costs_no_call_of_its_own():
+    R, x = bone_poses(PERSON, random_q(1)[0])
+    calls = []
+
+    def count(frame, event, called):
+        calls.append(called) if event == "c_call" else None
+
+    angles(R, x)
+    sys.setprofile(count)
+    try:
+        angles(R, x)
+    finally:
+        sys.setprofile(None)
+    assert len(calls) < 20

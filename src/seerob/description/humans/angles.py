@@ -14,6 +14,7 @@ changes sides in a mirror.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
@@ -24,13 +25,7 @@ from numpy.typing import ArrayLike
 
 from seerob.core.transforms import Array
 from seerob.description.humans.skeleton import BONES, SIDES
-
-_INDEX = {bone: i for i, bone in enumerate(BONES)}
-_OUTWARD = np.array([1.0, -1.0])
-"""Sign of Z that points away from the trunk, right and left."""
-_TINY = 1e-9
-_LEAST = 1e-6
-"""Directions that are shorter are rounding."""
+from seerob.kernels.posture_angles import ANGLES, SINES, TANGENTS, directions, in_range
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +130,20 @@ SIDED = frozenset(NEEDS) - {
 """Angles with a last axis (right, left)."""
 
 
+_PAIRS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+_PLACES = np.array(
+    [BONES.index(bone) for bone in ("pelvis", "thorax", "head")]
+    + [BONES.index(f"{side}_{bone}") for bone in _PAIRS for side in SIDES],
+    np.int64,
+)
+"""Bones as `seerob.kernels.posture_angles` takes them."""
+_ROWS: list[int | slice] = []
+"""Where each angle is among all of a posture."""
+for _name in NEEDS:
+    _at = sum(2 if isinstance(rows, slice) else 1 for rows in _ROWS)
+    _ROWS.append(slice(_at, _at + 2) if _name in SIDED else _at)
+
+
 @lru_cache(maxsize=256)
 def made_of(bones: frozenset[str]) -> tuple[tuple[str, int], ...]:
     """Angles that need one of the bones, each with its side: 0 right or none, 1 left."""
@@ -156,114 +165,12 @@ def angles(rotations: ArrayLike, positions: ArrayLike) -> Angles:
     Returns:
         Angles [rad], shapes (...) and (..., 2).
     """
-    R, p = np.asarray(rotations, float), np.asarray(positions, float)
-    pelvis, thorax, head = (R[..., _INDEX[bone], :, :] for bone in ("pelvis", "thorax", "head"))
-    clavicle, upper, fore, hand, thigh, shank = (
-        R[..., [_INDEX[f"{side}_{bone}"] for side in SIDES], :, :]
-        for bone in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank")
-    )
-    at = {bone: _sided(p, bone) for bone in ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")}
-    # Of all bones together: numpy takes longer to be asked than for the six or twelve of one posture.
-    middle, chest = np.stack([pelvis, thorax], -3), np.stack([thorax] * 6, -3)
-    trunk = _in_heading(pelvis[..., 2], thorax[..., 1])
-    parents = np.concatenate([chest, thorax[..., None, :, :], upper, fore, thigh], -3)
-    directions = [-upper[..., 1], -fore[..., 1], clavicle[..., 2] * _OUTWARD[:, None], head[..., None, :, 1]]
-    directions += [-fore[..., 1], -hand[..., 1], -shank[..., 1]]
-    seen = _seen(parents, np.concatenate(directions, -2))
-    arm, forearm, lateral = (seen[..., k : k + 2, :] for k in (0, 2, 4))
-    neck, (bent, wrist, knee) = seen[..., 6, :], (seen[..., k : k + 2, :] for k in (7, 9, 11))
-    children = np.concatenate([np.stack([thorax, head], -3), upper, fore], -3)
-    twist = _twist(np.concatenate([middle, chest[..., :2, :, :], upper], -3), children)
-    reach, leg = at["hand"] - at["upper_arm"], at["foot"] - at["thigh"]
-    across = -_OUTWARD * _dot(at["hand"] - p[..., None, _INDEX["thorax"], :], chest[..., :2, :, 2])
-    rise = at["foot"][..., 2] - at["foot"][..., 2].min(axis=-1, keepdims=True)
-    sines = [trunk[..., 2:], neck[..., 2:], _OUTWARD * arm[..., 2], lateral[..., 1]]
-    sines += [_OUTWARD * forearm[..., 2], across / np.maximum(_norm(reach), _TINY), -_OUTWARD * wrist[..., 2]]
-    tilt = _arcsin(np.concatenate([*sines, rise / np.maximum(_norm(leg), _TINY)], -1))
-    joints = np.concatenate([arm, bent, knee], -2)
-    folded = np.arctan2(np.hypot(joints[..., 0], joints[..., 2]), -joints[..., 1])
-    return Angles(
-        trunk_flexion=_bent(np.arctan2(trunk[..., 0], trunk[..., 1])),
-        trunk_side_bend=tilt[..., 0],
-        trunk_twist=twist[..., 0],
-        neck_flexion=np.arctan2(neck[..., 0], neck[..., 1]),
-        neck_side_bend=tilt[..., 1],
-        neck_twist=twist[..., 1],
-        shoulder_flexion=_forward(np.arctan2(arm[..., 0], -arm[..., 1])),
-        shoulder_elevation=folded[..., :2],
-        shoulder_abduction=tilt[..., 2:4],
-        shoulder_rotation=_OUTWARD * twist[..., 2:4],
-        clavicle_elevation=tilt[..., 4:6],
-        arm_rise=np.maximum(_slope(at["forearm"] - at["upper_arm"]), _slope(reach)),
-        elbow_flexion=folded[..., 2:4],
-        forearm_out=tilt[..., 6:8],
-        wrist_across=tilt[..., 8:10],
-        forearm_rotation=_wrapped(_OUTWARD * twist[..., 4:] - np.pi / 2),
-        wrist_flexion=np.arctan2(wrist[..., 0], -wrist[..., 1]),
-        wrist_deviation=tilt[..., 10:12],
-        knee_flexion=folded[..., 4:],
-        shank_tilt=np.arctan2(np.hypot(shank[..., 0, 1], shank[..., 1, 1]), shank[..., 2, 1]),
-        foot_rise=tilt[..., 12:],
-    )
-
-
-def _sided(p: Array, bone: str) -> Array:
-    return p[..., [_INDEX[f"{side}_{bone}"] for side in SIDES], :]
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("...i,...i->...", a, b))
-
-
-def _norm(a: Array) -> Array:
-    return np.asarray(np.sqrt(_dot(a, a)))
-
-
-def _arcsin(sine: Array) -> Array:
-    return np.arcsin(np.minimum(np.maximum(sine, -1.0), 1.0))
-
-
-def _slope(way: Array) -> Array:
-    """Angle of a direction above the horizontal."""
-    return np.arctan2(way[..., 2], np.hypot(way[..., 0], way[..., 1]))
-
-
-def _seen(rotation: Array, direction: Array) -> Array:
-    """A direction of the world in the frame of a bone."""
-    return np.asarray(np.einsum("...ji,...j->...i", rotation, direction))
-
-
-def _in_heading(right: Array, direction: Array) -> Array:
-    """A direction in the frame of gravity and heading: forward, up, right.
-
-    The heading comes from the axis to the right, not from the one forward, which points down when
-    somebody bends over. Somebody who lies on a side has none: not a number.
-    """
-    length = np.hypot(right[..., 0], right[..., 1])[..., None]
-    horizontal = right[..., :2] / np.where(length > _LEAST, length, np.nan)
-    x, y = horizontal[..., 0], horizontal[..., 1]
-    forward = -y * direction[..., 0] + x * direction[..., 1]
-    return np.stack([forward, direction[..., 2], x * direction[..., 0] + y * direction[..., 1]], axis=-1)
-
-
-def _twist(parent: Array, child: Array) -> Array:
-    """Rotation of a child about its long axis Y, without the swing of that axis."""
-
-    def entry(i: int, j: int) -> Array:
-        return _dot(parent[..., i], child[..., j])
-
-    return np.arctan2(entry(0, 2) - entry(2, 0), entry(0, 0) + entry(2, 2))
-
-
-def _bent(angle: Array) -> Array:
-    """An angle of the range -π to π of which the end is forward: upside down, whatever the last bit says."""
-    return np.where(angle < -np.pi + _LEAST, angle + 2 * np.pi, angle)
-
-
-def _forward(angle: Array) -> Array:
-    """An angle of the range -π/2 to 3π/2."""
-    return np.where(angle < -np.pi / 2, angle + 2 * np.pi, angle)
-
-
-def _wrapped(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
+    R = np.ascontiguousarray(rotations, float)
+    p = np.ascontiguousarray(positions, float)
+    many = R.shape[:-3]
+    n = math.prod(many)
+    tangents, sines, found = np.empty((n, TANGENTS, 2)), np.empty((n, SINES)), np.empty((n, ANGLES))
+    directions(R.reshape(n, *R.shape[-3:]), p.reshape(n, *p.shape[-2:]), _PLACES, tangents, sines)
+    in_range(np.arctan2(tangents[..., 0], tangents[..., 1]), np.arcsin(sines), found)
+    every = found.reshape(*many, ANGLES)
+    return Angles(*[every[..., rows] for rows in _ROWS])

@@ -60,7 +60,11 @@ def unit(symbol: str, *, parts: tuple[str, ...] = (), polygon: bool = False, **l
         polygon: Whether a list is of the corners of a polygon, for forms: one more lies between two of them.
         **limits: As of ``msgspec.Meta``.
     """
-    form = {"x-unit": symbol, **({"x-parts": parts} if parts else {}), **({"x-polygon": True} if polygon else {})}
+    form = {
+        "x-unit": symbol,
+        **({"x-parts": parts} if parts else {}),
+        **({"x-polygon": True} if polygon else {}),
+    }
     return Meta(extra={"unit": symbol}, extra_json_schema=form, **limits)
 
 

@@ -42,12 +42,13 @@ def _from(R: Array, parent: int, x: float, y: float, z: float) -> tuple[float, f
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _entry(R: Array, parent: int, i: int, child: int, j: int) -> float:
     """An entry of the rotation of a bone in the frame of another."""
-    return (
+    found: float = (
         0.0
         + R[parent, 0, i] * R[child, 0, j]
         + R[parent, 1, i] * R[child, 1, j]
         + R[parent, 2, i] * R[child, 2, j]
     )
+    return found
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -27,11 +27,12 @@ while True:
 coarse = lambda a: cv2.resize(a, (40, 40), interpolation=cv2.INTER_AREA).astype(float)
 far = lambda a, b: float(np.abs(coarse(a) - coarse(b)).mean())
 png = cv2.imread(picture)
-# What a player that went there shows is the picture of that time; of pictures that are alike each is as good.
+# What a player that went there shows is the picture of that time, or one beside it: how long a picture lasts
+# is not in the file, and players guess. Of pictures that are alike each is as good.
 due = max(k for k, ms in enumerate(shown) if ms <= sought)
 there = cv2.imread(found)
 off = [far(frame, there) for frame in frames]
-print(json.dumps(dict(due=off[due], least=min(off), count=count, size=size, shown=shown, same=far(frames[-1], png), moved=far(frames[0], frames[-1]))))
+print(json.dumps(dict(due=min(off[max(due - 1, 0) : due + 2]), least=min(off), count=count, size=size, shown=shown, same=far(frames[-1], png), moved=far(frames[0], frames[-1]))))
 `;
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-clip-"));
 let opened;
@@ -73,9 +74,16 @@ async function playedAt(clip, share, to) {
       video.src = URL.createObjectURL(await (await fetch(`data:video/webm;base64,${data}`)).blob());
       await ready;
       const at = part * video.duration;
+      // What was sought may be there before it is shown.
+      document.body.append(video);
+      const shown = new Promise((resolve) => {
+        const look = (_, { mediaTime }) =>
+          mediaTime > 0 ? resolve() : video.requestVideoFrameCallback(look);
+        video.requestVideoFrameCallback(look);
+      });
       const there = happens("seeked");
       video.currentTime = at;
-      await there;
+      await Promise.all([there, shown]);
       const canvas = document.createElement("canvas");
       [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
       canvas.getContext("2d").drawImage(video, 0, 0);

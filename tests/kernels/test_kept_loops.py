@@ -12,7 +12,8 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from numba import config
+from llvmlite import binding
+from numba import config, njit
 
 import seerob.kernels
 from seerob.kernels import _kept_loops
@@ -70,6 +71,22 @@ def test_a_loop_is_never_run_as_it_was_before_one_that_it_calls_was_edited(kerne
     again = kernels(2).scaled
     assert again(21) == 42
     assert sum(again.stats.cache_hits.values()) == 1  # and both are kept
+
+
+def test_what_is_kept_of_a_loop_beside_machine_code_is_read_by_who_calls_it_in_a_new_one(
+    kernels, monkeypatch
+):
+    kernels(2).scaled(21)
+    read, parse = [], binding.parse_bitcode
+    monkeypatch.setattr(binding, "parse_bitcode", lambda code: read.append(code) or parse(code))
+    scaled = kernels(2).scaled
+    assert scaled(21) == 42
+    assert sum(scaled.stats.cache_hits.values()) == 1
+    assert read == []
+    assert njit(lambda x: scaled(x) + 1)(21) == 43
+    assert len(read) == 1
+    assert njit(lambda x: scaled(x) + 2)(21) == 44
+    assert len(read) == 1
 
 
 def test_what_loops_import_is_of_the_form_that_their_key_follows():

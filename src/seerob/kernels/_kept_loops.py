@@ -83,7 +83,7 @@ def keep_loops() -> None:
     may write there: what is read back from it is run.
     """
     from numba import config
-    from numba.core import caching, dispatcher
+    from numba.core import caching, codegen, dispatcher
     from platformdirs import user_cache_path
 
     known = caching.CompileResultCacheImpl._locator_classes
@@ -91,6 +91,7 @@ def keep_loops() -> None:
         places = caching.UserProvidedCacheLocator, caching.InTreeCacheLocator, caching.UserWideCacheLocator
         known[:0] = [_keyed(place) for place in places]
         dispatcher.FunctionCache = _reading_what_is_brought(caching)  # type: ignore[attr-defined]
+        codegen.JITCPUCodegen._library_class = _taken_in_when_asked(codegen)
     if config.CACHE_DIR:  # type: ignore[attr-defined]
         return
     own = FOLDER / "__pycache__", user_cache_path("numba", appauthor=False)
@@ -157,6 +158,43 @@ def _reading_what_is_brought(caching: Any) -> Any:
             return None
 
     return Reading
+
+
+def _taken_in_when_asked(codegen: Any) -> Any:
+    """Machine code of a loop for Numba; what is kept for loops that call it is read by who compiles one.
+
+    Numba reads it at once, which takes half as long as all the rest of loading a loop.
+    """
+    from llvmlite import binding
+
+    class Library(codegen.JITCodeLibrary):  # type: ignore[misc]
+        _bitcode: bytes | None = None
+
+        @classmethod
+        def _unserialize(cls, own: Any, state: tuple[str, str, Any]) -> Any:
+            name, kind, data = state
+            if kind != "object":
+                return super()._unserialize(own, state)
+            found = own.create_library(name)
+            code, found._bitcode = data
+            found.enable_object_caching()
+            found._set_compiled_object(code)
+            found._finalize_final_module()
+            return found
+
+        def get_pointer_to_function(self, name: str) -> Any:
+            if self._bitcode is None:  # its symbols are known to Numba
+                return super().get_pointer_to_function(name)
+            return self._codegen._engine.get_function_address(name)
+
+        def _get_module_for_linking(self) -> Any:
+            bitcode, self._bitcode = self._bitcode, None
+            if bitcode is not None:
+                self._shared_module = binding.parse_bitcode(bitcode)
+                self._codegen._engine._load_defined_symbols(self._shared_module)
+            return super()._get_module_for_linking()
+
+    return Library
 
 
 def _writable(folder: Path) -> bool:

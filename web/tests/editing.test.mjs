@@ -318,6 +318,8 @@ test("a draft is run, its run follows an edit, and the file stays", async () => 
   await page.getByRole("button", { name: "Run", exact: true }).click();
   await page.locator(".source", { hasText: "a draft, not recorded" }).waitFor();
   await page.waitForFunction(() => window.seerob.t > 0.2);
+  // Also where the run falls behind real time.
+  assert.match(await page.locator(".source [role=status]").innerText(), /^live – a draft, not recorded/);
   assert.match(await page.locator(".pill strong").innerText(), /DRAFT/);
   await pick("table");
   const before = await page.evaluate(() => window.seerob.pose("table").position[0]);

@@ -227,10 +227,14 @@ test("a live run that falls behind real time is said to, and by how much", async
   await eventually(async () => {
     behind += 1.25;
     await served.tell("slip");
-    const said = { hasText: `live – ${(Math.ceil(10 * behind) / 10).toFixed(1)} s behind real time` };
+    const said = { hasText: `live – behind real timeby ${(Math.ceil(10 * behind) / 10).toFixed(1)} s` };
     // For three seconds of the run, which a loaded machine may need to draw the page once.
     await page.locator(".source.source-slow", said).waitFor({ timeout: 3000 });
+    assert.match(await page.locator(".source").getAttribute("title"), /too slow .* or was suspended/);
     await page.locator(".source.source-live", said).waitFor();
+    assert.doesNotMatch(await page.locator(".source").getAttribute("title"), /slow/);
+    // How much is not read out at each tenth of a second.
+    assert.equal(await page.locator(".source [role=status]").innerText(), "live – behind real time");
   });
 });
 

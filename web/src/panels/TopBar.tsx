@@ -58,25 +58,28 @@ function SourceState() {
       : isLive.value
         ? stale.value
           ? said("live – nothing heard")
-          : behind.value
-            ? said("live – {s} s behind real time", {
-                s: (Math.ceil(10 * behind.value.lost) / 10).toFixed(1),
-              })
-            : onTrial.value
-              ? said("live – a draft, not recorded")
-              : said("live")
+          : [
+              said("live"),
+              onTrial.value && said("a draft, not recorded"),
+              behind.value && said("behind real time"),
+            ]
+              .filter(Boolean)
+              .join(" – ")
         : said("replay"),
   }[state];
   const look = lost || stale.value ? "off" : !isLive.value ? "replay" : behind.value?.now ? "slow" : "live";
-  const why = behind.value
+  const why = behind.value?.now
     ? said(
-        "This machine is too slow for the workstation: what is heard while the run falls behind is late, and what rests on it undecided.",
+        "The run falls behind real time: this machine is too slow for the workstation, or was suspended. What is heard meanwhile is late, and what rests on it undecided.",
       )
     : (hello.value?.server ?? "");
+  const late = !lost && !notRun.value && !stale.value && isLive.value ? behind.value : null;
   return (
-    <div class={`source source-${look}`} title={lost ? reason : why} role="status">
+    <div class={`source source-${look}`} title={lost ? reason : why}>
       <span class="dot" aria-hidden="true" />
-      {words}
+      <span role="status">{words}</span>
+      {/* Not read anew at each tenth of a second. */}
+      {late && <span>{said("by {s} s", { s: (Math.ceil(10 * late.lost) / 10).toFixed(1) })}</span>}
       {lost && reason !== "" && <span class="source-reason">{reason}</span>}
     </div>
   );

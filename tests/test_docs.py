@@ -5,6 +5,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -46,6 +47,21 @@ def test_generated_pages_are_current() -> None:
         [sys.executable, ROOT / "scripts/write-docs", "--check"], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_arms_of_the_library_are_those_that_are_told() -> None:
+    files = (ROOT / "src/seerob/description/robots").glob("*.toml")
+    makers = Counter(tomllib.loads(path.read_text(encoding="utf-8"))["maker"] for path in files)
+    count = re.search(r"\((\d+) arms\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert count is not None
+    assert int(count[1]) == makers.total()
+    text = (ROOT / "docs/import.md").read_text(encoding="utf-8")
+    table = text.partition("| maker | in the library |")[2].partition("\n\n")[0]
+    told = {}
+    for maker, arms, *_ in re.findall(r"^\| (\w[^|]*) \| ([^|]+) \|", table, re.MULTILINE):
+        named = re.split(r";|, without", arms)[0]
+        told[re.split(r"[, ]", maker)[0]] = len(re.split(r", | and ", named))
+    assert told == {maker.split()[0]: count for maker, count in makers.items()}
 
 
 @pytest.mark.parametrize("path", pages())

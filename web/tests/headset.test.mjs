@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { load } from "./source.mjs";
+import { load, together } from "./source.mjs";
 
 const { sight, handName } = await load("xr/sight");
 
@@ -65,4 +65,25 @@ test("hands have the names of Body Tracking, and a body wins over a hand", () =>
 test("a body and two hands are not more than the server takes", () => {
   const body = new Map(Array.from({ length: 300 }, (_, k) => [`joint-${k}`, { x: k }]));
   assert.equal(sight(frameOf({ body }), FLOOR, [], "anna", 0).names.length, 160);
+});
+
+test("the board says of every undecided criterion why, also beside a figure", async () => {
+  globalThis.location = { search: "" };
+  const [{ Board }, { scene, frame }] = await together("xr/board", "page_state");
+  const criterion = (name, verdict, value, reason) => [
+    { name, kind: "k", group: "safety", title: "", unit: "m", limit: 0.5, at_most: false, subjects: [] },
+    { name, verdict, value, unit: "m", limit: 0.5, at_most: false, reason },
+  ];
+  const all = [
+    criterion("far", "within", 0.9, "table ↔ operator"),
+    criterion("open", "undecided", 0.7, "ur10: not heard for 0.31 s (time-out 0.2 s)"),
+    criterion("lost", "undecided", null, "nothing heard yet"),
+  ];
+  scene.value = { criteria: all.map(([info]) => info), nodes: [], mechanisms: [] };
+  frame.value = { results: all.map(([, result]) => result) };
+  const lines = Object.fromEntries(Board.lines().map((line) => [line.text, line]));
+  assert.equal(lines.open.reason, "ur10: not heard for 0.31 s (time-out 0.2 s)");
+  assert.equal(lines.open.figure, "0.7 / 0.5\u00a0m");
+  assert.deepEqual([lines.lost.figure, lines.lost.reason], ["", "nothing heard yet"]);
+  assert.equal(lines.far.reason, "");
 });

@@ -127,10 +127,12 @@ async function carry(point, by, high = 0.5) {
   await trigger(page, 0);
 }
 
-const status = (word) =>
-  page.waitForFunction((w) => window.seerob.panels.includes(w), word, {
-    polling: 50,
-  });
+/** Wait until the board says that of the file; what is being asked just now is drawn within a fifth of a second. */
+async function status(word) {
+  await page.waitForTimeout(250);
+  await pictures(page, 2);
+  await page.waitForFunction((w) => window.seerob.panels.includes(w), word, { polling: 50 });
+}
 
 /** Save as one does in the room: what changes is shown first. */
 async function save() {

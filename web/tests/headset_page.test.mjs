@@ -120,6 +120,17 @@ test("the menu at the wrist raises who sits, changes hands and ends the visit", 
   await pressIn("plot");
   // Drawn from what feeds the panel of the page.
   await pressIn("body map");
+  // What stands on them is what was drawn: verdict, criteria with what is open, the plot's title.
+  await page.waitForFunction(() => {
+    const { panels } = window.seerob;
+    const has = (...words) => words.every((one) => panels.some((line) => line.includes(one)));
+    return (
+      /run:/.test(panels[0]) && has("effective mass", "mass of ur10/shoulder_link was given by nobody", "[")
+    );
+  });
+  await pressIn("plot");
+  await page.waitForFunction(() => !window.seerob.panels.some((line) => / \[.+\]$/.test(line)));
+  await pressIn("plot");
   assert.equal(await page.evaluate(() => localStorage.getItem("xr.seated")), "off");
   await pressIn("leave");
   await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });

@@ -6,7 +6,7 @@ import path from "node:path";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { HEADSET, pictures, pressInRoom, put } from "./emulated_headset.mjs";
 import { askPython, python } from "./python.mjs";
 
 const CELL = `
@@ -178,6 +178,8 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
   await page.waitForFunction(() => window.headset.activeSession && window.seerob.visited([0, 0, 0]));
   // Until the first poses came, everything is at the origin.
   await page.waitForFunction(() => window.seerob.pose("blank/body").position[1] > 0.8, null, { polling: 50 });
+  // What happened is on the panel of plots.
+  await pressInRoom(page, "plot", [0, 1.64, 0]);
   const [x, y, z] = await at("blank/body");
   await reach([x, y, z]);
   // Where a grip is, a hand is about: the person is another than the visitor. What is taken keeps its place in the

@@ -14,9 +14,12 @@ import { INK, Panel } from "./panel";
 const PIXELS = { width: 1080, height: 720 };
 const ROW_PX = 54;
 const MARGIN_PX = 28;
-/** Characters of the reason why a criterion without a figure is undecided, and how wide they are at most. */
-const REASON = 60;
-const REASON_PX = 560;
+/** Where names begin, and what there is below the rows. */
+const NAME_PX = MARGIN_PX + 52;
+const FOOT_PX = 56;
+/** Why a criterion is undecided stands below it: how high that is, and how many characters at most. */
+const REASON_PX = 38;
+const REASON = 90;
 const COLORS: Record<State, string> = {
   exceeded: "#ff8fa6",
   undecided: "#fbe36a",
@@ -48,18 +51,18 @@ export class Board extends Panel {
   }
 
   /** Lines as they stand on it, worst first. */
-  static lines(): { state: State; text: string; figure: string }[] {
+  static lines(): { state: State; text: string; figure: string; reason: string }[] {
     return orderedRows.peek().map(({ info, result, state }) => {
       const shown =
         result && result.value !== null
           ? against(result.value, result.limit, result.unit, result.at_most)
           : null;
       const limit = shown && result?.limit !== null ? ` / ${shown.limit}` : "";
-      const why = result && state === "undecided" ? shortened(told(result.reason), REASON) : "";
       return {
         state,
         text: info.name,
-        figure: shown ? withUnit(`${shown.value}${limit}`, info.unit) : why,
+        figure: shown ? withUnit(`${shown.value}${limit}`, info.unit) : "",
+        reason: result && state === "undecided" ? shortened(told(result.reason), REASON) : "",
       };
     });
   }
@@ -78,18 +81,25 @@ export class Board extends Panel {
       ? said("NO CURRENT DATA")
       : `${STATE_ICONS[whole]} ${said("run: {state}", { state: said(STATE_WORDS[whole]) })}`;
     this.write(headline, MARGIN_PX, 62, COLORS[whole], "bold 46px sans-serif");
-    const room = Math.floor((height - 110) / ROW_PX);
     const lines = stale.peek() ? [] : Board.lines();
-    lines.slice(0, room).forEach(({ state, text, figure }, i) => {
-      const y = 130 + i * ROW_PX;
+    let y = 130;
+    let drawn = 0;
+    for (const { state, text, figure, reason } of lines) {
+      const below = reason === "" ? 0 : REASON_PX;
+      if (y + below > height - FOOT_PX) break;
       this.write(STATE_ICONS[state], MARGIN_PX, y, COLORS[state], "bold 38px sans-serif");
+      brush.font = "36px sans-serif";
+      const left = width - MARGIN_PX - 32 - NAME_PX - brush.measureText(figure).width;
+      this.write(text, NAME_PX, y, INK, "36px sans-serif", left);
       brush.textAlign = "right";
-      this.write(figure, width - MARGIN_PX, y, COLORS[state], "36px sans-serif", REASON_PX);
-      const left = width - 3 * MARGIN_PX - 60 - Math.min(brush.measureText(figure).width, REASON_PX);
+      this.write(figure, width - MARGIN_PX, y, COLORS[state], "36px sans-serif");
       brush.textAlign = "left";
-      this.write(text, MARGIN_PX + 52, y, INK, "36px sans-serif", left);
-    });
-    const more = lines.length > room ? said("and {n} more", { n: lines.length - room }) : "";
+      const room = width - MARGIN_PX - NAME_PX;
+      this.write(reason, NAME_PX, y + REASON_PX, COLORS[state], "26px sans-serif", room);
+      y += ROW_PX + below;
+      drawn += 1;
+    }
+    const more = lines.length > drawn ? said("and {n} more", { n: lines.length - drawn }) : "";
     const below = [more, edits.peek()].filter(Boolean).join(" · ");
     this.write(below, MARGIN_PX, height - 14, "#aab6c6", "28px sans-serif", width - 2 * MARGIN_PX);
   }

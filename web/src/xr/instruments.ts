@@ -25,7 +25,7 @@ import { hitAlong, nodeOf } from "../scene/picking";
 import type { Stage } from "../scene/stage";
 import type { Viewer } from "../scene/viewer";
 import { type Measuring, measuring, withFace } from "../view/measure";
-import { said } from "../words";
+import { said, told } from "../words";
 
 /** Letters of the ruler are 16 mm high. */
 const TEXT = { width: 0.22, height: 0.05, pixels: 512 };
@@ -103,7 +103,7 @@ export class Ruler {
     const value = now.result?.value;
     if (!b) this.write(said("to …"));
     else if (now.refusal !== "" || (now.result && value == null))
-      this.write(now.refusal || now.result!.reason);
+      this.write(told(now.refusal || now.result!.reason));
     else this.write(value == null ? said("measuring …") : distance(value));
   }
 

@@ -13,6 +13,8 @@ export abstract class Panel {
   protected readonly brush: CanvasRenderingContext2D;
   private readonly texture: CanvasTexture;
   private drawnAt = Number.NEGATIVE_INFINITY;
+  /** What was written on it when it was drawn last. */
+  readonly written: string[] = [];
 
   /** @param pixels Of the canvas, which is 0.54 m wide in the room. */
   constructor(protected readonly pixels: { readonly width: number; readonly height: number }) {
@@ -34,6 +36,7 @@ export abstract class Panel {
   update(time: number): void {
     if (!this.mesh.visible || time - this.drawnAt < EVERY_MS || !this.news()) return;
     this.drawnAt = time;
+    this.written.length = 0;
     const { width, height } = this.pixels;
     this.brush.clearRect(0, 0, width, height);
     this.brush.fillStyle = "rgba(13, 19, 28, 0.92)";
@@ -54,6 +57,8 @@ export abstract class Panel {
   protected abstract paint(): void;
 
   protected write(text: string, x: number, y: number, color: string, font: string, most?: number): void {
+    if (text === "") return;
+    this.written.push(text);
     this.brush.font = font;
     this.brush.fillStyle = color;
     this.brush.fillText(text, x, y, most);

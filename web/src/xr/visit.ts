@@ -17,18 +17,7 @@ import {
 import { ownScale } from "../company";
 import { ask, draft, mayEdit } from "../editing/draft";
 import { gizmoMode } from "../editing/handles";
-import {
-  hidden,
-  isLive,
-  lookingAt,
-  overReality,
-  registered,
-  rows,
-  scene,
-  soFar,
-  transport,
-} from "../page_state";
-import { eventLine } from "../panels/event_line";
+import { hidden, isLive, lookingAt, overReality, registered, rows, scene, transport } from "../page_state";
 import { ALONE_LAYER } from "../scene/crowds";
 import { markLine, markMaterial } from "../scene/materials";
 import type { Sighted } from "../scene/own_presence";
@@ -38,7 +27,7 @@ import type { TimeControl } from "../time_control";
 import { mayMeasure, measuring, toggleMeasure } from "../view/measure";
 import type { Register, Tracking } from "../wire";
 import { said, word } from "../words";
-import { Board, edits } from "./board";
+import { Board } from "./board";
 import { BodyBoard } from "./body_board";
 import { isOn, leftHanded, seated, smooth, sound, tone, turnOver, vignette } from "./comfort";
 import { Designing } from "./designing";
@@ -558,12 +547,10 @@ export class Visit implements Sighted {
     ];
   }
 
-  /** What its panels tell of: why criteria are as they are, the file, the ruler, and all that happened. */
+  /** What is written on the panels that are shown, and on the ruler, as it was drawn last. */
   get panels(): string[] {
-    const lines = rows.peek().map(({ info, result }) => `${info.name}: ${result?.reason ?? ""}`);
-    const file = said(draft.peek()?.diff ? word("not saved") : word("saved"));
-    const events = soFar.peek()?.events ?? [];
-    return [...lines, edits.peek(), file, this.ruler.text, ...events.map(eventLine)];
+    const shown = [this.board, ...this.aside].filter(({ mesh }) => mesh.visible);
+    return [...shown.flatMap(({ written }) => written), this.ruler.text].filter((text) => text !== "");
   }
 
   /** Where the middle of a button of the menu is in the world; null where there is none. */

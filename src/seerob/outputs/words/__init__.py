@@ -83,7 +83,7 @@ def told(text: str) -> str:
 
 @cache
 def alone() -> frozenset[str]:
-    """Single words that the engine says. Any other, such as the label of a button, may be a name and stays."""
+    """Single words that the engine says. Any other, such as a button's label, may be a name and stays."""
     return frozenset(files(__package__).joinpath("alone.txt").read_text("utf-8").split())
 
 

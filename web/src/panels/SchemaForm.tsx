@@ -224,18 +224,18 @@ interface ValueProps {
 
 function ValueRow({ field, value, path, onChange }: ValueProps) {
   const id = useId();
-  const wrong = useSignal("");
+  const now = JSON.stringify(value);
+  /** What is wrong with what was typed, as long as the value is the one that stood there then. */
+  const complaint = useSignal({ text: "", of: now });
+  const wrong = complaint.value.of === now ? complaint.value.text : "";
   const mistakes = mistakesAt(path);
-  useEffect(() => {
-    wrong.value = "";
-  }, [JSON.stringify(value)]);
   const put = (next: unknown): void => {
-    wrong.value = "";
+    complaint.value = { text: "", of: now };
     // What is awaited may make it another value than this one.
-    if (asking.peek() || JSON.stringify(next) !== JSON.stringify(value)) onChange(next);
+    if (asking.peek() || JSON.stringify(next) !== now) onChange(next);
     else if (mistakes.length > 0) refused.value = null;
   };
-  const bad = wrong.value !== "" || mistakes.length > 0;
+  const bad = wrong !== "" || mistakes.length > 0;
   return (
     <div class="field" data-field={field.name}>
       <label for={id} title={field.about}>
@@ -250,10 +250,10 @@ function ValueRow({ field, value, path, onChange }: ValueProps) {
         bad={bad}
         put={put}
         complain={(text) => {
-          wrong.value = text;
+          complaint.value = { text, of: now };
         }}
       />
-      {wrong.value !== "" && <p class="mistake">{wrong.value}</p>}
+      {wrong !== "" && <p class="mistake">{wrong}</p>}
       <MistakeList mistakes={mistakes} />
     </div>
   );

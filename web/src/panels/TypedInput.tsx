@@ -55,12 +55,15 @@ export function TypedInputs({ values, looks, bad, onEntered }: Several) {
   const before = useSignal<{ typed: readonly (string | undefined)[]; phase: Phase } | null>(null);
   const idle = !asking.value;
   const file = JSON.stringify(values);
+  // Effects come later than what they were made for: somebody may be typing again by then.
+  const shown = phase.value;
   useEffect(() => {
-    if (phase.value === "waits" && idle) phase.value = "rests";
-    if (phase.value === "rests" && !bad) typed.value = [];
-  }, [file, idle, bad, phase.value]);
+    if (phase.value !== shown) return;
+    if (shown === "waits" && idle) phase.value = "rests";
+    if (shown === "rests" && !bad) typed.value = [];
+  }, [file, idle, bad, shown]);
   useEffect(() => {
-    if (phase.value === "rests") typed.value = [];
+    if (shown === "rests" && phase.value === "rests") typed.value = [];
   }, [file]);
   const texts = values.map((value, k) => typed.value[k] ?? value);
   return (

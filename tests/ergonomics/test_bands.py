@@ -1,5 +1,6 @@
 """Postures in the same bands have the same scores: what is looked up is what would be scored."""
 
+from bisect import bisect_right
 from dataclasses import fields
 
 import numpy as np
@@ -7,8 +8,8 @@ import pytest
 
 from seerob.criteria.ergonomics.reba import Reba, RebaPhase
 from seerob.criteria.ergonomics.rula import Rula, RulaPhase
-from seerob.criteria.scoring.bands import Bands
-from seerob.criteria.scoring.spans import Thresholds
+from seerob.criteria.scoring.bands import Bands, _cuts
+from seerob.criteria.scoring.spans import Thresholds, reached
 from seerob.description.humans.angles import SIDED, Angles
 
 HALF_TURN = ("shoulder_flexion", "shoulder_elevation", "knee_flexion", "elbow_flexion", "shank_tilt")
@@ -76,3 +77,15 @@ def test_scores_are_the_same_in_the_same_bands(kind, phase, seed):
         assert others == scores
         found.append(cells)
     assert found
+
+
+@pytest.mark.parametrize("edge", [1.5 - 2e-6, 1.5 - 5e-10, 1.5, 1.5 + 1e-6, 1.5 + 1e-6 + 5e-10, 1.55])
+def test_an_edge_by_the_limit_of_what_is_looked_up_hides_no_score(edge):
+    """Of either sign, values around the limit are scored themselves, or do not reach the edge."""
+    cuts = _cuts((-edge, edge), most=1.5)
+    assert cuts == sorted(cuts)
+    for size in edge + np.array([-2e-6, -1e-6, -5e-10, -1e-16, 0, 1e-16, 5e-10, 1e-9, 1e-6]):
+        for value in (size, -size):
+            inside = bisect_right(cuts, 0.3 * np.sign(value))
+            assert bisect_right(cuts, value) != inside or not reached(abs(value), edge), value
+    assert bisect_right(cuts, np.nan) % 2 == 0

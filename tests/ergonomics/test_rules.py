@@ -13,8 +13,8 @@ from seerob.core.snapshot import Origin, RowState, Verdict
 from seerob.criteria.ergonomics import reba, rula
 from seerob.criteria.ergonomics.owas import Legs
 from seerob.criteria.scoring.rule import bind_posture
-from seerob.criteria.scoring.score_rows import band_of
-from seerob.description.humans.angles import Angles, angles
+from seerob.criteria.scoring.score_rows import aspects
+from seerob.description.humans.angles import SIDED, Angles, angles
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 from seerob.session.run import Judge, bind
@@ -386,7 +386,15 @@ def test_a_joint_with_an_accuracy_of_its_own_opens_only_its_components(tmp_path)
     ],
 )
 def test_bands_are_named(angle, edges, expected):
-    assert band_of(np.radians(angle), [np.radians(e) for e in edges]) == expected
+    bent = Angles(
+        **{
+            field.name: np.full((2,), np.nan) if field.name in SIDED else np.array(np.nan)
+            for field in fields(Angles)
+        }
+    )
+    bent.trunk_flexion[...] = np.radians(angle)
+    (found,) = aspects(bent, ["trunk_flexion"], None, {"trunk_flexion": np.radians(edges).tolist()})
+    assert found.band == expected
 
 
 def test_every_action_level_is_announced_with_its_highest_score(tmp_path):

@@ -15,8 +15,9 @@ from seerob.core.transforms import (
     wxyz_from_rotation,
 )
 from seerob.description.capture.fitting import Fitter, Pulls, pulls
+from seerob.description.humans.angles import angles
 from seerob.description.humans.posture import lowest_sole
-from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 from seerob.kernels import posture_fit as kernel
 
 FITTER = Fitter(PERSON)
@@ -140,6 +141,41 @@ def test_who_raises_hands_of_which_alone_a_headset_sees_stays_on_the_floor(lift,
         q, error = FITTER.fit(pulls(points, np.eye(4)), q)
     assert np.abs(error[:, :3]).max() < 0.01
     assert abs(lowest_sole(PERSON, q)) < 0.05
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.1])
+@pytest.mark.parametrize("higher", [0.1, 0.3, 1.0])
+def test_who_is_seen_by_head_and_hands_on_a_platform_is_there(higher, weight):
+    _, p = FITTER.bones(FITTER.rest)
+    points = [
+        BodyPoint(name=bone, bone=bone, position=tuple(p[k] + [0, 0, higher]), position_weight=weight)
+        for bone in ("head", "left_hand", "right_hand")
+        for k in [BONES.index(bone)]
+    ]
+    q = None
+    for _ in range(20):
+        q, error = FITTER.fit(pulls(points, np.eye(4)), q)
+    assert np.abs(error[:, :3]).max() < 1e-3
+    assert lowest_sole(PERSON, q) == pytest.approx(higher, abs=2e-3)
+
+
+@pytest.mark.parametrize("lean", [-110.0, 50.0, 60.0, 80.0])
+def test_a_chest_that_is_seen_is_where_it_is_seen(lean):
+    """Pulled upright it would be turned away from there, and the neck judged against it bent less."""
+    posture = FITTER.rest.copy()
+    for name, value in {"pelvis_tilt_back": lean, "neck_extension": -14, "head_extension": -9}.items():
+        posture[JOINTS.index(name)] = np.radians(value)
+    R, p = FITTER.bones(posture)
+    points = [
+        BodyPoint(name=b, bone=b, position=tuple(p[k]), wxyz=tuple(wxyz_from_rotation(R[k]).tolist()))
+        for b in ("head", "thorax", "left_hand", "right_hand")
+        for k in [BONES.index(b)]
+    ]
+    q = None
+    for _ in range(40):
+        q, error = FITTER.fit(pulls(points, np.eye(4)), q)
+    assert np.degrees(np.abs(error[:, 3:]).max()) < 0.1
+    assert angles(*FITTER.bones(q)).neck_flexion == pytest.approx(angles(R, p).neck_flexion, abs=2e-3)
 
 
 def test_who_is_lower_than_somebody_who_stands_is_not_bent_until_the_feet_fit():

@@ -727,3 +727,14 @@ def test_two_samples_of_one_instant_from_a_device_without_a_clock_end_nothing():
     looked = Contradictions(None)
     for t, q in ((1.0, 0.1), (1.0, 0.2), (1.01, 0.3), (1.02, 0.3), (1.2, 0.3)):
         assert looked.find(JointSample(source="", seq=0, t=t, target="arm", q=(q,))) == ""
+    looked = Contradictions(None)
+    for t, q in ((1.0, 0.0), (1.0, 0.3), (1.0, 0.3)):
+        looked.find(JointSample(source="", seq=0, t=t, target="arm", q=(q,), qd=(0.0,)))
+
+
+@pytest.mark.parametrize(("q", "qd"), [(1e200, 0.0), (0.0, 1e200), (1e200, 1e200), (1e308, -1e308)])
+def test_numbers_beyond_what_their_squares_hold_end_nothing_and_are_not_relied_on(q, qd):
+    for live in (True, False):
+        looked = Contradictions(None, live=live)
+        found = [looked.find(said(0.1 * k, (k % 2 * q, 0.0), (qd, 0.0))) for k in range(20)]
+        assert any(found)

@@ -64,6 +64,18 @@ def test_the_larger_of_both_counts_and_nothing_is_relieved(tmp_path):
     assert more == entered
 
 
+def test_what_was_scored_with_empty_hands_is_not_looked_up_for_full_ones(tmp_path):
+    text = PERSON + TABLE + BLANK.replace("mass = 0.8", "mass = 12") + RULES.format(load="load = 0")
+    cell = Cell(tmp_path, text).go(5)
+    kept = Judge(bind(cell.model))
+    empty = [(each.name, each.value) for each in kept(cell.state)]
+    cell.grab(RIGHT, "blank")
+    cell.go(3)
+    full = [(each.name, each.value) for each in kept(cell.state)]
+    assert full == [(each.name, each.value) for each in Judge(bind(cell.model))(cell.state)]
+    assert full != empty
+
+
 def test_where_nobody_entered_a_load_the_rest_stays_unknown(tmp_path):
     """A part in the hand does not say that nothing is pushed meanwhile."""
     empty, held = scores(tmp_path, 7, "", holds=False), scores(tmp_path, 7, "")

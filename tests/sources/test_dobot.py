@@ -52,6 +52,7 @@ def frame(**values):
     """As a controller says it, laid out by `CLIENT`."""
     one = np.zeros(1, CLIENT)
     usual = {"len": LENGTH, "TestValue": TEST_VALUE, "RobotMode": 7, "RunTime": 61_234, "SpeedScaling": 50.0}
+    usual["EnableStatus"] = 1
     for name, value in {**usual, **values}.items():
         one[name] = value
     return one.tobytes()
@@ -65,8 +66,10 @@ def test_every_field_is_where_the_makers_client_has_it():
     assert (said.positions, said.speeds, said.tool, said.payload) == (q, qd, tool, 1.5)
     assert (said.mode, said.time, said.speed_scaling) == (7, 61.234, 50.0)
     assert (said.user_frame, said.enabled, said.alarm, said.collision) == (2, True, True, True)
-    assert not said.dragged
-    assert not said.running
+    assert (said.dragged, said.running) == (False, False)
+    for name, there in {"DragStatus": (True, False), "RunningStatus": (False, True)}.items():
+        flag = decode(frame(**{name: 1}))
+        assert (flag.dragged, flag.running) == there
     sample = joint_sample(said, target="arm", arrived=3.0)
     assert sample.q == pytest.approx(np.radians(q))
     assert sample.qd == pytest.approx(np.radians(qd))
@@ -94,8 +97,23 @@ def test_a_robot_that_may_be_elsewhere_is_not_relied_on(mode, quality):
     assert joint_sample(decode(frame(RobotMode=mode)), target="arm", arrived=0.0).quality is quality
 
 
+@pytest.mark.parametrize("said", [{"EnableStatus": 0}, {"ErrorStatus": 1}])
+def test_a_robot_that_contradicts_its_mode_is_not_relied_on(said):
+    for mode in (RobotMode.RUNNING, RobotMode.ENABLED, RobotMode.DRAGGED, RobotMode.SINGLE_MOVE):
+        sample = joint_sample(decode(frame(RobotMode=mode, **said)), target="arm", arrived=0.0)
+        assert sample.quality is Quality.DEGRADED
+
+
 @pytest.mark.parametrize(
-    "data", [b"", frame()[:-1], frame(len=1439), frame(TestValue=0), struct.pack("<H", LENGTH) * 720]
+    "data",
+    [
+        b"",
+        frame()[:-1],
+        frame(len=1439),
+        frame(TestValue=0),
+        frame(RunTime=0),
+        struct.pack("<H", LENGTH) * 720,
+    ],
 )
 def test_what_is_none_of_its_messages_is_refused(data):
     with pytest.raises(ProtocolError):
@@ -111,7 +129,9 @@ def test_a_controller_is_heard_over_its_socket():
         q, qd = motion(sample.t_device - SINCE)
         assert sample.q == pytest.approx(q, abs=1e-9)
         assert sample.qd == pytest.approx(qd, abs=1e-9)
-        assert (sample.payload, sample.quality) == (2.0, Quality.GOOD)
+        assert sample.payload == 2.0
+        assert sample.quality in (Quality.GOOD, Quality.LATE)  # a loaded machine reads late
+    assert any(sample.quality is Quality.GOOD for sample in joints)
     told = next(s for s in samples if isinstance(s, SignalSample)).values
     assert (told["robot_mode"], told["enabled"], told["speed_scaling"]) == ("running", True, 1.0)
 

@@ -118,12 +118,12 @@ def margin(value: float, limit: float, unit: str = "", *, at_most: bool) -> str:
     return with_unit(next((text for text in shown if _back(text) > 0), repr(-float(gap))), unit)
 
 
-def between(low: float, high: float, unit: str = "") -> str:
-    """Where a value lies, rounded outward: ``0.29 m and 0.31 m``."""
+def ends(low: float, high: float, unit: str = "") -> tuple[str, str]:
+    """Between which a value lies, rounded outward: ``0.29 m`` and ``0.31 m``."""
     places = _places(unit, low, high)
     return (
-        f"{with_unit(_text(low, places, ROUND_FLOOR), unit)} and "
-        f"{with_unit(_text(high, places, ROUND_CEILING), unit)}"
+        with_unit(_text(low, places, ROUND_FLOOR), unit),
+        with_unit(_text(high, places, ROUND_CEILING), unit),
     )
 
 

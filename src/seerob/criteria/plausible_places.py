@@ -20,7 +20,6 @@ from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
 from seerob.model.mounting.in_place import BELOW, FEET, placed
 from seerob.twin.state import State
-from seerob.twin.validity.hearing import Hearing
 from seerob.workstation.plausibility.ranges import Quantity, canonical, findings, scaled
 
 LEGS = frozenset(f"{side}_{bone}" for side in ("left", "right") for bone in ("thigh", "shank", "foot"))
@@ -54,8 +53,6 @@ class PlausiblePlaces:
         self._plausible: set[str] = set()
         self._off: dict[str, float] = {}
         """Whose feet left what they stood on, and when [s] of run time."""
-        self._hearings: Mapping[str, Hearing] = {}
-        """What is known of everybody, by name, of the last instant that was looked at."""
         self._found: tuple[Finding, ...] = ()
         self._due = 0.0
 
@@ -75,9 +72,8 @@ class PlausiblePlaces:
         for name in new:
             self._waiting.discard(name)
             self._where[name] = state.joint_positions(self._model.mechanisms[name])
-        self._hearings = state.hearings
         before, self._due = self._found, state.t + AGAIN
-        self._found = tuple(self._implausible(self._now(state), state.t, feet=not new and not self._found))
+        self._found = tuple(self._implausible(state, self._now(state), feet=not new and not self._found))
         return None if self._found == before else self._found
 
     def _now(self, state: State) -> Mapping[str, Array]:
@@ -89,12 +85,12 @@ class PlausiblePlaces:
                 self._where[name] = here if captured is None else captured
         return self._where
 
-    def _implausible(self, q: Mapping[str, Array], t: float, *, feet: bool) -> list[Finding]:
+    def _implausible(self, state: State, q: Mapping[str, Array], *, feet: bool) -> list[Finding]:
         """What is implausible.
 
         Args:
+            state: Now.
             q: Joint positions of everybody who was heard.
-            t: Of the run [s].
             feet: All else is known to be plausible.
         """
         found: list[Finding] = []
@@ -103,27 +99,12 @@ class PlausiblePlaces:
             if again and quantity.kind not in (FEET, BELOW):
                 continue
             implausible = [f for f in findings([quantity], ()) if f.holds]
-            if unfitted := self._unfitted(quantity, t):
-                implausible = [structs.replace(f, text=f.text + unfitted) for f in implausible]
             if not implausible or self._confirmed(quantity):
                 self._plausible.add(key)
                 self._off.pop(key, None)
-            elif not again or t - self._off.setdefault(key, t) >= LASTS:
-                found += implausible
+            elif not again or state.t - self._off.setdefault(key, state.t) >= LASTS:
+                found += [_fitted(f, quantity, state) for f in implausible]
         return found
-
-    def _unfitted(self, quantity: Quantity, t: float) -> str:
-        """What to do about feet that no device sees: they are where a body of the file's stature has them."""
-        (name,) = quantity.about[:1]
-        hearing = self._hearings.get(name)
-        if quantity.kind not in (FEET, BELOW) or hearing is None:
-            return ""
-        if not set(hearing.unobserved(t)) >= LEGS:
-            return ""
-        return (
-            f"; no device sees the legs of {name}, which are as long as the stature in the file says: fit "
-            "the person to the wearer (calibration; in a headset 'fit me' at the wrist) or give their stature"
-        )
 
     def _confirmed(self, quantity: Quantity) -> bool:
         return any(
@@ -137,6 +118,21 @@ class PlausiblePlaces:
 def _no_farther(value: float, confirmed: float) -> bool:
     """Whether a value is no farther beyond than the one that was confirmed, to the same side."""
     return math.copysign(1.0, value) == math.copysign(1.0, confirmed) and abs(value) <= abs(confirmed)
+
+
+def _fitted(finding: Finding, quantity: Quantity, state: State) -> Finding:
+    """The finding; of feet that no device sees, which are where the stature has them, with what to do."""
+    if quantity.kind not in (FEET, BELOW):
+        return finding
+    name = quantity.about[0]
+    hearing = state.hearings.get(name)
+    if hearing is None or not set(hearing.unobserved(state.t)) >= LEGS:
+        return finding
+    text = (
+        f"no device sees the legs of {name}, which are as long as the stature in the file says: fit the "
+        "person to the wearer (calibration, in a headset 'fit me' at the wrist) or give their stature"
+    )
+    return structs.replace(finding, text=f"{finding.text}; {text}")
 
 
 def _placed(state: State, name: str) -> bool:

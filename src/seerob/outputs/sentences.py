@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from seerob.core.figures import against, between, figure, margin, with_unit
+from seerob.core.figures import against, ends, figure, margin, with_unit
 from seerob.core.snapshot import Finding, Verdict
 from seerob.outputs.words import said as spoken_as
 from seerob.outputs.words import told, word
@@ -248,7 +248,7 @@ def about(series: Series) -> list[str]:
         )
         said.append(spoken_as(text, value=reached(worst, series), t=f"{worst.t:.2f}"))
     if worst.interval is not None and worst.value is not None:
-        low, high = between(*worst.interval, series.unit).split(" and ")
+        low, high = ends(*worst.interval, series.unit)
         there = spoken_as("{low} and {high}", low=low, high=high)
         said.append(
             spoken_as(

@@ -467,8 +467,8 @@ def run(
                 if stop():
                     break
                 if clock is not None:
-                    log.slip(clock.slipped)
                     clock.wait(t + model.workstation.engine.tick)
+                    log.slip(clock.slipped)
         except KeyboardInterrupt:  # somebody has seen enough
             raise
         except BaseException as error:

@@ -8,13 +8,13 @@ import numpy as np
 from seerob.core.errors import Undecided
 from seerob.core.transforms import Array
 from seerob.model.model import Model
-from seerob.twin.places import Places
+from seerob.twin.places import StateOfPlaces
 from seerob.twin.signals import Signals
 from seerob.twin.validity.hearing import Hearing
 
 
-class Captured(Places):
-    """Where people were captured; arguments as of `Places`."""
+class Captured(StateOfPlaces):
+    """Where people were captured; arguments as of `StateOfPlaces`."""
 
     def __init__(
         self, model: Model, data: mujoco.MjData, hearings: dict[str, Hearing], signals: Signals | None = None

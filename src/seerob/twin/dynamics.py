@@ -16,7 +16,7 @@ from seerob.kernels.axes import felt, principal_axes, quaternion
 from seerob.kernels.chain import along, at_point
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.attachments import moving_dofs
-from seerob.twin.motion import Motion
+from seerob.twin.motion import StateOfMotion
 from seerob.twin.moving_points import Moved, Point, PointSurvey, place_of
 from seerob.twin.places import MOST_PLACES, Indices
 from seerob.twin.signals import Signals
@@ -45,8 +45,8 @@ class _Point(NamedTuple):
     wxyz: list[float]
 
 
-class Dynamics(Motion):
-    """Jacobians, masses and torques; arguments as of `seerob.twin.places.Places`."""
+class Dynamics(StateOfMotion):
+    """Jacobians, masses and torques; arguments as of `seerob.twin.places.StateOfPlaces`."""
 
     def __init__(
         self, model: Model, data: mujoco.MjData, hearings: dict[str, Hearing], signals: Signals | None = None

@@ -31,8 +31,8 @@ WRITTEN = ("placed", "velocities of")
 """What is kept of these lies in buffers."""
 
 
-class Motion(Captured):
-    """Speeds of joints and bodies; arguments as of `seerob.twin.places.Places`."""
+class StateOfMotion(Captured):
+    """Speeds of joints and bodies; arguments as of `seerob.twin.places.StateOfPlaces`."""
 
     def __init__(
         self, model: Model, data: mujoco.MjData, hearings: dict[str, Hearing], signals: Signals | None = None

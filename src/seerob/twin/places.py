@@ -32,7 +32,7 @@ def _picking(rows: Indices) -> Callable[[list[float]], tuple[float, ...]]:
     return cast("Callable[[list[float]], tuple[float, ...]]", itemgetter(*rows.tolist()))
 
 
-class Places(Validity):
+class StateOfPlaces(Validity):
     """Where robots, people and machines are.
 
     Args:

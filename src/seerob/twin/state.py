@@ -1,8 +1,8 @@
 """The twin at this tick, and what follows from it. Valid until the next tick.
 
-What two criteria share has its one home here and is computed once per tick: where everything is (`Places`),
+What two criteria share has its one home here and is computed once per tick: where everything is (`StateOfPlaces`),
 where people were captured (`Captured`), how fast everything is and what is known of its motion ahead
-(`Motion`), what follows from masses (`Dynamics`), and distances. Accessors raise `Undecided` when the robot
+(`StateOfMotion`), what follows from masses (`Dynamics`), and distances. Accessors raise `Undecided` when the robot
 or human they speak of was not heard lately, does not follow what was heard, or has a mass that nobody gave:
 a stale or guessed number can never be green.
 

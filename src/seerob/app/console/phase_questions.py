@@ -5,7 +5,9 @@ An answer that is not given is not guessed: it is left out of the file, and what
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Literal, get_args, get_origin
 
 import msgspec
@@ -115,7 +117,7 @@ def _end(
         if not given:
             return end
         try:
-            until = float(given.replace(",", "."))
+            until = _number(given)
             msgspec.convert({**table, "end": until}, TaskPhase)
         except (ValueError, msgspec.ValidationError) as error:
             tell(f"  {error}")
@@ -164,10 +166,7 @@ def _value(given: str, kind: Any, choices: Sequence[str]) -> Any:
         ValueError: It is none.
     """
     if not choices:
-        try:
-            return float(given.replace(",", "."))
-        except ValueError:
-            raise ValueError(f"{given!r} is no number") from None
+        return _number(given)
     if bool in (kind, *get_args(kind)):
         if given.lower() in YES + NO:
             return given.lower() in YES
@@ -178,6 +177,18 @@ def _value(given: str, kind: Any, choices: Sequence[str]) -> Any:
         if len(near) == 1:
             return near[0]
     raise ValueError(f"answer one of {', '.join(choices)}, or nothing")
+
+
+def _number(given: str) -> float:
+    """A finite number, with a point or a comma.
+
+    Raises:
+        ValueError: It is none.
+    """
+    with suppress(ValueError):
+        if math.isfinite(value := float(given.replace(",", "."))):
+            return value
+    raise ValueError(f"{given!r} is no number")
 
 
 def on_a_terminal(question: str) -> str:

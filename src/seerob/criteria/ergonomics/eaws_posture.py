@@ -540,7 +540,8 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         if found.silent > 0:
             reasons.append(f"coverage {100 * found.coverage:.1f} %: {found.silent:.1f} s not heard")
         if not known:
-            reasons.append(f"the points lie between {figures.between(*ends)}")
+            between = figures.ends(*ends)
+            reasons.append(f"the points lie between {between[0]} and {between[1]}")
         if found.counting:
             reasons.append(f"counting: {found.heard:.1f} of {self.cycle:g} s, judged after a whole cycle")
         if known and not missing and not found.counting and found.silent == 0:

@@ -49,17 +49,19 @@ def _cuts(edges: Sequence[float], *others: float, most: float = math.inf) -> lis
     at = set(others)
     for edge in map(abs, edges):
         at |= {edge - ROUNDING, edge + ROUNDING, ROUNDING - edge, -ROUNDING - edge}
+    bounded = most < math.inf
+    if bounded:
+        at = {min(max(each, -most), most) for each in at} | {-most, most}
     found: list[float] = []
     for each in sorted(at):
-        if abs(each) >= most:
-            continue
         if found and each - NEAR <= found[-1]:
             found[-1] = each + NEAR
         else:
             found += [each - NEAR, each + NEAR]
+    if bounded:
+        found[0], found[-1] = -math.inf, math.inf
     # A NaN is sorted behind all others.
-    beyond = [math.inf, math.inf] if most == math.inf else [most, math.inf, math.inf, math.inf]
-    return [*([] if most == math.inf else [-math.inf, -most]), *found, *beyond]
+    return [*found, math.inf, math.inf]
 
 
 class Bands:

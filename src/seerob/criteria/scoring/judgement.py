@@ -42,7 +42,8 @@ class Method:
     most: Mapping[str, int]
     """Components and their greatest score."""
     edges: Callable[[Thresholds], Edges]
-    """Bands of the angles."""
+    """Bands of the angles: every angle and every threshold on which a component depends, by which what was
+    scored is looked up again (`seerob.criteria.scoring.bands`)."""
     levels: Sequence[int]
     """Highest score of each action level."""
     actions: Sequence[str]

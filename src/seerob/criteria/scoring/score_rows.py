@@ -55,11 +55,6 @@ NEUTRAL = {"elbow_flexion": math.radians(80)}
 """Name of an angle → the posture away from which its bands get stricter [rad], where that is not 0."""
 
 
-def band_of(angle: float, edges: Sequence[float], neutral: float = 0.0) -> str:
-    """``20° to 45°`` of an angle [rad]; empty for one that is not measured or has no bands."""
-    return "" if not edges or math.isnan(angle) else _banded(tuple(edges), neutral).of(angle)
-
-
 class _Banded(NamedTuple):
     """Bands of an angle.
 

@@ -21,9 +21,11 @@ TURN_REST = 0.7
 """Pull of the posture of rest on joints about a bone's own axis, in the measure of `REST`: a straight arm or
 leg hardly shows how it is turned."""
 UPRIGHT = 20.0
-"""Pull of the posture of rest on how the pelvis leans, and on its height where it is above that of somebody
-who stands, in the measure of `REST`, while nothing below the chest is seen; own choice: who raises both hands
-neither swings the legs forward nor leaves the floor. Who is lower may sit, crouch or bow: nobody knows."""
+"""Pull of the posture of rest on how the pelvis leans, and on its height where it is higher below the head
+than that of somebody who stands, in the measure of `REST`, while nothing is seen but head and arms; own
+choice: who raises both hands neither swings the legs forward nor leaves the floor. Who is lower may sit,
+crouch or bow: nobody knows. A head that is higher takes the person along."""
+HEAD = BONES.index("head")
 KEEP = 6.0
 """Pull of the posture a `KEEP_TIME` before, in the same measure: it smooths what is hardly seen, such as
 how a forearm is turned, and hardly delays what is."""
@@ -136,9 +138,11 @@ class Fitter:
         leans = np.isin(JOINTS, ["pelvis_list_right", "pelvis_tilt_back"])
         self._height = JOINTS.index("pelvis_z")
         self._w_upright = np.where(leans, UPRIGHT**2, self._w_rest)
-        legs = ("pelvis", "lumbar", "thigh", "shank", "foot", "toes")
-        self._below = np.array([without_side(bone) in legs for bone in BONES])
-        """Of each bone whether it is below the chest."""
+        below = ("pelvis", "lumbar", "thorax", "thigh", "shank", "foot", "toes")
+        self._below = np.array([without_side(bone) in below for bone in BONES])
+        """Of each bone whether it is below head and arms: it shows how the trunk leans."""
+        R, x = self.bones(self.rest)
+        self._head_rest = R[HEAD], x[HEAD]
         self._w_keep = np.where(own_place, 1e-4, KEEP**2)
         # Loops that are not kept yet are compiled now: a run that waits for them falls behind.
         nothing = pulls((), np.eye(4))
@@ -203,13 +207,20 @@ class Fitter:
         rest, iterations = self.rest, FIRST_ITERATIONS if before is None else NEXT_ITERATIONS
         below = self._below[seen.bone[(seen.wp > 0) | (seen.wo > 0)]].any()
         w_rest = self._w_rest if below else self._w_upright.copy()
+        most = np.inf if below else self.rest[self._height] + self._above(seen)
         for _ in range(1 + AGAIN):
             beside = kernel.Beside(rest, w_rest, near.copy(), keep)
             kernel.fit(q, lower, upper, beside, self._links, seen.of_links(), iterations, ENOUGH, error)
             rest, iterations = q.copy(), AGAIN_ITERATIONS
-            if not below and q[self._height] > self.rest[self._height]:
-                rest[self._height], w_rest[self._height] = self.rest[self._height], UPRIGHT**2
+            if q[self._height] > most:
+                rest[self._height], w_rest[self._height] = most, UPRIGHT**2
         return q, error
+
+    def _above(self, seen: Pulls) -> float:
+        """How much higher the head is seen than that of somebody who stands at the root [m]; at least 0."""
+        head = (seen.bone == HEAD) & (seen.wp > 0)
+        R, x = self._head_rest
+        return float((seen.position[head] - x - seen.at[head] @ R.T)[:, 2].max(initial=0.0))
 
     def bones(self, q: Array) -> tuple[Array, Array]:
         """Root from bone (21, 3, 3) and positions [m] (21, 3), as `skeleton.bone_poses`."""

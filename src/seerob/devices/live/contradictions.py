@@ -217,7 +217,7 @@ class _Standing:
         if self._step[k] * told <= 0 or way < STEPS * self._finest[k]:
             return ""
         least = max(speed * self._interval[k] - way, 2 * self._finest[k], FINEST[unit]) + speed * jitter
-        if speed**2 <= 2 * HARDEST[unit] * least:
+        if speed * speed <= 2 * HARDEST[unit] * least:
             return ""
         return (
             f"joint {k + 1} stands to the last bit right after {speed:.3g} {unit}/s, "
@@ -243,13 +243,18 @@ class _Scale:
             return
         if self._way > 4 * LONG_WAY[self._unit]:
             self._went, self._said, self._way = 0.5 * self._went, 0.5 * self._said, 0.5 * self._way
-        self._went, self._said, self._way = self._went + went**2, self._said + said**2, self._way + abs(went)
+        # Not to the power of 2, which ends in an error beyond what a float holds.
+        self._went += went * went
+        self._said += said * said
+        self._way += abs(went)
 
     def off(self) -> str:
         """Why they are no velocities of these positions; empty when they may be."""
         if self._way < LONG_WAY[self._unit] or not self._said:
             return ""
         scale = math.sqrt(self._went / self._said)
+        if math.isnan(scale):
+            return "is off: both are beyond all bounds"
         if (1 - SCALE) <= scale <= 1 / (1 - SCALE):
             return ""
         return f"is off by a factor: positions move at {scale:.3g} × the velocity"
@@ -502,7 +507,8 @@ class Contradictions:
             if off < NOISE[unit]:
                 continue
             path = max(now.length[k] - then.length[k], abs(went))
-            lag = LAG * max(abs(now.qd[k]), abs(then.qd[k]), path / (now.t - then.t))
+            # Two samples may have come at one instant.
+            lag = LAG * max(abs(now.qd[k]), abs(then.qd[k]), path / max(now.t - then.t, 1e-9))
             if off > NOISE[unit] + SHARE * path + lag:
                 from seerob.files.trajectories.checks import disagreement  # numpy, which few need
 

@@ -31,7 +31,7 @@ SURE = (
     *(RobotMode.ENABLED, RobotMode.DRAGGED, RobotMode.RUNNING),
     *(RobotMode.SINGLE_MOVE, RobotMode.PAUSED, RobotMode.COLLISION),
 )
-"""A robot that has detected a collision stands where it says."""
+"""A robot that has detected a collision stands where it says, enabled or not, and may be in alarm."""
 
 
 def joint_sample(message: Message, *, target: str, arrived: float) -> JointSample:
@@ -42,7 +42,9 @@ def joint_sample(message: Message, *, target: str, arrived: float) -> JointSampl
         target: Robot it drives.
         arrived: Host's monotonic time [s].
     """
-    quality = Quality.GOOD if message.mode in SURE else Quality.DEGRADED
+    stopped = message.mode in (RobotMode.PAUSED, RobotMode.COLLISION)
+    agreed = stopped or (message.enabled and not message.alarm)
+    quality = Quality.GOOD if message.mode in SURE and agreed else Quality.DEGRADED
     if message.mode in UNSURE:
         quality = Quality.INVALID
     x, y, z, *_ = message.tool

@@ -197,7 +197,7 @@ def total(rows: Sequence[LinkMass]) -> str:
 
 def cells(row: LinkMass) -> list[str]:
     """One row of the table, in the order of `HEAD`."""
-    mass = "unknown" if row.mass is None else number(row.mass, "kg")
+    mass = said("unknown") if row.mass is None else number(row.mass, "kg")
     why = "; ".join(filter(None, (row.note, row.source)))
     moves = word("yes") if row.moves else word("no")
     return [row.name, mass, WHO[row.origin], moves, row.merged or "–", why or "–"]

@@ -103,13 +103,16 @@ def decode(data: bytes) -> Message:
     """What a message says.
 
     Raises:
-        ProtocolError: It has another length, or not the constant by which the layout is known.
+        ProtocolError: It has another length, not the constant by which the layout is known, or no time.
     """
     if len(data) != LENGTH:
         raise ProtocolError(f"a message of {len(data)} bytes; it has {LENGTH}")
     length, mode, time, test, scaling, *rest = LAYOUT.unpack(data)
     if length != LENGTH or test != TEST_VALUE:
         raise ProtocolError(f"no message of a Dobot controller (length {length}, test value {test:#x})")
+    if time == 0:
+        # A controller that has just been switched on has counted some.
+        raise ProtocolError("it says no time since it was switched on: is its firmware older than V4?")
     user, enabled, dragged, running, alarm, collision, payload = rest[18:]
     return Message(
         mode=mode,

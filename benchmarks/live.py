@@ -116,10 +116,11 @@ class Post:
                 firsts.setdefault(one[1], one)
             came = list(firsts.values()) if signals else said
             for k, (seq, instant, device) in enumerate(came):
-                if k + 1 < len(came) and came[k + 1][1] == instant:
-                    # Datagrams may share an instant, too, and it is theirs.
-                    instant = min(instant, written.get(device, instant))
-                found[source, signals, seq] = instant
+                # Datagrams may share an instant, too, and it is theirs.
+                shared = k + 1 < len(came) and came[k + 1][1] == instant
+                found[source, signals, seq] = (
+                    min(instant, written.get(device, instant)) if shared else instant
+                )
         return found
 
     def mailbox(self, written: dict[float, float], since: float) -> dict[str, list[float]]:

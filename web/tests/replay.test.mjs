@@ -47,6 +47,17 @@ test("who may be elsewhere is hatched, in the tree, and in the legend; the rest 
   await page.getByRole("img", { name: /^may be elsewhere: ur10: not heard for 0\.[45]\d s/ }).waitFor();
   assert.equal(await page.locator(".item .doubt").count(), 1);
   await page.locator(".legend").getByText("may be elsewhere").waitFor();
+  // Its key has the colour that is drawn, dark and light.
+  for (const [colorScheme, [r, g, b]] of [
+    ["light", [0x6f, 0x7a, 0x88]],
+    ["dark", [0x8a, 0x94, 0xa3]],
+  ]) {
+    await page.emulateMedia({ colorScheme });
+    await page.waitForFunction(
+      (color) => getComputedStyle(document.querySelector(".doubt-key i")).backgroundImage.includes(color),
+      `rgb(${r}, ${g}, ${b})`,
+    );
+  }
   await visit(10);
   await doubted("ur10/forearm_link", false);
   await page.waitForFunction(() => !document.querySelector(".item .doubt, .doubt-key"));

@@ -116,3 +116,26 @@ def test_what_the_reader_takes_the_schema_takes(validator, path, value):
 
 def test_a_dotted_kind_may_have_any_option(validator):
     validator.validate(changed(("safety", 0), {"kind": "acme.rules", "anything": 1}))
+
+
+def test_lists_of_corners_are_said_to_be_polygons_and_other_pairs_are_not() -> None:
+    """A form makes up a row between two of a polygon, and nowhere else."""
+    marked, pairs = set(), set()
+
+    def visit(name: str, at: object) -> None:
+        if isinstance(at, list):
+            for each in at:
+                visit(name, each)
+        if not isinstance(at, dict):
+            return
+        if at.get("x-polygon"):
+            marked.add(name)
+        if isinstance(at.get("items"), dict) and "prefixItems" in at["items"]:
+            pairs.add(name)
+        for key, each in at.items():
+            visit(name if key in ("anyOf", "items") else key, each)
+
+    visit("", schema())
+    suffixes = ("", "_mm", "_cm", "_inch")
+    assert marked == {name + suffix for name in ("corners", "polygon") for suffix in suffixes}
+    assert {"torque_limits", "points"} <= pairs - marked

@@ -47,7 +47,7 @@ export function Findings() {
           <dt>seerob</dt>
           <dd>{scene.value.version}</dd>
           <dt>{said("Connection")}</dt>
-          <dd>{spoken(link.value.reason || link.value.state)}</dd>
+          <dd>{link.value.reason ? spoken(link.value.reason) : said(link.value.state)}</dd>
         </dl>
       )}
     </section>

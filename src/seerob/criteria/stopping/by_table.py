@@ -151,11 +151,14 @@ def _by_tool_speed(
 
     def after(onset: Onset) -> Course:
         # Any point counts as the tool's: the fastest decides for all.
-        top, end = float(onset.v_s.max()), tool.speed[-1]
-        beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
-        T_s = along_axis(tool.speed, times, min(top, end))
-        unbounded_reasons = (onset.unbounded_reason, unknown, beyond if top > end * (1 + 1e-9) else "")
-        return braking(replace(onset, unbounded_reason="; ".join(filter(None, unbounded_reasons))), T_s)
+        top, end = float(np.maximum.reduce(onset.v_s)), tool.speed[-1]
+        T_s, beyond = along_axis(tool.speed, times, min(top, end)), ""
+        if top > end * (1 + 1e-9):
+            beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
+        if unknown or beyond:
+            reasons = filter(None, (onset.unbounded_reason, unknown, beyond))
+            onset = replace(onset, unbounded_reason="; ".join(reasons))
+        return braking(onset, T_s)
 
     return after
 

@@ -116,7 +116,7 @@ def factor_by_search(S_p: Callable[[float], Array], distance: Array, costly: boo
 
     def holds(factor: float) -> bool:
         try:
-            return bool(np.all(S_p(factor) <= distance))
+            return bool((S_p(factor) <= distance).all())
         except Undecided:
             return False
 

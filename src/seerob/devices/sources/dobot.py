@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
-from pathlib import Path
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -17,10 +16,10 @@ from msgspec import Meta
 from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.robot_controller import RobotController
 from seerob.protocols.robots import dobot
 from seerob.protocols.robots.dobot import JOINTS, Message, RobotMode
-from seerob.workstation.source import Opened, Target, driven_robot
+from seerob.workstation.source import Target
 
 SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""
@@ -82,12 +81,11 @@ def figures(message: Message) -> dict[str, float | bool | str]:
     return {"speed_scaling": 0.01 * message.speed_scaling, "payload": message.payload}
 
 
-class Dobot(LiveSource, frozen=True, kw_only=True):
+class Dobot(RobotController, frozen=True, kw_only=True):
     """A Dobot controller (CR, Nova, Magician E6), live, through its real-time feedback."""
 
-    links: ClassVar[bool] = False
-    robot: str
-    """The robot it drives."""
+    joints: ClassVar[int] = JOINTS
+    whose: ClassVar[str] = "the controller says those of"
     host: str
     """Name or address of the controller."""
     port: Annotated[int, Meta(ge=1, le=65535)] = dobot.PORT
@@ -96,23 +94,6 @@ class Dobot(LiveSource, frozen=True, kw_only=True):
     """Messages per second that the port sends [Hz]."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER
     """``vendor_emulator`` when it is the maker's virtual controller."""
-
-    def target(self) -> str:
-        """The robot."""
-        return self.robot
-
-    def period(self) -> float:
-        """Interval between samples that is expected [s]."""
-        return 1 / self.frequency
-
-    def open(self, folder: Path, target: Target | None) -> Opened:
-        """Check the robot; connects to nothing.
-
-        Raises:
-            InputError: The robot does not have six joints.
-        """
-        where, whose = f"dobot {self.host}", "the controller says those of"
-        return super().open(folder, driven_robot(target, self.robot, where, joints=JOINTS, whose=whose))
 
     async def ask(self) -> tuple[Finding, ...]:
         """What state it is in."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
-from pathlib import Path
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -18,7 +17,7 @@ from msgspec import Meta
 from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.robot_controller import RobotController
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import doosan_drfl
 from seerob.protocols.robots.doosan_drfl import (
@@ -30,7 +29,7 @@ from seerob.protocols.robots.doosan_drfl import (
     RobotState,
     decode,
 )
-from seerob.workstation.source import Opened, Target, driven_robot
+from seerob.workstation.source import Target
 
 SILENCE = 1.0
 """Longest pause before the bridge is taken for gone [s]."""
@@ -39,12 +38,11 @@ SIGNAL_PERIOD = 0.1
 DEGREE = math.pi / 180
 
 
-class Drfl(LiveSource, frozen=True, kw_only=True):
+class Drfl(RobotController, frozen=True, kw_only=True):
     """A Doosan controller, live, through the maker's library and a bridge."""
 
-    links: ClassVar[bool] = False
-    robot: str
-    """The robot it drives."""
+    joints: ClassVar[int] = JOINTS
+    whose: ClassVar[str] = "the bridge sends"
     host: str = "127.0.0.1"
     """Address of the machine on which the bridge runs; what others send is not listened to."""
     bind: str = "127.0.0.1"
@@ -55,23 +53,6 @@ class Drfl(LiveSource, frozen=True, kw_only=True):
     """Messages per second that the bridge was told to send [Hz]."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER
     """``vendor_emulator`` when it is the maker's emulator."""
-
-    def target(self) -> str:
-        """The robot."""
-        return self.robot
-
-    def period(self) -> float:
-        """Interval between samples that is expected [s]."""
-        return 1 / self.frequency
-
-    def open(self, folder: Path, target: Target | None) -> Opened:
-        """Look whether the bridge is sending.
-
-        Raises:
-            InputError: The robot does not have six joints.
-        """
-        where, whose = f"drfl {self.host}", "the bridge sends"
-        return super().open(folder, driven_robot(target, self.robot, where, joints=JOINTS, whose=whose))
 
     async def ask(self) -> tuple[Finding, ...]:
         """Whether it sends, and what it does not have."""

@@ -11,7 +11,6 @@ import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from enum import IntEnum
-from pathlib import Path
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -21,12 +20,12 @@ from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import REORDERED
 from seerob.devices.live.differentiation import SAMPLES, Differentiator
-from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.robot_controller import RobotController
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import fri
 from seerob.protocols.robots.fri import Monitoring, SessionState
-from seerob.workstation.source import Opened, Target, driven_robot
+from seerob.workstation.source import Target
 
 JOINTS = 7
 """Of every LBR."""
@@ -154,12 +153,11 @@ class _Answering:
         return fri.encode_answer(answer)
 
 
-class Fri(LiveSource, frozen=True, kw_only=True):
+class Fri(RobotController, frozen=True, kw_only=True):
     """A KUKA LBR controller, live, through FRI."""
 
-    links: ClassVar[bool] = False
-    robot: str
-    """The robot it drives."""
+    joints: ClassVar[int] = JOINTS
+    whose: ClassVar[str] = "an LBR has"
     host: str
     """Name or address of the controller; what others send is not listened to."""
     bind: str = "127.0.0.1"
@@ -170,23 +168,6 @@ class Fri(LiveSource, frozen=True, kw_only=True):
     """Messages per second that the robot program has asked for [Hz]: 1000 / send period in ms."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER
     """``vendor_emulator`` when it is KUKA.Sim or OfficeLite."""
-
-    def target(self) -> str:
-        """The robot."""
-        return self.robot
-
-    def period(self) -> float:
-        """Interval between samples that is expected [s]."""
-        return 1 / self.frequency
-
-    def open(self, folder: Path, target: Target | None) -> Opened:
-        """Look whether the controller is sending.
-
-        Raises:
-            InputError: The robot does not have seven joints.
-        """
-        where, whose = f"fri {self.host}", "an LBR has"
-        return super().open(folder, driven_robot(target, self.robot, where, joints=JOINTS, whose=whose))
 
     async def ask(self) -> tuple[Finding, ...]:
         """Which FRI it speaks, how often it sends, and what state it is in."""

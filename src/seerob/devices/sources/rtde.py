@@ -20,7 +20,8 @@ from seerob.core.errors import InputError
 from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.devices.live.listening import Contact, LiveSource, at_start, because
+from seerob.devices.live.listening import Contact, at_start, because
+from seerob.devices.live.robot_controller import RobotController
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots import rtde, ur_primary
 from seerob.protocols.robots.rtde import (
@@ -34,7 +35,7 @@ from seerob.protocols.robots.rtde import (
     name,
     quality,
 )
-from seerob.workstation.source import Opened, Target, driven_robot
+from seerob.workstation.source import Target
 
 if TYPE_CHECKING:
     from seerob.description.robots.calibration import Calibration
@@ -155,12 +156,11 @@ def _safety(values: Mapping[str, Value]) -> int | None:
 # -- the source ---------------------------------------------------------------------------------
 
 
-class Rtde(LiveSource, frozen=True, kw_only=True):
+class Rtde(RobotController, frozen=True, kw_only=True):
     """A Universal Robots controller, live, through RTDE."""
 
-    links: ClassVar[bool] = False
-    robot: str
-    """The robot it drives."""
+    joints: ClassVar[int] = 6
+    whose: ClassVar[str] = "a Universal Robots arm has"
     host: str
     """Name or address of the controller."""
     port: Annotated[int, Meta(ge=1, le=65535)] = rtde.PORT
@@ -172,23 +172,6 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
     out."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER
     """``vendor_emulator`` when it is URSim."""
-
-    def target(self) -> str:
-        """The robot."""
-        return self.robot
-
-    def period(self) -> float:
-        """Interval between samples that is asked for [s]."""
-        return 1 / self.frequency
-
-    def open(self, folder: Path, target: Target | None) -> Opened:
-        """Check the robot; connects to nothing.
-
-        Raises:
-            InputError: The robot does not have six joints.
-        """
-        where, whose = f"rtde {self.host}", "a Universal Robots arm has"
-        return super().open(folder, driven_robot(target, self.robot, where, joints=6, whose=whose))
 
     def reach(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
         """Ask the controller what it has, and for the kinematics of this very robot, if it can be reached.

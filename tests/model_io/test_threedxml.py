@@ -201,3 +201,31 @@ def test_damaged_files_are_parts_or_a_sentence(tmp_path):
         except InputError:
             refused += 1
     assert refused > 50
+
+
+def _many(folder, files):
+    """An unpacked document with a surface in each of these files, of which one of 10 kB has no triangles."""
+    rows = "".join(shape(1000 + k, 1, file) for k, file in enumerate(files))
+    (folder / "a.3dxml").write_text(structure(product(1, "g") + rows))
+    (folder / "big.3DRep").write_text(f"<X>{'<a/>' * 2500}</X>")
+    (folder / "block.3DRep").write_text(surface(BOX))
+    source = MeshSource(folder / "a.3dxml", (folder / "a.3dxml").read_bytes(), 200_000, 10**6)
+    source.files["a.3dxml"] = source.data
+    return threedxml._Archive(source)
+
+
+def test_a_file_of_an_unpacked_document_is_parsed_once(tmp_path, monkeypatch):
+    archive = _many(tmp_path, ["big.3DRep"] * 300 + ["block.3DRep"] * 2)
+    read = []
+    content = archive.content
+    monkeypatch.setattr(archive, "content", lambda name: read.append(name) or content(name))
+    assembly = archive.assembly()
+    assert read == ["a.3dxml", "big.3DRep", "block.3DRep"]
+    assert [instance.shape for instance in assembly.instances] == [0, 0]
+    assert len(assembly.left_out) == 300
+
+
+def test_files_of_an_unpacked_document_have_one_budget(tmp_path):
+    archive = _many(tmp_path, ["./" * k + "big.3DRep" for k in range(30)])
+    with pytest.raises(InputError, match="larger than 200000 bytes"):
+        archive.assembly()

@@ -518,6 +518,34 @@ def test_a_look_that_is_ignored_makes_no_distance_uncertain(tmp_path):
     assert solid.deviation == 0
 
 
+@pytest.mark.parametrize(
+    ("kind", "look"),
+    [
+        ('box size="0.1 0.1 0.3"', "0.11 0.1 0.3"),
+        ('sphere radius="0.1"', "0.1 0.1 0.19"),
+        ('capsule radius="0.1" length="1"', "0.21 0.02 0.3"),
+    ],
+)
+def test_a_stated_deviation_is_kept_by_every_shape(tmp_path, kind, look):
+    """What is shown to stand out by less takes nothing of it away."""
+    inside = f'<collision deviation="0.02"><geometry><{kind}/></geometry></collision>'
+    shown = '<visual><geometry><box size="' + look + '"/></geometry></visual>'
+    for more in ("", shown):
+        (solid,) = read(tmp_path, arm(INERTIAL + inside + more)).link("arm").solids
+        assert solid.deviation == 0.02
+
+
+def test_open_halves_that_close_together_keep_their_deviation(tmp_path):
+    whole = trimesh.creation.box((0.1, 0.1, 0.3))
+    inside = ""
+    for k, part in enumerate((whole.faces[:6], whole.faces[6:])):
+        trimesh.Trimesh(whole.vertices, part).export(tmp_path / f"half_{k}.stl")
+        mesh = f'<geometry><mesh filename="half_{k}.stl"/></geometry>'
+        inside += f'<collision deviation="0.0{k + 1}">{mesh}</collision>'
+    (solid,) = read(tmp_path, arm(INERTIAL + inside)).link("arm").solids
+    assert solid.deviation == 0.02
+
+
 def test_colours_and_elements_for_others_refuse_no_robot(tmp_path):
     text = robot(
         '<material name="m"><color rgba="1 0"/></material>',

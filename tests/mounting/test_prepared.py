@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from seerob.description import prepared as module
+from seerob.description.cad import reading, step
 from seerob.description.prepared import prepared
 from seerob.description.shapes.glb import glb_y_up
 from seerob.description.shapes.shapes import box_mesh
@@ -71,3 +72,24 @@ def test_a_file_that_names_others_is_looked_at_each_time(tmp_path):
         (tmp_path / "a.mtl").write_text(f"newmtl m\nKd {red} 0 0\n")
         found = prepared(file, units="m", up="z", cache=tmp_path / "cache")
         assert found.meshes[0].drawn[0].color[0] == pytest.approx(red)
+
+
+URDF = """<robot name="g"><link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry>
+</collision></link></robot>"""
+
+
+@pytest.mark.parametrize("what", ["opencascade", "usd-core", "mujoco", "tolerance"])
+def test_another_version_of_what_reads_it_is_another_entry(tmp_path, monkeypatch, what):
+    """A mesh file, which it does not read, stays the same one."""
+    (tmp_path / "g.urdf").write_text(URDF)
+    trimesh.creation.icosphere(1).export(tmp_path / "a.stl")
+    before = prepared(tmp_path / "g.urdf"), prepared(tmp_path / "a.stl", units="m")
+    assert prepared(tmp_path / "g.urdf") is before[0]
+    if what == "tolerance":
+        monkeypatch.setattr(step, "TOLERANCE", 1e-3)
+    else:
+        asked = step.PACKAGES if what == "opencascade" else (what,)
+        real = reading.edition
+        monkeypatch.setattr(reading, "edition", lambda *names: "0.1" if names == asked else real(*names))
+    assert prepared(tmp_path / "g.urdf") is not before[0]
+    assert prepared(tmp_path / "a.stl", units="m") is before[1]

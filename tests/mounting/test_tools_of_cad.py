@@ -117,3 +117,61 @@ def test_what_cannot_be_brought_whole_is_refused(tmp_path):
     (tmp_path / "g.sldprt").write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"SwDocContentMgr" * 99)
     with pytest.raises(InputError, match="STEP"):
         loaded(tmp_path, "g.sldprt")
+
+
+MOTOR = """<robot name="g"><link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry>
+</collision></link><link name="motor"><inertial><origin xyz="0 0 0"/><mass value="{mass}"/>
+<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="s" type="{kind}"><origin xyz="0 0 0.4"/><parent link="base"/><child link="motor"/>
+<axis xyz="0 1 0"/><limit lower="0" upper="0.01" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("kind", ["fixed", "prismatic"])
+def test_what_has_a_mass_and_no_shape_is_missing(tmp_path, kind):
+    (tmp_path / "g.urdf").write_text(MOTOR.format(mass=0.9, kind=kind))
+    with pytest.raises(InputError, match=r"brought whole: motor: has a mass of 0\.9 kg but no shape"):
+        loaded(tmp_path, "g.urdf")
+    # Up to a gram it is a frame.
+    (tmp_path / "g.urdf").write_text(MOTOR.format(mass=0.001, kind=kind))
+    assert len(loaded(tmp_path, "g.urdf").pieces) == 1
+
+
+def test_a_link_of_sdf_or_usd_with_a_mass_and_no_shape_is_missing(tmp_path):
+    motor = '<link name="motor"><inertial><mass>0.9</mass></inertial></link>'
+    (tmp_path / "g.sdf").write_text(SDF.replace("</model>", f"{motor}</model>"))
+    with pytest.raises(InputError, match=r"cannot be brought whole: .*mass of 0\.9 kg but no shape"):
+        loaded(tmp_path, "g.sdf")
+    pytest.importorskip("pxr")
+    schemas = 'prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]'
+    body = f'def Xform "motor" ( {schemas} )\n{{\n float physics:mass = 0.9\n}}\n'
+    (tmp_path / "g.usda").write_text(USD + body)
+    with pytest.raises(InputError, match=r"cannot be brought whole: .*mass of 0\.9 kg but no shape"):
+        loaded(tmp_path, "g.usda")
+
+
+def test_pictures_that_cannot_be_read_make_it_missing(tmp_path):
+    lost = '<visual><geometry><mesh filename="gone.stl"/></geometry></visual><collision>'
+    (tmp_path / "g.urdf").write_text(URDF.replace("<collision>", lost, 1))
+    with pytest.raises(InputError, match=r"cannot be brought whole: .*left out of pictures"):
+        loaded(tmp_path, "g.urdf")
+
+
+@pytest.mark.parametrize(("key", "value"), [("units", "mm"), ("up", "y")])
+def test_a_unit_or_axis_that_the_format_says_is_told_by_file_and_key(tmp_path, key, value):
+    (tmp_path / "g.urdf").write_text(URDF)
+    with pytest.raises(InputError) as refused:
+        loaded(tmp_path, "g.urdf", **{key: value})
+    (problem,) = refused.value.problems
+    assert (problem.file, problem.key) == (str(tmp_path / "g.urdf"), key)
+
+
+def test_pieces_of_one_name_are_told_apart(tmp_path):
+    (tmp_path / "g.sdf").write_text(
+        SDF.replace("</model>", "").replace("</sdf>", "")
+        + '<link name="m"><collision name="c"><geometry><sphere><radius>0.01</radius></sphere></geometry>'
+        '</collision></link><joint name="j" type="revolute"><parent>l</parent><child>m</child><axis>'
+        '<xyz>0 0 1</xyz></axis></joint></model><model name="l"><link name="link"><collision name="c">'
+        "<geometry><sphere><radius>0.01</radius></sphere></geometry></collision></link></model></sdf>"
+    )
+    names = [piece.name for piece in loaded(tmp_path, "g.sdf").pieces]
+    assert len(names) == len(set(names)) == 3

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 
 from seerob.core.errors import InputError, Problem
 
@@ -33,6 +35,14 @@ EXTRAS = {
     "weasyprint": "print",
 }
 """Package as it is imported → the extra that brings it."""
+
+
+def edition(*names: str) -> str | None:
+    """Which of these distributions is installed, with its version, unimported; None where none is."""
+    for name in names:
+        with suppress(PackageNotFoundError):
+            return f"{name} {version(name)}"
+    return None
 
 
 class MissingPackage(InputError):

@@ -1,7 +1,8 @@
 """A mesh file made ready for a body: exact for distances, light for the screen; made once for each content.
 
 What is made is kept while the process lives, and in a folder from start to start, by the hash of the file's
-content and of how it is read: another content is another entry, so nothing there can be out of date.
+content, of how it is read and of the versions of what reads it: another content is another entry, so nothing
+there can be out of date.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ from numpy.typing import NDArray
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
-from seerob.description.cad.reading import as_one
+from seerob.description.cad.reading import as_one, made_with
 from seerob.description.mesh import MAX_BYTES, READERS, file_content, load_meshes
 from seerob.description.shapes import detail
 from seerob.description.shapes.mesh_bodies import is_closed
 
-EDITION = 1
+EDITION = 2
 """Counts up where the same content would become something else, so that nothing old is taken."""
 MOST_BYTES = 1 << 30
 """Memory that what is kept in the process may take [byte]; beyond it, all is forgotten."""
@@ -91,10 +92,13 @@ def prepared(
         cache: Folder that keeps what was made from start to start.
 
     Raises:
-        InputError: As `load_meshes` raises it.
+        InputError: As `load_meshes` or, of other formats, `as_one` raises it.
+        MissingPackage: The file needs a package of an extra.
     """
     content = file_content(path, MAX_BYTES)
-    words = repr((EDITION, path.suffix.lower(), path.stem, units, up, triangles)).encode()
+    ending = path.suffix.lower()
+    readers = () if ending in READERS else made_with()
+    words = repr((EDITION, readers, ending, path.stem, units, up, triangles)).encode()
     key = hashlib.sha256(hashlib.sha256(content).digest() + words).hexdigest()[:40]
     found = _kept.get(key)
     if found is None and cache is not None:
@@ -174,13 +178,14 @@ def _read(file: Path, name: str, content: bytes) -> PreparedFile | None:
         with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as arrays:
             about = json.loads(arrays["about"].tobytes())
             meshes = tuple(_mesh(row, arrays.__getitem__) for row in about["meshes"])
+            deviation = float(about["deviation"])
     except (OSError, ValueError, LookupError, TypeError, EOFError, zipfile.BadZipFile):
         return None
     findings = tuple(
         Finding(level=level, subject=subject, text=text, holds=tuple(holds))
         for level, subject, text, holds in about["findings"]
     )
-    return PreparedFile(meshes, findings, {name: content}, about.get("deviation", 0.0))
+    return PreparedFile(meshes, findings, {name: content}, deviation)
 
 
 def _mesh(row: dict[str, Any], array: Callable[[str], NDArray[Any]]) -> PreparedMesh:

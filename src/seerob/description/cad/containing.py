@@ -1,4 +1,4 @@
-"""Meshes of simple shapes of a scene file: none is inside the shape that it stands for."""
+"""Meshes of simple shapes: none is inside the shape that it stands for, or says by how much it is."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seerob.core.shapes import Mesh
+from seerob.core.shapes import Mesh, Solid
+from seerob.description.shapes.glb import solid_mesh
 from seerob.description.shapes.shapes import capsule_mesh, lathe_mesh, sphere_mesh
 
 SIDES = 64
@@ -15,6 +16,18 @@ SIDES = 64
 _AROUND = 1 / math.cos(math.pi / SIDES)
 _BALL = 1 / math.cos(math.pi / 16)
 """Of the meshes of balls and capsules, whose flat ends begin a 16th of half a turn from the pole."""
+
+
+def around(solid: Solid) -> tuple[Mesh, float]:
+    """A mesh of any solid, and how far the real surface may lie outside of it [m]."""
+    if solid.points is None:
+        assert solid.mesh is not None
+        return solid.mesh, solid.deviation + solid.radius
+    if len(solid.points) == 2:
+        return rounded(solid.points[0], solid.points[1], solid.radius), solid.deviation
+    # Its corners lie on the surface, 20 on a circle.
+    sagitta = solid.radius * (1 - math.cos(math.pi / 20) ** 2)
+    return solid_mesh(solid), solid.deviation + sagitta
 
 
 def ball(radius: float) -> Mesh:

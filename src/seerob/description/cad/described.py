@@ -11,14 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array, inverse
+from seerob.description.cad import standing
 from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Moving, Shape
 from seerob.description.description import Description, Inertial, Link
 from seerob.description.loader import load_robot
 from seerob.description.mesh_files import MeshSource
-from seerob.description.shapes.glb import solid_mesh
 
 
 def read(source: MeshSource, ending: str) -> Assembly:
@@ -52,6 +51,8 @@ def taken_apart(description: Description, source: MeshSource, form: str) -> Asse
     shapes: list[Shape] = []
     known: dict[bytes, int] = {}
     instances: list[Instance] = []
+    # What holds a robot holds what is made of it.
+    left_out = [(finding.subject, finding.text) for finding in description.findings if finding.holds]
 
     def subtree(link: Link) -> list[Link]:
         found = [link]
@@ -60,20 +61,21 @@ def taken_apart(description: Description, source: MeshSource, form: str) -> Asse
         return found
 
     def stand(link: Link, world: Array) -> None:
-        pieces = _pieces(link)
+        pieces, deviation = standing.surface(link)
         if pieces:
-            key = hashlib.sha256()
+            key = hashlib.sha256(repr(deviation).encode())
             for mesh in pieces:
                 key.update(
                     mesh.vertices.round(9).tobytes() + mesh.faces.tobytes() + repr(mesh.color).encode()
                 )
             number = known.setdefault(key.digest(), len(shapes))
             if number == len(shapes):
-                stated = max((solid.deviation for solid in link.solids), default=0.0)
                 largest = max(float(np.abs(mesh.vertices).max()) for mesh in pieces)
-                shapes.append(Shape(link.name.rpartition("/")[2], pieces, stated + SINGLE * largest))
+                shapes.append(Shape(link.name.rpartition("/")[2], pieces, deviation + SINGLE * largest))
             path = tuple(filter(None, link.name.split("/")))
             instances.append(Instance(path, number, world, inertial=_known(link)))
+        elif why := standing.unseen(replace(link, inertial=_known(link))):
+            left_out.append((link.name, why))
         for other in below.get(link.name, ()):
             place(other, world @ other.parent_from_link)
 
@@ -98,7 +100,14 @@ def taken_apart(description: Description, source: MeshSource, form: str) -> Asse
         source.fail("holds no shape", "export meshes or simple shapes")
     findings = (*source.findings, *description.findings)
     return Assembly(
-        form, "m", tuple(shapes), tuple(instances), findings, (), dict(source.files), tuple(mechanisms)
+        form,
+        "m",
+        tuple(shapes),
+        tuple(instances),
+        findings,
+        tuple(left_out),
+        dict(source.files),
+        tuple(mechanisms),
     )
 
 
@@ -145,14 +154,3 @@ def _known(link: Link) -> Inertial | None:
     """Mass properties that the file states; what a simulator would assume is nobody's figure."""
     assumed = link.inertial is None or link.inertial.origin is Origin.ASSUMED
     return None if assumed else link.inertial
-
-
-def _pieces(link: Link) -> tuple[Mesh, ...]:
-    """What is shown of a link where that is there, for both are the same in a part; else what is measured."""
-    if link.visual and not link.solids:
-        return link.visual
-    if link.visual and all(solid.mesh is not None and not solid.radius for solid in link.solids):
-        shown = sum(len(mesh.faces) for mesh in link.visual)
-        if shown >= sum(len(s.mesh.faces) for s in link.solids if s.mesh is not None):
-            return link.visual
-    return tuple(solid_mesh(solid) for solid in link.solids)

@@ -13,6 +13,7 @@ from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
+from seerob.description.cad import standing
 from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Moving, Shape
 from seerob.description.cad.names import plain_name, told_apart
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
@@ -77,8 +78,9 @@ def assembled(
 
     Args:
         source: The file.
-        told: ``parts`` (``path``, ``pieces``, ``world``, ``inertial``), ``mechanisms`` as `moving` takes
-            them, with ``pieces`` and ``collision`` for ``meshes``, ``left_out``, ``findings`` and ``files``.
+        told: ``parts`` (``path``, ``pieces``, ``collision``, ``world``, ``inertial``), ``mechanisms`` as
+            `moving` takes them, with ``pieces`` and ``collision`` for ``meshes``, ``left_out``, ``findings``
+            and ``files``.
         form: What the file is.
         world_from_file: Axes of the file to z up, (3, 3), without a scale.
         meters: Metres per unit.
@@ -103,18 +105,25 @@ def assembled(
     instances: list[Instance] = []
     left_out = [(name, why) for name, why in told["left_out"]]
     for part in told["parts"]:
-        pieces = tuple(mesh for mesh in _meshes(part["pieces"], meters) if len(mesh.faces))
         label = part["path"][-1]
+        seen, shown = (_meshes(part[which], meters) for which in ("collision", "pieces"))
+        solids = tuple(Solid(mesh=mesh) for mesh in seen if len(mesh.faces))
+        link = Link(label, None, np.eye(4), visual=shaped(shown)[1], solids=solids)
+        pieces, deviation = standing.surface(link)
         if not pieces or not len(joined(pieces)[0].faces):
-            left_out.append(("/".join(part["path"]), "nothing but triangles without area"))
+            stated = part["inertial"] or {}
+            if stated.get("mass", 0.0) > lint.FRAME:
+                left_out.append(("/".join(part["path"]), f"has a mass of {stated['mass']:g} kg but no shape"))
+            elif part["pieces"] or part["collision"]:
+                left_out.append(("/".join(part["path"]), "nothing but triangles without area"))
             continue
-        key = hashlib.sha256()
+        key = hashlib.sha256(repr(deviation).encode())
         for mesh in pieces:
             key.update(mesh.vertices.round(9).tobytes() + mesh.faces.tobytes() + repr(mesh.color).encode())
         number = known.setdefault(key.digest(), len(shapes))
         if number == len(shapes):
             largest = max(float(np.abs(mesh.vertices).max()) for mesh in pieces)
-            shapes.append(Shape(label, pieces, SINGLE * largest))
+            shapes.append(Shape(label, pieces, max(deviation, SINGLE * largest)))
         inertial = _inertial(source, "/".join(part["path"]), part["inertial"], meters, pieces)
         instances.append(Instance(tuple(part["path"]), number, placed(part["world"]), inertial=inertial))
     mechanisms = []

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.extras import edition
 from seerob.core.printable import printable
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
-from seerob.description.cad import described, scene, sdf, step, threedxml, usd
-from seerob.description.cad.assembly import NOTHING, Assembly, baked
+from seerob.core.transforms import Array
+from seerob.description.cad import described, scene, sdf, standing, step, threedxml, usd
+from seerob.description.cad.assembly import NOTHING, Assembly, Moving, baked
+from seerob.description.cad.names import told_apart
 from seerob.description.cad.recognised import recognised
 from seerob.description.description import base_from_links
 from seerob.description.mesh import (
@@ -25,7 +29,6 @@ from seerob.description.mesh import (
     file_content,
 )
 from seerob.description.mesh_files import MeshSource
-from seerob.description.shapes.glb import solid_mesh
 from seerob.description.shapes.mesh_bodies import joined
 
 TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
@@ -34,6 +37,8 @@ LARGEST = 1e30
 """No number of a shape or a transform is larger before both are put together; nothing overflows then."""
 FINEST, COARSEST = 1e-3, 50.0
 """Tolerances that are taken [mm]."""
+STATED = "only a mesh file does not say its unit or which axis is up", "leave it out"
+"""Why a format takes no unit and no axis, and what to do."""
 
 
 def read(
@@ -68,8 +73,7 @@ def read(
     if ending in scene.FORMATS:
         return _near(scene.read(file, ending, units=units, up=up), file)
     if units or up:
-        what = "only a mesh file does not say its unit or which axis is up"
-        raise InputError.at("--units" if units else "--up", "", what, "leave it out")
+        raise InputError.at("--units" if units else "--up", "", *STATED)
     source = MeshSource(file, file_content(file, MAX_BYTES), MAX_BYTES, MAX_FACES)
     source.files[file.name] = source.data
     if ending in TRIANGLES:
@@ -95,48 +99,73 @@ def as_one(path: Path, *, units: str | None = None, up: str | None = None) -> tu
         units: As `read` takes it.
         up: As `read` takes it.
 
+    Returns:
+        Its meshes, each of them a surface that distances go by, and how far the real one may lie outside.
+
     Raises:
         InputError: As `read` raises it; or something of it could not be brought.
+        MissingPackage: The file needs a package of an extra.
     """
     ending = recognised(path, file_content(path, MAX_BYTES))
+    if (units or up) and ending not in scene.FORMATS:
+        raise InputError.at(path, "units" if units else "up", *STATED)
     if ending in (".aml", ".amlx"):
         raise InputError.at(path, "", "is a plant, not one thing", "seerob import makes a workstation of it")
     assembly = read(path, ending, units=units, up=up)
     lost = [f"{name}: {why}" for name, why in assembly.left_out if not why.startswith(NOTHING)]
+    links = [link for moving in assembly.mechanisms for link in moving.description.links]
+    lost += [f"{link.name}: {why}" for link in links if (why := standing.unseen(link))]
     if lost:
         what = f"cannot be brought whole: {'; '.join(lost)}"
         raise InputError.at(path, "", printable(what)[:500], "export it anew, or import it: docs/import.md")
-    parts = tuple(_parts(assembly))
-    if not parts:
+    things = [*_standing(assembly), *(thing for moving in assembly.mechanisms for thing in _linked(moving))]
+    things = [thing for thing in things if len(thing.whole.faces)]
+    if not things:
         raise InputError.at(path, "", "holds no surface", "export solids or surfaces")
-    deviation = max((shape.deviation for shape in assembly.shapes), default=0.0)
+    names = told_apart(thing.name for thing in things)
+    parts = tuple(
+        NamedMesh(name, thing.whole, thing.colored) for name, thing in zip(names, things, strict=True)
+    )
     findings = assembly.findings
     for moving in assembly.mechanisms:
         text = "its joints do not move: it is one rigid thing, as the file shows it"
         findings += (Finding(level="note", subject=moving.description.name, text=text),)
-    return LoadedMeshes(parts, findings, assembly.files), deviation
+    return LoadedMeshes(parts, findings, assembly.files), max(thing.deviation for thing in things)
 
 
-def _parts(assembly: Assembly) -> Iterator[NamedMesh]:
-    """Each instance and each link, where it is."""
+def made_with() -> tuple[object, ...]:
+    """What an answer of `as_one` depends on besides the file: versions of its readers, and the tolerance."""
+    return step.TOLERANCE, edition(*step.PACKAGES), edition("usd-core"), edition("mujoco")
+
+
+class _Rigid(NamedTuple):
+    """An instance or a link, where it is."""
+
+    name: str
+    whole: Mesh
+    colored: tuple[Mesh, ...]
+    deviation: float
+
+    @classmethod
+    def of(cls, name: str, pieces: Iterable[Mesh], place: Array, deviation: float) -> Self:
+        moved = [mesh.moved(place) for mesh in pieces]
+        return cls(name, joined(moved)[0], by_color(moved), deviation)
+
+
+def _standing(assembly: Assembly) -> Iterator[_Rigid]:
     for name, instance in zip(assembly.names(), assembly.instances, strict=True):
-        pieces = [m.moved(instance.world_from_shape) for m in assembly.shapes[instance.shape].pieces]
-        yield from _named(name, pieces)
-    for moving in assembly.mechanisms:
-        robot = moving.description
-        q = dict(zip((joint.name for joint in robot.joints()), moving.q, strict=False))
-        poses = base_from_links(robot, q)
-        for link in robot.links:
-            place = moving.world_from_base @ poses[link.name]
-            for solid in link.solids:
-                mesh = solid_mesh(solid) if solid.mesh is None else solid.mesh
-                yield from _named(link.name, [mesh.moved(place)])
+        shape = assembly.shapes[instance.shape]
+        yield _Rigid.of(name, shape.pieces, instance.world_from_shape, shape.deviation)
 
 
-def _named(name: str, pieces: list[Mesh]) -> Iterator[NamedMesh]:
-    whole, _ = joined(pieces)
-    if len(whole.faces):
-        yield NamedMesh(name, whole, by_color(pieces))
+def _linked(moving: Moving) -> Iterator[_Rigid]:
+    robot = moving.description
+    q = dict(zip((joint.name for joint in robot.joints()), moving.q, strict=False))
+    poses = base_from_links(robot, q)
+    for link in robot.links:
+        pieces, deviation = standing.surface(link)
+        if pieces:
+            yield _Rigid.of(link.name, pieces, moving.world_from_base @ poses[link.name], deviation)
 
 
 def _near(assembly: Assembly, file: Path) -> Assembly:

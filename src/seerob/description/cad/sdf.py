@@ -197,13 +197,13 @@ class _File:
         parts = [
             {
                 "path": _named(link),
-                "pieces": pieces,
+                "pieces": self._pieces(link, "visual"),
+                "collision": self._pieces(link, "collision"),
                 "world": link.world.tolist(),
                 "inertial": _inertial(link),
             }
             for name, link in self.links.items()
             if name not in taken
-            and (pieces := self._pieces(link, "visual") or self._pieces(link, "collision"))
         ]
         return {
             "parts": parts,

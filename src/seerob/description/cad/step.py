@@ -7,14 +7,12 @@ comes back is compared here with what it said of areas, volumes and points of th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from seerob.core.extras import need
+from seerob.core.extras import edition, need
 from seerob.core.files.parser_process import parsed_one_by_one
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
@@ -30,6 +28,8 @@ from seerob.kernels.tree import build_tree
 
 TOLERANCE = 1e-4
 """How far triangles may be from the surface unless the caller says otherwise [m]."""
+PACKAGES = ("cadquery-ocp-novtk", "cadquery-ocp")
+"""Distributions that bring OpenCASCADE."""
 SECONDS, MEMORY = 900.0, 4 << 30
 """Computing time [s] and memory [byte] that reading may take."""
 VALIDATION = 1e-3
@@ -68,10 +68,10 @@ def read(
         InputError: It cannot be read, holds no surface, or crashes OpenCASCADE.
         MissingPackage: OpenCASCADE is not installed.
     """
-    edition = _edition()
-    if cache is None or edition is None:
+    opencascade = edition(*PACKAGES)
+    if cache is None or opencascade is None:
         return _asked(source, iges, tolerance, progress)[0]
-    key = kept.key(source, (iges, tolerance, edition))
+    key = kept.key(source, (iges, tolerance, opencascade))
     found = kept.read(cache, key, source)
     if found is None:
         found, whole = _asked(source, iges, tolerance, progress)
@@ -79,14 +79,6 @@ def read(
         if whole:
             kept.write(cache, key, found)
     return found
-
-
-def _edition() -> str | None:
-    """Which OpenCASCADE is installed, without loading it; None where nobody knows."""
-    for name in ("cadquery-ocp-novtk", "cadquery-ocp"):
-        with suppress(PackageNotFoundError):
-            return f"{name} {version(name)}"
-    return None
 
 
 def _asked(

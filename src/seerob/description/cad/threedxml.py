@@ -74,7 +74,8 @@ class _Archive:
         """Surfaces that are in the document itself."""
         self.documents: list[str] = []
         self.roots: list[_Key] = []
-        self.shapes: dict[_Key, int | str] = {}
+        self.shapes: dict[_Key | str, int | str] = {}
+        """By the file of the surface, or by the representation that has it in its document."""
         self.made: list[Shape] = []
         self.instances: list[Instance] = []
         self.left_out: list[tuple[str, str]] = []
@@ -116,9 +117,13 @@ class _Archive:
     def content(self, name: str) -> bytes:
         """Bytes of a file of the archive; empty when there is none of the name."""
         if self.archive is None:
-            if name == self.source.path.name:
-                return self.source.data
-            return self.source.beside(name) or b""
+            own = name == self.source.path.name
+            data = self.source.data if own else self.source.beside(name) or b""
+            self.left -= len(data)
+            if self.left < 0:
+                what = f"with {name[:200]!r} it is larger than {self.source.max_bytes} bytes"
+                self.source.fail(what, "export the cell alone")
+            return data
         entry = self.entries.get(name.lower())
         if entry is None:
             return b""
@@ -244,9 +249,11 @@ class _Archive:
             self.left_out.append(("/".join(path), "has no shape"))
 
     def shape(self, key: _Key, name: str) -> int | str:
-        if key not in self.shapes:
-            self.shapes[key] = self.surface(key, name)
-        return self.shapes[key]
+        file = self.files.get(key, "")
+        known = (key[0], file) if file.startswith("#") else file or key
+        if known not in self.shapes:
+            self.shapes[known] = self.surface(key, name)
+        return self.shapes[known]
 
     def surface(self, key: _Key, name: str) -> int | str:
         file = self.files.get(key, "")

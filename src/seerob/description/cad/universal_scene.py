@@ -228,15 +228,22 @@ class _Stage:
                 walk.PruneChildren()
             elif prim.IsA(self.geom.Gprim):
                 owned.setdefault(owners[-1] if owners else prim.GetPath(), []).append(prim)
+        for path in bodies:  # those without a shape may have a mass
+            owned.setdefault(path, [])
         mechanisms = list(self._mechanisms(bodies, joints, owned))
         parts = []
         for path, shapes in owned.items():
             prim = self.stage.GetPrimAtPath(path)
-            pieces = self._pieces(prim, shapes, collision=False) or self._pieces(prim, shapes, collision=True)
-            if pieces:
-                world = _rigid(self._world(prim))
-                row = {"path": self._names(prim), "pieces": pieces, "world": world.tolist()}
-                parts.append({**row, "inertial": self._inertial(prim)})
+            world = _rigid(self._world(prim))
+            row = {
+                "path": self._names(prim),
+                "pieces": self._pieces(prim, shapes, collision=False),
+                "collision": self._pieces(prim, shapes, collision=True),
+                "world": world.tolist(),
+                "inertial": self._inertial(prim),
+            }
+            if row["pieces"] or row["collision"] or row["inertial"]:
+                parts.append(row)
         groups = [p for p in self.stage.Traverse() if p.IsA(self.physics.CollisionGroup)]
         if groups:
             names = ", ".join(p.GetName() for p in groups[:8])

@@ -104,7 +104,7 @@ class Shapes:
             else:
                 solid = self._primitive(kind, key)
                 if solid is not None:
-                    found.append(moved(replace(solid[0], name=label), link_from_shape))
+                    found.append(moved(replace(solid[0], name=label, deviation=deviation), link_from_shape))
         return with_insides(found)
 
     def _deviation(self, element: Element, key: str) -> float:

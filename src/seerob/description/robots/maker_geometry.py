@@ -167,12 +167,16 @@ def with_protrusions(description: Description) -> Description:
             found.append(Finding(level="warning", subject=f"{description.name}/{link.name}", text=text))
             deviating[link.name] = float(depths.max())
     links = tuple(
-        replace(link, solids=tuple(replace(solid, deviation=deviating[link.name]) for solid in link.solids))
+        replace(link, solids=tuple(_deviating(solid, deviating[link.name]) for solid in link.solids))
         if link.name in deviating
         else link
         for link in description.links
     )
     return replace(description, links=links, findings=(*description.findings, *found))
+
+
+def _deviating(solid: Solid, far: float) -> Solid:
+    return replace(solid, deviation=max(solid.deviation, far))
 
 
 def _depths(description: Description) -> Iterator[tuple[Link, Array]]:

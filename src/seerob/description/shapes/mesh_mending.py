@@ -115,7 +115,8 @@ def with_insides(solids: Sequence[Solid]) -> tuple[Solid, ...]:
         return tuple(solids)
     rest = [s for s in solids if all(s is not piece for piece in split)]
     notes = dict.fromkeys(piece.note for piece in split if piece.note)
-    whole = Solid(mesh=physics_mesh(around), name=split[0].name, note=", ".join(notes))
+    deviation = max(piece.deviation for piece in split)
+    whole = Solid(mesh=physics_mesh(around), name=split[0].name, note=", ".join(notes), deviation=deviation)
     return *rest, whole
 
 

@@ -78,10 +78,13 @@ class Riders:
             if entry.role == "workpiece" and entry.holder == entry.owner:
                 continue  # loose: who holds it, and whether, only a run tells
             mounted = entry.carrier in (name, *riders) and entry.role in THINGS and entry.owner != name
-            if entry.owner in riders or mounted:
-                mass = None if entry.mass is None else entry.mass.value
+            mass = None if entry.mass is None else entry.mass.value
+            if entry.owner in riders:
                 known = things.setdefault(entry.owner, 0.0)
                 things[entry.owner] = None if known is None or mass is None else known + mass
+            elif mounted:  # one mass for all its pieces
+                known = things.setdefault(entry.owner, None)
+                things[entry.owner] = known if mass is None else mass
         return things
 
     def weighed(self, name: str) -> tuple[LinkMass, ...]:

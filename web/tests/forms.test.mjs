@@ -66,7 +66,7 @@ before(async () => {
   [server, browser] = await Promise.all([edited(folder), openBrowser({ width: 1366, height: 768 })]);
   page = browser.page;
   await showEdited(page, server.url);
-  page.setDefaultTimeout(20_000);
+  page.setDefaultTimeout(60_000);
 });
 
 after(async () => {

@@ -156,6 +156,12 @@ def test_pictures_that_cannot_be_read_make_it_missing(tmp_path):
         loaded(tmp_path, "g.urdf")
 
 
+def test_a_plane_or_a_height_field_of_mjcf_is_missing(tmp_path):
+    (tmp_path / "g.xml").write_text(MJCF.replace("<body", '<geom type="plane" size="1 1 1"/><body'))
+    with pytest.raises(InputError, match=r"cannot be brought whole: .*a plane cannot be part"):
+        loaded(tmp_path, "g.xml")
+
+
 @pytest.mark.parametrize(("key", "value"), [("units", "mm"), ("up", "y")])
 def test_a_unit_or_axis_that_the_format_says_is_told_by_file_and_key(tmp_path, key, value):
     (tmp_path / "g.urdf").write_text(URDF)

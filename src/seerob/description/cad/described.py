@@ -16,6 +16,7 @@ from seerob.core.transforms import Array, inverse
 from seerob.description.cad import standing
 from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Moving, Shape
 from seerob.description.description import Description, Inertial, Link
+from seerob.description.formats.mjcf import UNSHAPED
 from seerob.description.loader import load_robot
 from seerob.description.mesh_files import MeshSource
 
@@ -51,8 +52,8 @@ def taken_apart(description: Description, source: MeshSource, form: str) -> Asse
     shapes: list[Shape] = []
     known: dict[bytes, int] = {}
     instances: list[Instance] = []
-    # What holds a robot holds what is made of it.
-    left_out = [(finding.subject, finding.text) for finding in description.findings if finding.holds]
+    # What holds a robot holds what is made of it; what a robot cannot have may be what stands.
+    left_out = [(f.subject, f.text) for f in description.findings if f.holds or f.text.endswith(UNSHAPED)]
 
     def subtree(link: Link) -> list[Link]:
         found = [link]

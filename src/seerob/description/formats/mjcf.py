@@ -42,6 +42,9 @@ from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.mesh_mending import with_insides
 from seerob.description.xml_values import FARTHEST, HEAVIEST, MAX_BYTES, SMALLEST, Reader, parse_xml
 
+UNSHAPED = "cannot be part of a robot here: left out"
+"""Ends what is told of a plane or a height field."""
+
 
 def shapes_of_body(
     reader: Reader, model: Compiled, body: int, name: str
@@ -107,7 +110,7 @@ def _geom(reader: Reader, model: Compiled, geom: int, body: str) -> tuple[Solid,
         shown, solid = _ellipsoid(size)
     else:
         what = str(kind.name).removeprefix("mjGEOM_").lower()
-        reader.finding("warning", body, f"a {what} cannot be part of a robot here: left out")
+        reader.finding("warning", body, f"a {what} {UNSHAPED}")
         return None
     placed = moved(solid, body_from_geom)
     return replace(placed, name=name), replace(shown.moved(body_from_geom), color=(r, g, b, a))

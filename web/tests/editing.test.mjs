@@ -97,7 +97,7 @@ test("an edit that makes the file wrong is refused beside its field, and the fil
 test("a robot, an area, a scanner and a criterion are added, saved and there after a reload", async () => {
   await add("robots", { "model *": "library:ur5e" });
   await add("areas", { "name *": "zone" });
-  await add("sensors", { "name *": "scanner" });
+  await add("sensors", { "name *": "scanner", range: "4", angle_deg: "190", resolution_deg: "0.5" });
   await add("safety", { "between 1": "robot", "between 2": "operator", limit: "0.3" }, "minimum_distance");
   assert.equal(saved(), CELL);
   await review("Save");

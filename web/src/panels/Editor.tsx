@@ -392,10 +392,11 @@ const BEGIN: Record<string, () => Table> = {
   sensors: () => ({
     name: freeName("scanner"),
     at: { position: [0, 0, 0.3] },
+    // What its data sheet says is typed, angles in degrees; the corners of its field are seen in the room.
     laser_scanner: {
-      range: 4,
-      angle_deg: 190,
-      resolution_deg: 0.5,
+      range: "",
+      angle_deg: "",
+      resolution_deg: "",
       fields: [
         {
           name: "protective",

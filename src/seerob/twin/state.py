@@ -1,10 +1,10 @@
 """The twin at this tick, and what follows from it. Valid until the next tick.
 
 What two criteria share has its one home here and is computed once per tick: where everything is
-(`StateOfPlaces`), where people were captured (`Captured`), how fast everything is and what is known of its motion
-ahead (`StateOfMotion`), what follows from masses (`Dynamics`), and distances. Accessors raise `Undecided` when
-the robot or human they speak of was not heard lately, does not follow what was heard, or has a mass that nobody
-gave: a stale or guessed number can never be green.
+(`StateOfPlaces`), where people were captured (`Captured`), how fast everything is and what is known of its
+motion ahead (`StateOfMotion`), what follows from masses (`Dynamics`), and distances. Accessors raise
+`Undecided` when the robot or human they speak of was not heard lately, does not follow what was heard, or has
+a mass that nobody gave: a stale or guessed number can never be green.
 
 What says nothing of whether it may be relied on (`data`, `rotations`, `hearings` and so on) is for the
 engine, the picture and the recorder. While a criterion is asked (`asking`) it is closed: reading it raises

@@ -9,7 +9,7 @@ import pytest
 from seerob.core.figures import (
     DECIMALS,
     against,
-    between,
+    ends,
     figure,
     margin,
     rounded_down,
@@ -136,11 +136,11 @@ def test_texts_beside_and_without_a_limit_are_those_of_decimal_arithmetic(unit):
 def test_where_a_value_lies_is_rounded_outward(unit):
     rng = np.random.default_rng(6)
     for low, high in np.sort(rng.normal(0, 10.0 ** rng.integers(-3, 3, (200, 1)), (200, 2)), axis=1):
-        shown_low, shown_high = map(back, between(low, high, unit).split(" and "))
+        shown_low, shown_high = map(back, ends(low, high, unit))
         noise = 1e-11 * max(abs(low), abs(high)) + 1e-3 * 10.0 ** -DECIMALS.get(unit, 9)
         assert shown_low <= low + noise
         assert shown_high >= high - noise
-    assert between(-math.inf, 0.29, "m") == "−∞ m and 0.29 m"
+    assert ends(-math.inf, 0.29, "m") == ("−∞ m", "0.29 m")
 
 
 @pytest.mark.parametrize("unit", [*DECIMALS, "", "mm", "%"])

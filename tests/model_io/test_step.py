@@ -180,6 +180,13 @@ def test_a_file_of_nothing_is_an_error_and_no_empty_scene(tmp_path):
         read(tmp_path / "a.step", made.text())
 
 
+def test_a_corner_beyond_all_bounds_is_an_error(tmp_path):
+    made = Step("m")
+    made.box("block", (1e200, 2.0, 1.0))
+    with pytest.raises(InputError, match=r"block reaches 1e\+200 m"):
+        read(tmp_path / "a.step", made.text())
+
+
 def broken(seed, data):
     rng, out = random.Random(seed), bytearray(data)
     for _ in range(rng.randrange(1, 20)):

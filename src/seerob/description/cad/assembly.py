@@ -20,6 +20,8 @@ RIGID = 1e-6
 """A transform is rigid where the rotation nearest to it moves no corner by more than this [m]."""
 ASKED = "as asked: "
 """Begin of why a part is left out that the user does not want."""
+LARGEST = 1e30
+"""No number of a shape or a transform is larger before both are put together; nothing overflows then."""
 NOTHING = (
     "nothing but triangles without area",
     "an assembly of nothing",

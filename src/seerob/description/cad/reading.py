@@ -15,7 +15,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.cad import described, scene, sdf, standing, step, threedxml, usd
-from seerob.description.cad.assembly import NOTHING, Assembly, Moving, baked
+from seerob.description.cad.assembly import LARGEST, NOTHING, Assembly, Moving, baked
 from seerob.description.cad.names import told_apart
 from seerob.description.cad.recognised import recognised
 from seerob.description.description import base_from_links
@@ -33,8 +33,6 @@ from seerob.description.shapes.mesh_bodies import joined
 
 TRIANGLES = {".3dxml": "3DXML", ".usd": "USD", ".sdf": "SDF", ".urdf": "URDF", ".mjcf": "MJCF"}
 """Formats besides mesh files whose surfaces are triangles already, by the ending that `recognised` says."""
-LARGEST = 1e30
-"""No number of a shape or a transform is larger before both are put together; nothing overflows then."""
 FINEST, COARSEST = 1e-3, 50.0
 """Tolerances that are taken [mm]."""
 STATED = "only a mesh file does not say its unit or which axis is up", "leave it out"

@@ -14,11 +14,12 @@ import numpy as np
 
 from seerob.core.extras import edition, need
 from seerob.core.files.parser_process import parsed_one_by_one
+from seerob.core.printable import printable
 from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.cad import kept
-from seerob.description.cad.assembly import SINGLE, Assembly, Instance, Shape, Surface
+from seerob.description.cad.assembly import LARGEST, SINGLE, Assembly, Instance, Shape, Surface
 from seerob.description.cad.opencascade import plain
 from seerob.description.mesh_files import MeshSource
 from seerob.description.shapes.mesh_bodies import is_closed, joined
@@ -106,7 +107,7 @@ def _asked(
             done += 1
             progress(f"cutting {name} into triangles: {done} of {products} products")
             if answer["shape"] is not None:
-                shapes.append(_shape(answer["shape"], tolerance, findings))
+                shapes.append(_shape(source, answer["shape"], tolerance, findings))
         else:
             told = answer
     source.files.update(told["files"])
@@ -123,14 +124,17 @@ def _asked(
     return assembly, not told["missing"]
 
 
-def _shape(row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Shape:
+def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: list[Finding]) -> Shape:
     pieces = tuple(
         Mesh(np.frombuffer(v, "<f8").reshape(-1, 3), np.frombuffer(f, "<i4").reshape(-1, 3), color)
         for v, f, color in row["pieces"]
     )
     name = row["name"]
-    whole, _ = joined(pieces)
     points = np.frombuffer(row["points"], "<f8").reshape(-1, 3)
+    size = max(float(np.abs(corners).max(initial=0.0)) for corners in (points, *(p.vertices for p in pieces)))
+    if not size <= LARGEST:
+        source.fail(f"{printable(name)[:200]} reaches {size:.3g} m", "check its unit")
+    whole, _ = joined(pieces)
     far = _farthest(whole, points)
     far *= BETWEEN if far <= tolerance else ROUGH
     rounding = SINGLE * float(np.abs(whole.vertices).max(initial=0.0))

@@ -45,8 +45,12 @@ export function* coarsening(
   const made = new Uint32Array(at.count);
   for (let i = 0; i < at.count; i += 1) {
     if (i % AT_ONCE === AT_ONCE - 1) yield;
-    const [x, y, z] = [at.getX(i), at.getY(i), at.getZ(i)];
-    const [a, b, c] = [normal.getX(i), normal.getY(i), normal.getZ(i)];
+    const x = at.getX(i);
+    const y = at.getY(i);
+    const z = at.getZ(i);
+    const a = normal.getX(i);
+    const b = normal.getY(i);
+    const c = normal.getZ(i);
     const key =
       cell > 0
         ? `${Math.floor(x / cell)} ${Math.floor(y / cell)} ${Math.floor(z / cell)} ${facing(a, b, c)}`
@@ -58,7 +62,9 @@ export function* coarsening(
       kept.push(x, y, z);
       sums.push(0, 0, 0);
     }
-    for (const [j, n] of [a, b, c].entries()) sums[3 * number + j]! += n;
+    sums[3 * number]! += a;
+    sums[3 * number + 1]! += b;
+    sums[3 * number + 2]! += c;
     made[i] = number;
   }
   const index = shape.getIndex();
@@ -96,7 +102,10 @@ export function* coarsening(
 
 /** Which of the six directions of the axes a normal is nearest to. */
 function facing(a: number, b: number, c: number): number {
-  const sizes = [Math.abs(a), Math.abs(b), Math.abs(c)];
-  const axis = sizes.indexOf(Math.max(...sizes));
-  return 2 * axis + ([a, b, c][axis]! < 0 ? 1 : 0);
+  const x = Math.abs(a);
+  const y = Math.abs(b);
+  const z = Math.abs(c);
+  if (x >= y && x >= z) return a < 0 ? 1 : 0;
+  if (y >= z) return b < 0 ? 3 : 2;
+  return c < 0 ? 5 : 4;
 }

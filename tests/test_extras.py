@@ -29,6 +29,7 @@ from seerob.workstation.source import Target
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 DISTRIBUTION = {
+    "zenoh": "eclipse-zenoh",
     "xr": "pyopenxr",
     "OCP": "cadquery-ocp-novtk",
     "pxr": "usd-core",

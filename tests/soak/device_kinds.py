@@ -138,6 +138,13 @@ def foxglove(_):
     return Made(server, Foxglove(robot="arm", host=HERE, port=server.port))
 
 
+def zenoh(_):
+    from seerob.devices.sources.zenoh import Zenoh
+
+    server = Elsewhere("zenoh").start()
+    return Made(server, Zenoh(robot="arm", host=HERE, port=server.port))
+
+
 # -- machines -----------------------------------------------------------------------------------
 
 
@@ -312,7 +319,7 @@ def headset(patch):
     return Made(page, Headset(human="anna", timeout=1.0).taking(page.offers))
 
 
-FOREIGN = (opcua, opcua_robot, mqtt, foxglove)
+FOREIGN = (opcua, opcua_robot, mqtt, foxglove, zenoh)
 """Their servers are processes of their own, which are killed with SIGKILL."""
 OWN = (
     *(rtde, fri, drfl, dobot, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),

@@ -162,7 +162,65 @@ def foxglove(port: int) -> Start:
     return start
 
 
-SERVERS = {make.__name__: make for make in (opcua, opcua_robot, opcua_standing, mqtt, foxglove)}
+JOINT_STATE = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+JOINT_STATE_HASH = "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"
+"""As nodes of ROS 2 say it of sensor_msgs/msg/JointState."""
+
+
+def zenoh(port: int) -> Start:
+    """A router of Zenoh's own library, and a node of ROBOTIS' SDK that publishes over it."""
+    import numpy as np
+    import zenoh as library
+    from zenoh_ros2_sdk import ROS2Publisher
+
+    def publish() -> None:
+        node = ROS2Publisher(
+            "/joint_states",
+            "sensor_msgs/msg/JointState",
+            msg_definition=JOINT_STATE,
+            type_hash=JOINT_STATE_HASH,
+            router_ip=HERE,
+            router_port=port,
+        )
+        types = node.session_mgr.store.types
+        while True:
+            t = time.monotonic()
+            stamp = types["builtin_interfaces/msg/Time"](sec=int(t), nanosec=int(t % 1 * 1e9))
+            node.publish(
+                header=types["std_msgs/msg/Header"](stamp=stamp, frame_id=""),
+                name=["a", "b"],
+                position=np.array([0.1, 0.1]),
+                velocity=np.array([0.0, 0.0]),
+                effort=np.array([]),
+            )
+            time.sleep(0.01)
+
+    def start() -> None:
+        config = library.Config()
+        config.insert_json5("mode", '"router"')
+        config.insert_json5("scouting/multicast/enabled", "false")
+        config.insert_json5("listen/endpoints", f'["tcp/{HERE}:{port}"]')
+        kept.append(library.open(config))
+        threading.Thread(target=publish, daemon=True).start()
+
+    kept: list[object] = []
+    return start
+
+
+SERVERS = {make.__name__: make for make in (opcua, opcua_robot, opcua_standing, mqtt, foxglove, zenoh)}
 """Each imports and builds what its server needs, once, and returns what starts it in a fork."""
 
 

@@ -7,6 +7,7 @@ import struct
 
 import numpy as np
 import pytest
+import zenoh
 
 from free_ports import free_port
 from live_story import wait_for
@@ -16,6 +17,7 @@ from seerob.app.console.terminal import Exit
 from seerob.app.emulation.motions import swing
 from seerob.app.emulators.ros_tcp import RosTcpEndpoint
 from seerob.app.emulators.rosbridge import RosbridgeServer
+from seerob.app.emulators.zenoh import ZenohRouter
 from seerob.core.errors import InputError
 from seerob.core.samples import PoseSample, Quality
 from seerob.core.snapshot import Snapshot
@@ -157,6 +159,41 @@ def test_targets_reach_an_endpoint_of_ros_tcp_as_it_serialises(tmp_path, edition
     assert b"base_link" in body
 
 
+def test_targets_reach_nodes_of_ros_2_over_zenoh(tmp_path):
+    with ZenohRouter(swing((0.0,)), ("a",)) as router:
+        text = STATION.replace('host = "127.0.0.1"', 'host = "127.0.0.1"\nwire = "zenoh"\ndomain = 3')
+        model = station(tmp_path, router, text).model
+        with pytest.raises(InputError, match="not allowed; it takes both"):
+            CartesianTargets(model, on_command_line=False)
+        heard = []
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("connect/endpoints", f'["tcp/127.0.0.1:{router.port}"]')
+        with zenoh.open(config) as node:
+            key = "3/target_pose/geometry_msgs::msg::dds_::PoseStamped_/*"
+            node.declare_subscriber(key, lambda sample: heard.append(sample.payload.to_bytes()))
+            with CartesianTargets(model, on_command_line=True) as targets:
+
+                def sent():
+                    targets.write(at(0.0), (pose(1.25),))
+                    return heard
+
+                wait_for(sent)
+                tokens = [str(said.ok.key_expr) for said in node.liveliness().get("@ros2_lv/3/**")]
+                (way,) = targets.ways
+                router.stop()
+                wait_for(lambda: way.reason)
+                router.start()
+                heard.clear()
+                wait_for(sent)
+    assert ["MP", "%target_pose", "geometry_msgs::msg::dds_::PoseStamped_"] in [
+        [said.split("/")[k] for k in (5, 9, 10)] for said in tokens
+    ]
+    np.testing.assert_allclose(
+        struct.unpack("<7d", heard[0][-56:]), (0.0, -0.25, 1.0, 0.0, 0.0, 0.0, 1.0), atol=1e-9
+    )
+
+
 @pytest.mark.parametrize("edition", [Edition.ROS1, Edition.ROS2])
 @pytest.mark.parametrize("kind", list(TargetMessage))
 def test_every_message_is_serialised_as_ros_has_it(kind, edition):
@@ -172,9 +209,18 @@ def test_every_message_is_serialised_as_ros_has_it(kind, edition):
         assert struct.unpack("<2I", raw[start : start + 8]) == (12, 500_000_000)
 
 
-def test_encryption_is_of_rosbridge_only():
-    with pytest.raises(ValueError, match="has no encryption"):
-        CartesianTarget(at="arm/tool0", host="h", topic="/t", wire=TargetWire.ROS_TCP, tls=True)
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"wire": TargetWire.ROS_TCP, "tls": True}, "ros_tcp is not encrypted here"),
+        ({"wire": TargetWire.ZENOH, "tls": True}, "zenoh is not encrypted here"),
+        ({"wire": TargetWire.ZENOH, "ros": 1}, "nodes of ROS 1 do not speak Zenoh"),
+        ({"domain": 3}, "domain does nothing with wire = rosbridge"),
+    ],
+)
+def test_options_that_do_nothing_are_refused(options, reason):
+    with pytest.raises(ValueError, match=reason):
+        CartesianTarget(at="arm/tool0", host="h", topic="/t", **options)
 
 
 def load_of(tool):

@@ -15,6 +15,7 @@ EXTRAS = {
     "httpx": "web",
     "rosbags": "ros",
     "cbor2": "ros",
+    "zenoh": "zenoh",
     "ruckig": "waypoints",
     "ruamel.yaml": "waypoints",
     "scipy": "waypoints",

@@ -4,16 +4,17 @@ Off unless file and command line both allow it. Threads of their own write, so a
 slows the loop.
 
 What triggers write are edges: a verdict that came or went since the run began; each writing and each failure
-is one line of the log. What a source says of where a tool is to be is published, over rosbridge or ROS-TCP,
-when the twin gets there, in the frame that the controller wants; of what waits, only the newest is sent.
-Nothing that its source does not call good is sent, and nothing is repeated: a controller that must stop when
-targets cease has to see to that itself. Where steps say where to (`seerob.session.steps`), it is said again
-and again until the robot is heard to be there.
+is one line of the log. What a source says of where a tool is to be is published, over rosbridge, ROS-TCP
+or Zenoh, when the twin gets there, in the frame that the controller wants; of what waits, only the newest is
+sent. Nothing that its source does not call good is sent, and nothing is repeated: a controller that must stop
+when targets cease has to see to that itself. Where steps say where to (`seerob.session.steps`), it is said
+again and again until the robot is heard to be there.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections import Counter, deque
@@ -36,7 +37,7 @@ from seerob.model.model import Model
 from seerob.outputs.sink import Closing
 from seerob.protocols.links.connection import Connection, connected
 from seerob.protocols.links.websocket_link import Link, linked
-from seerob.protocols.ros import ros_tcp, rosbridge
+from seerob.protocols.ros import rmw_zenoh, ros_tcp, rosbridge
 from seerob.protocols.ros.ros_messages import Edition, ros1_name, store
 from seerob.protocols.ros.rosbridge import Status
 from seerob.session.opening import signal_timeouts, target
@@ -248,6 +249,12 @@ async def wired(table: CartesianTarget) -> AsyncGenerator[Wire, None]:
             kind = str(table.message) if table.ros == 1 else str(table.message).replace("/", "/msg/")
             await link.send(rosbridge.advertise(table.topic, kind))
             yield _Rosbridge(link, table.topic)
+    elif table.wire is TargetWire.ZENOH:
+        types = await asyncio.to_thread(store, Edition.ROS2)
+        kind = str(table.message).replace("/", "/msg/")
+        async with rmw_zenoh.opened(table.host, table.port or rmw_zenoh.PORT) as router:
+            definition = types.hash_rihs01(kind)
+            yield _Zenoh(router, router.publisher(table.topic, kind, definition, table.domain), table)
     else:
         async with connected(table.host, table.port or ros_tcp.PORT, CONNECT_WITHIN) as connection:
             wire = _RosTcp(connection, table)
@@ -313,6 +320,23 @@ class _RosTcp:
 
     async def end(self) -> None:
         """Nothing: an endpoint forgets who closes the connection."""
+
+
+class _Zenoh:
+    def __init__(
+        self, router: rmw_zenoh.Router, publisher: rmw_zenoh.Publisher, table: CartesianTarget
+    ) -> None:
+        self._router, self._publisher, self._table = router, publisher, table
+
+    async def publish(self, said: Mapping[str, Any]) -> None:
+        self._publisher.publish(serialised(self._table.message, said, Edition.ROS2), time.time())
+
+    async def listen(self, patience: float) -> None:
+        with contextlib.suppress(TimeoutError):
+            await self._router.next(patience)
+
+    async def end(self) -> None:
+        """Nothing: whoever closes the session takes its token away."""
 
 
 def serialised(message: TargetMessage, said: Mapping[str, Any], edition: Edition) -> bytes:

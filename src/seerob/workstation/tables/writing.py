@@ -35,6 +35,8 @@ class TargetWire(StrEnum):
     ROSBRIDGE = "rosbridge"
     ROS_TCP = "ros_tcp"
     """Unity's ROS-TCP-Endpoint."""
+    ZENOH = "zenoh"
+    """A Zenoh router, for nodes of ROS 2 with rmw_zenoh."""
 
 
 class Step(Table, frozen=True, kw_only=True):
@@ -73,11 +75,13 @@ class CartesianTarget(Table, frozen=True, kw_only=True):
     """Full name of the link or tool that goes there (``ur10/tool0``), or the robot's: a source moves it by
     poses, or ``steps`` say where to."""
     host: str
-    """Name or address of the computer with the rosbridge server or ROS-TCP endpoint."""
+    """Name or address of the computer with the rosbridge server, ROS-TCP endpoint or Zenoh router."""
     wire: TargetWire = TargetWire.ROSBRIDGE
-    """Which of both it is."""
+    """Which of them it is."""
     port: Annotated[int, Meta(ge=1, le=65535)] | None = None
-    """9090 of rosbridge and 10000 of an endpoint when not given."""
+    """9090 of rosbridge, 10000 of an endpoint and 7447 of a router when not given."""
+    domain: Annotated[int, Meta(ge=0, le=232)] = 0
+    """With ``zenoh``: ``ROS_DOMAIN_ID``."""
     tls: bool = False
     """The connection to rosbridge is encrypted, and the server's certificate is checked."""
     topic: Topic
@@ -98,8 +102,12 @@ class CartesianTarget(Table, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         check_host("host", self.host)
-        if self.tls and self.wire is TargetWire.ROS_TCP:
-            raise ValueError("an endpoint of ROS-TCP has no encryption: leave out tls, or use rosbridge")
+        if self.tls and self.wire is not TargetWire.ROSBRIDGE:
+            raise ValueError(f"{self.wire} is not encrypted here: leave out tls, or use rosbridge")
+        if self.wire is TargetWire.ZENOH and self.ros == 1:
+            raise ValueError("nodes of ROS 1 do not speak Zenoh: leave out ros, or use rosbridge")
+        if self.domain and self.wire is not TargetWire.ZENOH:
+            raise ValueError(f"domain does nothing with wire = {self.wire}")
 
 
 # -- one bool of a machine per trigger ------------------------------------------------------------

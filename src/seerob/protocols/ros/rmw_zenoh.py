@@ -1,0 +1,263 @@
+"""ROS 2 over Zenoh: keys as ``rmw_zenoh`` and ``zenoh-bridge-ros2dds`` form them, and a session at a router.
+
+``rmw_zenoh`` publishes a message, as CDR, under ``<domain>/<topic>/<type>/<hash>``: the type in DDS's words
+(``sensor_msgs::msg::dds_::JointState_``), the hash of its definition. Who publishes what is told by
+liveliness tokens, in which ``/`` is written as ``%``:
+
+    @ros2_lv/<domain>/<session>/<node>/<entity>/MP/<enclave>/<namespace>/<name>/<topic>/<type>/<hash>/<qos>
+
+The bridge from DDS publishes under the topic alone. Source: design document of rmw_zenoh.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+from typing import Any, NamedTuple
+
+from seerob.core.extras import need
+from seerob.protocols import ProtocolError
+
+PORT = 7447
+MAX_MESSAGE = 1 << 20
+CONNECT_WITHIN = 2.0
+"""[s]"""
+LOOK = 0.25
+"""How soon it is noticed that the router is gone [s]."""
+ASK_WITHIN = 0.5
+"""How long publishers are waited for that tell of themselves [s]."""
+MOST_TOKENS = 4096
+MOST_WAITING = 1024
+"""Messages; of more, the oldest are left out."""
+MOST_KEPT = 64
+"""Messages of a topic that are kept for whoever comes later."""
+NODE = "seerob"
+TOKENS = "@ros2_lv"
+PUBLISHER = "MP"
+
+
+def dds_name(message_type: str) -> str:
+    """``sensor_msgs::msg::dds_::JointState_`` for ``sensor_msgs/msg/JointState``."""
+    *package, name = message_type.split("/")
+    return "::".join([*package, "dds_", f"{name}_"])
+
+
+def message_type(dds: str) -> str:
+    """``sensor_msgs/msg/JointState`` for ``sensor_msgs::msg::dds_::JointState_``; others as they are."""
+    *package, dds_, name = ["", *dds.split("::")][-4:] if dds.count("::") >= 2 else ["", "", ""]
+    return "/".join([*filter(None, package), name.removesuffix("_")]) if dds_ == "dds_" else dds
+
+
+def key(topic: str, message: str, domain: int, definition: str = "*") -> str:
+    """Key of a topic.
+
+    Args:
+        topic: ``/joint_states``.
+        message: Type of its messages, ``sensor_msgs/msg/JointState``.
+        domain: ``ROS_DOMAIN_ID``.
+        definition: Hash of the definition, ``RIHS01_…``; any when not given.
+    """
+    return f"{domain}/{topic.strip('/')}/{dds_name(message)}/{definition}"
+
+
+def bridged(topic: str) -> str:
+    """Key of a topic behind ``zenoh-bridge-ros2dds``."""
+    return topic.strip("/")
+
+
+_ATTACHMENT = struct.Struct("<QQB16s")
+"""Number of the message, when it was published [ns since 1970], and who did: 16 bytes and their count."""
+
+
+class Publisher:
+    """Publishes on one topic, as a node of ``rmw_zenoh``.
+
+    Args:
+        session: Zenoh's.
+        topic: ``/joint_states``.
+        message: Type of its messages, ``sensor_msgs/msg/JointState``.
+        definition: Hash of the definition, ``RIHS01_…``.
+        domain: ``ROS_DOMAIN_ID``.
+        kept: Whether who comes later is told what was published before.
+    """
+
+    def __init__(
+        self, session: Any, topic: str, message: str, definition: str, domain: int, *, kept: bool = False
+    ) -> None:
+        from zenoh.ext import CacheConfig, declare_advanced_publisher
+
+        made = declare_advanced_publisher(
+            session,
+            key(topic, message, domain, definition),
+            cache=CacheConfig(max_samples=MOST_KEPT) if kept else None,
+            publisher_detection=kept,
+        )
+        who, mangled = str(session.info.zid()), f"/{topic.strip('/')}".replace("/", "%")
+        entity = f"{TOKENS}/{domain}/{who}/0/1/{PUBLISHER}/%/%/{NODE}/{mangled}/{dds_name(message)}"
+        quality = f"{':1' if kept else ':'}:,{MOST_KEPT if kept else 10}:,:,:,,"
+        self._token = session.liveliness().declare_token(f"{entity}/{definition}/{quality}")
+        self._publisher, self._number = made, 0
+        self._who = bytes.fromhex(who.zfill(32))[:16]
+
+    def publish(self, raw: bytes, now: float) -> None:
+        """Publish a message.
+
+        Args:
+            raw: As CDR.
+            now: Wall clock [s since 1970].
+        """
+        self._number += 1
+        said = _ATTACHMENT.pack(self._number, round(1e9 * now), len(self._who), self._who)
+        self._publisher.put(raw, attachment=said)
+
+
+def offered(tokens: Iterable[str]) -> dict[str, str]:
+    """Topics that somebody publishes, and the types of their messages, out of liveliness tokens."""
+    found: dict[str, str] = {}
+    for text in tokens:
+        parts = text.split("/")
+        if len(parts) == 13 and parts[0] == TOKENS and parts[5] == PUBLISHER:
+            found[parts[9].replace("%", "/")] = message_type(parts[10])
+    return found
+
+
+def settings(mode: str, **endpoints: str) -> Any:
+    """Settings of a session that looks for nobody: it connects, or listens, where it is told.
+
+    Args:
+        mode: ``client`` or ``router``.
+        endpoints: ``connect`` or ``listen``: ``tcp/127.0.0.1:7447``.
+    """
+    need("zenoh")
+    import zenoh
+
+    config = zenoh.Config()
+    said: dict[str, Any] = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "transport/shared_memory/enabled": False,
+        # Four times what is read: what is a little too long is refused with its length, and not cut off.
+        "transport/link/rx/max_message_size": 4 * MAX_MESSAGE,
+        "connect/timeout_ms": round(1e3 * CONNECT_WITHIN),
+        **{f"{what}/endpoints": [endpoint] for what, endpoint in endpoints.items()},
+    }
+    for path, value in said.items():
+        config.insert_json5(path, json.dumps(value))
+    return config
+
+
+class Put(NamedTuple):
+    """What somebody published."""
+
+    arrived: float
+    """Host's monotonic time [s]."""
+    topic: str
+    payload: bytes
+
+
+class Router:
+    """A session at a router: what is published on topics, and publishing.
+
+    Args:
+        session: Zenoh's.
+        loop: Of who waits; messages come in a thread of Zenoh's own.
+    """
+
+    def __init__(self, session: Any, loop: asyncio.AbstractEventLoop) -> None:
+        self._session, self._loop = session, loop
+        self._waiting, self._some = deque[Put](maxlen=MOST_WAITING), asyncio.Event()
+        self._declared: list[Any] = []
+
+    def subscribe(self, topic: str, keys: Iterable[str], *, kept: bool) -> None:
+        """Hear a topic under each of these keys; what was published before, too, where it is ``kept``."""
+        from zenoh.ext import HistoryConfig, declare_advanced_subscriber
+
+        def take(sample: Any) -> None:
+            # What is too long is cut by one byte more than is read, so that whoever decodes it refuses it.
+            payload = sample.payload
+            raw = payload.to_bytes() if len(payload) <= MAX_MESSAGE else bytes(MAX_MESSAGE + 1)
+            self._waiting.append(Put(time.monotonic(), topic, raw))
+            self._loop.call_soon_threadsafe(self._some.set)
+
+        for one in keys:
+            if kept:
+                history = HistoryConfig(detect_late_publishers=True, max_samples=MOST_KEPT)
+                made = declare_advanced_subscriber(self._session, one, take, history=history)
+            else:
+                made = self._session.declare_subscriber(one, take)
+            self._declared.append(made)
+
+    def publisher(self, topic: str, message: str, definition: str, domain: int) -> Publisher:
+        """Announce a topic; arguments as of `Publisher`."""
+        return Publisher(self._session, topic, message, definition, domain)
+
+    async def next(self, within: float | None) -> Put:
+        """The next message.
+
+        Args:
+            within: How long to wait [s]; for ever when None.
+
+        Raises:
+            TimeoutError: Nothing came.
+            ConnectionError: The router is gone.
+        """
+        until = None if within is None else time.monotonic() + within
+        while not self._waiting:
+            left = LOOK if until is None else min(LOOK, until - time.monotonic())
+            try:
+                async with asyncio.timeout(max(0.0, left)):
+                    await self._some.wait()
+            except TimeoutError:
+                if not await asyncio.to_thread(self._at_router):
+                    raise ConnectionError("the router is gone") from None
+                if until is not None and time.monotonic() >= until:
+                    raise
+            self._some.clear()
+        return self._waiting.popleft()
+
+    def _at_router(self) -> bool:
+        info = self._session.info
+        return bool(info.routers_zid() or info.peers_zid())
+
+    async def publishers(self, domain: int) -> dict[str, str]:
+        """Topics that somebody publishes with ``rmw_zenoh``, and the types of their messages."""
+        return await asyncio.to_thread(self._publishers, domain)
+
+    def _publishers(self, domain: int) -> dict[str, str]:
+        found: list[str] = []
+        for reply in self._session.liveliness().get(f"{TOKENS}/{domain}/**", timeout=ASK_WITHIN):
+            if reply.ok is not None and len(found) < MOST_TOKENS:
+                found.append(str(reply.ok.key_expr))
+        return offered(found)
+
+
+@asynccontextmanager
+async def opened(host: str, port: int) -> AsyncIterator[Router]:
+    """Connect to a router.
+
+    Args:
+        host: Name or address.
+        port: TCP port.
+
+    Raises:
+        ConnectionError: There is none.
+        ProtocolError: Zenoh refuses the address.
+    """
+    config = settings("client", connect=f"tcp/{f'[{host}]' if ':' in host else host}:{port}")
+    import zenoh
+
+    try:
+        session = await asyncio.to_thread(zenoh.open, config)
+    except zenoh.ZError as error:
+        raise ConnectionError(f"no Zenoh router: {str(error).partition(' at ')[0][:200]}") from None
+    except ValueError as error:
+        raise ProtocolError(f"no address for Zenoh: {str(error)[:200]}") from None
+    try:
+        yield Router(session, asyncio.get_running_loop())
+    finally:
+        await asyncio.to_thread(session.close)

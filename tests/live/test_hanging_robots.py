@@ -40,6 +40,7 @@ class Hangs:
         ("rtde", True),
         ("rtde", False),
         ("fri", False),
+        ("egm", False),
         ("drfl", True),
         ("dobot", True),
         ("modbus_robot", True),

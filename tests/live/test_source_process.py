@@ -233,7 +233,7 @@ def test_who_needs_no_links_listens_without_numpy():
     kinds_of = [
         kind for kind in kinds("sources") if not getattr(load("sources", kind, Source), "links", True)
     ]
-    assert {"rtde", "fri", "drfl", "modbus_robot", "opcua", "mqtt"} <= set(kinds_of)
+    assert {"rtde", "fri", "egm", "drfl", "modbus_robot", "opcua", "mqtt"} <= set(kinds_of)
     modules = [
         "seerob.devices.live.listening_process",
         *(f"seerob.devices.sources.{kind}" for kind in kinds_of),

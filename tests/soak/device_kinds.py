@@ -67,6 +67,15 @@ def fri(patch):
     return Made(FriServer(swing(SEVEN), to=(HERE, port)).start(), Fri(robot="arm", host=HERE, port=port))
 
 
+def egm(patch):
+    from seerob.app.emulators.egm import EgmServer
+    from seerob.devices.sources.egm import Egm
+
+    patch.setattr("seerob.devices.sources.egm.SILENCE", SILENCE)
+    port = free_port()
+    return Made(EgmServer(swing(SIX), to=(HERE, port)).start(), Egm(robot="arm", host=HERE, port=port))
+
+
 def drfl(patch):
     from seerob.app.emulators.drfl import DrflSender
     from seerob.devices.sources.drfl import Drfl
@@ -322,7 +331,7 @@ def headset(patch):
 FOREIGN = (opcua, opcua_robot, mqtt, foxglove, zenoh)
 """Their servers are processes of their own, which are killed with SIGKILL."""
 OWN = (
-    *(rtde, fri, drfl, dobot, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),
+    *(rtde, fri, egm, drfl, dobot, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),
     *(modbus, siemens_web, web, web_http),
     *(natnet, vrpn, mvn, rokoko, vive, kinect, mediapipe, headset),
 )

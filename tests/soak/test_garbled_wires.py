@@ -17,7 +17,7 @@ from seerob.core.samples import Quality, SignalSample
 from seerob.devices.live.listening import Listener
 from soak.device_kinds import KINDS
 
-SENDERS = {"fri", "drfl", "mvn", "rokoko"}
+SENDERS = {"fri", "egm", "drfl", "mvn", "rokoko"}
 """Devices that send datagrams to a port of ours."""
 WIRED = [kind for kind in KINDS if kind != "headset"]
 STREAMS = [kind for kind in WIRED if kind not in SENDERS and kind != "natnet"]

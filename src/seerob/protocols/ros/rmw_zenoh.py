@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import struct
 import time
 from collections import deque
@@ -21,7 +22,6 @@ from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
 
 from seerob.core.extras import need
-from seerob.protocols import ProtocolError
 
 PORT = 7447
 MAX_MESSAGE = 1 << 20
@@ -245,19 +245,19 @@ async def opened(host: str, port: int) -> AsyncIterator[Router]:
         port: TCP port.
 
     Raises:
-        ConnectionError: There is none.
-        ProtocolError: Zenoh refuses the address.
+        OSError: There is none, or nobody knows its name.
     """
-    config = settings("client", connect=f"tcp/{f'[{host}]' if ':' in host else host}:{port}")
+    loop = asyncio.get_running_loop()
+    (found, *_) = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    address = found[4][0]
+    config = settings("client", connect=f"tcp/{f'[{address}]' if ':' in str(address) else address}:{port}")
     import zenoh
 
     try:
         session = await asyncio.to_thread(zenoh.open, config)
     except zenoh.ZError as error:
         raise ConnectionError(f"no Zenoh router: {str(error).partition(' at ')[0][:200]}") from None
-    except ValueError as error:
-        raise ProtocolError(f"no address for Zenoh: {str(error)[:200]}") from None
     try:
-        yield Router(session, asyncio.get_running_loop())
+        yield Router(session, loop)
     finally:
         await asyncio.to_thread(session.close)

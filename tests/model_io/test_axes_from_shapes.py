@@ -80,6 +80,22 @@ def test_accepted_axes_become_a_robot_that_moves_as_far_as_parts_let_it(files, t
         assert robot.links[-1].solids[0].deviation > 0 or name == "slide"
 
 
+def test_what_moves_about_an_accepted_axis_weighs_what_its_solids_do(files, tmp_path):
+    folder, _ = files
+    cell = tmp_path / "cell"
+    given = ("--accept", "1", "--density", "2700")
+    assert cli.main(["import", str(folder / "door.step"), str(cell), *given]) == Exit.WITHIN
+    assembly = assembly_of(folder / "door.step")
+    names = [name.rpartition("/")[2] for name in assembly.names()]
+    leaf = assembly.shapes[assembly.instances[names.index("leaf")].shape]
+    (robot,) = tomllib.loads((cell / "workstation.toml").read_text())["robots"]
+    inertial = load_robot(robot["model"], folder=cell).links[-1].inertial
+    assert inertial.mass == pytest.approx(2700 * leaf.solid.volume, rel=1e-9)
+    assert (inertial.error, inertial.spread_error) == (0, 0)
+    expected = np.linalg.eigvalsh(2700 * leaf.solid.inertia)
+    np.testing.assert_allclose(np.linalg.eigvalsh(inertial.inertia), expected, rtol=1e-9)
+
+
 def test_an_arm_is_a_chain_of_six(files, tmp_path):
     folder, true = files
     cell = tmp_path / "cell"

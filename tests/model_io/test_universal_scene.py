@@ -244,3 +244,36 @@ def test_damaged_scenes_are_parts_or_a_sentence(tmp_path, count):
             assert np.isfinite(instance.world_from_shape).all()
     assert outcomes == {"read", "refused"}
     assert [p.name for p in path.parent.iterdir()] == ["b.usd"]
+
+
+def test_simple_shapes_of_a_density_weigh_what_they_do_and_not_what_is_around_them(tmp_path):
+    """A ball came 3.7 % too heavy: the mesh that stands for it contains it."""
+    file = tmp_path / "two.usda"
+    stage = Usd.Stage.CreateNew(str(file))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    for name, apart in (("apart", 30.0), ("overlapping", 6.0)):
+        body = UsdGeom.Xform.Define(stage, f"/{name}")
+        UsdPhysics.RigidBodyAPI.Apply(body.GetPrim())
+        # Kilograms per cubic centimetre.
+        UsdPhysics.MassAPI.Apply(body.GetPrim()).CreateDensityAttr(0.0027)
+        ball = UsdGeom.Sphere.Define(stage, f"/{name}/ball")
+        ball.CreateRadiusAttr(5.0)
+        rod = UsdGeom.Cylinder.Define(stage, f"/{name}/rod")
+        rod.CreateRadiusAttr(2.0)
+        rod.CreateHeightAttr(10.0)
+        rod.CreateAxisAttr("X")
+        rod.AddTranslateOp().Set(Gf.Vec3d(apart, 0, 0))
+        rod.AddScaleOp().Set(Gf.Vec3f(2, 1, 1))
+    stage.Save()
+    apart, over = (instance.inertial for instance in read(file).instances)
+    ball, rod = 4 / 3 * np.pi * 0.05**3, np.pi * 0.02**2 * 0.2
+    assert apart.mass == pytest.approx(2700 * (ball + rod), rel=1e-6)
+    assert apart.com == pytest.approx([0.3 * rod / (ball + rod), 0, 0], abs=1e-9)
+    about_x = 2700 * (ball * 0.4 * 0.05**2 + rod * 0.02**2 / 2)
+    assert apart.inertia[0, 0] == pytest.approx(about_x, rel=1e-6)
+    assert apart.error == 0
+    # What overlaps counts once, by the meshes, and says by how much they are larger.
+    assert over.mass < 2700 * (ball + rod)
+    assert 2700 * ball < over.mass * (1 + over.error)
+    assert over.error > 0.01

@@ -12,8 +12,9 @@ import trimesh
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Origin
-from seerob.description.description import JointKind
+from seerob.description.description import Description, Inertial, JointKind, Link
 from seerob.description.formats.resolve import Resolver
+from seerob.description.formats.urdf_writing import written
 from seerob.description.loader import load_robot
 from seerob.description.xml_values import Reader
 
@@ -582,3 +583,16 @@ def test_a_file_without_the_customary_ending_is_read_as_what_it_is(tmp_path, nam
     (tmp_path / name).write_bytes(b"solid a\nendsolid a\n")
     with pytest.raises(InputError, match="is not a robot description"):
         load_robot(name, folder=tmp_path)
+
+
+def test_by_how_much_a_mass_may_be_off_is_written_and_read_again(tmp_path):
+    inertial = Inertial(2.0, np.zeros(3), np.eye(3) * 0.01, Origin.ESTIMATED, "by density", 0.02, 0.05)
+    link = Link("one", None, np.eye(4), inertial=inertial)
+    for plain, expected in ((False, (0.02, 0.05)), (True, (0, 0))):
+        text, _ = written(Description("one", (link,), "one", "made here"), plain=plain)
+        (tmp_path / "one.urdf").write_text(text)
+        read = load_robot("one.urdf", folder=tmp_path).links[0].inertial
+        assert (read.error, read.spread_error) == expected
+    (tmp_path / "one.urdf").write_text(text.replace('value="2.0"', 'value="2.0" error="-1"'))
+    with pytest.raises(InputError, match="a share from 0 up"):
+        load_robot("one.urdf", folder=tmp_path)

@@ -38,6 +38,8 @@ class Quantity:
     source: str
     error: float = 0.0
     """Relative uncertainty, of an estimate that has a bound; 0 when stated."""
+    spread_error: float = 0.0
+    """Of a mass: `Inertial.spread_error`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +91,37 @@ class Inertial:
     source: str
     error: float = 0.0
     """Relative uncertainty of the mass, of an estimate; 0 when stated."""
+    spread_error: float = 0.0
+    """By which share all that it adds to a mass matrix may be off in any motion, with centre and moments,
+    where that is more than ``error``."""
     within: float = 0.0
     """How far from ``com`` any of the mass may lie, where nobody knows how it is spread [m]; 0 where that is
     known."""
+
+
+def rigid(parts: Sequence[tuple[Inertial, Array]]) -> Inertial:
+    """Mass properties of several bodies as one.
+
+    Args:
+        parts: Of each body, and the frame of the whole from its own, (4, 4).
+    """
+    mass = sum(one.mass for one, _ in parts)
+    coms = [at[:3, :3] @ one.com + at[:3, 3] for one, at in parts]
+    com = sum((one.mass * c for (one, _), c in zip(parts, coms, strict=True)), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for (one, at), c in zip(parts, coms, strict=True):
+        d = c - com
+        inertia += at[:3, :3] @ one.inertia @ at[:3, :3].T + one.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Inertial(
+        mass,
+        com,
+        inertia,
+        parts[0][0].origin,
+        "; ".join(dict.fromkeys(one.source for one, _ in parts)),
+        error=sum(one.mass * one.error for one, _ in parts) / mass,
+        # What holds of each by itself holds of their sum by the largest.
+        spread_error=max(max(one.error, one.spread_error) for one, _ in parts),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,7 +159,7 @@ class Mechanism:
         inertials = [link.inertial for link in self.description.links if link.inertial is not None]
         if not any(inertial.error or inertial.within for inertial in inertials):
             return ""
-        return f"of the links of {self.name} only rough masses are published: give them in masses"
+        return f"of the links of {self.name} masses are known within bounds alone: give them in masses"
 
     def require_masses(self, who: str) -> None:
         """Refuse a figure that rests on masses that cannot be; those that nobody gave leave it undecided.

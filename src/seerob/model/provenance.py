@@ -98,6 +98,15 @@ def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
                     source=body.mass.source,
                 )
             )
+            if body.mass.error:
+                found.append(
+                    Input(
+                        name=f"mass of {body.owner} may be off by",
+                        value=body.mass.error,
+                        origin=Origin.ESTIMATED,
+                        source=body.mass.source,
+                    )
+                )
     station = model.workstation
     tables: tuple[Robot | Mounted, ...] = (*station.robots, *station.tools, *station.workpieces)
     carried = {model.bodies[index].owner for index in mechanism.carried}

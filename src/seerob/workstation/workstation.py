@@ -214,7 +214,8 @@ class Thing(_Table, frozen=True, kw_only=True):
     """Axis that points up in the mesh file, when the format does not say."""
     deviation: Annotated[float, unit("m", ge=0, le=1)] = 0.0
     """How far the real surface may lie outside the mesh [m], as of a round one that was cut into triangles;
-    every distance is uncertain by it, or by what the reader of the file leaves out where that is more."""
+    every distance is uncertain by it, or by what the reader of the file leaves out where that is more. A mass
+    by `density` is uncertain as if it lay as far inside, too."""
     triangles: Annotated[int, Meta(ge=100, le=20_000_000)] | None = None
     """Most triangles of each of its meshes on the screen, 20 000 when not given; how far what is shown is off
     then is a finding. Distances use all."""

@@ -14,7 +14,7 @@ from seerob.core.errors import InputError, suggestion
 from seerob.core.files.whole_file import hidden_folder, whole_folder
 
 if TYPE_CHECKING:
-    from seerob.app.importing.folder import Files
+    from seerob.app.importing.folder import Densities, Files
     from seerob.description.cad.assembly import Assembly
 
 HELP = "make a workstation folder from CAD: parts with names, places, colours and meshes"
@@ -141,7 +141,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
         unreachable=options.unreachable,
         triangles=options.triangles,
     )
-    assembly = _moving(options, assembly)
+    assembly = _moving(options, assembly, given)
     own = set[str]()
     if before is not None:
         made_before = {row["mesh"] for row in before["parts"]}
@@ -160,7 +160,7 @@ def _assembly(options: argparse.Namespace, ending: str, folder: Path, before: di
     return Exit.WITHIN
 
 
-def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:
+def _moving(options: argparse.Namespace, assembly: Assembly, given: Densities) -> Assembly:
     """The assembly with axes that the user accepts as a mechanism; tells what is proposed."""
     if not (options.axes or options.accept):
         if options.ground:
@@ -192,7 +192,7 @@ def _moving(options: argparse.Namespace, assembly: Assembly) -> Assembly:
     ground = None if options.ground is None else names.index(options.ground)
     try:
         chosen = [found[number - 1] for number in dict.fromkeys(numbers)]
-        made, told = accepted(assembly, chosen, plain_name(options.file.stem), ground)
+        made, told = accepted(assembly, chosen, plain_name(options.file.stem), ground, given.weighed)
     except ValueError as error:
         raise InputError.at("--accept", "", str(error), "accept other axes, or say --ground") from None
     for text in told:
@@ -272,12 +272,16 @@ def _say(file: Path, assembly: Assembly, made: Files) -> None:
 
 def _say_masses(parts: Sequence[Mapping[str, Any]]) -> None:
     """The sum of masses that are known, and of how many parts none is."""
-    known = [row["density"] * row["volume"] for row in parts if row["density"] and row["volume"]]
-    known += [row["written"]["mass"] for row in parts if "mass" in row["written"]]
+    known = [(row["mass"], row["mass_error"]) for row in parts if row["mass"] is not None]
     if known:
         without = len(parts) - len(known)
         rest = f"; of {without} it is not known" if without else ""
-        line("found", f"{sum(known):.6g} kg in {len(known)} of {len(parts)} parts{rest}")
+        off = sum(mass * error for mass, error in known)
+        within = f" ± {off:.2g} kg" if off > 0 else ""
+        line(
+            "found",
+            f"{sum(mass for mass, _ in known):.6g} kg{within} in {len(known)} of {len(parts)} parts{rest}",
+        )
 
 
 def _plant(file: Path, folder: Path) -> Exit:

@@ -250,7 +250,7 @@ def _read(file: Path, folder: Path, under: str, options: Mapping[str, str], form
             ground = None if stands is None else names.index(stands)
             chosen = [found[n - 1] for n in numbers]
             try:
-                assembly, told = accepted(assembly, chosen, plain_name(file.stem), ground)
+                assembly, told = accepted(assembly, chosen, plain_name(file.stem), ground, given.weighed)
             except ValueError as error:
                 raise InputError.at(file.name, "axes", str(error), "accept other ones") from None
     made = files(assembly, file, given, options=asked, progress=say)

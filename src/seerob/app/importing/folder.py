@@ -17,7 +17,7 @@ from seerob.core.errors import InputError
 from seerob.core.files import bounded
 from seerob.core.printable import printable
 from seerob.core.shapes import Mesh
-from seerob.core.snapshot import Finding
+from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.description.cad.assembly import ASKED, NOTHING, Assembly, Instance, Moving, Shape
 from seerob.description.cad.names import plain_name, told_apart
@@ -25,6 +25,7 @@ from seerob.description.description import Inertial
 from seerob.description.formats.urdf_writing import written
 from seerob.description.mesh_files import Color
 from seerob.description.shapes.glb import glb_y_up
+from seerob.description.shapes.mass_properties import from_shape
 from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.mesh_mending import sided
 from seerob.description.shapes.moments import signed_volume
@@ -51,6 +52,23 @@ class Densities:
     def of(self, shape: Shape) -> float | None:
         """Density of a shape; None when nobody gave it."""
         return self.by_material.get(shape.material, self.of_all)
+
+    def weighed(self, shape: Shape) -> Inertial | None:
+        """Mass properties of a shape: of its solids as the file has them, else of their triangles.
+
+        None where nobody gave its density, or the triangles enclose no volume that is known.
+        """
+        density = self.of(shape)
+        if density is None:
+            return None
+        if shape.solid is not None:
+            source = f"{density:g} kg/m³ × volume of the solids in the file"
+            mass = density * shape.solid.volume
+            return shape.solid.inertial(mass=mass, origin=Origin.ESTIMATED, source=source)
+        try:
+            return from_shape(shape.pieces, density=density, deviation=shape.deviation, subject=shape.name)[0]
+        except InputError:
+            return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +117,7 @@ def files(
         meshes[name], known = _measured(shape, findings)
         facts.append(known)
     parts: list[dict[str, Any]] = []
+    weighed: dict[int, Inertial | None] = {}
     for full, instance in zip(assembly.names(), assembly.instances, strict=True):
         shape = assembly.shapes[instance.shape]
         density = densities.of(shape)
@@ -113,11 +132,19 @@ def files(
             "box": _box(shape, instance),
             "world": instance.world_from_shape,
         }
+        if instance.shape not in weighed:
+            weighed[instance.shape] = densities.weighed(shape)
+        inertial = weighed[instance.shape] if density is not None else instance.inertial
+        row["mass"] = None if inertial is None else _number(inertial.mass, 12)
+        row["mass_error"] = None if inertial is None else inertial.error
         row["written"] = part_values(row, instance.color)
         if options.get("triangles"):
             row["written"]["triangles"] = options["triangles"]
-        if instance.inertial is not None and density is None:
-            row["written"] |= _stated_mass(instance.inertial)
+        # Where triangles are not the surface, the mass is that of the solid, which they do not tell.
+        better = shape.solid is not None and shape.deviation > NEGLIGIBLE
+        if inertial is not None and (density is None or better):
+            row["written"].pop("density", None)
+            row["written"] |= _stated_mass(inertial)
         del row["world"]
         parts.append(row)
     robots = [
@@ -216,11 +243,11 @@ def _robot(moving: Moving, name: str, files: dict[str, bytes]) -> dict[str, Any]
 
 
 def _stated_mass(inertial: Inertial) -> dict[str, Any]:
-    i = inertial.inertia
+    i = np.where(np.abs(inertial.inertia) > 1e-12 * np.trace(inertial.inertia), inertial.inertia, 0.0)
     six = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
     return {
         "mass": _number(inertial.mass, 12),
-        "com": [_number(x, 12) for x in inertial.com],
+        "com": [_number(x, 12) for x in inertial.com.round(12)],
         "inertia": [_number(x, 12) for x in six],
     }
 

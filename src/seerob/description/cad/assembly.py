@@ -15,6 +15,7 @@ from seerob.core.transforms import Array
 from seerob.description.cad.names import full_name, told_apart
 from seerob.description.description import Description, Inertial
 from seerob.description.mesh_files import Color
+from seerob.description.shapes.moments import Moments
 
 RIGID = 1e-6
 """A transform is rigid where the rotation nearest to it moves no corner by more than this [m]."""
@@ -68,6 +69,9 @@ class Shape:
     """Name of its material, as the file has it."""
     surfaces: tuple[Surface, ...] = ()
     """Plane and round faces, where the file is a boundary representation."""
+    solid: Moments | None = None
+    """Of its solids as the file has them, where they agree with the triangles; None where nobody knows them
+    better than the triangles do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,4 +229,11 @@ def _stretched(shape: Shape, linear: Array) -> Shape:
     pieces = tuple(
         Mesh(m.vertices @ linear.T, m.faces[:, ::-1] if mirrored else m.faces, m.color) for m in shape.pieces
     )
-    return replace(shape, pieces=pieces, deviation=shape.deviation * float(np.linalg.norm(linear, 2)))
+    matrix = np.eye(4)
+    matrix[:3, :3] = linear
+    return replace(
+        shape,
+        pieces=pieces,
+        deviation=shape.deviation * float(np.linalg.norm(linear, 2)),
+        solid=None if shape.solid is None else shape.solid.moved(matrix),
+    )

@@ -7,7 +7,7 @@ planes of another, or on two shafts that are parallel, slides. Nothing is decide
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -18,7 +18,7 @@ from seerob.core.shapes import Solid
 from seerob.core.transforms import Array, rotation_from_axis_angle, transform
 from seerob.description.cad.assembly import Assembly, Moving, Shape
 from seerob.description.cad.names import told_apart
-from seerob.description.description import Description, Joint, JointKind, Link
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, rigid
 from seerob.description.shapes.detail import manifold
 from seerob.description.shapes.mesh_bodies import joined
 
@@ -382,7 +382,11 @@ def _sliding(
 
 
 def accepted(
-    assembly: Assembly, chosen: Sequence[Proposal], name: str, ground: int | None = None
+    assembly: Assembly,
+    chosen: Sequence[Proposal],
+    name: str,
+    ground: int | None = None,
+    weighed: Callable[[Shape], Inertial | None] = lambda _: None,
 ) -> tuple[Assembly, list[str]]:
     """The assembly with accepted axes as a mechanism; what moves is no part any more.
 
@@ -391,6 +395,8 @@ def accepted(
         chosen: Axes that the user accepted.
         name: Of the mechanism.
         ground: Number of the instance that stands; of the lowest ones the largest when not given.
+        weighed: Mass properties of a shape in its own frame, None where nobody knows them: a link with such
+            a part has none.
 
     Returns:
         The assembly, and one sentence for each joint.
@@ -448,9 +454,17 @@ def accepted(
         ]
         deviation = max(assembly.shapes[assembly.instances[i].shape].deviation for i in members[child])
         solid = Solid(mesh=joined(meshes)[0], deviation=deviation)
+        known = [
+            (one, np.linalg.inv(placed[child]) @ assembly.instances[i].world_from_shape)
+            for i in members[child]
+            if (one := weighed(assembly.shapes[assembly.instances[i].shape])) is not None
+        ]
+        inertial = rigid(known) if len(known) == len(members[child]) else None
         kind = "turn" if p.kind is JointKind.REVOLUTE else "slide"
         joint = Joint(f"{kind}_{label[child]}", p.kind, axis)
-        links.append(Link(label[child], label[parent], at, (joint,), visual=tuple(meshes), solids=(solid,)))
+        links.append(
+            Link(label[child], label[parent], at, (joint,), inertial, visual=tuple(meshes), solids=(solid,))
+        )
         edges = [edge for edge in edges if edge[2] is not p]
     if edges or not order:
         odd = edges[0][2] if edges else chosen[0]

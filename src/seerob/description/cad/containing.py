@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from seerob.core.shapes import Mesh, Solid
+from seerob.core.transforms import Array
+from seerob.description.shapes import moments
 from seerob.description.shapes.glb import solid_mesh
-from seerob.description.shapes.shapes import capsule_mesh, lathe_mesh, sphere_mesh
+from seerob.description.shapes.moments import Moments
+from seerob.description.shapes.shapes import box_mesh, capsule_mesh, lathe_mesh, sphere_mesh
 
 SIDES = 64
 """Corners of a cylinder or a cone, outside the circle."""
@@ -28,6 +32,46 @@ def around(solid: Solid) -> tuple[Mesh, float]:
     # Its corners lie on the surface, 20 on a circle.
     sagitta = solid.radius * (1 - math.cos(math.pi / 20) ** 2)
     return solid_mesh(solid), solid.deviation + sagitta
+
+
+class Contained(NamedTuple):
+    """A simple shape in a mesh around it."""
+
+    mesh: Mesh
+    moments: Moments
+    """Of the shape itself."""
+    off: float
+    """How far the mesh is outside of it, at most [m]."""
+
+
+def box(half: float) -> Contained:
+    """A cube about the origin, by half of its size [m]."""
+    mesh = box_mesh([-half] * 3, [half] * 3)
+    return Contained(mesh, moments.of_closed_mesh(mesh), 0.0)
+
+
+def ball_within(radius: float) -> Contained:
+    """A ball about the origin."""
+    middle = np.zeros(3)
+    return Contained(ball(radius), moments.of_capsule(middle, middle, radius), radius * (_BALL - 1))
+
+
+def capsule_within(start: Array, end: Array, radius: float) -> Contained:
+    """A capsule between two points."""
+    shape = moments.of_capsule(start, end, radius)
+    return Contained(rounded(start, end, radius), shape, radius * (_BALL - 1))
+
+
+def cylinder_within(start: Array, end: Array, radius: float) -> Contained:
+    """A cylinder between two points."""
+    shape = moments.of_cylinder(start, end, radius)
+    return Contained(cylinder(start, end, radius), shape, radius * (_AROUND - 1))
+
+
+def cone_within(start: Array, end: Array, radius: float) -> Contained:
+    """A cone from its base to its tip."""
+    shape = moments.of_cone(start, end, radius)
+    return Contained(cylinder(start, end, radius, 0.0), shape, radius * (_AROUND - 1))
 
 
 def ball(radius: float) -> Mesh:

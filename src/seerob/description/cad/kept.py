@@ -25,6 +25,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding
 from seerob.description.cad.assembly import Assembly, Instance, Shape, Surface
 from seerob.description.mesh_files import MeshSource
+from seerob.description.shapes.moments import Moments
 
 MOST = 32
 """Assemblies that are kept; beyond it, those that were used longest ago go."""
@@ -60,6 +61,9 @@ def write(folder: Path, name: str, assembly: Assembly) -> None:
             "deviation": shape.deviation,
             "solids": shape.solids,
             "material": shape.material,
+            "solid": None
+            if shape.solid is None
+            else put([shape.solid.volume, *shape.solid.com, *shape.solid.inertia.ravel()]),
             "surfaces": [[s.kind, list(s.round), len(s.corners)] for s in shape.surfaces],
             "frames": put([[*s.point, *s.axis] for s in shape.surfaces]),
             "corners": put(np.vstack([np.empty((0, 3)), *(s.corners for s in shape.surfaces)])),
@@ -145,4 +149,8 @@ def _shape(row: dict[str, Any], array: Callable[[str], NDArray[Any]]) -> Shape:
         Surface(kind, frames[k, :3], frames[k, 3:], tuple(figures), corners[ends[k] : ends[k + 1]])
         for k, (kind, figures, _) in enumerate(row["surfaces"])
     )
-    return Shape(row["name"], pieces, row["deviation"], row["solids"], row["material"], surfaces)
+    solid = None
+    if row["solid"] is not None:
+        volume, *rest = array(row["solid"])
+        solid = Moments(float(volume), np.array(rest[:3]), np.array(rest[3:]).reshape(3, 3))
+    return Shape(row["name"], pieces, row["deviation"], row["solids"], row["material"], surfaces, solid)

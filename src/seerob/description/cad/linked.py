@@ -21,6 +21,7 @@ from seerob.description.mesh import FARTHEST
 from seerob.description.mesh_files import MeshSource
 from seerob.description.shapes import mass_properties
 from seerob.description.shapes.mesh_bodies import joined
+from seerob.description.shapes.moments import Moments
 
 MOST_TURNS = 1e3
 """Limits of a joint beyond this are none [rad or m]."""
@@ -209,17 +210,37 @@ def _joint(
     )
 
 
+def _solids(row: Mapping[str, Any], meters: float) -> Moments | None:
+    """Moments [m] of simple shapes together; None where there are others, or some may overlap."""
+    told = row.get("solids")
+    if not told:
+        return None
+    return mass_properties.combined(
+        Moments(volume * meters**3, np.array(com) * meters, np.array(inertia) * meters**5)
+        for volume, com, inertia in told
+    )
+
+
 def _inertial(
     source: MeshSource, link: str, row: Mapping[str, Any] | None, meters: float, shape: Sequence[Mesh]
 ) -> Inertial | None:
     if row is None:
         return None
     if row.get("density") is not None or row["moments"] is None:
+        solids = _solids(row, meters)
         try:
-            if row.get("density"):
-                made, findings = mass_properties.from_shape(shape, density=row["density"], subject=link)
+            if solids is not None:
+                findings: tuple[Finding, ...] = ()
+                mass = row["density"] * solids.volume if row.get("density") else row["mass"]
+                made = solids.inertial(mass=mass, origin=Origin.ESTIMATED, source=str(source.path))
             else:
-                made, findings = mass_properties.from_shape(shape, mass=row["mass"], subject=link)
+                made, findings = mass_properties.from_shape(
+                    shape,
+                    density=row.get("density"),
+                    mass=None if row.get("density") else row["mass"],
+                    deviation=row.get("off", 0.0) * meters,
+                    subject=link,
+                )
         except InputError as error:
             source.note(f"link {link}: no inertia from its shape ({error}): unknown", level="warning")
             return None

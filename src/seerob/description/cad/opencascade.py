@@ -27,6 +27,8 @@ COLOR = (0.7, 0.72, 0.75, 1.0)
 """Shown of a face without a colour: red, green, blue, alpha in 0…1."""
 MAX_INSTANCES = 200_000
 MAX_DEPTH = 100
+COARSE, FINE = 1e-8, 1e-11
+"""Relative errors that volumes are integrated to, of which the first tells how good the second is."""
 MAX_CORNERS = 64
 """Corners of a plane face that are told."""
 MAX_SAMPLES = 40_000
@@ -272,10 +274,9 @@ class _Document:
             by_color.setdefault(color, []).append((vertices, triangles))
         if not by_color:
             return "none of its faces could be cut into triangles"
-        area, volume = GProp_GProps(), GProp_GProps()
+        area = GProp_GProps()
         BRepGProp.SurfaceProperties_s(shape, area)
-        if solids:
-            BRepGProp.VolumeProperties_s(shape, volume)
+        volume, off = _volume(shape) if solids else (GProp_GProps(), 0.0)
         return {
             "name": name,
             "pieces": [(*_merged(parts), color) for color, parts in by_color.items()],
@@ -288,9 +289,36 @@ class _Document:
             "volume": float(volume.Mass()) * 1e-9 if solids else 0.0,
             "material": _material(label),
             "stated": _validation(label),
+            "inertia": _inertia(volume) if solids else None,
+            "off": off,
             "center": (np.array(volume.CentreOfMass().Coord()) * 1e-3).tolist() if solids else None,
             "surfaces": [found for face in faces if (found := _analytic(face)) is not None],
         }
+
+
+def _volume(shape: Any) -> tuple[Any, float]:
+    """Volume, centre and moments of solids, and by which share they differ between two integrations.
+
+    Without a tolerance OpenCASCADE takes so few points that of a ball made of splines 1 % is missing.
+    """
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    coarse, fine = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, coarse, COARSE, False, False)
+    said = BRepGProp.VolumeProperties_s(shape, fine, FINE, False, False)
+    volume = float(fine.Mass())
+    if not volume > 0:
+        return fine, 0.0
+    inertia, other = (np.array(_inertia(props)) for props in (fine, coarse))
+    off = np.linalg.norm(inertia - other) / max(float(np.linalg.norm(inertia)), 1e-300)
+    return fine, max(abs(float(coarse.Mass()) / volume - 1), float(off), float(said))
+
+
+def _inertia(volume: Any) -> list[list[float]]:
+    """Moments about the centre at density 1 [m⁵], shape (3, 3)."""
+    matrix = volume.MatrixOfInertia()
+    return [[matrix.Value(i, j) * 1e-15 for j in range(1, 4)] for i in range(1, 4)]
 
 
 def _schema(data: bytes) -> str:

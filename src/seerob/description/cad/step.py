@@ -22,8 +22,9 @@ from seerob.description.cad import kept
 from seerob.description.cad.assembly import LARGEST, SINGLE, Assembly, Instance, Shape, Surface
 from seerob.description.cad.opencascade import plain
 from seerob.description.mesh_files import MeshSource
+from seerob.description.shapes import mass_bounds, mass_properties
 from seerob.description.shapes.mesh_bodies import is_closed, joined
-from seerob.description.shapes.moments import signed_volume
+from seerob.description.shapes.moments import Moments, of_closed_mesh, signed_volume
 from seerob.kernels.signed_distance import farthest_outside
 from seerob.kernels.tree import build_tree
 
@@ -35,6 +36,8 @@ SECONDS, MEMORY = 900.0, 4 << 30
 """Computing time [s] and memory [byte] that reading may take."""
 VALIDATION = 1e-3
 """Share by which area, volume and centroid may differ from what the file states without a warning."""
+INTEGRATED = 5e-5
+"""Share by which volumes and moments of two integrations may differ for the finer one to be taken."""
 AREA, VOLUME = 0.02, 0.02
 """Shares of area and volume by which triangles may be off without a warning."""
 
@@ -135,10 +138,10 @@ def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: 
     if not size <= LARGEST:
         source.fail(f"{printable(name)[:200]} reaches {size:.3g} m", "check its unit")
     whole, _ = joined(pieces)
-    far = _farthest(whole, points)
-    far *= BETWEEN if far <= tolerance else ROUGH
+    # Distances go by what lies outside, masses by both sides.
+    far, either = (d * (BETWEEN if d <= tolerance else ROUGH) for d in _farthest(whole, points))
     rounding = SINGLE * float(np.abs(whole.vertices).max(initial=0.0))
-    deviation = (0.0 if row["flat"] else max(tolerance, far)) + rounding
+    deviation = (0.0 if row["flat"] else max(tolerance, far, either)) + rounding
 
     def note(level: str, text: str) -> None:
         findings.append(Finding(level=level, subject=name, text=text))
@@ -160,13 +163,38 @@ def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: 
             note("warning", f"its triangles enclose {100 * share:+.1f} % of the solid's volume")
     elif not row["solids"] and is_closed(whole):
         note("note", "is made of surfaces, not of a solid; they close")
+    solid, text = _solid(row, whole, deviation)
+    if text:
+        note("warning", text)
     for text in _contradicted(row):
         note("warning", text)
     surfaces = tuple(
         Surface(kind, np.array(at), np.array(axis), tuple(figures), np.array(corners, float).reshape(-1, 3))
         for kind, at, axis, figures, corners in row["surfaces"]
     )
-    return Shape(name, pieces, deviation, row["solids"], row["material"], surfaces)
+    return Shape(name, pieces, deviation, row["solids"], row["material"], surfaces, solid)
+
+
+def _solid(row: dict[str, Any], whole: Mesh, deviation: float) -> tuple[Moments | None, str]:
+    """Moments of the solids themselves where their triangles agree with them, else what does not agree."""
+    if not (row["solids"] and row["volume"] > 0 and row["off"] <= INTEGRATED and is_closed(whole)):
+        return None, ""
+    if not signed_volume(whole) > 0:
+        return None, ""
+    triangles = of_closed_mesh(whole)
+    if row["solids"] > 1:
+        once = mass_properties.from_shape([whole], density=1.0)[0]
+        if abs(once.mass / triangles.volume - 1) > INTEGRATED:  # some overlap, or are in others
+            return None, ""
+    solid = Moments(row["volume"], np.array(row["center"]), np.array(row["inertia"]))
+    off = mass_bounds.off_by(whole, deviation, triangles).volume + INTEGRATED
+    share = solid.volume / triangles.volume - 1
+    if abs(share) > off:
+        return None, (
+            f"its solids have {100 * share:+.2g} % of the volume in their triangles, where {100 * off:.2g} % "
+            "would do: overlapping or inside out? A mass by density goes by the triangles"
+        )
+    return solid, ""
 
 
 def _contradicted(row: dict[str, Any]) -> Iterator[str]:
@@ -183,11 +211,11 @@ def _contradicted(row: dict[str, Any]) -> Iterator[str]:
             yield f"the file states a centroid that is {off * 1e3:.3g} mm from that of its surface"
 
 
-def _farthest(whole: Mesh, points: Array) -> float:
-    """How far the farthest of points on the surface lies outside the triangles [m]."""
+def _farthest(whole: Mesh, points: Array) -> tuple[float, float]:
+    """How far the farthest of points on the surface lies outside of the triangles, and on either side [m]."""
     if not len(points) or not len(whole.faces):
-        return 0.0
+        return 0.0, 0.0
     vertices, faces = np.ascontiguousarray(whole.vertices), np.ascontiguousarray(whole.faces, np.int32)
-    return float(
-        farthest_outside(*build_tree(vertices, faces), is_closed(whole), np.ascontiguousarray(points))
-    )
+    tree, points = build_tree(vertices, faces), np.ascontiguousarray(points)
+    far, either = (float(farthest_outside(*tree, closed, points)) for closed in (is_closed(whole), False))
+    return far, either

@@ -10,7 +10,7 @@ import io
 import math
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from seerob.core.errors import InputError
 from seerob.core.files.bounded import TooLarge, unpacked
 from seerob.core.transforms import Array, rotation_from_axis_angle, rotation_from_wxyz, transform
+from seerob.description.cad import containing
 from seerob.description.cad.assembly import link_row, nearest_rotation
-from seerob.description.cad.containing import ball, cylinder, rounded
 from seerob.description.mesh_files import MeshSource, triangles
-from seerob.description.shapes.shapes import box_mesh
+from seerob.description.shapes.mass_properties import boxes_meet
 
 MAX_PRIMS = 200_000
 MAX_LAYERS = 1_000
@@ -240,7 +240,7 @@ class _Stage:
                 "pieces": self._pieces(prim, shapes, collision=False),
                 "collision": self._pieces(prim, shapes, collision=True),
                 "world": world.tolist(),
-                "inertial": self._inertial(prim),
+                "inertial": self._inertial(prim, shapes),
             }
             if row["pieces"] or row["collision"] or row["inertial"]:
                 parts.append(row)
@@ -283,27 +283,11 @@ class _Stage:
 
     def _pieces(self, owner: Any, prims: list[Any], *, collision: bool) -> list[Piece]:
         """Meshes of prims, in the rigid frame of what they belong to."""
-        above = self._world(owner)
-        stretch = np.linalg.inv(_rigid(above)) @ above
-        if np.abs(stretch - np.eye(4)).max() < 1e-9:
-            stretch = np.eye(4)
         found: list[Piece] = []
         for prim in prims:
-            imageable = self.geom.Imageable(prim)
-            collides = prim.HasAPI(self.physics.CollisionAPI)
-            if collision:
-                if not collides:
-                    continue
-            elif (
-                imageable.ComputePurpose() in ("guide", "proxy")
-                or imageable.ComputeVisibility() == self.geom.Tokens.invisible
-            ):
+            if not (prim.HasAPI(self.physics.CollisionAPI) if collision else self._seen(prim)):
                 continue
-            local = np.eye(4)
-            if prim.GetPath() != owner.GetPath():
-                relative, _ = self.cache.ComputeRelativeTransform(prim, owner)
-                local = np.array(relative, float).T
-            matrix = stretch @ local
+            matrix = self._placed(owner, prim)
             for vertices, faces, color in self._mesh(prim):
                 self.faces += len(faces)
                 if self.faces > self.source.max_faces:
@@ -319,6 +303,22 @@ class _Stage:
                 )
         return found
 
+    def _seen(self, prim: Any) -> bool:
+        imageable = self.geom.Imageable(prim)
+        hidden = imageable.ComputeVisibility() == self.geom.Tokens.invisible
+        return not hidden and imageable.ComputePurpose() not in ("guide", "proxy")
+
+    def _placed(self, owner: Any, prim: Any) -> Array:
+        """The rigid frame of an owner from a prim's own, (4, 4), with every scale."""
+        above = self._world(owner)
+        stretch = np.linalg.inv(_rigid(above)) @ above
+        if np.abs(stretch - np.eye(4)).max() < 1e-9:
+            stretch = np.eye(4)
+        if prim.GetPath() == owner.GetPath():
+            return stretch
+        relative, _ = self.cache.ComputeRelativeTransform(prim, owner)
+        return np.asarray(stretch @ np.array(relative, float).T)
+
     def _mesh(
         self, prim: Any
     ) -> Iterator[tuple[Array, NDArray[np.int64], tuple[float, float, float, float]]]:
@@ -327,16 +327,16 @@ class _Stage:
         if prim.IsA(geom.Mesh):
             yield from self._polygons(prim, color)
             return
-        make = self._simple(prim)
-        if make is None:
+        known = self._simple(prim)
+        if known is None:
             self.left_out.append(
                 (str(prim.GetPath()), f"{prim.GetTypeName()} has no surface that is read here")
             )
             return
-        mesh = make()
+        mesh = known.mesh
         yield mesh.vertices, mesh.faces.astype(np.int64), color
 
-    def _simple(self, prim: Any) -> Callable[[], Any] | None:
+    def _simple(self, prim: Any) -> containing.Contained | None:
         geom = self.geom
 
         def size(name: str) -> float:
@@ -351,15 +351,15 @@ class _Stage:
 
         if prim.IsA(geom.Cube):
             half = size("size") / 2
-            return lambda: box_mesh([-half] * 3, [half] * 3)
+            return containing.box(half)
         if prim.IsA(geom.Sphere):
-            return lambda: ball(size("radius"))
+            return containing.ball_within(size("radius"))
         if prim.IsA(geom.Cylinder):
-            return lambda: cylinder(*ends(size("height")), size("radius"))
+            return containing.cylinder_within(*ends(size("height")), size("radius"))
         if prim.IsA(geom.Capsule):
-            return lambda: rounded(*ends(size("height")), size("radius"))
+            return containing.capsule_within(*ends(size("height")), size("radius"))
         if prim.IsA(geom.Cone):
-            return lambda: cylinder(*ends(size("height")), size("radius"), 0.0)
+            return containing.cone_within(*ends(size("height")), size("radius"))
         return None
 
     def _polygons(
@@ -424,7 +424,7 @@ class _Stage:
 
     # -- masses -------------------------------------------------------------------------------
 
-    def _inertial(self, prim: Any) -> dict[str, Any] | None:
+    def _inertial(self, prim: Any, shapes: list[Any]) -> dict[str, Any] | None:
         """Mass properties in the rigid frame of a prim; None where the file states no mass."""
         if not prim.HasAPI(self.physics.MassAPI):
             return None
@@ -432,7 +432,7 @@ class _Stage:
         mass = float(api.GetMassAttr().Get() or 0.0) * self.kilograms
         density = float(api.GetDensityAttr().Get() or 0.0) * self.kilograms / self.meters**3
         if mass <= 0:
-            return {"density": density} if density > 0 else None
+            return {"density": density, **self._moments(prim, shapes)} if density > 0 else None
         scale = np.linalg.norm(self._world(prim)[:3, :3], axis=0)
         com = np.array(api.GetCenterOfMassAttr().Get(), float)
         moments = np.array(api.GetDiagonalInertiaAttr().Get(), float) * self.kilograms
@@ -440,7 +440,32 @@ class _Stage:
         placed = np.isfinite(com).all()
         frame = transform(turned, com * scale if placed else np.zeros(3))
         known = placed and bool((moments > 0).any())
-        return {"mass": mass, "frame": frame.tolist(), "moments": moments.tolist() if known else None}
+        stated = {"mass": mass, "frame": frame.tolist(), "moments": moments.tolist() if known else None}
+        return stated if known else {**stated, **self._moments(prim, shapes)}
+
+    def _moments(self, owner: Any, prims: list[Any]) -> dict[str, Any]:
+        """Moments of simple shapes at density 1 in the rigid frame of what they belong to, one by one.
+
+        With how far their meshes are outside of them; no moments where one is no simple shape, or some may
+        overlap.
+        """
+        chosen = [prim for prim in prims if prim.HasAPI(self.physics.CollisionAPI)] or [
+            prim for prim in prims if self._seen(prim)
+        ]
+        found: list[Any] = []
+        meshes: list[Any] = []
+        off, simple = 0.0, True
+        for prim in chosen:
+            known = self._simple(prim)
+            if known is None:
+                simple = False
+                continue
+            matrix = self._placed(owner, prim)
+            moments = known.moments.moved(matrix)
+            meshes.append(known.mesh.moved(matrix))
+            found.append([moments.volume, moments.com.tolist(), moments.inertia.tolist()])
+            off = max(off, known.off * float(np.linalg.norm(matrix[:3, :3], 2)))
+        return {"solids": found if simple and found and not boxes_meet(meshes) else None, "off": off}
 
     # -- joints -------------------------------------------------------------------------------
 
@@ -572,7 +597,7 @@ class _Stage:
             prim = bodies[body]
             shapes = owned.get(body, [])
             row["name"] = str(prim.GetDisplayName() or prim.GetName())
-            row["inertial"] = self._inertial(prim)
+            row["inertial"] = self._inertial(prim, shapes)
             row["pieces"] = self._pieces(prim, shapes, collision=False)
             row["collision"] = self._pieces(prim, shapes, collision=True)
         if joint is None:

@@ -585,6 +585,10 @@ def _inertial(
         reader.finding("warning", name, "inertial without a mass: unknown")
         return None, "inertial without a mass", None
     kilograms = float(reader.numbers(mass, "value", f"{key}.mass", (0.0,))[0])
+    # As an import of ours writes them, of a mass by density.
+    off = [float(reader.numbers(mass, key_, f"{key}.mass", (0.0,))[0]) for key_ in ("error", "spread_error")]
+    if not all(0 <= share <= 1e3 for share in off):
+        reader.problem(f"{key}.mass.error", f"is {off}", "a share from 0 up")
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
@@ -601,6 +605,8 @@ def _inertial(
         inertia=0.5 * (matrix + matrix.T),
         origin=Origin.STATED,
         source=f"{reader.file}: link {name}",
+        error=off[0],
+        spread_error=off[1],
     )
     kept, level, text = lint.plausible_inertial(made, body=body)
     if text:

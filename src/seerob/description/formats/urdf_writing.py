@@ -58,7 +58,8 @@ def written(
         description: What is written.
         folder: Of the meshes, relative to the URDF.
         mimics: Whether joints that follow another one are written so.
-        plain: Only what URDF itself has: no ``deviation`` on collisions, capsules of three pieces.
+        plain: Only what URDF itself has: no ``deviation`` on collisions, no ``error`` on masses, capsules of
+            three pieces.
     """
     robot = Element("robot", name=description.name)
     if plain:
@@ -103,7 +104,7 @@ def _link(robot: Element, link: Link, meshes: MeshFiles, *, mimics: bool, plain:
         _origin(fixed, at)
     element = SubElement(robot, "link", name=link.name)
     if link.inertial is not None:
-        _inertial(element, link.inertial)
+        _inertial(element, link.inertial, plain=plain)
     for mesh in link.visual:
         visual = SubElement(element, "visual")
         geometry = SubElement(visual, "geometry")
@@ -158,10 +159,12 @@ def _origin(element: Element, at: Array) -> None:
     SubElement(element, "origin", xyz=_text(at[:3, 3]), rpy=_text(rpy_from_rotation(at[:3, :3])))
 
 
-def _inertial(link: Element, inertial: Inertial) -> None:
+def _inertial(link: Element, inertial: Inertial, *, plain: bool) -> None:
     element = SubElement(link, "inertial")
     SubElement(element, "origin", xyz=_text(inertial.com), rpy="0 0 0")
-    SubElement(element, "mass", value=repr(float(inertial.mass)))
+    off = {"error": inertial.error, "spread_error": inertial.spread_error}
+    said = {} if plain else {key: repr(float(share)) for key, share in off.items() if share > 0}
+    SubElement(element, "mass", {"value": repr(float(inertial.mass)), **said})
     pairs = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
     moments: Mapping[str, str] = {key: repr(float(inertial.inertia[at])) for key, at in pairs.items()}
     SubElement(element, "inertia", dict(moments))

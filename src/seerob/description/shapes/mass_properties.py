@@ -11,6 +11,7 @@ is wider than a voxel the true volume lies between the inside voxels and inside 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Inertial
+from seerob.description.shapes import mass_bounds
 from seerob.description.shapes.detail import from_manifold, manifold
 from seerob.description.shapes.hull import convex_hull
 from seerob.description.shapes.mesh_bodies import (
@@ -38,6 +40,8 @@ from seerob.description.shapes.moments import (
     combined,
     of_capsule,
     of_closed_mesh,
+    of_cone,
+    of_cylinder,
     of_dilated_rectangle,
     of_solid,
     signed_volume,
@@ -50,6 +54,8 @@ class Filled(NamedTuple):
     moments: Moments
     low: float
     high: float
+    inside: Moments
+    """Of the inside voxels alone."""
 
 
 def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
@@ -66,7 +72,14 @@ def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
     inside = ~surface & ~_around(~surface)
     if not inside.any():
         return None
-    weight = inside + 0.5 * surface
+    low_volume = float(inside.sum()) * h**3
+    high_volume = low_volume + float(surface.sum()) * h**3
+    amid = _of_voxels(inside + 0.5 * surface, origin, h)
+    return Filled(amid, low_volume, high_volume, _of_voxels(inside.astype(float), origin, h))
+
+
+def _of_voxels(weight: Array, origin: Array, h: float) -> Moments:
+    """Moments of voxels of size h [m], of which some count in part."""
     index = np.argwhere(weight > 0)
     w = weight[tuple(index.T)] * h**3
     points = origin + (index + 0.5) * h
@@ -74,9 +87,7 @@ def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
     com = w @ points / volume
     d = points - com
     second = (d * w[:, None]).T @ d + volume * h * h / 12 * np.eye(3)
-    inertia = np.trace(second) * np.eye(3) - second
-    low_volume = float(inside.sum()) * h**3
-    return Filled(Moments(volume, com, inertia), low_volume, low_volume + float(surface.sum()) * h**3)
+    return Moments(volume, com, np.trace(second) * np.eye(3) - second)
 
 
 def _around(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -131,10 +142,13 @@ def _overlap(corners: Array, centers: Array) -> NDArray[np.bool_]:
 
 __all__ = [
     "Moments",
+    "boxes_meet",
     "combined",
     "from_shape",
     "of_capsule",
     "of_closed_mesh",
+    "of_cone",
+    "of_cylinder",
     "of_dilated_rectangle",
     "of_solid",
 ]
@@ -149,6 +163,9 @@ class _Estimate(NamedTuple):
     moments: Moments
     method: str
     error: float
+    """Of the volume."""
+    inertia: float = 0.0
+    """By which share what it adds to a mass matrix may be off, in any motion."""
     notes: tuple[str, ...] = ()
     provided: str = ""
     """What the error bound rests on."""
@@ -159,6 +176,7 @@ def from_shape(
     *,
     density: float | None = None,
     mass: float | None = None,
+    deviation: float = 0.0,
     subject: str = "mass properties",
 ) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties of a part of uniform density.
@@ -167,11 +185,13 @@ def from_shape(
         meshes: Its surface, in the part's frame [m]; several are taken together.
         density: Mass per volume [kg/m³]; the mass follows from it.
         mass: Mass [kg]; the inertia is scaled to it. Exactly one of the two.
+        deviation: How far the real surface may lie from the meshes, on either side [m].
         subject: Full name of the part, for findings and errors.
 
     Returns:
-        The mass properties, whose ``error`` bounds the relative error of the mass (0 for a closed mesh
-        and for a given mass), and what was noticed.
+        The mass properties, whose ``error`` bounds the relative error of the mass and ``spread_error`` that
+        of all that they add to a mass matrix (0 for a closed mesh without a deviation, and for a given
+        mass), and what was noticed.
 
     Raises:
         InputError: neither or both are given, or not positive; there is no mesh; or no volume can be
@@ -191,12 +211,18 @@ def from_shape(
     if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
         raise InputError.at(subject, name, "the mesh has no area or is not finite", "export it again")
     estimate = _estimate(mesh, subject, strict=mass is None)
-    moments, error = estimate.moments, estimate.error
+    moments = estimate.moments
+    near = mass_bounds.off_by(mesh, deviation, moments)
+    error, everything = estimate.error + near.volume, estimate.inertia + near.inertia
+    if mass is None and error > WORST:
+        what = f"its surface is known within {deviation * 1e3:.3g} mm: no volume within ±{100 * WORST:.0f} %"
+        raise InputError.at(subject, "density", what, "give the mass, or a mesh with a smaller deviation")
     if mass is None:
         source = f"{given:g} kg/m³ × volume of {estimate.method}"
         inertial = moments.inertial(
             mass=given * moments.volume, origin=Origin.ESTIMATED, source=source, error=error
         )
+        inertial = replace(inertial, spread_error=everything if everything > error else 0.0)
     else:
         source = f"mass given; centre and inertia from uniform density over {estimate.method}"
         inertial = moments.inertial(mass=mass, origin=Origin.GIVEN, source=source)
@@ -204,10 +230,17 @@ def from_shape(
     findings = [Finding(level="note", subject=subject, text=text) for text in notes]
     if error > 0 or estimate.method != _EXACT:
         figure = f"mass {inertial.mass:.4g} kg" if mass is None else "centre of mass and inertia"
-        bound = f"±{100 * error:.{0 if error > 0.1 else 2}f} %" if error > 1e-4 else "exact within 0.01 %"
-        text = f"{figure} from {estimate.method}, volume {bound}{estimate.provided}"
+        text = f"{figure} from {estimate.method}, volume {_within(error)}{estimate.provided}"
+        if deviation > 0:
+            text += f", as its surface lies within {deviation * 1e3:.3g} mm"
+        if everything > max(error, 1e-4):
+            text += f"; in a mass matrix, with centre and inertia, {_within(everything)}"
         findings.append(Finding(level="warning" if error > 0.01 else "note", subject=subject, text=text))
     return inertial, tuple(findings)
+
+
+def _within(error: float) -> str:
+    return f"±{100 * error:.{0 if error > 0.1 else 2}f} %" if error > 1e-4 else "exact within 0.01 %"
 
 
 _EXACT = "the closed mesh"
@@ -238,12 +271,16 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool) -> _Estimate:
     if flooded is not None:
         error = (flooded.high - flooded.low) / (flooded.high + flooded.low)
         if error <= WORST:
-            return _Estimate(flooded.moments, "the mesh filled with voxels (open or tangled)", error)
+            # Of the half of what is on the surface that may be there or not.
+            off = mass_bounds.off_by_difference(flooded.moments, flooded.inside)
+            method = "the mesh filled with voxels (open or tangled)"
+            return _Estimate(flooded.moments, method, error, max(off, error))
     # What is there bounds a hull from inside only while most of the surface is there.
     inner = first.moments.volume if credible else 0.0
     error = 1 - inner / hull.volume
     if error <= WORST or not strict:
-        return _Estimate(hull, "the convex hull of the open mesh", error)
+        off = mass_bounds.off_by_difference(hull, first.moments) if credible else 1.0
+        return _Estimate(hull, "the convex hull of the open mesh", error, max(off, error))
     raise InputError.at(
         subject,
         "density",
@@ -282,7 +319,10 @@ def _of_mended(patched: Mended) -> _Estimate:
     volume = estimate.moments.volume
     error = estimate.error + patched.slack / volume if volume > 0 else np.inf
     provided = ", if the holes' true surface lies in the hull of their rims" if patched.filled else ""
-    return estimate._replace(error=float(error), provided=provided)
+    off = estimate.inertia
+    if volume > 0 and patched.slack > 0:
+        off += mass_bounds.off_by_volume(patched.mesh.vertices, patched.slack, estimate.moments)
+    return estimate._replace(error=float(error), inertia=off, provided=provided)
 
 
 def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:
@@ -294,22 +334,25 @@ def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:
     solid = [p for p, v in zip(parts, volumes, strict=True) if v > 0]
     total = sum(volumes)
     if not solid or not total > 0:
-        return _Estimate(_NOTHING, method, np.inf, notes)
+        return _Estimate(_NOTHING, method, np.inf, 1.0, notes)
     whole = of_closed_mesh(joined_unmerged(parts))
-    if not _boxes_meet(solid):
-        return _Estimate(whole, method, 0.0, notes)
+    if not boxes_meet(solid):
+        return _Estimate(whole, method, 0.0, 0.0, notes)
     union = _union(parts, volumes)
     if union is None:
         error = 1 - max(volumes) / sum(v for v in volumes if v > 0)
-        return _Estimate(whole, method + " (overlaps of its bodies not resolved)", error, notes)
+        largest = of_closed_mesh(parts[int(np.argmax(volumes))])
+        off = max(mass_bounds.off_by_difference(whole, largest), error)
+        return _Estimate(whole, method + " (overlaps of its bodies not resolved)", error, off, notes)
     once = of_closed_mesh(union)
     if once.volume < whole.volume * (1 - 1e-9):
         notes += (f"its {len(parts)} bodies overlap; the {whole.volume - once.volume:.3g} m³ count once",)
-        return _Estimate(once, method, 0.0, notes)
-    return _Estimate(whole, method, 0.0, notes)
+        return _Estimate(once, method, 0.0, 0.0, notes)
+    return _Estimate(whole, method, 0.0, 0.0, notes)
 
 
-def _boxes_meet(parts: Sequence[Mesh]) -> bool:
+def boxes_meet(parts: Sequence[Mesh]) -> bool:
+    """Whether the boxes of two of several meshes overlap."""
     low = np.array([p.vertices.min(axis=0) for p in parts])
     high = np.array([p.vertices.max(axis=0) for p in parts])
     order = np.argsort(low[:, 0])

@@ -16,7 +16,7 @@ and a capsule is the case :math:`b = 0`, a ball :math:`a = b = 0`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import pi
 
@@ -38,6 +38,19 @@ class Moments:
     """Centre of volume [m], shape (3,)."""
     inertia: Array
     """About the centre, at density 1 [m⁵], shape (3, 3)."""
+
+    @property
+    def second(self) -> Array:
+        """Second moments about the centre, at density 1 [m⁵], shape (3, 3)."""
+        return np.asarray(np.trace(self.inertia) / 2 * np.eye(3) - self.inertia)
+
+    def moved(self, matrix: Array) -> Moments:
+        """Moments of the shape under an affine map (4, 4), which may stretch or mirror it."""
+        linear = matrix[:3, :3]
+        share = abs(float(np.linalg.det(linear)))
+        second = share * linear @ self.second @ linear.T
+        com = linear @ self.com + matrix[:3, 3]
+        return Moments(share * self.volume, com, np.trace(second) * np.eye(3) - second)
 
     def inertial(self, *, mass: float, origin: Origin, source: str, error: float = 0.0) -> Inertial:
         """Mass properties of this shape when it has this mass [kg]."""
@@ -79,6 +92,31 @@ def of_capsule(start: Array, end: Array, radius: float) -> Moments:
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     return of_dilated_rectangle(start, end - start, np.zeros(3), radius)
+
+
+def of_cylinder(start: Array, end: Array, radius: float) -> Moments:
+    """Moments of a cylinder between two points (3,) [m]."""
+    return _about_axis(start, end, lambda h: (pi * radius**2 * h, h / 2, radius**2 / 4, h**2 / 12))
+
+
+def of_cone(start: Array, end: Array, radius: float) -> Moments:
+    """Moments of a cone with its base at one point and its tip at another, (3,) each [m]."""
+    return _about_axis(
+        start, end, lambda h: (pi * radius**2 * h / 3, h / 4, 3 * radius**2 / 20, 3 * h**2 / 80)
+    )
+
+
+def _about_axis(
+    start: Array, end: Array, figures: Callable[[float], tuple[float, float, float, float]]
+) -> Moments:
+    """Moments of a body about an axis: volume, centre, and second moments per volume, across and along."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    volume, center, across, along = figures(length)
+    axis /= length
+    second = volume * (across * np.eye(3) + (along - across) * np.outer(axis, axis))
+    return Moments(volume, start + center * axis, np.trace(second) * np.eye(3) - second)
 
 
 def of_dilated_rectangle(corner: Array, u: Array, v: Array, radius: float) -> Moments:

@@ -556,7 +556,7 @@ class _Compiler:
 
 
 def _weight(inertial: Inertial) -> Quantity:
-    return Quantity(inertial.mass, inertial.origin, inertial.source, inertial.error)
+    return Quantity(inertial.mass, inertial.origin, inertial.source, inertial.error, inertial.spread_error)
 
 
 def _body_id(mj: mujoco.MjModel, name: str) -> int:

@@ -133,11 +133,12 @@ def load_thing(
         piece, whole = _simple(thing.shape, color)
         pieces, source = (piece,), "shape in the workstation file"
     solids = tuple(solid for piece in pieces for solid in piece.solids)
+    off = 0.0 if thing.mesh is None else max((solid.deviation for solid in solids), default=0.0)
     findings += _odd(thing, solids, whole)
     inertial: Inertial | None = None
     more: tuple[Finding, ...] = ()
     if needs_mass and (thing.mass is not None or thing.density is not None):
-        inertial, more = _inertial(thing, whole, source)
+        inertial, more = _inertial(thing, whole, off, source)
     elif needs_mass and known is not None:
         inertial = known.inertial
     elif thing.mass is not None and thing.com is not None:
@@ -145,7 +146,7 @@ def load_thing(
         inertial = given_inertial(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)
     if inertial is not None:
         inertial, noticed = _possible(
-            inertial, solids, thing, thing.name, file, "", lambda: _spread(thing, whole)
+            inertial, solids, thing, thing.name, file, "", lambda: _spread(thing, whole, off)
         )
         findings += more + noticed
     if not needs_mass:
@@ -216,10 +217,12 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
     return Piece("", (mesh,), (Solid(mesh=mesh, note=note),)), [mesh]
 
 
-def _inertial(thing: Thing, meshes: list[Mesh], source: str) -> tuple[Inertial, tuple[Finding, ...]]:
+def _inertial(
+    thing: Thing, meshes: list[Mesh], deviation: float, source: str
+) -> tuple[Inertial, tuple[Finding, ...]]:
     if thing.mass is not None and thing.com is not None and thing.inertia is not None:
         return given_inertial(thing.mass, thing.com, thing.inertia, "workstation file"), ()
-    inertial, findings = _spread(thing, meshes)
+    inertial, findings = _spread(thing, meshes, deviation)
     if thing.com is not None:
         inertial = replace(inertial, com=np.array(thing.com, float))
     if thing.mass is not None:
@@ -233,35 +236,36 @@ def _inertial(thing: Thing, meshes: list[Mesh], source: str) -> tuple[Inertial, 
     return inertial, findings
 
 
-def _spread(thing: Thing, meshes: list[Mesh]) -> tuple[Inertial, tuple[Finding, ...]]:
+def _spread(thing: Thing, meshes: list[Mesh], deviation: float) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties at uniform density, and what was noticed."""
-    rounded = _round(thing.shape)
-    if rounded is None:
+    closed = _closed_form(thing.shape)
+    if closed is None:
         try:
             return mass_properties.from_shape(
-                meshes, density=thing.density, mass=thing.mass, subject=thing.name
+                meshes, density=thing.density, mass=thing.mass, deviation=deviation, subject=thing.name
             )
         except InputError as error:
             raise InputError(
                 [problem._replace(file=thing.mesh or "") for problem in error.problems]
             ) from None
-    volume, moments = _capsule(*rounded)
-    what = "capsule" if rounded[1] else "sphere"
+    moments, what = closed
     mass, origin, source = thing.mass, Origin.GIVEN, f"{what}, shape in the workstation file"
     if mass is None:
-        mass = volume * (thing.density or 0.0)
+        mass = moments.volume * (thing.density or 0.0)
         origin, source = Origin.ESTIMATED, f"{thing.density:g} kg/m³ × volume of the {what}"
-    return Inertial(mass, np.zeros(3), np.diag(mass * moments), origin, source), ()
+    return moments.inertial(mass=mass, origin=origin, source=source), ()
 
 
-def _capsule(radius: float, length: float) -> tuple[float, Array]:
-    """Volume [m³] and moments of inertia about the centre per mass [m²] (3,) of a capsule along z."""
-    middle, ends = np.pi * radius**2 * length, 4 / 3 * np.pi * radius**3
-    across = middle * (length**2 / 12 + radius**2 / 4)
-    across += ends * (0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius)
-    along = middle * radius**2 / 2 + ends * 0.4 * radius**2
-    volume = float(middle + ends)
-    return volume, np.array([across, across, along]) / volume
+def _closed_form(shape: Shape | None) -> tuple[mass_properties.Moments, str] | None:
+    """Moments of a ball, a capsule or a cylinder, and what it is; None of what has flat faces alone."""
+    rounded = _round(shape)
+    if rounded is not None:
+        end = np.array([0.0, 0.0, rounded[1] / 2])
+        return mass_properties.of_capsule(-end, end, rounded[0]), "capsule" if rounded[1] else "sphere"
+    if shape is not None and shape.cylinder is not None:
+        end = np.array([0.0, 0.0, shape.cylinder[1] / 2])
+        return mass_properties.of_cylinder(-end, end, shape.cylinder[0]), "cylinder"
+    return None
 
 
 def _hole(thing: Thing, path: Path) -> Finding:
@@ -294,9 +298,9 @@ def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[F
 
 def _odd_mass(mass: float, thing: Thing, meshes: list[Mesh]) -> str:
     """What is odd about a mass in this shape, whose hull bounds its volume where it is not closed."""
-    rounded = _round(thing.shape)
-    if rounded is not None:
-        return lint.odd_mass(mass, _capsule(*rounded)[0], exact=True)
+    closed = _closed_form(thing.shape)
+    if closed is not None:
+        return lint.odd_mass(mass, closed[0].volume, exact=True)
     mesh, _ = joined([m for m in meshes if len(m.faces)])
     hull = hull_volume(mesh.vertices)
     volume = signed_volume(mesh) if is_closed(mesh) else 0.0

@@ -11,9 +11,10 @@ that with a larger mass of any body
 
 All three are monotone in every mass, whatever the others are: their ends are at the ends of the masses.
 
-A density that is off is a mass that is off. A centre of mass that is off by d, in any direction, changes
-:math:`J_c` by no more than :math:`\delta = |d|` times :math:`J_\omega`, so that for every
-:math:`0 < \epsilon < 1`, in the order of Loewner,
+A density that is off is a mass that is off. Of what follows from a density and a mesh, one share bounds mass,
+centre and moments at once (`seerob.description.shapes.mass_bounds`). A centre of mass that is off by d, in
+any direction, changes :math:`J_c` by no more than :math:`\delta = |d|` times :math:`J_\omega`, so that for
+every :math:`0 < \epsilon < 1`, in the order of Loewner,
 
 .. math:: (1-\epsilon) J_c^T J_c - (1/\epsilon - 1)\,\delta^2 J_\omega^T J_\omega
     \le J_{c+d}^T J_{c+d} \le (1+\epsilon) J_c^T J_c + (1 + 1/\epsilon)\,\delta^2 J_\omega^T J_\omega
@@ -106,7 +107,7 @@ class MassTolerances:
     def heaviest(self, body: int) -> tuple[float, float]:
         """Factor on the mass of one of MuJoCo's bodies, and way of its centre of mass [m], at most."""
         offs = [off for off in self._offs if body in off.bodies]
-        factor = max(1 + sum(off.share for off in offs), *(off.heavier for off in offs), 1.0)
+        factor = max(1 + sum(max(off.share, off.spread) for off in offs), *(off.heavier for off in offs), 1.0)
         return factor, sum(off.way_of(body) for off in offs)
 
     def simplified(self, nominal: float, shifts: Shifts) -> float:
@@ -116,7 +117,8 @@ class MassTolerances:
             nominal: As given [kg].
             shifts: Of each tolerance.
         """
-        return nominal + float(self._simplified @ np.array(shifts, float)) if shifts else nominal
+        found = nominal + float(self._simplified @ np.array(shifts, float)) if shifts else nominal
+        return max(found, NOTHING * nominal)
 
     def weighed(self, mj: mujoco.MjModel, shifts: Shifts) -> mujoco.MjModel:
         """A `mujoco.MjModel` with shifted masses, and moments of inertia with them.
@@ -129,9 +131,10 @@ class MassTolerances:
         """
         found, factors = mj.__copy__(), np.ones(mj.nbody)
         for off, shift in zip(self._offs, shifts, strict=True):
-            factors[list(off.bodies)] += shift * off.share
+            factors[list(off.bodies)] += shift * max(off.share, off.spread)
             if off.rotors:
                 found.dof_armature[self.robot.v_address] *= 1 + shift * off.share
+        factors = np.maximum(factors, NOTHING)
         found.body_mass *= factors
         found.body_inertia *= factors[:, None]
         mujoco.mj_setConst(found, mujoco.MjData(found))
@@ -179,6 +182,8 @@ class _Off:
     """Of `mujoco`."""
     share: float = 0.0
     """Of their masses."""
+    spread: float = 0.0
+    """Of all that they add to a mass matrix; no less than the share of their masses."""
     ways: tuple[float, ...] = ()
     """Of the centre of mass of each, or of all its parts [m]; empty where only masses are off."""
     anyhow: bool = False
@@ -201,14 +206,16 @@ class _Off:
         for body in self.bodies:
             part = _Part.of(state, robot, body)
             way = self.way_of(body)
-            each = part.shifted(self, way, qd) if self.ways else (self.share * part.matrix,) * 3
+            share = max(self.share, self.spread)
+            lost = min(share, 1.0) * part.matrix
+            each = part.shifted(self, way, qd) if self.ways else (lost, lost, share * part.matrix)
             found = [a + b for a, b in zip(found, each, strict=True)]
         if self.rotors:
             spun = state.model.mj.dof_armature[robot.v_address]
             matrix = self.share * robot.coupling.T @ (spun[:, None] * robot.coupling)
             found = [a + matrix for a in found]
         lost, at_most, gained = found
-        return _Bounds(lost, at_most, gained, self.anyhow)
+        return _Bounds(lost, at_most, gained, self.anyhow or self.spread >= 1)
 
 
 @dataclass(frozen=True)
@@ -303,9 +310,10 @@ def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Ite
     """
     full = {f"{robot.name}/{link.name}": link.inertial for link in robot.description.links}
     known = [(bodies[name], of) for name, of in full.items() if of is not None and name in bodies]
-    for share in sorted({of.error for _, of in known if of.error}):
-        off = tuple(body for body, of in known if of.error == share)
-        yield _Off(Tolerance(f"masses of links of {robot.name}", 100 * share, "%"), off, share=share)
+    for share, spread in sorted({(of.error, of.spread_error) for _, of in known if of.error}):
+        off = tuple(body for body, of in known if (of.error, of.spread_error) == (share, spread))
+        tolerance = Tolerance(f"masses of links of {robot.name}", 100 * share, "%")
+        yield _Off(tolerance, off, share=share, spread=spread)
     if anyhow := [(body, of) for body, of in known if of.within]:
         widest, error = max(of.within for _, of in anyhow), max(of.error for _, of in anyhow) + either
         yield _Off(
@@ -323,10 +331,11 @@ def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
     given = {thing.name: thing for thing in (*model.workstation.tools, *model.workstation.workpieces)}
     for index in robot.carried:
         body = model.bodies[index]
-        if body.mass is not None and body.mass.error > EXACT:
+        if body.mass is not None and max(body.mass.error, body.mass.spread_error) > EXACT:
             dense = getattr(given.get(body.owner), "density_tolerance", None) or 0.0
-            share = body.mass.error * (1 + dense)
-            yield _Off(Tolerance(f"volume of {body.owner}", 100 * share, "%"), (body.mj,), share=share)
+            share, spread = body.mass.error * (1 + dense), body.mass.spread_error * (1 + dense)
+            tolerance = Tolerance(f"volume of {body.owner}", 100 * share, "%")
+            yield _Off(tolerance, (body.mj,), share=share, spread=spread)
 
 
 class Matrices:

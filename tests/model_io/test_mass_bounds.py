@@ -1,0 +1,181 @@
+"""Mass properties of what a mesh stands for lie within the bounds that are stated of it, in every motion."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.core.errors import InputError
+from seerob.core.shapes import Mesh
+from seerob.description.cad import containing, step
+from seerob.description.mesh_files import MeshSource
+from seerob.description.shapes import moments
+from seerob.description.shapes.mass_bounds import off_by
+from seerob.description.shapes.mass_properties import from_shape
+
+
+def mesh_of(body):
+    return Mesh(np.array(body.vertices), np.array(body.faces, np.int32))
+
+
+def spatial(of, about):
+    """Spatial inertia (6, 6) about a point."""
+    x, y, z = d = of.com - about
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turns = of.inertia + of.volume * (d @ d * np.eye(3) - np.outer(d, d))
+    return np.block([[of.volume * np.eye(3), -of.volume * cross], [of.volume * cross, turns]])
+
+
+def holds(of, truth, share):
+    """Whether a truth is between 1 - share and 1 + share times something, in every motion."""
+    a, b = spatial(of, of.com), spatial(truth, of.com)
+    least = min(np.linalg.eigvalsh((1 + share) * a - b)[0], np.linalg.eigvalsh(b - (1 - share) * a)[0])
+    return least >= -1e-12 * np.trace(a)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("outside", [False, True])
+def test_a_ball_is_within_the_bounds_of_its_triangles_inside_and_around(count, outside):
+    ball = trimesh.creation.icosphere(count, 1.0)
+    inner = float(np.linalg.norm(ball.triangles_center, axis=1).min())
+    size = 0.05 / inner if outside else 0.05
+    mesh = mesh_of(ball.apply_scale(size))
+    found, truth = moments.of_closed_mesh(mesh), moments.of_capsule(np.zeros(3), np.zeros(3), 0.05)
+    off = off_by(mesh, size * (1 - inner), found)
+    assert holds(found, truth, off.inertia)
+    assert abs(truth.volume / found.volume - 1) <= off.volume <= off.inertia
+    # It is no larger than it must be: the layer of a ball is 3 δ/R of its volume, and 5 δ/R of its turn.
+    share = (1 - inner) * size / 0.05
+    assert off.volume < 3.2 * share / (1 - share) ** 3
+    assert off.inertia < 5.5 * share / (1 - share) ** 5
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_lies_within_the_deviation_is_within_the_bounds(seed):
+    """Steps, ribs and dents all over a bracket with a hole: each layer as thick as the deviation."""
+    rng = np.random.default_rng(seed)
+    bodies = [
+        trimesh.creation.torus(0.06, 0.02, 24, 16),
+        trimesh.creation.annulus(0.03, 0.05, 0.1, sections=24),
+        trimesh.creation.box((0.2, 0.05, 0.01)),
+    ]
+    body = bodies[seed % 3].apply_translation(rng.uniform(-0.3, 0.3, 3))
+    mesh, deviation = mesh_of(body), rng.uniform(1e-4, 2e-3)
+    found = moments.of_closed_mesh(mesh)
+    off = off_by(mesh, deviation, found)
+    fine = body.subdivide().subdivide()
+    for _ in range(10):
+        which = (
+            np.sign(rng.uniform(-1, 1)) if rng.random() < 0.3 else rng.choice([-1, 0, 1], len(fine.vertices))
+        )
+        moved = fine.vertices + deviation * np.asarray(which).reshape(-1, 1) * fine.vertex_normals
+        assert holds(found, moments.of_closed_mesh(Mesh(moved, mesh_of(fine).faces)), off.inertia)
+
+
+def test_the_steiner_formula_of_a_box_is_met_exactly():
+    a, b, c, d = 0.2, 0.3, 0.4, 0.01
+    mesh = mesh_of(trimesh.creation.box((a, b, c)))
+    layer = 2 * (a * b + b * c + a * c) * d + math.pi * (a + b + c) * d**2 + 4 / 3 * math.pi * d**3
+    found = off_by(mesh, d, moments.of_closed_mesh(mesh)).volume * a * b * c
+    assert layer <= found < layer + 20 * d**3
+    assert off_by(mesh, 0.0, moments.of_closed_mesh(mesh)) == (0.0, 0.0)
+
+
+def test_sides_that_contradict_each_other_bound_no_less():
+    body = trimesh.creation.icosphere(2, 0.05)
+    odd = np.where(np.arange(len(body.faces))[:, None] % 3 == 0, body.faces[:, ::-1], body.faces)
+    of = moments.of_closed_mesh(mesh_of(body))
+    turned = off_by(Mesh(np.array(body.vertices), odd.astype(np.int32)), 1e-3, of)
+    assert turned.volume >= off_by(mesh_of(body), 1e-3, of).volume * (1 - 1e-12)
+
+
+def test_a_volume_that_its_deviation_leaves_open_is_refused():
+    plate = mesh_of(trimesh.creation.box((0.2, 0.2, 0.001)))
+    with pytest.raises(InputError, match=r"known within 0\.3 mm") as caught:
+        from_shape([plate], density=7850, deviation=3e-4, subject="plate")
+    assert "give the mass" in caught.value.problems[0].remedy
+    assert from_shape([plate], mass=1.0, deviation=3e-4)[0].mass == 1.0
+
+
+def test_simple_shapes_have_the_moments_of_what_they_stand_for():
+    a, b = np.array([0.1, 0.2, 0.3]), np.array([0.3, -0.1, 0.5])
+    for made in (
+        containing.box(0.1),
+        containing.ball_within(0.05),
+        containing.capsule_within(a, b, 0.05),
+        containing.cylinder_within(a, b, 0.05),
+        containing.cone_within(a, b, 0.05),
+    ):
+        around = moments.of_closed_mesh(made.mesh)
+        assert around.volume >= made.moments.volume * (1 - 1e-12)
+        if made.off:
+            assert holds(around, made.moments, off_by(made.mesh, 1.01 * made.off, around).inertia)
+        scaled = np.diag([1.0, -2.0, 3.0, 1.0])
+        stretched = Mesh(made.mesh.vertices @ scaled[:3, :3], made.mesh.faces[:, ::-1])
+        expected, got = moments.of_closed_mesh(stretched), around.moved(scaled)
+        assert got.volume == pytest.approx(expected.volume, rel=1e-9)
+        np.testing.assert_allclose(got.com, expected.com, atol=1e-12)
+        np.testing.assert_allclose(got.inertia, expected.inertia, rtol=1e-9, atol=1e-14)
+
+
+def solids(path):
+    """Balls, cylinders, rings and cones, also of splines: volume [m³], two moments [m⁵], how near."""
+    pytest.importorskip("OCP")
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+    from OCP.BRepPrimAPI import (
+        BRepPrimAPI_MakeCone,
+        BRepPrimAPI_MakeCylinder,
+        BRepPrimAPI_MakeSphere,
+        BRepPrimAPI_MakeTorus,
+    )
+    from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+
+    r, h, R = 0.05, 0.12, 0.08
+    ball, rod, cone = 4 / 3 * math.pi * r**3, math.pi * r**2 * h, math.pi * r**2 * h / 3
+    ring = 2 * math.pi**2 * R * 0.02**2
+    for name, made, volume, across, along in (
+        ("ball", BRepPrimAPI_MakeSphere(50.0), ball, 0.4 * r**2, 0.4 * r**2),
+        ("rod", BRepPrimAPI_MakeCylinder(50.0, 120.0), rod, r**2 / 4 + h**2 / 12, r**2 / 2),
+        ("ring", BRepPrimAPI_MakeTorus(80.0, 20.0), ring, R**2 / 2 + 5 / 8 * 4e-4, R**2 + 3 / 4 * 4e-4),
+        ("cone", BRepPrimAPI_MakeCone(50.0, 0.0, 120.0), cone, 0.15 * r**2 + 3 / 80 * h**2, 0.3 * r**2),
+    ):
+        for splines in (False, True):
+            shape = BRepBuilderAPI_NurbsConvert(made.Shape(), True).Shape() if splines else made.Shape()
+            file = path / f"{name}{splines}.step"
+            writer = STEPControl_Writer()
+            writer.Transfer(shape, STEPControl_StepModelType.STEPControl_AsIs)
+            writer.Write(str(file))
+            yield file, volume, volume * across, volume * along, 5e-5 if splines else 1e-6
+
+
+def test_analytic_solids_of_step_weigh_what_they_do_to_a_millionth(tmp_path):
+    for file, volume, across, along, near in solids(tmp_path):
+        assembly = step.read(MeshSource(file, file.read_bytes(), 1 << 26, 1 << 20))
+        (shape,) = assembly.shapes
+        assert shape.solid is not None, file.name
+        assert shape.solid.volume == pytest.approx(volume, rel=1e-6)
+        np.testing.assert_allclose(
+            np.linalg.eigvalsh(shape.solid.inertia), sorted([across, across, along]), rtol=near
+        )
+        # Its triangles say themselves by how much they are off.
+        made, _ = from_shape(shape.pieces, density=1.0, deviation=shape.deviation)
+        assert abs(made.mass / volume - 1) > 1e-6
+        triangles = moments.Moments(made.mass, made.com, made.inertia)
+        assert holds(triangles, shape.solid, max(made.error, made.spread_error))
+
+
+def test_what_is_written_of_a_round_solid_is_its_own_mass(tmp_path):
+    for file, volume, across, along, near in solids(tmp_path):
+        cell = tmp_path / file.stem
+        assert cli.main(["import", str(file), str(cell), "--density", "7850"]) == Exit.WITHIN
+        (row,) = json.loads((cell / "import.json").read_text())["parts"]
+        assert row["mass"] == pytest.approx(7850 * volume, rel=1e-6)
+        assert row["mass_error"] == 0
+        assert row["written"]["mass"] == row["mass"]
+        expected = 7850 * np.array(sorted([across, across, along]))
+        assert sorted(row["written"]["inertia"][:3]) == pytest.approx(expected, rel=near)
+        assert cli.main(["check-file", str(cell)]) == Exit.WITHIN

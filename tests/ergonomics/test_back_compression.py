@@ -11,10 +11,17 @@ from made_cell import made, person
 from oracles.pinocchio_oracle import index_of, pinocchio_model
 from seerob.core.errors import InputError
 from seerob.core.verdict import Verdict
-from seerob.criteria.ergonomics.back_compression import UPPER, G, compression, held
+from seerob.criteria.ergonomics.back_compression import (
+    UPPER,
+    Accelerations,
+    G,
+    compression,
+    held,
+    moved,
+)
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
-from seerob.session.run import Judge
+from seerob.session.run import Judge, pump
 from seerob.twin.engine import Engine
 
 MODEL = pinocchio_model(PERSON)
@@ -126,3 +133,100 @@ def test_without_a_load_or_without_being_slow_nothing_is_within(tmp_path):
     assert off.verdict is Verdict.UNDECIDED
     with pytest.raises(InputError, match="shorter"):
         told(tmp_path / "g", "lever = 0.06\nlong_lever = 0.05\n")
+
+
+# -- a motion that is called slow ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("load", [0.0, 12.0])
+def test_pinocchio_has_the_same_moments_of_any_motion(load):
+    rng = np.random.default_rng(11)
+    for q in random_q(10, seed=5):
+        v, qdd = rng.normal(0, 1, (2, len(q)))
+        model = MODEL.copy()
+        rows = index_of(model, PERSON)
+        for side in ("right", "left"):
+            hand = model.frames[model.getFrameId(f"{side}_hand", pin.FrameType.BODY)]
+            at = hand.placement.act(np.asarray(LINKS[f"{side}_hand"].inertial.com))
+            model.appendBodyToJoint(
+                hand.parentJoint, pin.Inertia(load / 2, at, np.zeros((3, 3))), pin.SE3.Identity()
+            )
+        # Bones as points: their own turning inertia is no part of the formula.
+        for inertia in model.inertias:
+            inertia.inertia = np.zeros((3, 3))
+        data, own, rate, gain = model.createData(), *np.zeros((3, model.nq))
+        own[rows], rate[rows], gain[rows] = q, v, qdd
+        torque = pin.rnea(model, data, own, rate, gain)
+        found = of(q, load)
+        t = np.linspace(-2e-3, 0.0, 21)
+        seen = []
+        for s in t:
+            R, x = bone_poses(PERSON, q + s * v + s**2 * qdd / 2)
+            seen.append(x[ROWS] + np.einsum("nij,nj->ni", R[ROWS], COMS))
+        a = 2 * np.polyfit(t, np.array(seen).reshape(len(t), -1), 4)[2].reshape(-1, 3)
+        force = found.masses[:, None] * (np.array([0.0, 0.0, -G]) - a)
+        vector = np.cross(found.at - found.joint, force).sum(axis=0)
+        pin.computeJointJacobians(model, data, own)
+        for name in [name for name in JOINTS if name.startswith("lumbar")]:
+            joint = model.getJointId(name)
+            column = model.joints[joint].idx_v
+            J = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            assert J[3:, column] @ vector == pytest.approx(-torque[column], abs=1e-2)
+        across = np.linalg.norm(vector - (vector @ found.spine) * found.spine)
+        expected = compression(across, max(0.0, -force[:, 2].sum()), found.spine[2], 0.05)
+        assert moved(found, a, 0.05) == pytest.approx(expected)
+        still = compression(found.moment, found.weight, found.upright, 0.05)
+        assert moved(found, np.zeros_like(a), 0.05) == pytest.approx(still)
+
+
+def test_accelerations_are_those_of_a_parabola_and_nothing_is_made_up():
+    seen, at = Accelerations(), lambda t: np.array([[1 + t + 2 * t**2, 0.0, -(t**2)]])
+    found = [seen.add(0.01 * k, at(0.01 * k)) for k in range(40)]
+    assert found[0] is found[9] is None
+    for a in found[10:]:
+        np.testing.assert_allclose(a, [[4.0, 0.0, -2.0]], atol=1e-6)
+    np.testing.assert_allclose(seen.add(0.39, at(0.39)), [[4.0, 0.0, -2.0]], atol=1e-6)  # asked again
+    assert seen.add(0.1, at(0.1)) is None  # from another beginning
+    noise = np.random.default_rng(2).normal(0, 1e-3, (200, 1, 3))
+    seen = Accelerations()
+    found = [seen.add(0.01 * k, noise[k]) for k in range(200)]
+    assert np.abs([a for a in found if a is not None]).max() < 0.8
+
+
+def bends_forward(folder, lasts, bend, more):
+    """A person who stands for a second, and bends forward."""
+    (folder / "motion").mkdir(parents=True, exist_ok=True)
+    at = '[[keyframes]]\nposture = "standing"\nt ='
+    bent = f"joints = {{ pelvis_tilt_back_deg = {-bend} }}"
+    keys = f'title = "bend"\n{at} 0\n{at} 1\n{at} {1 + lasts}\n{bent}\n'
+    (folder / "motion/bend.toml").write_text(keys)
+    source = '[[sources]]\nkind = "keyframes"\nhuman = "op"\nfile = "motion/bend.toml"\n'
+    return made(folder, person("op") + source + TABLE + more)
+
+
+def verdicts(cell, until):
+    engine, judge = Engine(cell.model), Judge(cell.bound)
+    feed = pump(cell.sources, cell.workstation.engine.tick)
+    found = []
+    for samples in feed:
+        engine.take(samples)
+        state = engine.tick() if found else engine.start()
+        (result,) = judge(state)
+        found.append((state.t, result))
+        if state.t >= until:
+            return found
+    return found
+
+
+@pytest.mark.parametrize("load", [1, 4])
+def test_a_motion_that_is_called_slow_and_is_not_is_never_within(tmp_path, load):
+    more = f"load = {load}\nslow = true\n"
+    slow = verdicts(bends_forward(tmp_path / "slow", 4.0, 10, more), 5.0)
+    assert {result.verdict for _, result in slow} == {Verdict.WITHIN}
+    quick = verdicts(bends_forward(tmp_path / "quick", 0.15, 10, more), 2.0)
+    undecided = [result for _, result in quick if result.verdict is Verdict.UNDECIDED]
+    assert undecided
+    assert all("harder than their weight" in result.reason for result in undecided)
+    seldom = verdicts(bends_forward(tmp_path / "seldom", 0.15, 10, f"{more}every = 0.5\n"), 2.0)
+    assert Verdict.WITHIN not in {result.verdict for _, result in seldom}
+    assert "nobody sees whether it is slow" in seldom[0][1].reason

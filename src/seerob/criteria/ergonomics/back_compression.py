@@ -8,11 +8,16 @@ What is below, and the ground, does not enter.
 
 with :math:`M_\perp` the moment across the spine's axis :math:`u`, :math:`d` the lever of the muscle and
 :math:`W` the weight above the joint.
+
+That the motion is slow is the file's word. It is held against what is seen: with the accelerations of the
+last `WINDOW` seconds the same formula says what it takes to move body and load, and where that is more by
+`SHARE`, the weights are not all that acts.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -20,7 +25,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
-from seerob.core.domains import at_least
+from seerob.core.domains import agree, at_least
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Arrow, Basis, Input, Origin, Result
 from seerob.core.transforms import Array
@@ -44,6 +49,14 @@ LEVER, LONG_LEVER = 0.05, 0.075
 1987, quoted from memory)."""
 BODY = 0.1
 """By how much each bone's weight may differ from that of the regressions, as a share; a choice."""
+WINDOW = 0.2
+"""Over which accelerations are taken [s]: a lift takes a second and more; a choice."""
+FEWEST = 5
+"""Instants within it, by which noise is not an acceleration of its own; a choice."""
+SELDOM = WINDOW / (FEWEST - 1)
+"""Who is asked less often does not see whether a motion is slow [s]."""
+SHARE = 0.1
+"""How much more than their weight body and load may press where the motion is called slow; a choice."""
 ARMS = {
     side: tuple(f"{side}_{bone}" for bone in ("upper_arm", "forearm", "hand")) for side in ("right", "left")
 }
@@ -82,6 +95,14 @@ class Held(NamedTuple):
     """Sum of the sizes of the moments of all bones [N·m]."""
     shoulders: tuple[float, float]
     """Moments about the right shoulder and the left one [N·m]."""
+    at: Array
+    """Centres of mass of the bones [m], shape (n, 3)."""
+    masses: Array
+    """Of the bones, with the load [kg], shape (n,)."""
+    joint: Array
+    """L5/S1 [m], shape (3,)."""
+    spine: Array
+    """Its axis there, shape (3,)."""
 
 
 def compression(moment: float, weight: float, upright: float, lever: float) -> float:
@@ -142,7 +163,55 @@ def held(
         error=off * (G * float(m @ np.array(paths)) + float(np.linalg.norm(vector))),
         each=float((np.linalg.norm(moments, axis=1) * masses / m).sum()),
         shoulders=(shoulders[0], shoulders[1]),
+        at=at,
+        masses=m,
+        joint=p,
+        spine=u,
     )
+
+
+def moved(found: Held, a: Array, lever: float) -> float:
+    """Compression while bones and load accelerate [N]; of a body at rest that of `compression`.
+
+    Args:
+        found: The posture.
+        a: Accelerations of the bones' centres of mass [m/s²], shape (n, 3).
+        lever: Of the muscle [m].
+    """
+    agree(n=(len(found.masses), len(a)))
+    force = found.masses[:, None] * (np.array([0.0, 0.0, -G]) - a)
+    vector, u = np.cross(found.at - found.joint, force).sum(axis=0), found.spine
+    across = float(np.linalg.norm(vector - (vector @ u) * u))
+    return compression(across, max(0.0, float(-force[:, 2].sum())), float(u[2]), lever)
+
+
+class Accelerations:
+    """Of points, out of where they were at the last instants: the parabola through those of `WINDOW`."""
+
+    def __init__(self) -> None:
+        self._seen = deque[tuple[float, Array]]()
+
+    def add(self, t: float, at: Array) -> Array | None:
+        """Accelerations [m/s²], shape (n, 3); None while fewer than `FEWEST` instants are within the window.
+
+        Args:
+            t: [s]
+            at: Points then [m], shape (n, 3).
+        """
+        seen = self._seen
+        if seen and t < seen[-1][0]:
+            seen.clear()
+        elif seen and t == seen[-1][0]:
+            seen.pop()
+        seen.append((t, at))
+        while t - seen[0][0] > WINDOW * (1 + 1e-9):
+            seen.popleft()
+        if len(seen) < FEWEST or t - seen[0][0] < WINDOW / 2:
+            return None
+        times = np.array([each for each, _ in seen]) - t
+        places = np.stack([each for _, each in seen]).reshape(len(seen), -1)
+        found: Array = 2 * np.linalg.lstsq(np.vander(times, 3), places, rcond=None)[0][0].reshape(at.shape)
+        return found
 
 
 class BackCompression(PostureRule, frozen=True, kw_only=True):
@@ -158,7 +227,8 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
     hands: Literal["both", "right", "left"] = "both"
     """Which hold it; of both each has half of it."""
     slow: bool = False
-    """Whether body and load move so slowly that no more than their weight acts; else nothing is within."""
+    """Whether body and load move so slowly that no more than their weight acts; else nothing is within, nor
+    where they are seen to move faster."""
     limit: Annotated[float, Meta(gt=0, extra={"unit": "N"})] = ACTION_LIMIT
     """Largest admissible compression [N]; NIOSH's action limit when not given."""
     lever: Annotated[float, Meta(gt=0, le=0.2, extra={"unit": "m"})] = LEVER
@@ -184,6 +254,7 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
         off = max(error.values(), default=0.0) if isinstance(error, Mapping) else error or 0.0
         sides = ("right", "left") if self.hands == "both" else (self.hands,)
         unmeasured = {bone for bone in self.unmeasured if bone in UPPER}
+        accelerations, seldom = Accelerations(), (self.every or 0.0) > SELDOM
 
         def compute(twin: Twin) -> Figure:
             assert isinstance(twin, State)
@@ -204,22 +275,25 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
                 found.moment + loose, found.weight + weight, min(found.upright + off, 1.0), self.lever
             )
             known = math.isfinite(most)
+            a, share = accelerations.add(twin.t, found.at), 0.0
+            if a is not None:
+                share = moved(found, a, self.lever) / value - 1
             return Figure(
                 value if known else None,
                 self.limit,
                 interval=(low, high if known else math.inf),
-                open=not (known and self.slow),
-                beside=(found, known),
+                open=not (known and self.slow) or seldom or share > SHARE,
+                beside=(found, known, share),
             )
 
         return compute
 
     def present(self, model: Model) -> Present:
         """Return the function that says the moments and draws the compression at the lumbar bone."""
-        frame = model.frame(f"{self.human}/lumbar")
+        frame, seldom = model.frame(f"{self.human}/lumbar"), (self.every or 0.0) > SELDOM
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
-            posture, known = figure.beside
+            posture, known, share = figure.beside
             parts = tuple(
                 Result(name=name, value=moment, unit="N·m")
                 for name, moment in (
@@ -234,6 +308,13 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
                     reason = "not entered: load"
                 elif not self.slow and figure.interval is not None and figure.interval[1] <= self.limit:
                     reason = "what it takes to accelerate body and load is not counted: give slow = true"
+                elif share > SHARE:
+                    reason = (
+                        "slow = true, and body and load are seen to accelerate so that they press "
+                        f"{share:.0%} harder than their weight"
+                    )
+                elif seldom:
+                    reason = f"every = {self.every:g}: so seldom nobody sees whether it is slow"
                 else:
                     reason = "lever of the muscles, weight of the body and accuracy of the angles decide"
             place = state.drawn_point(frame, np.zeros(3))
@@ -254,6 +335,10 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
             return (Arrow(origin=(x, y, z + long), vector=(0.0, 0.0, -long), label=label, verdict=verdict),)
 
         return draw
+
+    def remembers(self, model: Model) -> bool:
+        """Say that accelerations follow from earlier instants."""
+        return True
 
     def one_by_one(self, model: Model) -> str:
         """Say so: what hands hold is known of one instant at a time."""
@@ -290,7 +375,9 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
                 *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured, model, self.human),
             ),
             not_modelled=(
-                "what it takes to accelerate body and load: with slow = false nothing is within",
+                "what it takes to accelerate body and load: with slow = false nothing is within, nor where "
+                f"they are seen to press {SHARE:.0%} harder than their weight, which the first "
+                f"{WINDOW / 2:g} s do not show",
                 "a load whose centre is farther from the body than the hands, or that pushes or pulls",
                 "muscles that work against each other, and pressure in the abdomen",
                 "twisting moments, shear, and how often it is done",

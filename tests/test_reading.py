@@ -90,7 +90,7 @@ WRONG = {
     "astronomic in mm": (
         ROBOT + "base={position_mm=[0,0,1" + "0" * 400 + "]}",
         "robots[0].base.position_mm[2]",
-        "inf",
+        "finite",
     ),
     "too far": (ROBOT + "base = { position = [0, 0, 1e7] }", "robots[0].base.position[2]", "<= 1000"),
     "below a range": (
@@ -185,7 +185,7 @@ WRONG = {
     "negative distance": (
         "[[safety]]\nkind='minimum_distance'\nbetween=['a','b']\nlimit_mm=-1",
         "safety[0].limit_mm",
-        "-0.001 is wrong; expected a number >= 0 [m]",
+        "-1 is wrong; expected a number >= 0 [mm]",
     ),
     "period of nothing": ("[[safety]]\nkind='velocity'\nat='x'\nevery=0", "safety[0].every", "> 0 [s]"),
     "reacts at once": (

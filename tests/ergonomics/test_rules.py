@@ -246,8 +246,12 @@ def test_every_threshold_stands_in_the_basis_with_its_origin(tmp_path, kind):
 def test_what_was_not_entered_stands_in_the_basis_as_missing(tmp_path):
     stage = station(tmp_path, table("reba", phases="load = 3"))
     named = {i.name: i for i in stage.bound[0].basis.inputs}
-    assert (named["load"].value, named["load"].unit, named["load"].origin) == (3.0, "kg", Origin.GIVEN)
-    assert {named[k].origin for k in ("coupling", "legs", "static", "shock")} == {Origin.MISSING}
+    assert (named["entered load"].value, named["entered load"].unit, named["entered load"].origin) == (
+        3.0,
+        "kg",
+        Origin.GIVEN,
+    )
+    assert {named[f"entered {k}"].origin for k in ("coupling", "legs", "static", "shock")} == {Origin.MISSING}
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_the_basis_names_the_phase_and_its_time(tmp_path):
     stage = made(tmp_path, HUMANS + FIRST + SECOND + RULES)
     for bound in stage.bound:
         named = {i.name: i for i in bound.basis.inputs}
-        load = named["load from 1 s to 3 s (pick)"]
+        load = named["entered load from 1 s to 3 s (pick)"]
         assert (load.value, load.origin) == (12, Origin.GIVEN)
 
 

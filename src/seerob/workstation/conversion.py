@@ -11,7 +11,7 @@ import types
 from collections.abc import Collection, Mapping
 from enum import Enum
 from functools import cache
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
@@ -82,12 +82,22 @@ def described(wanted: object) -> str | None:
     return None
 
 
-def expected(wanted: object, complaint: str) -> str:
+class Written(NamedTuple):
+    """A value as it stands in the file, under a key with a unit of its own."""
+
+    value: object
+    unit: str
+    factor: float
+    """SI over that unit."""
+
+
+def expected(wanted: object, complaint: str, written: Written | None = None) -> str:
     """What would be right, from the type and the complaint of `msgspec`.
 
     Args:
         wanted: The field's type.
         complaint: Message of a `msgspec.ValidationError` without its place.
+        written: What it says is in the unit of that; in SI when None.
     """
     allowed = choices(wanted)
     if allowed and ("enum" in complaint or "Expected `str`" in complaint):
@@ -100,6 +110,10 @@ def expected(wanted: object, complaint: str) -> str:
     nouns = [_NOUNS.get(name, name) for name in found.group(1).split(" | ") if name != "null"]
     unit = unit_of(wanted)
     rest = re.sub(r"\.0$", "", found.group(2))
+    if written is not None:
+        unit, factor = written.unit, written.factor
+        # A bound of the number, not of how many there are.
+        rest = re.sub(r"^( [<>]=? )(\S+)$", lambda bound: f"{bound[1]}{float(bound[2]) / factor:.6g}", rest)
     return f"expected {' or '.join(nouns)}{rest}" + (f" [{unit}]" if unit else "")
 
 
@@ -139,7 +153,7 @@ def convert(
     missing = [name for name, info in fields.items() if info.required and name not in given]
     for name, value in table.items():
         place = _join(key, name)
-        field, factor = _field(name, fields)
+        field, suffix = _field(name, fields)
         if field is None:
             remedy = _wrong_unit(name, fields) or suggestion(name, [*fields, *beside])
             meant = _ALSO_CALLED.get(name) or (missing[0] if len(missing) == 1 else "")
@@ -149,9 +163,12 @@ def convert(
         elif field in values:
             problems.append(Problem(file, place, f"{field!r} is given twice, in two units", "keep one"))
         else:
-            if factor is not None:
+            written = None
+            if suffix is not None:
+                factor = quantities.SUFFIXES[suffix][1]
+                written = Written(value, _UNITS.get(suffix, suffix), factor)
                 value = _scaled(value, factor)  # noqa: PLW2901
-            values[field] = _value(value, fields[field].type, place, file, problems)
+            values[field] = _value(value, fields[field].type, place, file, problems, written)
     for name, info in fields.items():
         if info.required and name not in values:
             problems.append(Problem(file, _join(key, name), "missing", _give(info.type)))
@@ -204,13 +221,17 @@ def _give(wanted: object) -> str:
     return ""
 
 
-def _field(name: str, fields: Mapping[str, Any]) -> tuple[str | None, float | None]:
-    """Field and factor that a key means: itself, or a field with a unit suffix."""
+_UNITS = {"deg_s": "deg/s", "mm_s": "mm/s", "g_cm3": "g/cm³"}
+"""Units of suffixes that are written otherwise than these."""
+
+
+def _field(name: str, fields: Mapping[str, Any]) -> tuple[str | None, str | None]:
+    """Field and suffix that a key means: itself, or a field with a unit suffix."""
     if name in fields:
         return name, None
-    for stem, unit, factor in quantities.splits(name):
+    for stem, unit, _ in quantities.splits(name):
         if stem in fields and unit_of(fields[stem].type) == unit:
-            return stem, factor
+            return stem, name.removeprefix(stem + "_")
     return None, None
 
 
@@ -237,7 +258,14 @@ def _scaled(value: object, factor: float) -> object:
     return value * factor if abs(value) < LARGEST * LARGEST else math.inf
 
 
-def _value(value: Any, wanted: Any, place: str, file: str, problems: list[Problem]) -> Any:
+def _value(
+    value: Any,
+    wanted: Any,
+    place: str,
+    file: str,
+    problems: list[Problem],
+    written: Written | None = None,
+) -> Any:
     for option in members(wanted) if isinstance(value, dict | list) else ():
         arguments = get_args(option)
         if is_struct(option) and isinstance(value, dict):
@@ -254,22 +282,21 @@ def _value(value: Any, wanted: Any, place: str, file: str, problems: list[Proble
             }
     unusable = _unusable(value, place)
     if unusable is not None:
-        problems.append(
-            Problem(
-                file,
-                unusable[0],
-                f"{short(unusable[1])} is wrong",
-                f"expected a finite number, not beyond {LARGEST:g}",
-            )
-        )
+        where, shown = unusable
+        largest = LARGEST
+        if written is not None:
+            shown, largest = _inner(written.value, where.removeprefix(place)), LARGEST / written.factor
+        remedy = f"expected a finite number, not beyond {largest:g}"
+        problems.append(Problem(file, where, f"{short(shown)} is wrong", remedy))
         return None
     try:
         return msgspec.convert(value, wanted)
     except msgspec.ValidationError as error:
         complaint, _, path = str(error).partition(" - at `")
         path = path.rstrip("`").removeprefix("$")
-        what = f"{short(_inner(value, path))} is wrong"
-        problems.append(Problem(file, place + path, what, expected(wanted, complaint)))
+        given = value if written is None else written.value
+        what = f"{short(_inner(given, path))} is wrong"
+        problems.append(Problem(file, place + path, what, expected(wanted, complaint, written)))
         return None
 
 

@@ -20,7 +20,7 @@ export function BasisView({ basis }: { basis: Basis }) {
   return (
     <div class="basis">
       <h3>{said("Basis")}</h3>
-      <p class="formula">{basis.formula}</p>
+      <p class="formula">{spoken(basis.formula)}</p>
       <p class="cited">{spoken(basis.source)}</p>
       {basis.inputs.length > 0 && (
         <table class="inputs">
@@ -46,13 +46,26 @@ export function BasisView({ basis }: { basis: Basis }) {
   );
 }
 
+/** A word may be told otherwise beside its name than alone. */
+function pair(name: string, text: string): readonly [string, string] {
+  const [whole, both] = [`${name}: ${text}`, said(`${name}: ${text}`)];
+  const end = both.lastIndexOf(": ");
+  return both === whole ? [label(name), spoken(text)] : [both.slice(0, end), both.slice(end + 2)];
+}
+
+/** What an input is called: never by a name of the file alone, so that a single word can be told. */
+const label = (name: string) => (said(name) === name ? spoken(name) : said(name));
+
 function InputRow({ input }: { input: Input }) {
-  const value = typeof input.value === "number" ? formatNumber(input.value) : (input.value ?? "–");
+  const [name, value] =
+    typeof input.value === "number"
+      ? [label(input.name), formatNumber(input.value)]
+      : pair(input.name, input.value ?? "");
   return (
     <tr>
-      <th scope="row">{spoken(input.name)}</th>
+      <th scope="row">{name}</th>
       <td class="number">
-        {value} <span class="unit">{input.unit}</span>
+        {value || "–"} <span class="unit">{input.unit}</span>
       </td>
       <td>
         <span class={`origin origin-${input.origin}`}>{said(ORIGINS[input.origin] ?? input.origin)}</span>

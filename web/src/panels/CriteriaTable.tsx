@@ -204,7 +204,7 @@ function WorstInstants({ info }: { info: CriterionInfo }) {
 
 function hint({ info }: Row): string {
   const { basis } = info;
-  return basis ? `${told(info.title)}\n${basis.formula}\n${basis.source}` : told(info.title);
+  return basis ? `${told(info.title)}\n${told(basis.formula)}\n${told(basis.source)}` : told(info.title);
 }
 
 /** What the whole run came to, and of which share of it that speaks. */

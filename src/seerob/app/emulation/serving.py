@@ -58,7 +58,7 @@ def served(kind: str, asked: EmulatorOptions) -> Iterator[Served]:
         to = getattr(server, "to", None)
         host, port = to or (getattr(server, "host", asked.host), getattr(server, "port", 0))
         commands = probes_of(kind, host, port, sends=bool(to), commands=made.commands)
-        at = f"{'sends to' if to else 'listens at'} {host}:{port}"
+        at = f"sends to {host}:{port}" if to else f"listens at {host}:{port}"
         ports = {option: getattr(server, option, 0) for option in asked.listens}
         yield Served(server, made.what, at, commands, ports)
     finally:

@@ -103,7 +103,7 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
             formula="time since the device's output and (distance to the field > 0) were last the same",
             source="comparison of a signal with the twin; no standard",
             inputs=(
-                Input(name=self.variable, origin=Origin.MEASURED, source=source),
+                Input(name=f"variable {self.variable}", origin=Origin.MEASURED, source=source),
                 *provenance.motion(model, *gap.carriers),
                 *provenance.shapes(gap),
                 *provenance.limit(self.limit, "s"),

@@ -108,7 +108,9 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
             formula=f"{self.variable} as its controller tells it",
             source="the machine itself",
             inputs=(
-                Input(name=self.variable, unit=self.unit, origin=Origin.MEASURED, source=source),
+                Input(
+                    name=f"variable {self.variable}", unit=self.unit, origin=Origin.MEASURED, source=source
+                ),
                 Input(name="time-out", value=figure, unit="s", origin=Origin.GIVEN, source="dictionary"),
                 *expected,
                 *provenance.limit(self.limit, self.unit),

@@ -32,7 +32,7 @@ def entered(phases: Sequence[Phase], unknown: Phase) -> tuple[Input, ...]:
         where = _where(phase) if len(listed) > 1 or phase.start > 0 or phase.end is not None else ""
         for field in msgspec.structs.fields(phase):
             value = getattr(phase, field.name)
-            name = field.name.replace("_", " ") + where
+            name = f"entered {field.name.replace('_', ' ')}{where}"
             if field.name in Phase.__struct_fields__:
                 continue
             if value is None:

@@ -149,7 +149,7 @@ def faster(human: str, seen: float, human_speed: float | None) -> str:
     v_h = human_speed or WALKING
     if not seen > v_h:
         return ""
-    return f", and {human} is seen at {figures.worded(seen, v_h, 'm/s', at_most=True)}, faster than v_h"
+    return f"; {human} is seen at {figures.worded(seen, v_h, 'm/s', at_most=True)}, faster than v_h"
 
 
 def terms(S_r: float, S_s: float, S_h: float) -> tuple[Result, ...]:

@@ -213,8 +213,8 @@ class DeviceClock:
         risen = self._offset + DRIFT * passed
         if raw < self._offset - STEP:
             ahead, self._ahead = self._ahead, raw
-            what = f"its time stamps are {self._offset - raw:.3g} s ahead of what its clock was"
-            self._hold(host, HOLD, what)
+            why = f"its time stamps are {self._offset - raw:.3g} s ahead of what its clock was"
+            self._hold(host, HOLD, why)
             if ahead is None:
                 return False
             raw = max(ahead, raw)
@@ -244,24 +244,24 @@ class DeviceClock:
         if before == said:
             self._otherwise = 0
             if not self._connected:
-                what = f"says again what it said {back:.3g} s before: is a recording played to it?"
-                self._hold(host, HOLD, what)
+                why = f"says again what it said {back:.3g} s before: is a recording played to it?"
+                self._hold(host, HOLD, why)
                 return False
         elif before is not None and device > self._last_otherwise:
             self._otherwise, self._last_otherwise = self._otherwise + 1, device
         late = host - device - self._offset - DRIFT * max(0.0, host - self._host)
         if late < BUFFERED and self._otherwise < OTHERWISE:
             # Who is told of it is told once.
-            what = f"its time went back by {back:.3g} s{MAY_BE_LATE}"
+            why = f"its time went back by {back:.3g} s{MAY_BE_LATE}"
             standing = self._standing(host)
-            self._hold(host, HOLD, standing if standing.endswith(MAY_BE_LATE) else what)
+            self._hold(host, HOLD, standing if standing.endswith(MAY_BE_LATE) else why)
             return False
         if host - self._restarted < AGAIN:
-            what = f"its time went back by {back:.3g} s, not for the first time within {AGAIN:g} s: a loop?"
-            self._hold(host, AGAIN, what)
+            why = f"its time went back by {back:.3g} s, not for the first time within {AGAIN:g} s: a loop?"
+            self._hold(host, AGAIN, why)
         else:
-            what = f"its time went back by {back:.3g} s: it seems to have started again"
-            self._hold(host, RESTART_HOLD, what)
+            why = f"its time went back by {back:.3g} s: it seems to have started again"
+            self._hold(host, RESTART_HOLD, why)
         if late < BUFFERED:
             self._before = None
         elif self._before is None or host - self._restarted > RESTART_HOLD:

@@ -195,10 +195,11 @@ def payload(robot: str, things: Mapping[str, float | None]) -> list[Finding]:
         return []
     known = {name: mass for name, mass in things.items() if mass is not None}
     total = sum(known.values())
-    text = "carries " + ("at least " if len(known) < len(things) else "") + f"{total:.4g} kg: "
-    text += ", ".join(
-        f"{name} {'unknown' if mass is None else f'{mass:.4g} kg'}" for name, mass in things.items()
+    each = ", ".join(
+        f"{name} unknown" if mass is None else f"{name} {mass:.4g} kg" for name, mass in things.items()
     )
+    some = len(known) < len(things)
+    text = f"carries at least {total:.4g} kg: {each}" if some else f"carries {total:.4g} kg: {each}"
     if total <= MAX_PAYLOAD:
         return [Finding(level="note", subject=robot, text=text)]
     text += f"; no robot beside a person carries more than {MAX_PAYLOAD:g} kg: check the unit"

@@ -602,9 +602,11 @@ def unasked(model: Model) -> Iterator[Finding]:
             and (m.name in named or not judged.isdisjoint(m.bodies))
         )
         remedy = f'name it in one, such as separation between = ["{moving.name}", "{station.humans[0].name}"]'
-        what = f"not evaluated: {moving.name} moves"
-        if carried:
-            what += f" and carries {', '.join(carried)}"
+        what = (
+            f"not evaluated: {moving.name} moves and carries {', '.join(carried)}"
+            if carried
+            else f"not evaluated: {moving.name} moves"
+        )
         text = f"{what}, and no criterion asks about it: {remedy}"
         yield Finding(level="warning", subject=moving.name, text=text, holds=carried)
 

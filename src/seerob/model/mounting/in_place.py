@@ -63,8 +63,13 @@ def _without_floor(model: Model, place: _Home) -> Iterator[Finding]:
         low = place.lowest(_of(model, model.mechanisms[human.name]))
         if human.name in place.still and low >= -LEVEL:
             continue  # where they stand is compared with z = 0
-        where = f"{-low:.3g} m below it" if human.name in place.still else "where a source puts them below it"
-        text = f"nothing is drawn that stands at z = 0: nobody looks at what {human.name} stands on {where}"
+        text = (
+            "nothing is drawn that stands at z = 0: nobody looks at what "
+            f"{human.name} stands on {-low:.3g} m below it"
+            if human.name in place.still
+            else "nothing is drawn that stands at z = 0: nobody looks at what "
+            f"{human.name} stands on where a source puts them below it"
+        )
         yield Finding(level="assumed", subject=human.name, text=text)
 
 

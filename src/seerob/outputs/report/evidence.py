@@ -74,7 +74,7 @@ def evaluated(report: Report) -> Html:
     )  # fmt: skip
     facts: list[list[str | Html]] = [
         [said("workstation"), scene.title],
-        [said("editions of the figures"), scene.edition],
+        [said("editions of the figures"), told(scene.edition)],
         [said("run time"), span],
         *([what, value] for what, value in how.engine),
         *(
@@ -130,7 +130,7 @@ def _sources(heads: list[str], how: Setup) -> Html:
             "from then on."
         )
         return joined([table(heads, how.sources), tag("p", text, class_="lead")])
-    return tag("p", said("No source: everything stands still.") if how.readable else UNKNOWN)
+    return tag("p", said("No source: everything stands still.") if how.readable else said(UNKNOWN))
 
 
 Cell = str | float | int | None

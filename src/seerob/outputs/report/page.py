@@ -227,7 +227,7 @@ def _cover(report: Report, title: str, contents: Sequence[str]) -> Html:
         word("author"): cover.author,
         word("revision"): cover.revision,
         word("written"): said("{date}, by seerob {version}", date=report.date, version=scene.version),
-        word("figures from"): scene.edition,
+        word("figures from"): told(scene.edition),
         word("inputs, SHA-256"): scene.workstation_hash,
     }
     return tag(
@@ -256,7 +256,8 @@ def _logo(report: Report) -> Html | None:
     data = report.files.get(name, b"")
     kind = next((kind for begin, kind in _IMAGES.items() if data.startswith(begin)), None)
     if kind is None or len(data) > _LARGEST_LOGO:
-        return tag("p", f"{name} is no PNG or JPEG file of at most 1 MB: no logo.", class_="lead")
+        text = said("{name} is no PNG or JPEG file of at most 1 MB: no logo.", name=name)
+        return tag("p", text, class_="lead")
     return tag("img", src=f"data:image/{kind};base64,{b64encode(data).decode()}", alt="", class_="logo")
 
 
@@ -473,7 +474,9 @@ def _parts(series: Series) -> Html | None:
 def _formula(basis: Basis | None) -> Html:
     if basis is None:
         return tag("p", said("The criterion did not say what its figure rests on."), class_="doubt")
-    return joined([tag("p", basis.formula, class_="formula"), tag("p", told(basis.source), class_="lead")])
+    return joined(
+        [tag("p", told(basis.formula), class_="formula"), tag("p", told(basis.source), class_="lead")]
+    )
 
 
 def _origins(report: Report) -> Html:

@@ -107,7 +107,7 @@ def curve(series: Series, *, salt: str) -> Html:
     middle = _number((y.begin + y.end) / 2)
     return _svg(
         _HEIGHT,
-        f"{series.name} over time",
+        said("{name} over time", name=series.name),
         _hatches(salt),
         under,
         [
@@ -151,7 +151,11 @@ def lanes(series: Sequence[Series], *, salt: str) -> Html:
                         _rectangle(a, top, b - a, 0.72 * row, f"url(#{_hatch(verdict, salt, on=True)})")
                     )
     return _svg(
-        height, "Verdict of every criterion over time", _hatches(salt, on=True), drawn, _time_axis(x, floor)
+        height,
+        said("Verdict of every criterion over time"),
+        _hatches(salt, on=True),
+        drawn,
+        _time_axis(x, floor),
     )
 
 

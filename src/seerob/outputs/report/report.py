@@ -92,13 +92,23 @@ def badge(verdict: Verdict | None) -> Html:
     return tag("span", f"{MARK[verdict]} {said(WORD[verdict])}", class_=f"badge {name}")
 
 
+def _named(item: Input) -> str:
+    """What an input is called, and its value; a word may be called otherwise beside its name than alone."""
+    # No input is called by a name of the file alone, so that a single word can be told.
+    name = found if (found := said(item.name)) != item.name else told(item.name)
+    if isinstance(item.value, str):
+        pair = f"{item.name}: {item.value}"
+        both = said(pair)
+        return both if both != pair else ": ".join(filter(None, (name, told(item.value))))
+    figure = number(item.value, item.unit)
+    return name if figure == "–" else f"{name}: {figure}"
+
+
 def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]:
     """Inputs with the names of their criteria: those of one origin, source and criteria are one row."""
     rows: dict[tuple[Origin, str], dict[str, dict[str, None]]] = {}
     for name, item in items:
-        value = told(item.value) if isinstance(item.value, str) else number(item.value, item.unit)
-        what = told(item.name)
-        text = what if value in ("", "–") else f"{what}: {value}"
+        text = _named(item)
         rows.setdefault((item.origin, item.source), {}).setdefault(text, {})[name] = None
     found: list[list[str | Html]] = []
     for (origin, source), texts in rows.items():
@@ -111,7 +121,7 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
     return found
 
 
-UNKNOWN = "unknown: the workstation file is not at hand or cannot be read"
+UNKNOWN = word("unknown: the workstation file is not at hand or cannot be read")
 ORIGINS = {
     "controller": word("measured: the real robot's controller"),
     "vendor_emulator": word("the maker's own controller software, without the robot: preliminary"),
@@ -147,7 +157,7 @@ def setup(files: dict[str, bytes]) -> Setup:
     except (ValueError, RecursionError):
         table = None
     if table is None:
-        return Setup((("physics", UNKNOWN),), (), readable=False)
+        return Setup(((said("physics"), said(UNKNOWN)),), (), readable=False)
     entries = table.get("sources", [])
     try:
         cover = msgspec.convert(table.get("report", {}), ReportCover)
@@ -170,7 +180,7 @@ def _engine(table: object) -> tuple[tuple[str, str], ...]:
     try:
         e = msgspec.convert(table, Engine, strict=False)
     except msgspec.ValidationError:
-        return (("engine as the file has it", str(table)),)
+        return ((said("engine as the file has it"), str(table)),)
     return (
         (
             said("ticks"),
@@ -219,7 +229,7 @@ def _source(entry: dict[str, object]) -> tuple[str, ...]:
     origin = getattr(source, "origin", None) or rest.get("origin") or captured or None
     says = word("this kind does not say: see what was assumed") if origin is None else str(origin)
     if source is None:
-        timeout, end = str(rest.get("timeout", "unknown")), "unknown"
+        timeout, end = str(rest.get("timeout", said("unknown"))), said("unknown")
     else:
         timeout = number(source.timeout, "s")
         end = (

@@ -222,7 +222,7 @@ class _Ends:
         self._t = t
         q = wanted if self._q is None else self._q + float(np.clip(wanted - self._q, -step, step))
         self._q = q
-        invalid_reason = f"{ON_ITS_WAY} {self._name} changed: between its ends nobody says where"
+        invalid_reason = f"on its way since {self._name} changed: between its ends nobody says where"
         return Place(np.array([q]), invalid_reason="" if q == wanted else invalid_reason)
 
 

@@ -46,7 +46,8 @@ def unobserved_reason(person: str, bones: Sequence[str]) -> str:
     """Why nothing is decided of a person of whom bones are not seen; empty when there are none."""
     if not bones:
         return ""
-    shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
+    shown = ", ".join(bones[:6])
+    shown = f"{shown} and {len(bones) - 6} more" if len(bones) > 6 else shown
     return f"{person}: no device sees {shown}"
 
 
@@ -363,6 +364,7 @@ class Hearing:
 
 def no_position_reason(bones: Sequence[str]) -> str:
     """Why nothing rests on where bones are of which only the directions are known; empty for none."""
-    shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
+    shown = ", ".join(bones[:6])
+    shown = f"{shown} and {len(bones) - 6} more" if len(bones) > 6 else shown
     which = "the person is" if len(bones) == len(BONES) else f"{shown} {'is' if len(bones) == 1 else 'are'}"
     return f"no device says where {which}, only how bones are turned" if bones else ""

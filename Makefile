@@ -49,8 +49,10 @@ test: $(RUN) $(NODE)
 	$(MAKE) --no-print-directory -j3 $(DEV) $(LOOPS)/.made $(PAGE) browser
 	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && $(MAKE) --no-print-directory -j4 FIRST=compiled check package unit web-test-told-later
 
+# And mono for the C# client, after it: two installations of packages would wait for each other.
 browser:
 	scripts/find-browser >/dev/null
+	{ command -v mcs && command -v mono; } >/dev/null || scripts/apt-install mono-mcs mono-runtime || true
 
 unit web-test-told-later: $(FIRST)
 

@@ -22,12 +22,31 @@ const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
     3,
     "sortInPlace( $1, $2 );",
   ],
+  // What is compared is returned as an integer; a float would be an object for each comparison.
+  [/return (a|b)\.z - (a|b)\.z;/g, ["module"], 2, "return $1.z < $2.z ? -1 : 1;"],
+  // How deep something lies is handed over in memory, not as an object for each mesh; nor are planes.
+  [/groupOrder, _vector4\.z, /g, ["module"], 3, "groupOrder, ( howDeep[ 0 ] = _vector4.z, 0 ), "],
+  [
+    /(function unshift\( object, geometry, material, groupOrder, z, group \) \{)/g,
+    ["module"],
+    1,
+    "$1 howDeep[ 0 ] = z;",
+  ],
+  [/renderItem\.z = z;/g, ["module"], 1, "renderItem.z = howDeep[ 0 ];"],
+  [/\bz: z\b/g, ["module"], 1, "z: howDeep[ 0 ]"],
+  [
+    /(planes\[ \d \])\.setComponents\( ([^,;]+), ([^,;]+), ([^,;]+), ([^,;]+) \)\.normalize\(\);/g,
+    ["core"],
+    9,
+    "{ const { normal } = $1; normal.x = $2; normal.y = $3; normal.z = $4; $1.constant = $5; $1.normalize(); }",
+  ],
 ];
 
 // Floats of a number and of vectors, by WebGL's kinds of uniforms.
 const ADDED = `
 const FLOATS = { 0x1406: 1, 0x8b50: 2, 0x8b51: 3, 0x8b52: 4 };
 const aside = [];
+const howDeep = new Float64Array(1);
 function sortInPlace(list, order) {
   const n = list.length;
   for (let from = 0; from < n; from += 8) {

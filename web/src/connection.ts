@@ -4,7 +4,7 @@ import { heardPresences, heardVisitors, ownDevice } from "./company";
 import { refused } from "./doing";
 import { draft, heardEdited, lostDraft } from "./editing/draft";
 import { Form } from "./form";
-import { DRAWN, type Frame, type FromWorker, PANELS, type ToWorker } from "./messages";
+import { DRAWN, type Frame, type FromWorker, PANELS, type ToldResult, type ToWorker } from "./messages";
 import {
   beginScene,
   besideTitle,
@@ -30,7 +30,7 @@ import { traceFromWire } from "./traces";
 import { STATE_ORDER, stateOf } from "./verdicts";
 import { heardMeasured } from "./view/measure";
 import { heardReach } from "./view/reach";
-import { type History, type Result, SCHEMA, type Scene } from "./wire";
+import { type History, SCHEMA, type Scene } from "./wire";
 
 /** In the room panels are drawn no faster, and nobody sees the page. */
 const NUMBERS_IN_ROOM_MS = 240;
@@ -257,7 +257,7 @@ export class Connection {
 }
 
 /** Whether any result is in a worse state than the one before. */
-function worse(form: Form, numbers: Float64Array | null, before: readonly Result[]): boolean {
+function worse(form: Form, numbers: Float64Array | null, before: readonly ToldResult[]): boolean {
   const { results } = form.shown;
   for (let k = 0; k < results.length; k += 1) {
     const other = before[k];

@@ -9,6 +9,7 @@ import type {
   History,
   Hold,
   Introduction,
+  Marker,
   Measure,
   Measured,
   Presence,
@@ -25,6 +26,7 @@ import type {
   Tracked,
   Tracking,
   Transport,
+  Verdict,
   Visitors,
 } from "./wire";
 
@@ -43,14 +45,23 @@ export interface TracePoints {
   verdicts: Uint8Array;
 }
 
-/** A snapshot without its poses: those travel through shared memory. */
+/** What panels write of a marker: where it is the room alone needs. */
+export interface ToldMarker {
+  type: Marker["type"];
+  verdict: Verdict | null;
+  label?: string;
+  text?: string;
+}
+export type ToldResult = Omit<Result, "markers" | "parts"> & { parts: ToldResult[]; markers: ToldMarker[] };
+
+/** A snapshot without its poses, and without where markers are: those travel through shared memory. */
 export interface Frame {
   seq: number;
   t: number;
   joints: { [name: string]: number[] };
   tracking: { [name: string]: number };
   late: Snapshot["late"];
-  results: Result[];
+  results: ToldResult[];
   looks: Snapshot["looks"];
   doubts: Snapshot["doubts"];
   /** What was told last of them. */
@@ -62,6 +73,8 @@ export interface Shown extends Pick<Frame, "t" | "looks" | "doubts"> {
   results: readonly ShownResult[];
 }
 export type ShownResult = Pick<Result, "name" | "value" | "limit" | "at_most" | "verdict" | "markers">;
+/** What is written in the room. */
+export type WrittenResult = Omit<ShownResult, "markers"> & { markers: readonly ToldMarker[] };
 
 /** Where of what a page asks of the worker it says which form it has drawn, and whether its panels can take numbers. */
 export const DRAWN = 0;

@@ -2,20 +2,10 @@
 
 import { batch, computed, signal } from "@preact/signals";
 import { type Elsewhere, worseElsewhere } from "./elsewhere";
-import type { Frame, LinkState } from "./messages";
+import type { Frame, LinkState, ToldResult } from "./messages";
 import { Trace } from "./traces";
 import { type State, stateOf, worstState } from "./verdicts";
-import type {
-  CriterionInfo,
-  Hello,
-  Node,
-  Registered,
-  Result,
-  Scene,
-  SoFar,
-  Tracked,
-  Transport,
-} from "./wire";
+import type { CriterionInfo, Hello, Node, Registered, Scene, SoFar, Tracked, Transport } from "./wire";
 
 export interface Selection {
   /** `node` and `criterion` name one thing; `owner` a whole robot, human, tool or part. */
@@ -26,7 +16,7 @@ export interface Selection {
 /** A row of the criteria table: what the criterion is and what it says now. */
 export interface Row {
   info: CriterionInfo;
-  result: Result | null;
+  result: ToldResult | null;
   state: State;
 }
 

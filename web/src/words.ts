@@ -28,9 +28,11 @@ export const language = remembered(
 );
 
 /** A text of the page in the chosen language; `{name}` in it is replaced by the value of that name. */
-export function said(text: string, values: Readonly<Record<string, string | number>> = {}): string {
+export function said(text: string, values?: Readonly<Record<string, string | number>>): string {
   const chosen = language.value;
   const found = chosen === "en" ? text : (CATALOGUES[chosen][text] ?? text);
+  // Without values nothing is made: buttons in the room are asked for their words ten times a second.
+  if (!values) return found;
   return found.replace(/\{(\w+)\}/g, (all, name: string) => String(values[name] ?? all));
 }
 

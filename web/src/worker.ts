@@ -4,12 +4,21 @@
 import { Decoder } from "@msgpack/msgpack";
 import { completed, completedMeasure } from "./completed";
 import { countOf, HEAD, numbersOf } from "./form";
-import { DRAWN, type Frame, type FromWorker, PANELS, type Shown, type ToWorker } from "./messages";
+import {
+  DRAWN,
+  type Frame,
+  type FromWorker,
+  PANELS,
+  type Shown,
+  type ToldMarker,
+  type ToldResult,
+  type ToWorker,
+} from "./messages";
 import { PointCollector } from "./points";
 import { FLOATS_PER_NODE, FormNumbers, numberBufferBytes, PoseWriter, poseBufferBytes } from "./poses";
 import { Recent } from "./recent";
 import { Socket } from "./socket";
-import type { Scene, ServerMessage, Snapshot } from "./wire";
+import type { Marker, Result, Scene, ServerMessage, Snapshot } from "./wire";
 
 const RECENT_BYTES = 64 * 1024 * 1024;
 const RECENT_SPACING_S = 0.04;
@@ -157,8 +166,8 @@ let sources: Snapshot["sources"] = {};
 function show(snapshot: Snapshot): void {
   const { seq, t, joints, tracking, late, results, looks, doubts } = snapshot;
   if (Object.keys(snapshot.sources).length > 0) sources = snapshot.sources;
-  unread = { seq, t, joints, tracking, late, results, looks, doubts, sources };
-  waiting = { shown: drawnOf(unread), poses: snapshot.poses, seq };
+  unread = { seq, t, joints, tracking, late, results: results.map(toldOf), looks, doubts, sources };
+  waiting = { shown: drawnOf(snapshot), poses: snapshot.poses, seq };
   deliver();
 }
 
@@ -200,8 +209,19 @@ function told(shown: Shown): void {
   post({ kind: "form", id: formId, shown, numbers: numbersShared, heard: heardAt, silent: isSilent() });
 }
 
+// Without where markers are: the browser copies for the page what it is told, four times a second and more.
+function toldOf(result: Result): ToldResult {
+  return { ...result, parts: result.parts.map(toldOf), markers: result.markers.map(writtenOf) };
+}
+
+function writtenOf(marker: Marker): ToldMarker {
+  const { type, verdict } = marker;
+  if ("label" in marker) return { type, verdict, label: marker.label };
+  return marker.type === "label" ? { type, verdict, text: marker.text } : { type, verdict };
+}
+
 // Without what is written: that the panels say.
-function drawnOf({ t, looks, doubts, results }: Frame): Shown {
+function drawnOf({ t, looks, doubts, results }: Snapshot): Shown {
   return {
     t,
     looks,

@@ -1,6 +1,7 @@
 // From a result's rows to what the body map shows of each place: which row, and how near it is to its limit.
 
-import type { Input, Result, Row, RowState, Scene } from "../wire";
+import type { ToldResult } from "../messages";
+import type { Input, Row, RowState, Scene } from "../wire";
 import { word } from "../words";
 import type { Side, Spot } from "./figure";
 
@@ -45,7 +46,7 @@ const ORDER: readonly Look[] = [
 ];
 
 /** Rows that speak of the body map: those with areas, and those that have no limit anywhere. */
-export function contactRows(results: readonly Result[], only: string | null): Told[] {
+export function contactRows(results: readonly ToldResult[], only: string | null): Told[] {
   return results
     .filter((result) => only === null || result.name === only)
     .flatMap((result) => result.rows.filter(isContact).map((row) => ({ criterion: result.name, row })));
@@ -94,7 +95,7 @@ export function lookAt(told: Told | undefined, aspect: Aspect, open: boolean): L
  * One that is undecided as a whole has no rows, or none that is within; of one that is undecided because of a place
  * others are within.
  */
-export function leavesOpen({ verdict, muted, rows }: Result): boolean {
+export function leavesOpen({ verdict, muted, rows }: ToldResult): boolean {
   const limited = rows.filter((row) => isContact(row) && !WITHOUT_LIMIT.has(row.state));
   if (limited.some((row) => row.verdict === "within")) return false;
   return muted || verdict === "undecided" || limited.some((row) => row.verdict === "undecided");

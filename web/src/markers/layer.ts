@@ -3,7 +3,7 @@
 
 import { Group } from "three";
 import { UNSEEN } from "../form";
-import type { Shown, ShownResult } from "../messages";
+import type { Shown, ShownResult, ToldMarker, WrittenResult } from "../messages";
 import { STATE_ORDER, stateOf } from "../verdicts";
 import type { Marker, Verdict } from "../wire";
 import { Caption } from "./caption";
@@ -21,12 +21,12 @@ interface Slot {
 
 /** Labels of one result, unless it is selected. */
 const LABELS_OF_ONE = 2;
-const NONE: readonly Marker[] = [];
+const NONE: readonly never[] = [];
 
 /** What is to be written. */
 export interface Written {
   /** Results as the panels show them: bodies and lines may be of a later instant, a text never is. */
-  told: readonly ShownResult[];
+  told: readonly WrittenResult[];
   /** Criterion whose labels are written beside those of the worst. */
   selected: string | null;
   /** Of how many results: more would hide what they are about. */
@@ -79,7 +79,7 @@ export class MarkerLayer {
   }
 
   private readonly drawnBefore: ShownResult[] = [];
-  private readonly toldBefore: ShownResult[] = [];
+  private readonly toldBefore: WrittenResult[] = [];
   private mutedBefore: ReadonlySet<string> | null = null;
   private selectedBefore: string | null = null;
   private mostBefore = -1;
@@ -161,7 +161,7 @@ export class MarkerLayer {
     this.count += 1;
   }
 
-  private draw(name: string, markers: readonly Marker[], texts: readonly Marker[], labels: number): void {
+  private draw(name: string, markers: readonly Marker[], texts: readonly ToldMarker[], labels: number): void {
     const slots = this.slots.get(name) ?? [];
     this.slots.set(name, slots);
     let used = 0;
@@ -174,8 +174,8 @@ export class MarkerLayer {
       if (!slot) continue;
       slot.drawn.update(marker);
       const text = texts[k]?.type === marker.type ? texts[k]! : null;
-      if (text?.type === "label") slot.drawn.caption?.say(text.text, text.verdict);
-      const label = left > 0 && text && "label" in text ? text.label : "";
+      if (text?.text !== undefined) slot.drawn.caption?.say(text.text, text.verdict);
+      const label = left > 0 ? (text?.label ?? "") : "";
       const verdict = text?.verdict ?? null;
       this.write(slot, label === "" || label.startsWith(name) ? label : owner + label, verdict);
       if (label !== "") {
@@ -239,8 +239,8 @@ function keep<T>(list: readonly T[], before: T[]): boolean {
   return other;
 }
 
-function worst(results: readonly ShownResult[], muted: ReadonlySet<string>, count: number): Set<string> {
-  const rank = (r: ShownResult): number => STATE_ORDER.indexOf(stateOf(r));
+function worst(results: readonly WrittenResult[], muted: ReadonlySet<string>, count: number): Set<string> {
+  const rank = (r: WrittenResult): number => STATE_ORDER.indexOf(stateOf(r));
   const shown = results.filter((r) => !muted.has(r.name) && r.markers.length > 0);
   return new Set(
     shown
@@ -257,8 +257,10 @@ function paintWorst(painted: Map<string, Verdict | null>, body: string, verdict:
   if (before === undefined || RANK.indexOf(verdict) > RANK.indexOf(before)) painted.set(body, verdict);
 }
 
+type Seen = Pick<Shown, "looks" | "doubts"> & { results: readonly WrittenResult[] };
+
 /** Whether two frames look the same in the room, wherever their bodies are: a still room costs no picture. */
-export function alike(a: Shown | null, b: Shown | null): boolean {
+export function alike<T extends Seen>(a: T | null, b: T | null): boolean {
   if (a === b) return true;
   if (!a || !b || !sameLooks(a.looks, b.looks) || !sameLooks(a.doubts, b.doubts)) return false;
   if (a.results.length !== b.results.length) return false;

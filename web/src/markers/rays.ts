@@ -44,7 +44,10 @@ export class RaysDrawn implements Drawn<Rays> {
     const hitting = begin(this.hitting.geometry, 2 * met);
     const dots = begin(this.dots.geometry, met);
     const sheet = begin(this.sheet.geometry, between * (several ? 6 : 3));
-    let [p, h, d, s] = [0, 0, 0, 0];
+    let p = 0;
+    let h = 0;
+    let d = 0;
+    let s = 0;
     for (let i = 0; i < count; i += 1) {
       const start = several ? starts[i]! : starts[0]!;
       const end = ends[i]!;

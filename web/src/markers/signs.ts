@@ -21,7 +21,7 @@ export const SIGNS: Record<Marker["type"], { word: string; path: string; filled?
 };
 
 /** The kinds of some markers, each once, in the order of the table. */
-export function kindsOf(markers: readonly Marker[]): Marker["type"][] {
+export function kindsOf(markers: readonly Pick<Marker, "type">[]): Marker["type"][] {
   const there = new Set(markers.map((marker) => marker.type));
   return (Object.keys(SIGNS) as Marker["type"][]).filter((kind) => there.has(kind));
 }

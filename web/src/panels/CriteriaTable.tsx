@@ -4,12 +4,13 @@ import { useSignal } from "@preact/signals";
 import { Fragment } from "preact";
 import { against, between, gap, percent, steady, withUnit } from "../figures";
 import { formatTime } from "../format";
+import type { ToldResult } from "../messages";
 import { mutedCriteria, type Row, scene, select, selection, soFar, stale, toggleMuted } from "../page_state";
 import { worstOf } from "../posture/instants";
 import { aim, orderedRows } from "../row_order";
 import { shownIn, spoken } from "../units";
 import { margin, STATE_WORDS } from "../verdicts";
-import type { CriterionInfo, Result } from "../wire";
+import type { CriterionInfo } from "../wire";
 import { said, told, word } from "../words";
 import { BasisView } from "./BasisView";
 import { Icon } from "./Icon";
@@ -171,7 +172,7 @@ function Name({ row: { info }, open, onToggle, wide = false }: NameProps) {
 }
 
 /** How much of the limit is used; the tick is the limit. */
-function Usage({ result }: { result: Result }) {
+function Usage({ result }: { result: ToldResult }) {
   const { value, limit, at_most } = result;
   if (value === null || limit === null || !(limit > 0)) return null;
   const full = at_most ? 1.25 : 2;
@@ -185,7 +186,7 @@ function Usage({ result }: { result: Result }) {
 }
 
 // A share of the limit; of a limit that is zero there is none, so the difference itself.
-function leftOf(result: Result): string {
+function leftOf(result: ToldResult): string {
   const share = margin(result);
   if (share !== null || result.value === null || result.limit === null) return percent(share);
   return withUnit(gap(result.value, result.limit, result.unit, result.at_most), result.unit);

@@ -1,12 +1,12 @@
 // What a result says of each of its parts: a link, a body area, a side.
 
 import { against, withUnit } from "../figures";
+import type { ToldResult } from "../messages";
 import { spoken } from "../units";
-import type { Result } from "../wire";
 import { said } from "../words";
 import { StateBadge } from "./StateBadge";
 
-export function Parts({ parts }: { parts: readonly Result[] }) {
+export function Parts({ parts }: { parts: readonly ToldResult[] }) {
   return (
     <table class="parts">
       <caption>{said("Parts")}</caption>
@@ -19,7 +19,7 @@ export function Parts({ parts }: { parts: readonly Result[] }) {
   );
 }
 
-function Part({ part }: { part: Result }) {
+function Part({ part }: { part: ToldResult }) {
   const { value, limit } = against(part.value, part.limit, part.unit, part.at_most);
   return (
     <tr>

@@ -1,12 +1,12 @@
 // Ergonomics: the scores of the posture by body part and side, when they were worst, and what that costs.
 
 import { against, between } from "../figures";
+import type { ToldResult } from "../messages";
 import { frame, scene, stale } from "../page_state";
 import { chooseScore, shownScore } from "../posture/coloring";
 import { worstScores } from "../posture/instants";
 import { components, scored } from "../posture/scores";
 import { spoken } from "../units";
-import type { Result } from "../wire";
 import { said } from "../words";
 import { Instants } from "./Instants";
 import { Parts } from "./Parts";
@@ -63,7 +63,7 @@ export function Posture() {
   );
 }
 
-function Score({ result }: { result: Result }) {
+function Score({ result }: { result: ToldResult }) {
   const parts = components(result.rows);
   const figures = against(result.value, result.limit, result.unit, result.at_most);
   return (

@@ -3,6 +3,7 @@
 import { ownDevice } from "../company";
 import { notRun, onTrial } from "../editing/draft";
 import { against, percent, withUnit } from "../figures";
+import type { ToldResult } from "../messages";
 import {
   behind,
   elsewhere,
@@ -20,7 +21,6 @@ import {
 } from "../page_state";
 import { orderedRows } from "../row_order";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
-import type { Result } from "../wire";
 import { said, word } from "../words";
 import { Company } from "./Company";
 import { ElsewhereNote } from "./ElsewhereNote";
@@ -177,7 +177,7 @@ function AtInstant() {
   );
 }
 
-function pillFigure({ value, limit, unit, at_most }: Result): string {
+function pillFigure({ value, limit, unit, at_most }: ToldResult): string {
   return withUnit(against(value, limit, unit, at_most).value, unit);
 }
 

@@ -1,6 +1,7 @@
 // Scores of a posture as the panel and the manikin show them: components by side, shares of the scale, colours.
 
-import type { Result, Row } from "../wire";
+import type { ToldResult } from "../messages";
+import type { Row } from "../wire";
 import { word } from "../words";
 
 export type Palette = "green to red" | "blue to orange";
@@ -19,7 +20,7 @@ export interface Component {
 }
 
 /** Results that have scores by body part. */
-export function scored(results: readonly Result[]): Result[] {
+export function scored(results: readonly ToldResult[]): ToldResult[] {
   return results.filter((result) => result.rows.some(isScore));
 }
 
@@ -81,7 +82,7 @@ export type Coloring = "parts" | "overall" | "verdict";
 export const COLORINGS: readonly Coloring[] = ["parts", "overall", "verdict"];
 
 /** Colour per node: each bone by the worst of its components, or all of them by the total. */
-export function tints(result: Result | undefined, by: Coloring, palette: Palette): Map<string, number> {
+export function tints(result: ToldResult | undefined, by: Coloring, palette: Palette): Map<string, number> {
   const found = new Map<string, number>();
   if (!result || by === "verdict") return found;
   const rows = result.rows.filter(isScore);

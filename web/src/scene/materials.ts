@@ -141,8 +141,9 @@ const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: bool
 // Keys are made once: they are asked for with every marker of every frame.
 const KEYS = byTone("line", "ghost", "fill", "volume");
 const THIN_KEYS = byTone("thin", "faint");
+const DOT_KEYS = byTone("dot");
 
-function byTone<K extends string>(...kinds: K[]): Record<K, Record<Tone, string>> {
+export function byTone<K extends string>(...kinds: K[]): Record<K, Record<Tone, string>> {
   const tones: Tone[] = ["within", "exceeded", "undecided", "none"];
   const keys = (kind: K) => Object.fromEntries(tones.map((tone) => [tone, `${kind} ${tone}`]));
   return Object.fromEntries(kinds.map((kind) => [kind, keys(kind)])) as Record<K, Record<Tone, string>>;
@@ -183,6 +184,9 @@ export function markLine(over: boolean): Material {
     return new LineBasicMaterial({ color: colorOf("mark"), ...look });
   });
 }
+
+/** A shared material that is there already. */
+export const known = (key: string): Material | undefined => made.get(key);
 
 /** A material that is made when it is first needed and shared from then on. */
 export function once(key: string, make: () => Material): Material {
@@ -230,6 +234,10 @@ export function faintMaterial(verdict: Verdict | null): Material {
 
 function thin(key: "thin" | "faint", verdict: Verdict | null, opacity: number): Material {
   const tone: Tone = verdict ?? "none";
+  return made.get(THIN_KEYS[key][tone]) ?? madeThin(key, tone, opacity);
+}
+
+function madeThin(key: "thin" | "faint", tone: Tone, opacity: number): Material {
   return once(THIN_KEYS[key][tone], () => {
     // Seen through: what lies in the same plane, such as a field and its beams, must not flicker.
     const look = { toneMapped: false, transparent: true, opacity, depthWrite: false };
@@ -240,7 +248,11 @@ function thin(key: "thin" | "faint", verdict: Verdict | null, opacity: number): 
 /** The shared material of dots with a size in pixels. */
 export function dotMaterial(verdict: Verdict | null): Material {
   const tone: Tone = verdict ?? "none";
-  return once(`dot ${tone}`, () => {
+  return made.get(DOT_KEYS.dot[tone]) ?? madeDot(tone);
+}
+
+function madeDot(tone: Tone): Material {
+  return once(DOT_KEYS.dot[tone], () => {
     return new PointsMaterial({ color: colorOf(tone), toneMapped: false, size: 5, sizeAttenuation: false });
   });
 }

@@ -3,7 +3,7 @@
 
 import { BackSide, Color, type Material, ShaderMaterial } from "three";
 import type { Verdict } from "../wire";
-import { colorOf, once } from "./materials";
+import { byTone, colorOf, known, once } from "./materials";
 import type { Tone } from "./room_look";
 
 const VERTEX = `
@@ -33,7 +33,13 @@ void main() {
 /** The shared veil of one verdict; its geometry needs normals. */
 export function veilMaterial(verdict: Verdict | null): Material {
   const tone: Tone = verdict ?? "none";
-  return once(`veil ${tone}`, () => {
+  return known(KEYS.veil[tone]) ?? made(tone);
+}
+
+const KEYS = byTone("veil");
+
+function made(tone: Tone): Material {
+  return once(KEYS.veil[tone], () => {
     return new ShaderMaterial({
       uniforms: { tone: { value: new Color(colorOf(tone)) }, hatched: { value: tone === "undecided" } },
       vertexShader: VERTEX,

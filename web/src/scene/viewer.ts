@@ -10,7 +10,7 @@ import type { Form } from "../form";
 import { Glide } from "../glide";
 import { alike, MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/view";
-import type { Frame, Shown, ShownResult } from "../messages";
+import type { Frame, Shown, ShownResult, WrittenResult } from "../messages";
 import {
   frame,
   hidden,
@@ -91,7 +91,7 @@ export class Viewer {
   private doubted: Shown | null = null;
   // Made once: a picture allocates nothing of ours.
   private readonly results: ShownResult[] = [];
-  private readonly written = { told: [] as ShownResult[], selected: null as string | null, most: 0 };
+  private readonly written = { told: [] as WrittenResult[], selected: null as string | null, most: 0 };
   private framed = false;
   private dressed = false;
 

@@ -1,7 +1,7 @@
 // What one takes along of the instant that is shown: a file of it, and its figures.
 
+import type { ToldResult } from "../messages";
 import { frame, scene, stale } from "../page_state";
-import type { Result } from "../wire";
 
 export function save(content: Blob, name: string): void {
   const link = document.createElement("a");
@@ -34,7 +34,7 @@ export function figures(): object {
 
 const COLUMNS = ["name", "value", "unit", "limit", "at_most", "verdict", "low", "high", "reason"] as const;
 
-function figuresOf({ name, value, unit, limit, at_most, verdict, interval, reason }: Result) {
+function figuresOf({ name, value, unit, limit, at_most, verdict, interval, reason }: ToldResult) {
   const [low, high] = interval ?? [null, null];
   return { name, value, unit, limit, at_most, verdict, low, high, reason };
 }

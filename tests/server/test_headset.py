@@ -1,5 +1,6 @@
 """A page that offers what a headset sees, over the connection it has anyway."""
 
+import asyncio
 import time
 from contextlib import contextmanager
 
@@ -26,7 +27,7 @@ from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import bone_poses
 from seerob.devices.capture.options import Calibration
 from seerob.devices.capture.stream_source import _Hearing
-from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, SHORTEST, Offer
+from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, SHORTEST, Offer, Offers, now, read
 from seerob.devices.live.listening import Listener
 from seerob.devices.live.receivers import Receivers
 from seerob.devices.sources.headset import Headset, frame, layout_of
@@ -135,6 +136,30 @@ def test_who_works_at_another_scale_is_told_of_by_posture_alone(server, samples,
     # In their own metres: who reaches out by 40 cm does so at any size.
     before, now = ({p.name: p.position for p in sample.points} for sample in (own, scaled))
     np.testing.assert_allclose(now["left-grip"], before["left-grip"], atol=1e-5)
+
+
+def test_whoever_comes_after_nobody_came_for_long_is_taken_at_once(monkeypatch):
+    monkeypatch.setattr("seerob.devices.sources.headset.SILENCE", 0.05)
+    place, page = Offers(), object()
+    source = Headset(human="anna", name="headset", timeout=0.05).taking(place)
+    message = Tracking(human="anna", t=0.0, names=("viewer",), poses=np.zeros(7, "<f4").tobytes())
+    offer = read(message, now())
+    assert place.offer("anna", page, offer).startswith("nothing in this run waits")
+
+    async def waited():
+        with pytest.raises(TimeoutError, match="no page offers"):
+            await anext(source._offers(place))
+        assert place.offer("anna", page, offer._replace(arrived=now())) == "", "it is about to be back"
+        again = source._offers(place)
+        coming = asyncio.ensure_future(anext(again))
+        await asyncio.wait((coming,), timeout=0.3)
+        assert not coming.done(), "that nobody is there is said once"
+        assert place.offer("anna", page, offer._replace(arrived=now())) == ""
+        assert (await coming).t == 0.0
+        with pytest.raises(TimeoutError, match="no page offers"):  # whoever has left is missed
+            await anext(again)
+
+    asyncio.run(waited())
 
 
 def test_nobody_waits_for_it(server):

@@ -4,6 +4,12 @@ import { metaQuest3, XRDevice } from "iwer";
 
 const device = new XRDevice(metaQuest3);
 device.installRuntime({ forceInstall: true });
+// The emulator draws a session into the page's own canvas, which is opaque where the processor draws: what is behind
+// glasses would be black. A headset has a canvas of its own.
+const { getContext } = HTMLCanvasElement.prototype;
+HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, look?: object) {
+  return getContext.call(this, kind, kind === "webgl2" ? { ...look, alpha: true } : look);
+} as typeof getContext;
 const left = device.controllers.left!;
 const right = device.controllers.right!;
 
@@ -96,7 +102,10 @@ setInterval(() => {
     head.z - 0.2 * Math.sin(head.turn) + hand.far * k + noise(),
   );
   right.quaternion.set(...turned(way, hand.nod));
-  const [p, , q] = ahead(head.turn + (keys.has("KeyM") ? 0.35 : 0.9), 0);
-  left.position.set(head.x + 0.35 * p + noise(), head.y - (keys.has("KeyM") ? 0.3 : 0.6), head.z + 0.35 * q);
+  // The board above the hand is 0.54 m wide: at arm's length, beside the way one looks, it can be read.
+  const menu = keys.has("KeyM");
+  const [p, , q] = ahead(head.turn + (menu ? 0.3 : 0.8), 0);
+  const out = menu ? 0.5 : 0.62;
+  left.position.set(head.x + out * p + noise(), head.y - (menu ? 0.4 : 0.6), head.z + out * q);
   left.quaternion.set(...turned(head.turn, 0));
 }, 10);

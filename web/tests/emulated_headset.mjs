@@ -10,6 +10,12 @@ export const HEADSET = `${RUNTIME}
   const device = new IWER.XRDevice(IWER.metaQuest3);
   device.installRuntime({ forceInstall: true });
   window.headset = device;
+  // The emulator draws a session into the page's own canvas, which is opaque where the processor draws: what is
+  // behind glasses would be black. A headset has a canvas of its own.
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, look) {
+    return getContext.call(this, kind, kind === "webgl2" ? { ...look, alpha: true } : look);
+  };
   // Who stands still moves by a fraction of a millimetre; what is the same to the last bit is frozen.
   const shaken = [device, device.controllers.left, device.controllers.right];
   const still = shaken.map((each) => [...each.position.vec3]);

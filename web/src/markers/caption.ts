@@ -20,7 +20,7 @@ import type { View } from "./view";
 const PAD_PX = 6;
 const SHARPNESS = 2;
 /** Characters of a line; about as many as fit across the room of a telephone. */
-const LONGEST = 46;
+const LONGEST = 50;
 /** Lower edge of the plate above its point [px]. */
 const RAISED_PX = 8;
 const FAMILY = 'system-ui, "Segoe UI", "Noto Sans", sans-serif';

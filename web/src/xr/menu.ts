@@ -1,6 +1,7 @@
 // A menu beside the wrist: large buttons that the other hand's beam presses, for time and for comfort.
 
 import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, type Raycaster, SRGBColorSpace } from "three";
+import { OVER_CAPTIONS } from "./panel";
 
 /** Size of a button in the room [m]: no smaller than a finger hits. */
 const BUTTON = { width: 0.066, height: 0.046 };
@@ -40,6 +41,7 @@ export class Menu {
     this.texture.colorSpace = SRGBColorSpace;
     const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
     this.mesh = new Mesh(new PlaneGeometry(width, height), material);
+    this.mesh.renderOrder = OVER_CAPTIONS;
   }
 
   /** Whether a ray of the world meets it; notes which button. */

@@ -6,6 +6,8 @@ import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace }
 const WIDTH = 0.54;
 /** Least time between two drawings [ms]: nobody reads faster. */
 const EVERY_MS = 200;
+/** What is written in the room is drawn over everything, but for panels: those are nearer. */
+export const OVER_CAPTIONS = 11;
 export const INK = "#dbe3ee";
 
 export abstract class Panel {
@@ -25,6 +27,7 @@ export abstract class Panel {
     this.texture.colorSpace = SRGBColorSpace;
     const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
     this.mesh = new Mesh(new PlaneGeometry(WIDTH, (WIDTH * pixels.height) / pixels.width), material);
+    this.mesh.renderOrder = OVER_CAPTIONS;
   }
 
   /** Height in the room [m]. */

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 HELD = 2.0
 """A page that offers nothing for so long loses its place [s]."""
+BACK = 3.0
+"""Whoever waited in vain is back within that [s]: longer than a source that fails pauses."""
 SHORTEST = 0.003
 """Offers of a page that follow one another faster are left out [s]; headsets do 60 to 144 Hz."""
 MOST_NAMES = 160
@@ -158,6 +160,8 @@ class Offers:
         """What visitors do besides."""
         self._rooms: dict[str, Room] = {}
         self._registering: dict[str, Registering] = {}
+        self._back: dict[str, float] = {}
+        """Until when [s] a source that heard nobody is about to wait anew, by person."""
         self.mixed = False
         """Whether something of the cell is real: then where a room lies has an error, or is not known."""
 
@@ -172,7 +176,18 @@ class Offers:
         with self._lock:
             self._registering[human] = registering
             self._fits.pop(human, None)
+            self._back.pop(human, None)
             self._waiting.setdefault(human, {})[key] = take
+
+    def silent(self, human: str) -> None:
+        """Know that whoever waits for a person has heard nobody for long, says so, and waits anew at once."""
+        with self._lock:
+            self._back[human] = now() + BACK
+
+    def was_silent(self, human: str) -> bool:
+        """Whether whoever waited for a person a moment ago heard nobody: then nobody has to be told again."""
+        with self._lock:
+            return now() <= self._back.get(human, -math.inf)
 
     def leave(self, human: str, key: object) -> None:
         """Wait no longer."""
@@ -191,10 +206,12 @@ class Offers:
             offer: What it says.
 
         Returns:
-            Why nobody takes it; empty when somebody does.
+            Why nobody takes it; empty when somebody does, or will in a moment.
         """
         with self._lock:
             takers = list(self._waiting.get(human, {}).values())
+            if not takers and offer.arrived <= self._back.get(human, -math.inf):
+                return ""
             if not takers:
                 return f"nothing in this run waits for a headset of {human!r}"
             held = self._held.get(human)

@@ -134,6 +134,9 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
         waiting: deque[Offer] = deque(maxlen=64)
         arrived = asyncio.Event()
         key = object()
+        silence = max(SILENCE, self.timeout)
+        # Whoever comes in late is taken at once: that nobody was there is said once.
+        patience = None if place.was_silent(self.human) else silence
 
         def take(offer: Offer) -> None:
             waiting.append(offer)
@@ -144,12 +147,14 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
         try:
             while True:
                 try:
-                    async with asyncio.timeout(max(SILENCE, self.timeout)):
+                    async with asyncio.timeout(patience):
                         await arrived.wait()
                 except TimeoutError as error:
+                    place.silent(self.human)
                     what = f"no page offers a headset of {self.human!r}"
                     raise TimeoutError(what) from error
                 arrived.clear()
+                patience = silence
                 while waiting:
                     yield waiting.popleft()
         finally:

@@ -131,7 +131,8 @@ class _Whole:
     """Whether a whole body hangs: walked, and stands in all its points from one sample to the next."""
 
     def __init__(self) -> None:
-        self._past: deque[tuple[float, Array]] = deque()
+        self._past: deque[tuple[float, Array, Array]] = deque()
+        """When, where, and by how much the middle moved since the sample before (`_way`)."""
         self._hung: Array | None = None
 
     def hangs(self, t: float, places: Array) -> bool:
@@ -144,7 +145,7 @@ class _Whole:
         past = self._past
         if past and t <= past[-1][0]:
             return False  # two at one instant, or set back: a matter of time, not of places
-        past.append((t, places))
+        past.append((t, places, _way(past[-1][1], places) if past else np.zeros(3)))
         while len(past) > 2 and past[1][0] <= t - 2 * SPAN - SLACK:
             past.popleft()
         if self._hung is not None:
@@ -157,7 +158,7 @@ class _Whole:
         walked = next((k for k in range(stood, -1, -1) if past[k][0] <= past[stood][0] - SPAN + SLACK), stood)
         if stood - walked < 2:
             return False
-        steps = np.array([_way(past[k][1], past[k + 1][1]) for k in range(walked, stood)])
+        steps = np.array([past[k][2] for k in range(walked + 1, stood + 1)])
         ways = np.linalg.norm(steps, axis=1)
         way = float(np.linalg.norm(steps.sum(axis=0)))
         evenly = ways.min() >= EVENLY * ways.mean()

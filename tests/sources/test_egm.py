@@ -186,6 +186,7 @@ def test_what_no_controller_sends_is_refused_with_the_reason():
         (foreign(joints=()).SerializeToString(), "no measured joints"),
         (foreign(joints=(0.0,) * 33).SerializeToString(), "at most 32"),
         (bytes(abb_egm.LARGEST + 1), "at most 4096"),
+        (foreign().SerializeToString() + b"\x52\x00", "field 10 holds 0 numbers"),
     ):
         with pytest.raises(ProtocolError, match=reason):
             abb_egm.decode(raw)

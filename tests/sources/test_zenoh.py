@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import subprocess
@@ -261,3 +262,24 @@ def test_what_is_no_message_is_passed_over_and_too_much_of_it_ends_the_connectio
 def test_tokens_of_strangers_are_passed_over(tokens):
     of_publishers = [text for text in tokens if text.startswith("@ros2_lv/") and "/MP/" in text]
     assert len(rmw_zenoh.offered(tokens)) <= len(of_publishers)
+
+
+def test_who_publishes_faster_than_is_read_fills_no_memory():
+    async def flooded():
+        port = free_port()
+        with router(port) as session:
+            async with rmw_zenoh.opened("127.0.0.1", port) as link:
+                link.subscribe("/x", ["x"], kept=False)
+                await asyncio.sleep(0.2)
+                raw = bytes(rmw_zenoh.MAX_MESSAGE)
+                for k in range(40):
+                    session.put("x", raw[: -k - 1])
+                session.put("x", b"last")
+                sizes = []
+                while not sizes or sizes[-1] != 4:
+                    sizes.append(len((await link.next(60.0)).payload))
+                return sizes
+
+    sizes = asyncio.run(flooded())
+    assert sizes[-1] == 4
+    assert sum(sizes) <= rmw_zenoh.MOST_BYTES + rmw_zenoh.MAX_MESSAGE

@@ -113,7 +113,7 @@ def decode(data: bytes) -> Message:
         motion=_state(parts, 5),
         program=_state(parts, 8),
         force=_repeated(about, 2) if active else (),
-        utilization=parts[10][-1].doubles()[0] if 10 in parts else None,
+        utilization=_number(parts[10][-1]) if 10 in parts else None,
     )
 
 
@@ -137,6 +137,13 @@ def _repeated(parts: dict[int, list[Field]], number: int) -> tuple[float, ...]:
     return found
 
 
+def _number(field: Field) -> float:
+    found = field.doubles()
+    if len(found) != 1:
+        raise ProtocolError(f"field {field.number} holds {len(found)} numbers instead of one")
+    return found[0]
+
+
 def _numbers(parts: dict[int, list[Field]], number: int) -> tuple[float, ...]:
     """Of joints, which are a message of their own."""
     return _repeated(_parts(parts[number][-1].bytes()), 1) if number in parts else ()
@@ -147,7 +154,7 @@ def _position(measured: dict[int, list[Field]]) -> tuple[float, float, float] | 
     place = _parts(pose[1][-1].bytes()) if 1 in pose else {}
     if not all(k in place for k in (1, 2, 3)):
         return None
-    x, y, z = (place[k][-1].doubles()[0] for k in (1, 2, 3))
+    x, y, z = (_number(place[k][-1]) for k in (1, 2, 3))
     return x, y, z
 
 

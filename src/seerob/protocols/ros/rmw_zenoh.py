@@ -19,6 +19,7 @@ import time
 from collections import deque
 from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
+from threading import Lock
 from typing import Any, NamedTuple
 
 from seerob.core.extras import need
@@ -34,6 +35,8 @@ ASK_WITHIN = 0.5
 MOST_TOKENS = 4096
 MOST_WAITING = 1024
 """Messages; of more, the oldest are left out."""
+MOST_BYTES = 8 * MAX_MESSAGE
+"""Of all that wait; likewise."""
 MOST_KEPT = 64
 """Messages of a topic that are kept for whoever comes later."""
 NODE = "seerob"
@@ -170,7 +173,9 @@ class Router:
 
     def __init__(self, session: Any, loop: asyncio.AbstractEventLoop) -> None:
         self._session, self._loop = session, loop
-        self._waiting, self._some = deque[Put](maxlen=MOST_WAITING), asyncio.Event()
+        self._waiting, self._some = deque[Put](), asyncio.Event()
+        self._bytes, self._lock = 0, Lock()
+        """How much waits, and whose turn it is with that: messages come in one thread, and go in another."""
         self._declared: list[Any] = []
 
     def subscribe(self, topic: str, keys: Iterable[str], *, kept: bool) -> None:
@@ -181,7 +186,7 @@ class Router:
             # What is too long is cut by one byte more than is read, so that whoever decodes it refuses it.
             payload = sample.payload
             raw = payload.to_bytes() if len(payload) <= MAX_MESSAGE else bytes(MAX_MESSAGE + 1)
-            self._waiting.append(Put(time.monotonic(), topic, raw))
+            self._add(Put(time.monotonic(), topic, raw))
             self._loop.call_soon_threadsafe(self._some.set)
 
         for one in keys:
@@ -191,6 +196,13 @@ class Router:
             else:
                 made = self._session.declare_subscriber(one, take)
             self._declared.append(made)
+
+    def _add(self, put: Put) -> None:
+        with self._lock:
+            self._waiting.append(put)
+            self._bytes += len(put.payload)
+            while len(self._waiting) > MOST_WAITING or self._bytes > MOST_BYTES:
+                self._bytes -= len(self._waiting.popleft().payload)
 
     def publisher(self, topic: str, message: str, definition: str, domain: int) -> Publisher:
         """Announce a topic; arguments as of `Publisher`."""
@@ -218,7 +230,10 @@ class Router:
                 if until is not None and time.monotonic() >= until:
                     raise
             self._some.clear()
-        return self._waiting.popleft()
+        with self._lock:
+            put = self._waiting.popleft()
+            self._bytes -= len(put.payload)
+        return put
 
     def _at_router(self) -> bool:
         info = self._session.info

@@ -169,19 +169,30 @@ export function recolor(): void {
 export const GHOSTLY = 0.5;
 
 /** The shared material of surfaces that point or mark; over everything, seen through, or neither. */
-export function markMaterial(kind: "solid" | "over" | "ghost"): Material {
+export function markMaterial(kind: "solid" | "held" | "over" | "ghost"): Material {
   const ghost = { transparent: true, opacity: GHOSTLY, depthWrite: false };
-  const look = { solid: {}, over: { depthTest: false }, ghost }[kind];
+  const look = { solid: {}, held: {}, over: { depthTest: false }, ghost }[kind];
   return once(`${kind} mark`, () => {
-    return new MeshBasicMaterial({ color: colorOf("mark"), toneMapped: false, ...look });
+    const material = new MeshBasicMaterial({ color: colorOf("mark"), toneMapped: false, ...look });
+    return kind === "held" ? uncut(material) : material;
   });
+}
+
+/** Have a material drawn whole where a section cuts the room open: of what a visitor holds. */
+export function uncut<M extends Material>(material: M): M {
+  material.onBeforeCompile = (shader) => {
+    shader.fragmentShader = shader.fragmentShader.replace("#include <clipping_planes_fragment>", "");
+  };
+  material.customProgramCacheKey = () => "uncut";
+  return material;
 }
 
 /** The shared material of lines that point or mark; over everything or not. */
 export function markLine(over: boolean): Material {
   const look = { toneMapped: false, transparent: over, opacity: over ? 0.85 : 1, depthTest: !over };
   return once(`${over ? "line-over" : "beam"} mark`, () => {
-    return new LineBasicMaterial({ color: colorOf("mark"), ...look });
+    const material = new LineBasicMaterial({ color: colorOf("mark"), ...look });
+    return over ? material : uncut(material);
   });
 }
 

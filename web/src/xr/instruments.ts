@@ -20,11 +20,12 @@ import {
 import { select } from "../page_state";
 import { distance } from "../panels/MeasureNote";
 import type { Bodies } from "../scene/bodies";
-import { colorOf, markLine, markMaterial } from "../scene/materials";
+import { colorOf, markLine, markMaterial, uncut } from "../scene/materials";
 import { hitAlong, nodeOf } from "../scene/picking";
 import type { Stage } from "../scene/stage";
 import type { Viewer } from "../scene/viewer";
 import { type Measuring, measuring, withFace } from "../view/measure";
+import { sectionPlanes } from "../view/section";
 import { said, told } from "../words";
 
 /** Letters of the ruler are 16 mm high. */
@@ -144,12 +145,12 @@ export class Section {
   turnOver(at: Vector3, along: Vector3): void {
     this.on = !this.on;
     this.plane.setFromNormalAndCoplanarPoint(along, at);
-    this.stage.renderer.clippingPlanes = this.on ? [this.plane] : [];
+    this.stage.renderer.clippingPlanes = this.on ? [...sectionPlanes(), this.plane] : sectionPlanes();
   }
 
   clear(): void {
     this.on = false;
-    this.stage.renderer.clippingPlanes = [];
+    this.stage.renderer.clippingPlanes = sectionPlanes();
   }
 }
 
@@ -197,7 +198,9 @@ export class Ghost {
 export class Vignette {
   readonly mesh = new Mesh(
     new RingGeometry(0.09, 0.6, 48),
-    new MeshBasicMaterial({ color: 0x05070a, transparent: true, opacity: 0, depthTest: false, fog: false }),
+    uncut(
+      new MeshBasicMaterial({ color: 0x05070a, transparent: true, opacity: 0, depthTest: false, fog: false }),
+    ),
   );
   private strength = 0;
 

@@ -1,6 +1,7 @@
 // A menu beside the wrist: large buttons that the other hand's beam presses, for time and for comfort.
 
 import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, type Raycaster, SRGBColorSpace } from "three";
+import { uncut } from "../scene/materials";
 import { OVER_CAPTIONS } from "./panel";
 
 /** Size of a button in the room [m]: no smaller than a finger hits. */
@@ -39,7 +40,7 @@ export class Menu {
     this.brush = canvas.getContext("2d")!;
     this.texture = new CanvasTexture(canvas);
     this.texture.colorSpace = SRGBColorSpace;
-    const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
+    const material = uncut(new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false }));
     this.mesh = new Mesh(new PlaneGeometry(width, height), material);
     this.mesh.renderOrder = OVER_CAPTIONS;
   }

@@ -1,6 +1,7 @@
 // A panel that hangs in the room: a canvas that is drawn on when there is news, at most so often.
 
 import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace } from "three";
+import { uncut } from "../scene/materials";
 
 /** Width in the room [m]. */
 const WIDTH = 0.54;
@@ -25,7 +26,7 @@ export abstract class Panel {
     this.brush = canvas.getContext("2d")!;
     this.texture = new CanvasTexture(canvas);
     this.texture.colorSpace = SRGBColorSpace;
-    const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
+    const material = uncut(new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false }));
     this.mesh = new Mesh(new PlaneGeometry(WIDTH, (WIDTH * pixels.height) / pixels.width), material);
     this.mesh.renderOrder = OVER_CAPTIONS;
   }

@@ -14,7 +14,7 @@ import {
   Vector3,
 } from "three";
 import { registered, scene } from "../page_state";
-import { markMaterial } from "../scene/materials";
+import { markMaterial, uncut } from "../scene/materials";
 import type { Viewer } from "../scene/viewer";
 import type { Register, Registered } from "../wire";
 import { said, told, word } from "../words";
@@ -99,7 +99,7 @@ export class Registering {
     this.brush = canvas.getContext("2d")!;
     this.texture = new CanvasTexture(canvas);
     this.texture.colorSpace = SRGBColorSpace;
-    const material = new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false });
+    const material = uncut(new MeshBasicMaterial({ map: this.texture, transparent: true, fog: false }));
     this.panel = new Mesh(new PlaneGeometry(SIZE.width, SIZE.height), material);
     this.panel.position.set(0, 1.55, -1);
     this.mark.renderOrder = 5;

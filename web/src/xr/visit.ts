@@ -77,7 +77,7 @@ export async function sessionModes(): Promise<Mode[]> {
 
 /** What a visitor holds: a ball where the hand is, and a beam to where it points. */
 class Pointer {
-  readonly ball = new Mesh(new SphereGeometry(0.022, 16, 10), markMaterial("solid"));
+  readonly ball = new Mesh(new SphereGeometry(0.022, 16, 10), markMaterial("held"));
   readonly beam = new Line(
     new BufferGeometry().setFromPoints([new Vector3(), new Vector3(0, 0, -1)]),
     markLine(false),

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { enterRoom, HEADSET, outOfRoom, pictures, put } from "./emulated_headset.mjs";
 import { open, show } from "./expect.mjs";
 
 /** How far what one sees of another may be from where they are [m of that other]. */
@@ -28,7 +28,7 @@ after(async () => {
 
 const enter = async (page, scale) => {
   await page.getByLabel("my size").selectOption(String(scale));
-  await page.getByRole("button", { name: "enter VR", exact: true }).click({ timeout: 240_000 });
+  await enterRoom(page, "enter VR");
   await page.getByRole("status").getByText("headset on").waitFor({ timeout: 240_000 });
 };
 
@@ -107,7 +107,7 @@ test("who follows looks from where the other's head is, until they are gone", {
   timeout: 900_000,
 }, async () => {
   await small.evaluate(() => window.headset.activeSession.end());
-  await small.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });
+  await outOfRoom(small);
   await small.locator("details.company summary").click();
   await small.getByRole("button", { name: "follow", exact: true }).click();
   const [there] = await small.evaluate(() => window.seerob.others);

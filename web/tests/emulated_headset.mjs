@@ -27,6 +27,13 @@ export const HEADSET = `${RUNTIME}
   setInterval(() => shaken.forEach((each, i) => each.position.set(...still[i].map((v) => v + noise()))), 10);
 })();`;
 
+/** Begin a session by what the page's one button offers; and wait until it is offered again. */
+export async function enterRoom(page, name) {
+  await page.locator(".room-offer summary").click({ timeout: 240_000 });
+  await page.getByRole("button", { name, exact: true }).click({ timeout: 240_000 });
+}
+export const outOfRoom = (page) => page.locator(".room-offer").waitFor({ timeout: 240_000 });
+
 /** Wait for so many pictures of the session. */
 export function pictures(page, count) {
   return page.evaluate(

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { HEADSET, pictures, pressInRoom, put } from "./emulated_headset.mjs";
+import { enterRoom, HEADSET, outOfRoom, pictures, pressInRoom, put } from "./emulated_headset.mjs";
 import { frames, open, pixels } from "./expect.mjs";
 
 const NEAR = 1e-3;
@@ -17,11 +17,11 @@ before(async () => {
 
 after(() => opened?.close());
 
-const press = (name) => page.getByRole("button", { name, exact: true }).click({ timeout: 240_000 });
+const press = (name) => enterRoom(page, name);
 const visited = (point) => page.evaluate((p) => window.seerob.visited(p), point);
 const leave = async () => {
   await page.evaluate(() => window.headset.activeSession.end());
-  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });
+  await outOfRoom(page);
 };
 const push = (side, x, y) =>
   page.evaluate(([s, a, b]) => window.headset.controllers[s].updateAxes("thumbstick", a, b), [side, x, y]);
@@ -133,7 +133,7 @@ test("the menu at the wrist raises who sits, changes hands and ends the visit", 
   await pressIn("plot");
   assert.equal(await page.evaluate(() => localStorage.getItem("xr.seated")), "off");
   await pressIn("leave");
-  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor({ timeout: 240_000 });
+  await outOfRoom(page);
   assert.deepEqual(browser.complaints, []);
 });
 

@@ -8,7 +8,7 @@ import path from "node:path";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { enterRoom, HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { askPython, python } from "./python.mjs";
 
 /** How far the twin may be from the cell at the table, after touches that are good to a millimetre [m]. */
@@ -200,7 +200,7 @@ function sweep(tip, at, leans) {
 test("touches put the twin where the cell is, and what was undecided is decided", {
   timeout: 900_000,
 }, async () => {
-  await page.getByRole("button", { name: "be operator in AR", exact: true }).click({ timeout: 240_000 });
+  await enterRoom(page, "be operator in AR");
   await put(page, [0, 1.64, 0], [0.25, 1.1, -0.3]);
   await asked("Where is the tip");
   await page.waitForFunction(() => window.headset.activeSession.inputSources.length === 2);
@@ -277,7 +277,7 @@ test("looks of the device's own camera at a printed board put the twin where the
     window.giveCamera();
     return window.headset.activeSession?.end();
   });
-  await page.getByRole("button", { name: "be operator in AR", exact: true }).click({ timeout: 120_000 });
+  await enterRoom(page, "be operator in AR");
   await asked("Look at the board at sheet");
   // From three places, ahead of the board's middle and down at it: a turn of the head about x [rad].
   const places = [

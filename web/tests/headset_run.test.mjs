@@ -7,7 +7,7 @@ import path from "node:path";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, pressInRoom, put, trigger } from "./emulated_headset.mjs";
+import { enterRoom, HEADSET, pictures, pressInRoom, put, trigger } from "./emulated_headset.mjs";
 import { python } from "./python.mjs";
 
 /** How far the person may be from what the headset did [m]. */
@@ -125,7 +125,7 @@ async function stand(names) {
 }
 
 test("head and hand of the person go where those of the visitor go", { timeout: 900_000 }, async () => {
-  await page.getByRole("button", { name: "be operator in VR", exact: true }).click({ timeout: 240_000 });
+  await enterRoom(page, "be operator in VR");
   await put(page, [0, 1.64, 0], [0.25, 1.1, -0.3]);
   const bones = ["operator/head", "operator/right_hand"];
   const [head, hand] = await stand(bones);

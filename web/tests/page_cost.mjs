@@ -8,7 +8,7 @@
 
 import { SourceMap } from "node:module";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { enterRoom, HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { serve } from "./served.mjs";
 
 const SECONDS = Number(process.argv[2] ?? 10);
@@ -221,7 +221,7 @@ async function measure(name) {
 }
 
 await measure("desk");
-await page.getByRole("button", { name: "enter VR", exact: true }).click();
+await enterRoom(page, "enter VR");
 await page.getByRole("status").getByText("headset on").waitFor();
 await put(page, [0, 1.6, 0], [0.25, 1.1, -0.3]);
 await pictures(page, 5);

@@ -8,7 +8,7 @@ import path from "node:path";
 import { createInterface } from "node:readline";
 import { fileURLToPath } from "node:url";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, pressInRoom, put, trigger } from "./emulated_headset.mjs";
+import { enterRoom, HEADSET, outOfRoom, pictures, pressInRoom, put, trigger } from "./emulated_headset.mjs";
 import { python } from "./python.mjs";
 
 const HERE = path.dirname(fileURLToPath(import.meta.url));
@@ -45,7 +45,7 @@ async function show(browser, url) {
 
 /** Enter, look down by an angle [rad], with the left hand so high [m]. */
 const enter = async (page, name, down = 0.25, left = 1.15) => {
-  await page.getByRole("button", { name, exact: true }).click();
+  await enterRoom(page, name);
   await page.getByRole("status").getByText("headset on").waitFor();
   await page.evaluate(
     ([angle, height]) => {
@@ -61,7 +61,7 @@ const enter = async (page, name, down = 0.25, left = 1.15) => {
 };
 const leave = async (page) => {
   await page.evaluate(() => window.headset.activeSession.end());
-  await page.getByRole("button", { name: "enter VR", exact: true }).waitFor();
+  await outOfRoom(page);
 };
 
 /** Keep the picture of the room alone, as WebP, by the browser that draws it. */

@@ -50,24 +50,38 @@ export function HeadsetOffer() {
           ))}
         </select>
       </label>
-      {!inside &&
-        modes.map((mode) => (
-          <button key={mode} type="button" title={said(TITLES[mode])} onClick={() => void begin(mode, null)}>
-            {said("enter {mode}", { mode: WORDS[mode] })}
-          </button>
-        ))}
-      {!inside &&
-        may &&
-        [...people].flatMap((human) =>
-          modes.map((mode) => (
-            <button key={human + mode} type="button" onClick={() => void begin(mode, human)}>
-              {modes.length > 1
-                ? said("be {name} in {mode}", { name: human, mode: WORDS[mode] })
-                : said("be {name}", { name: human })}
-            </button>
-          )),
-        )}
-      {complaint && <span role="alert">{told(complaint)}</span>}
+      {!inside && (
+        <details class="room-offer">
+          <summary>{said("enter the room")}</summary>
+          <div class="room-choices">
+            {modes.map((mode) => (
+              <button
+                key={mode}
+                type="button"
+                title={said(TITLES[mode])}
+                onClick={() => void begin(mode, null)}
+              >
+                {said("enter {mode}", { mode: WORDS[mode] })}
+              </button>
+            ))}
+            {may &&
+              [...people].flatMap((human) =>
+                modes.map((mode) => (
+                  <button key={human + mode} type="button" onClick={() => void begin(mode, human)}>
+                    {modes.length > 1
+                      ? said("be {name} in {mode}", { name: human, mode: WORDS[mode] })
+                      : said("be {name}", { name: human })}
+                  </button>
+                )),
+              )}
+          </div>
+        </details>
+      )}
+      {complaint && (
+        <span role="alert" title={told(complaint)}>
+          {told(complaint)}
+        </span>
+      )}
     </div>
   );
 }

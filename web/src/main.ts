@@ -39,6 +39,9 @@ declare global {
       pose(name: string): { position: number[]; quaternion: number[] } | null;
       /** Colour of a score that a body is shown in, 0xrrggbb; null for its own or a verdict's. */
       tint(name: string): number | null;
+      /** Bytes of a PNG file of the room as it is drawn, or with nothing kept. */
+      picture(anew: boolean): Promise<number[]>;
+      readonly keeps: boolean;
       /** Whether a body is shown as one that may be elsewhere. */
       doubted(name: string): boolean;
       /** Whether a body is not drawn, as it is real, and hides what is behind it. */
@@ -146,6 +149,10 @@ function begin(element: HTMLElement): void {
     },
     get held() {
       return viewer.gizmo.held;
+    },
+    picture: async (anew) => [...new Uint8Array(await (await viewer.stage.picture(anew)).arrayBuffer())],
+    get keeps() {
+      return viewer.stage.keeps;
     },
     visited: (point) => visit?.inWorld(point) ?? null,
     get others() {

@@ -44,6 +44,13 @@ const FIRST = -1;
 /** What is no farther than this from where it was drawn last stands still: single precision, in metres and as a turn. */
 const STANDS = 1e-6;
 
+/** How far something may be from where it is while one moves [px], and how long after that one stands [ms]. */
+const MOVING_PX = 3;
+const SETTLED_MS = 150;
+
+/** Triangles that stand still from which on they are kept as a picture. */
+const HEAVY = 20_000;
+
 /** Time for coarser shapes in each picture [ms]. */
 const COARSER_MS = 4;
 
@@ -236,6 +243,9 @@ export class Bodies {
   readonly byName = new Map<string, Body>();
   private list: Body[] = [];
   private crowds: Crowd[] = [];
+  /** Crowds that stand still, and all of them below one group. */
+  private readonly standingCrowds = new Set<Crowd>();
+  readonly standing = { root: new Group(), version: 0, heavy: false };
   /** Where every body was put. */
   private posed = new Float32Array();
   private hidden: ReadonlySet<string> = new Set();
@@ -261,6 +271,10 @@ export class Bodies {
     this.root.clear();
     for (const crowd of this.crowds) crowd.dispose();
     this.crowds = [];
+    this.standingCrowds.clear();
+    this.standing.root.clear();
+    this.root.add(this.standing.root);
+    this.standing.version += 1;
     this.posed = new Float32Array();
     this.byName.clear();
     this.list = scene.nodes.map((node) => new Body(node));
@@ -331,6 +345,7 @@ export class Bodies {
     return moved;
   }
 
+  private movedAt = Number.NEGATIVE_INFINITY;
   private readonly sight: Sight = { eye: new Vector3(), frustum: new Frustum(), pixel: 0 };
   private readonly toScreen = new Matrix4();
   private readonly seenFrom = new Matrix4();
@@ -338,27 +353,58 @@ export class Bodies {
   /**
    * Draw those that are many no finer than one sees them.
    *
+   * While one moves they are coarser by up to `MOVING_PX` pixels, and by less than one as soon as one stands.
+   *
    * @param camera Its matrices up to date.
    * @param pixel Size of a pixel of the screen one metre away [m]; 0 where all are drawn as they are.
+   * @param time Of the picture [ms].
+   * @returns Whether it is time for a picture, as one has come to stand.
    */
-  arrange(camera: PerspectiveCamera, pixel: number): void {
-    if (this.crowds.length === 0) return;
+  arrange(camera: PerspectiveCamera, pixel: number, time: number): boolean {
+    if (this.crowds.length === 0) return false;
     const { sight, toScreen, seenFrom } = this;
     const close = pixel > 0 && drawnBySoftware();
     if (close) {
       toScreen.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
       toScreen.multiply(this.root.matrixWorld);
     } else toScreen.identity();
-    const anew = sight.pixel !== pixel || !toScreen.equals(seenFrom);
+    const elsewhere = !toScreen.equals(seenFrom);
+    if (elsewhere) this.movedAt = time;
+    const off = close && time - this.movedAt < SETTLED_MS ? MOVING_PX * pixel : pixel;
+    const anew = elsewhere || sight.pixel !== off;
     if (anew) {
       seenFrom.copy(toScreen);
-      sight.pixel = pixel;
+      sight.pixel = off;
       sight.frustum.setFromProjectionMatrix(toScreen);
       this.root.worldToLocal(camera.getWorldPosition(sight.eye));
     }
-    for (let k = 0; k < this.crowds.length; k += 1) this.crowds[k]!.arrange(close ? sight : null, anew);
+    this.settle(close, anew);
     const until = performance.now() + COARSER_MS;
     for (let k = 0; k < this.crowds.length; k += 1) this.crowds[k]!.refine(until);
+    return anew && !elsewhere;
+  }
+
+  /** Arrange crowds, and tell those that stand still from others. */
+  private settle(close: boolean, anew: boolean): void {
+    const { standing, standingCrowds, sight } = this;
+    let other = anew;
+    for (let k = 0; k < this.crowds.length; k += 1) {
+      const crowd = this.crowds[k]!;
+      const stood = standingCrowds.has(crowd);
+      const arranged = crowd.arrange(close ? sight : null, anew, stood && standing.heavy);
+      const stands = close && crowd.stands;
+      if (stands !== stood) {
+        (stands ? standing.root : this.root).add(crowd.root);
+        if (stands) standingCrowds.add(crowd);
+        else standingCrowds.delete(crowd);
+      }
+      if (stands !== stood || (stood && arranged)) other = true;
+    }
+    if (!other) return;
+    standing.version += 1;
+    let triangles = 0;
+    for (const crowd of standingCrowds) triangles += crowd.triangles;
+    standing.heavy = triangles >= HEAVY;
   }
 
   /** Show them over the real cell, or in a room of their own. */

@@ -12,6 +12,7 @@ import {
   Sphere,
   type Vector3,
 } from "three";
+import { STANDING_LAYER } from "./backdrop";
 import { drawnBySoftware } from "./effort";
 import { Levels, triangles } from "./levels";
 import { ownMaterial } from "./materials";
@@ -19,6 +20,8 @@ import { ownMaterial } from "./materials";
 /** Fewer of one shape are drawn one by one, unless they have many triangles. */
 const LEAST = 4;
 const MANY_TRIANGLES = 200;
+/** What moved so few pictures ago may move on. */
+const STILL = 8;
 /** Layer of what no camera sees, and rays meet all the same. Masks of higher ones are no small integers to V8. */
 export const ALONE_LAYER = 28;
 /** A mesh of a body that may be drawn with others. */
@@ -71,8 +74,10 @@ export class Crowd {
   private readonly shapes: Levels;
   private readonly material: Material;
   private changed = true;
-  /** Whether a coarser shape would do for one of its members. */
-  private wants = false;
+  /** Looks from which none of it has moved or looked different. */
+  private still = 0;
+  /** How far off the one that is seen smallest may be [m]. */
+  private coarsest = 0;
   private readonly members: readonly Member[];
 
   /** Meshes that are drawn in one call; `members` has at least one. */
@@ -108,11 +113,15 @@ export class Crowd {
    *
    * @param sight From where one looks; null where all are drawn as they are.
    * @param anew Whether that is another place than before.
+   * @param kept Whether it stands, and a picture of it is kept: a coarser shape waits for the next place.
+   * @returns Whether it may look different than before.
    */
-  arrange(sight: Sight | null, anew: boolean): void {
+  arrange(sight: Sight | null, anew: boolean, kept = false): boolean {
     const { levels, shapes } = this;
-    if (!anew && !this.changed && levels.length === shapes.made.length) return;
-    this.changed = this.wants = false;
+    this.still = this.changed ? 0 : this.still + 1;
+    if (!anew && !this.changed && (kept || levels.length === shapes.made.length)) return false;
+    this.changed = false;
+    this.coarsest = 0;
     while (levels.length < shapes.made.length) this.take(shapes.made[levels.length]!);
     for (const { drawn } of levels) drawn.count = 0;
     for (const { within, place, ball } of this.members) {
@@ -125,6 +134,19 @@ export class Crowd {
       drawn.visible = drawn.count > 0;
       drawn.instanceMatrix.needsUpdate = drawn.visible;
     }
+    return true;
+  }
+
+  /** Whether it has stood still for some pictures. */
+  get stands(): boolean {
+    return this.still >= STILL;
+  }
+
+  /** Triangles that are drawn of it now. */
+  get triangles(): number {
+    let sum = 0;
+    for (const { drawn } of this.levels) sum += drawn.count * triangles(drawn.geometry);
+    return sum;
   }
 
   private take({ shape, off }: { shape: BufferGeometry; off: number }): void {
@@ -132,19 +154,20 @@ export class Crowd {
     drawn.castShadow = drawn.receiveShadow = true;
     drawn.frustumCulled = false;
     drawn.raycast = () => {};
+    drawn.layers.enable(STANDING_LAYER);
     this.root.add(drawn);
     this.levels.push({ drawn, off });
   }
 
   /** Work on a coarser shape, where one would do, until a time [ms]; the finer one is drawn until it is there. */
   refine(until: number): void {
-    if (this.wants && this.levels.length === this.shapes.made.length) this.shapes.work(until);
+    if (this.coarsest >= this.shapes.next) this.shapes.work(until);
   }
 
   // The coarsest of which no point is a pixel off.
   private levelOf({ eye, pixel }: Sight, { center, radius }: Sphere): number {
     const seen = pixel * Math.max(eye.distanceTo(center) - radius, 0);
-    if (seen >= this.shapes.next) this.wants = true;
+    this.coarsest = Math.max(this.coarsest, seen);
     let level = this.levels.length - 1;
     while (level > 0 && this.levels[level]!.off > seen) level -= 1;
     return level;

@@ -16,6 +16,7 @@ import {
   ShadowMaterial,
   WebGLRenderer,
 } from "three";
+import { Backdrop, type Standing } from "./backdrop";
 import { drawnBySoftware, Sharpness } from "./effort";
 import { makeGrid, recolorGrid } from "./grid";
 import { roomLook } from "./room_look";
@@ -41,6 +42,9 @@ export class Stage {
   project: (() => void) | null = null;
   private dirty = true;
   private tickedAt = Number.NEGATIVE_INFINITY;
+  /** What stands still, where it is drawn once while one looks from one place; null where all is drawn anew. */
+  standing: Standing | null = null;
+  private readonly backdrop: Backdrop;
   /** Told after each picture, while it can still be read. */
   drawn: (() => void) | null = null;
   private drawnAt = Number.NEGATIVE_INFINITY;
@@ -51,6 +55,7 @@ export class Stage {
     const light = drawnBySoftware();
     const kind = light ? "software" : "hardware";
     this.renderer = light ? opaque() : new WebGLRenderer({ antialias: true });
+    this.backdrop = new Backdrop(this.renderer);
     this.sharpest = Math.min(globalThis.devicePixelRatio, light ? 1 : 2);
     const least = Math.min(LEAST_SHARPNESS[kind], this.sharpest);
     this.sharpness = new Sharpness(this.sharpest, least, LEAST_RATE[kind]);
@@ -72,6 +77,11 @@ export class Stage {
     this.resize();
   }
 
+  /** Whether what stands still was not drawn anew for the last picture. */
+  get keeps(): boolean {
+    return this.standing !== null && this.backdrop.holds(this.standing);
+  }
+
   /** Ask for a new picture; without being asked none is drawn. */
   invalidate(): void {
     this.dirty = true;
@@ -89,6 +99,12 @@ export class Stage {
     this.ground.setHex(ground);
     this.fog.color.setHex(ground);
     recolorGrid(this.grid);
+    this.refresh();
+  }
+
+  /** Ask for a picture in which everything is drawn anew: its colours, or where it is cut, are others. */
+  refresh(): void {
+    this.backdrop.forget();
     this.dirty = true;
   }
 
@@ -119,13 +135,21 @@ export class Stage {
 
   /** Draw at once: what was drawn before is not kept. */
   redraw(): void {
-    this.renderer.render(this.scene, this.camera);
+    const { renderer, scene, camera, standing } = this;
+    if (!(standing && this.backdrop.draw(scene, camera, standing))) renderer.render(scene, camera);
     this.drawn?.();
   }
 
-  /** What is drawn now, as a PNG file. */
-  picture(): Promise<Blob> {
+  /**
+   * What is drawn now, as a PNG file.
+   *
+   * @param anew Whether all of it is drawn, also what was kept.
+   */
+  picture(anew = false): Promise<Blob> {
+    const { standing } = this;
+    if (anew) this.standing = null;
     this.redraw();
+    this.standing = standing;
     return new Promise((resolve, reject) => {
       this.renderer.domElement.toBlob((png) => (png ? resolve(png) : reject(new Error("no picture"))));
     });

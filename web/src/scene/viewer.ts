@@ -197,7 +197,8 @@ export class Viewer {
     camera.updateWorldMatrix(true, false);
     // Through a real camera and in a headset pixels have another size.
     const plain = this.view.margins && this.through === null;
-    this.bodies.arrange(camera, plain ? this.view.pixel : 0);
+    if (this.bodies.arrange(camera, plain ? this.view.pixel : 0, time)) this.stage.invalidate();
+    this.stage.standing = this.bodies.standing;
     this.fillVolumes();
     // Two figures for one thing at one instant would look like an error.
     const { told } = this;
@@ -406,7 +407,7 @@ export class Viewer {
     });
     effect(() => {
       this.stage.renderer.clippingPlanes = sectionPlanes();
-      this.stage.invalidate();
+      this.stage.refresh();
     });
     effect(() => {
       this.stage.grid.visible = showGrid.value && !overReality.value;

@@ -51,8 +51,9 @@ const SETTLED_MS = 150;
 /** Triangles that stand still from which on they are kept as a picture. */
 const HEAVY = 20_000;
 
-/** Time for coarser shapes in each picture [ms]. */
+/** Time for coarser shapes in each picture [ms], and as a share of what it takes: they make slow ones faster. */
 const COARSER_MS = 4;
+const COARSER_SHARE = 0.2;
 
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
@@ -346,6 +347,7 @@ export class Bodies {
   }
 
   private movedAt = Number.NEGATIVE_INFINITY;
+  private arrangedAt = 0;
   private readonly sight: Sight = { eye: new Vector3(), frustum: new Frustum(), pixel: 0 };
   private readonly toScreen = new Matrix4();
   private readonly seenFrom = new Matrix4();
@@ -378,21 +380,23 @@ export class Bodies {
       sight.frustum.setFromProjectionMatrix(toScreen);
       this.root.worldToLocal(camera.getWorldPosition(sight.eye));
     }
-    this.settle(close, anew);
-    const until = performance.now() + COARSER_MS;
+    this.settle(close, anew, time);
+    const took = Math.min(time - this.arrangedAt, 1000);
+    this.arrangedAt = time;
+    const until = performance.now() + Math.max(COARSER_MS, COARSER_SHARE * took);
     for (let k = 0; k < this.crowds.length; k += 1) this.crowds[k]!.refine(until);
     return anew && !elsewhere;
   }
 
   /** Arrange crowds, and tell those that stand still from others. */
-  private settle(close: boolean, anew: boolean): void {
+  private settle(close: boolean, anew: boolean, time: number): void {
     const { standing, standingCrowds, sight } = this;
     let other = anew;
     for (let k = 0; k < this.crowds.length; k += 1) {
       const crowd = this.crowds[k]!;
       const stood = standingCrowds.has(crowd);
-      const arranged = crowd.arrange(close ? sight : null, anew, stood && standing.heavy);
-      const stands = close && crowd.stands;
+      const stands = close && crowd.stands(time);
+      const arranged = crowd.arrange(close ? sight : null, anew, stood && stands && standing.heavy);
       if (stands !== stood) {
         (stands ? standing.root : this.root).add(crowd.root);
         if (stands) standingCrowds.add(crowd);

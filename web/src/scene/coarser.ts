@@ -39,7 +39,10 @@ export function* coarsening(
   const { shape } = before;
   const at = shape.getAttribute("position");
   const normal = shape.getAttribute("normal");
-  const numbers = new Map<string, number>();
+  const numbers = new Numbers(at.count);
+  const exact = new Float32Array(6);
+  const bits = new Int32Array(exact.buffer);
+  const coarse = new Int32Array(4);
   const kept: number[] = [];
   const sums: number[] = [];
   const made = new Uint32Array(at.count);
@@ -51,14 +54,23 @@ export function* coarsening(
     const a = normal.getX(i);
     const b = normal.getY(i);
     const c = normal.getZ(i);
-    const key =
-      cell > 0
-        ? `${Math.floor(x / cell)} ${Math.floor(y / cell)} ${Math.floor(z / cell)} ${facing(a, b, c)}`
-        : `${x} ${y} ${z} ${a} ${b} ${c}`;
-    let number = numbers.get(key);
-    if (number === undefined) {
-      number = numbers.size;
-      numbers.set(key, number);
+    const key = cell > 0 ? coarse : bits;
+    if (cell > 0) {
+      coarse[0] = Math.floor(x / cell);
+      coarse[1] = Math.floor(y / cell);
+      coarse[2] = Math.floor(z / cell);
+      coarse[3] = facing(a, b, c);
+    } else {
+      // Of two zeros there is one.
+      exact[0] = x + 0;
+      exact[1] = y + 0;
+      exact[2] = z + 0;
+      exact[3] = a + 0;
+      exact[4] = b + 0;
+      exact[5] = c + 0;
+    }
+    const number = numbers.of(key);
+    if (3 * number === kept.length) {
       kept.push(x, y, z);
       sums.push(0, 0, 0);
     }
@@ -98,6 +110,48 @@ export function* coarsening(
   fewer.setAttribute("normal", new BufferAttribute(new Float32Array(sums), 3));
   fewer.setIndex(new BufferAttribute(new Uint32Array(triangles), 1));
   return { shape: fewer, off, standIn };
+}
+
+/** Numbers of keys of whole numbers, in the order in which they are asked for first. */
+class Numbers {
+  private readonly slots: Int32Array;
+  private keys = new Int32Array(0);
+  private count = 0;
+
+  constructor(most: number) {
+    this.slots = new Int32Array(2 ** Math.ceil(Math.log2(2 * most + 2))).fill(-1);
+  }
+
+  of(key: Int32Array): number {
+    const { slots } = this;
+    const { length } = key;
+    let hash = 0;
+    for (let k = 0; k < length; k += 1) {
+      hash = Math.imul(hash ^ key[k]!, 0x9e3779b1);
+      hash ^= hash >>> 15;
+    }
+    for (let at = hash & (slots.length - 1); ; at = (at + 1) & (slots.length - 1)) {
+      const number = slots[at]!;
+      if (number < 0) {
+        slots[at] = this.count;
+        this.keep(key);
+        return this.count++;
+      }
+      let k = 0;
+      while (k < length && this.keys[number * length + k] === key[k]) k += 1;
+      if (k === length) return number;
+    }
+  }
+
+  private keep(key: Int32Array): void {
+    const from = this.count * key.length;
+    if (from + key.length > this.keys.length) {
+      const more = new Int32Array(Math.max(1024, 2 * this.keys.length + key.length));
+      more.set(this.keys);
+      this.keys = more;
+    }
+    this.keys.set(key, from);
+  }
 }
 
 /** Which of the six directions of the axes a normal is nearest to. */

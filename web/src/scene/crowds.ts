@@ -20,8 +20,8 @@ import { ownMaterial } from "./materials";
 /** Fewer of one shape are drawn one by one, unless they have many triangles. */
 const LEAST = 4;
 const MANY_TRIANGLES = 200;
-/** What moved so few pictures ago may move on. */
-const STILL = 8;
+/** What moved not longer ago may move on [ms]. */
+const STILL_MS = 250;
 /** Layer of what no camera sees, and rays meet all the same. Masks of higher ones are no small integers to V8. */
 export const ALONE_LAYER = 28;
 /** A mesh of a body that may be drawn with others. */
@@ -74,8 +74,8 @@ export class Crowd {
   private readonly shapes: Levels;
   private readonly material: Material;
   private changed = true;
-  /** Looks from which none of it has moved or looked different. */
-  private still = 0;
+  /** When one of it was seen last to have moved or to look different [ms]. */
+  private changedAt = 0;
   /** How far off the one that is seen smallest may be [m]. */
   private coarsest = 0;
   private readonly members: readonly Member[];
@@ -118,7 +118,6 @@ export class Crowd {
    */
   arrange(sight: Sight | null, anew: boolean, kept = false): boolean {
     const { levels, shapes } = this;
-    this.still = this.changed ? 0 : this.still + 1;
     if (!anew && !this.changed && (kept || levels.length === shapes.made.length)) return false;
     this.changed = false;
     this.coarsest = 0;
@@ -137,9 +136,10 @@ export class Crowd {
     return true;
   }
 
-  /** Whether it has stood still for some pictures. */
-  get stands(): boolean {
-    return this.still >= STILL;
+  /** Whether it stands still at a time [ms], and has for a while; asked before it is arranged. */
+  stands(time: number): boolean {
+    if (this.changed) this.changedAt = time;
+    return time - this.changedAt > STILL_MS;
   }
 
   /** Triangles that are drawn of it now. */

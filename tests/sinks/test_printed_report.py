@@ -2,6 +2,7 @@
 
 import base64
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from seerob.outputs.report import printing
 from seerob.outputs.report.page import STYLE
 from seerob.outputs.report.report import ReportSection
 from seerob.outputs.sinks.dossier import Dossier
+from seerob.outputs.words import LANGUAGES
 
 DEMO = Path(__file__).parents[2] / "workstations" / "ur10_assembly"
 PIXEL = base64.b64decode(
@@ -46,6 +48,25 @@ def test_the_demo_is_a_dozen_pages_and_begins_with_its_verdict(tmp_path):
     for name, series in summary.results.items():
         if series.verdict is sr.Verdict.EXCEEDED:
             assert f"Change the cell, its motion or its task: {name} is " in page.text
+
+
+ENGLISH = re.compile(r"\b(the|of|by|with|from|not|is|are|its|where|who|that|this|which|than|nobody|and)\b")
+# Signs of a formula, a document that is cited, and what a motion of the demo is called in its own file.
+STAYS = re.compile(r"\b[JSvm]_\w|tables A, B and C|\b(19|20)\d\d\b|^motion operator secures the plate: ")
+
+
+@pytest.mark.parametrize("language", LANGUAGES[1:])
+def test_the_demo_is_a_dozen_pages_in_every_language_and_says_nothing_of_its_own_in_english(
+    tmp_path, language
+):
+    shutil.copytree(DEMO, tmp_path / "cell", ignore=shutil.ignore_patterns("runs"))
+    with (tmp_path / "cell/workstation.toml").open("a") as file:
+        file.write(f'\n[report]\nlanguage = "{language}"\n')
+    sr.load(tmp_path / "cell").run(folder=tmp_path, sinks=[Dossier(pdf=True)])
+    assert len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "report.pdf").read_bytes())) <= 12
+    text = (tmp_path / "report.html").read_text().partition("<body")[2]
+    said = re.split(r"<[^>]+>|; ", re.sub(r"<code>.*?</code>", "", text))
+    assert [part for part in said if ENGLISH.search(part) and not STAYS.search(part)] == []
 
 
 def test_the_first_page_says_for_whom_by_whom_and_which_revision(tmp_path):

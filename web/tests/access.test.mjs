@@ -3,10 +3,15 @@
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import { createRequire } from "node:module";
+import os from "node:os";
+import path from "node:path";
 import { after, before, test } from "node:test";
+import { fileURLToPath, pathToFileURL } from "node:url";
 import { open, settled } from "./expect.mjs";
+import { python } from "./python.mjs";
 
 const AXE = fs.readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
 const SIZES = { desk: [1366, 768], upright: [390, 844], across: [844, 390] };
 let opened;
 let page;
@@ -22,8 +27,8 @@ before(async () => {
 after(() => opened?.close());
 
 /** What axe finds, one line each: how bad, which rule, where. */
-async function faults() {
-  const { violations } = await page.evaluate(() =>
+async function faults(where = page) {
+  const { violations } = await where.evaluate(() =>
     globalThis.axe.run(document, { resultTypes: ["violations"] }),
   );
   return violations.flatMap(({ id, impact, nodes }) =>
@@ -71,6 +76,31 @@ for (const [name, go] of Object.entries(STATES)) {
     assert.deepEqual(found, []);
   });
 }
+
+test("a report and a comparison: no fault, at a desk and on a phone", async () => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-report-"));
+  const cell = path.join(ROOT, "workstations/ur10_assembly");
+  const ran = async (...parameters) => {
+    const child = python("-m", "seerob", ...parameters);
+    child.stdout.resume();
+    await new Promise((resolve) => child.once("exit", resolve));
+  };
+  await ran("assess", cell, "-o", path.join(folder, "run"));
+  await ran("compare", path.join(folder, "run"), cell, "--html", path.join(folder, "compared.html"));
+  const shown = await opened.browser.context.newPage();
+  const found = [];
+  for (const name of ["run/report.html", "compared.html"]) {
+    await shown.goto(pathToFileURL(path.join(folder, name)).href);
+    await shown.evaluate(AXE);
+    for (const [width, height] of [SIZES.desk, SIZES.upright]) {
+      await shown.setViewportSize({ width, height });
+      found.push(...(await faults(shown)).map((fault) => `${name}, ${width}: ${fault}`));
+    }
+  }
+  await shown.close();
+  fs.rmSync(folder, { recursive: true });
+  assert.deepEqual(found, []);
+});
 
 test("dark or light is the system's choice until one is made here, which is kept", async () => {
   await page.keyboard.press("Escape");

@@ -164,7 +164,7 @@ class Comparison:
     def html(self) -> str:
         """One page that stands alone: no script, nothing from elsewhere."""
         title = f"{self.before.title} compared with {self.after.title}"
-        return document(title, tag("body", tag("h1", title), list(self._content())))
+        return document(title, [tag("h1", title), list(self._content())])
 
     def json(self) -> dict[str, Any]:
         """All of it but pictures, as what JSON can say; a figure that there is not is None."""

@@ -60,10 +60,14 @@ def whole(figure: str) -> Html:
 
 
 def table(head: Iterable[Content], rows: Iterable[Iterable[Content]], *, class_: str | None = None) -> Html:
-    """A table with a header row; the first cell of each row heads it."""
-    body = []
+    """A table with a header row, unless all its titles are empty; the first cell of each row heads it.
+
+    On a narrow screen it scrolls, so keys have to reach it.
+    """
+    head, body = list(head), []
     for row in rows:
         first, *rest = row
         body.append(tag("tr", tag("th", first, scope="row"), [tag("td", cell) for cell in rest]))
-    titles = tag("tr", [tag("th", cell, scope="col") for cell in head])
-    return tag("table", tag("thead", titles), tag("tbody", body), class_=class_)
+    titles = [tag("th", cell, scope="col") if cell else tag("td") for cell in head]
+    first_row = tag("thead", tag("tr", titles)) if any(head) else None
+    return tag("table", first_row, tag("tbody", body), class_=class_, tabindex="0")

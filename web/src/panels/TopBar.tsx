@@ -21,7 +21,7 @@ import {
 } from "../page_state";
 import { orderedRows } from "../row_order";
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
-import { said, word } from "../words";
+import { said, told, word } from "../words";
 import { Company } from "./Company";
 import { ElsewhereNote } from "./ElsewhereNote";
 import { HeadsetOffer } from "./HeadsetOffer";
@@ -36,7 +36,7 @@ export function TopBar() {
       </div>
       <div class="study">
         <h1 title={run?.title}>{run?.title ?? "…"}</h1>
-        {run && <span class="edition">{run.edition || said("no edition stated")}</span>}
+        {run && <span class="edition">{run.edition ? told(run.edition) : said("no edition stated")}</span>}
       </div>
       <Company />
       <HeadsetOffer />

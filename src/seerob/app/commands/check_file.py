@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from seerob.app.console.loading import compiled
-from seerob.app.console.terminal import Exit, add_workstation, allowed, describe, line
+from seerob.app.console.terminal import Exit, add_workstation, allowed, describe, line, tell
 
 if TYPE_CHECKING:
     from seerob.session.station import Station
@@ -40,8 +40,7 @@ def run(options: argparse.Namespace) -> int:
     """Read, compile, bind and open everything; run nothing, connect to nothing."""
     station = compiled(options.workstation, allowed(options))
     describe(station)
-    for finding in station.scene().findings:
-        line(finding.level, f"{finding.subject}: {finding.text}")
+    tell(station.scene().findings, verbose=True)
     for name, contact in station.contacts().items():
         line("would", f"{name}: {contact}; checking connects to nothing, seerob probe and run do")
     _masses(station)

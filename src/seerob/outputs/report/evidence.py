@@ -65,6 +65,10 @@ def not_covered(report: Report) -> Html:
     )
 
 
+_ROLES = {"human": word("human")}
+"""Roles that nothing else names."""
+
+
 def evaluated(report: Report) -> Html:
     """Rates, sources, versions, hashes and bodies."""
     scene, log, how = report.scene, report.log, report.setup
@@ -100,7 +104,7 @@ def evaluated(report: Report) -> Html:
         mass = f" {number(node.mass, 'kg')}" if node.mass is not None else ""
         alike.setdefault((node.role, node.mass_origin, node.note), []).append(f"{node.name}{mass}")
     bodies = [
-        ["; ".join(names), role, said(WHO[origin]), told(note) or "–"]
+        ["; ".join(names), said(_ROLES.get(role, role)), said(WHO[origin]), told(note) or "–"]
         for (role, origin, note), names in alike.items()
     ]
     heads = [
@@ -110,13 +114,13 @@ def evaluated(report: Report) -> Html:
         [
             table(["", ""], facts),
             bone_errors(log.bones),
-            tag("h4", said("Sources")),
+            tag("h3", said("Sources"), class_="minor"),
             _sources(heads, how),
-            tag("h4", said("With what")),
+            tag("h3", said("With what"), class_="minor"),
             table(["", ""], written),
-            tag("h4", said("Input files")) if files else None,
+            tag("h3", said("Input files"), class_="minor") if files else None,
             table([said("file"), said("size"), "SHA-256"], files) if files else None,
-            tag("h4", said("Bodies of the twin")),
+            tag("h3", said("Bodies of the twin"), class_="minor"),
             table([said("bodies and masses"), said("role"), said("mass is"), said("geometry")], bodies),
             masses(scene),
         ]
@@ -168,7 +172,13 @@ def bone_errors(people: Mapping[str, BoneErrors]) -> Html | None:
         "How far the twin's bones are from where the devices see them: fit of the person's lengths, "
         "the controllers, and contacts together. Percentiles are good to half a per cent of themselves."
     )
-    return joined([tag("h4", said("Tracking of bones")), table(head, rows), tag("p", text, class_="lead")])
+    return joined(
+        [
+            tag("h3", said("Tracking of bones"), class_="minor"),
+            table(head, rows),
+            tag("p", text, class_="lead"),
+        ]
+    )
 
 
 HEAD = (
@@ -203,9 +213,16 @@ def cells(row: LinkMass) -> list[str]:
     return [row.name, mass, WHO[row.origin], moves, row.merged or "–", why or "–"]
 
 
-def _shown(row: LinkMass) -> list[str | Html]:
-    name, mass, origin, moves, merged, why = cells(row)
-    return [name, whole(mass), said(origin), said(moves), merged, told(why)]
+def _shown(rows: Sequence[LinkMass]) -> list[list[str | Html]]:
+    """Rows of the table, those that differ by their name only as one."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for row in rows:
+        name, *rest = cells(row)
+        alike.setdefault(tuple(rest), []).append(name)
+    return [
+        ["; ".join(names), whole(mass), said(origin), said(moves), merged, told(why)]
+        for (mass, origin, moves, merged, why), names in alike.items()
+    ]
 
 
 def weighed(scene: Scene) -> tuple[MechanismInfo, ...]:
@@ -222,10 +239,11 @@ def masses(scene: Scene) -> Html | None:
             joined(
                 [
                     tag(
-                        "h4",
+                        "h3",
                         said("Masses of {name}: {total}", name=mechanism.name, total=total(mechanism.masses)),
+                        class_="minor",
                     ),
-                    table([said(title) for title in HEAD], map(_shown, mechanism.masses)),
+                    table([said(title) for title in HEAD], _shown(mechanism.masses)),
                 ]
             )
             for mechanism in weighed(scene)

@@ -9,7 +9,7 @@ from base64 import b64encode
 from collections.abc import Sequence
 
 from seerob.core.snapshot import Basis, CriterionInfo, Verdict
-from seerob.outputs.html import Html, joined, table, tag, whole
+from seerob.outputs.html import Content, Html, joined, table, tag, whole
 from seerob.outputs.palette import DARK_HEX, HEX
 from seerob.outputs.report import plots as _plots
 from seerob.outputs.report.events import events_section
@@ -31,7 +31,7 @@ h1 {{ font-size: 1.9rem; line-height: 1.2; margin: 0 0 .3rem; }}
 h2 {{ font-size: 1.3rem; margin: 2.8rem 0 .8rem; padding-bottom: .3rem;
   border-bottom: 2px solid var(--ink); }}
 h3 {{ font-size: 1.1rem; margin: 2.2rem 0 .5rem; }}
-h4 {{ font-size: .95rem; margin: 1.2rem 0 .3rem; color: var(--soft); }}
+h4, .minor {{ font-size: .95rem; margin: 1.2rem 0 .3rem; padding: 0; border: 0; color: var(--soft); }}
 p, ul {{ margin: .5rem 0; }}
 .lead {{ color: var(--soft); margin: 0 0 1.4rem; }}
 .notice {{ border-left: 4px solid var(--soft); background: var(--wash); padding: .6rem 1rem; }}
@@ -77,9 +77,9 @@ figcaption {{ font-size: .84rem; color: var(--soft); margin-top: .3rem; }}
 .cover ol {{ columns: 2; margin: .4rem 0; font-size: .88rem; }}
 .cover a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
 .inputs {{ table-layout: fixed; }}
-.inputs th:nth-child(2) {{ width: 12%; }}
+.inputs th:nth-child(2) {{ width: 16%; }}
 .inputs th:nth-child(3) {{ width: 10%; }}
-.inputs th:last-child {{ width: 42%; }}
+.inputs th:last-child {{ width: 39%; }}
 .inputs tbody th {{ font-weight: normal; }}
 .logo {{ float: right; max-width: 11rem; max-height: 4.5rem; }}
 section.criterion {{ border-top: 1px solid var(--rule); padding-top: .2rem; margin-top: 1.6rem; }}
@@ -97,7 +97,7 @@ h2 + section.criterion {{ border-top: none; margin-top: 0; }}
   body {{ max-width: none; padding: 0; font-size: 9.5pt; line-height: 1.4; }}
   h2 {{ margin: 1.4rem 0 .5rem; }}
   h3 {{ margin: .9rem 0 .2rem; }}
-  h4 {{ margin: .6rem 0 .2rem; }}
+  h4, .minor {{ margin: .6rem 0 .2rem; }}
   p, ul {{ margin: .25rem 0; }}
   figure {{ margin: .3rem 0; }}
   h2, h3, h4 {{ break-after: avoid; }}
@@ -111,8 +111,11 @@ h2 + section.criterion {{ border-top: none; margin-top: 0; }}
   .parts th, .parts td {{ padding: .02rem .4rem; }}
   .parts .badge {{ font-size: 6pt; padding: 0 .3rem; border-width: 1px; }}
   .appendix {{ font-size: 8.5pt; }}
-  .appendix h4 {{ margin: .4rem 0 .1rem; }}
-  .appendix table {{ font-size: 6.8pt; }}
+  .appendix .minor {{ margin: .4rem 0 .1rem; }}
+  .appendix table {{ font-size: 6.5pt; }}
+  .appendix th, .appendix td {{ padding: .05rem .4rem; }}
+  .appendix td {{ overflow-wrap: break-word; min-width: 0; }}
+  .appendix td code {{ overflow-wrap: anywhere; }}
   .formula {{ padding: .25rem .6rem; font-size: 7.5pt; }}
   .badge {{ font-size: 7.5pt; padding: .05rem .4rem; }}
   thead th {{ white-space: normal; overflow-wrap: normal; }}
@@ -175,8 +178,7 @@ def _page(report: Report) -> str:
         (word("What was evaluated"), evaluated(report)),
     ]
     written = [(name, content) for name, content in sections if content]
-    body = tag(
-        "body",
+    content = [
         _cover(report, title, [name for name, _ in written]),
         [
             tag(
@@ -187,12 +189,12 @@ def _page(report: Report) -> str:
             )
             for k, (name, content) in enumerate(written)
         ],
-    )
-    return document(title, body)
+    ]
+    return document(title, content)
 
 
-def document(title: str, body: Html) -> str:
-    """A whole document around a body, with the report's style; nothing in it is from elsewhere."""
+def document(title: str, content: Content) -> str:
+    """A whole document around its content, with the report's style; nothing in it is from elsewhere."""
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -202,7 +204,7 @@ def document(title: str, body: Html) -> str:
         tag("title", title),
         tag("style", Html(STYLE)),
     )
-    return "<!DOCTYPE html>\n" + tag("html", head, body, lang=spoken()) + "\n"
+    return "<!DOCTYPE html>\n" + tag("html", head, tag("body", tag("main", content)), lang=spoken()) + "\n"
 
 
 _SHARES = word(
@@ -236,9 +238,9 @@ def _cover(report: Report, title: str, contents: Sequence[str]) -> Html:
         tag("h1", title),
         tag("dl", [[tag("dt", said(name)), tag("dd", text)] for name, text in facts.items() if text]),
         _opening(report),
-        tag("h4", said("What to do")),
+        tag("h2", said("What to do"), class_="minor"),
         tag("ul", [tag("li", text) for text in to_do(report)]),
-        tag("h4", said("Contents")),
+        tag("h2", said("Contents"), class_="minor"),
         tag("ol", [tag("li", tag("a", said(name), href=f"#{_place(k)}")) for k, name in enumerate(contents)]),
         class_="cover",
     )

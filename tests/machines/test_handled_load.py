@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from machines.test_loose import BLANK, LEFT, PERSON, RIGHT, TABLE, Cell
 from seerob.core.snapshot import Verdict
@@ -112,6 +113,17 @@ def test_what_is_mounted_on_a_hand_is_held_all_the_time(tmp_path, weight, mass, 
     cell = Cell(tmp_path, PERSON + worn)
     found = bind_handled(cell.model, "operator")(cell.state)
     assert found == Handled(None if mass is None else pytest.approx(mass), frozenset(hands))
+
+
+def test_what_may_weigh_more_counts_with_what_it_weighs_at_most(tmp_path):
+    """By density a tool follows its triangles, which are a millimetre off: it is no lighter for that."""
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "drill.stl")
+    worn = '[[tools]]\nname = "drill"\non = "operator/left_hand"\nmesh = "drill.stl"\nunits = "m"\n'
+    cell = Cell(tmp_path, PERSON + worn + "density = 1000\ndeviation_mm = 1\n")
+    found = bind_handled(cell.model, "operator")(cell.state)
+    # A box of 102 mm with rounded edges.
+    assert 1.0603 < found.mass < 0.102**3 * 1000
+    assert found.hands == {"left"}
 
 
 def test_two_hands_at_one_piece_carry_it_once_and_two_pieces_both(tmp_path):

@@ -15,6 +15,7 @@ import numpy as np
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
 from seerob.criteria.figure import Twin
+from seerob.description.description import Quantity
 from seerob.model.model import Model
 from seerob.twin.state import State
 
@@ -41,8 +42,8 @@ def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
     hand weighs, nobody knows what all of it does. Where workpieces are loose there is one instant at a time.
     """
     station = model.workstation
-    # By a mass that is given, or by density; one of several shapes has it on each.
-    weighed = {body.owner: body.mass.value for body in model.bodies if body.mass is not None}
+    # By a mass that is given, or by density at most; one of several shapes has it on each.
+    weighed = {body.owner: at_most(body.mass) for body in model.bodies if body.mass is not None}
     worn = [
         ((thing.on or "").partition("/")[2], weighed[thing.name])
         for thing in (*station.workpieces, *station.tools)
@@ -72,6 +73,11 @@ def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
         return Handled(mass, hands)
 
     return read if loose else lambda twin: always
+
+
+def at_most(mass: Quantity) -> float:
+    """What something weighs at most [kg], where its volume is known within bounds alone."""
+    return mass.value * (1 + mass.error)
 
 
 def unweighed(model: Model, human: str) -> list[str]:

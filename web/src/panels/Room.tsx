@@ -3,7 +3,7 @@
 import { controls, mayPull, press, pull, refused, release, standsAt } from "../doing";
 import { soFar } from "../page_state";
 import type { ControlInfo } from "../wire";
-import { said } from "../words";
+import { said, told } from "../words";
 import { eventFigures, eventLine } from "./event_line";
 
 export function Room() {
@@ -19,7 +19,7 @@ export function Room() {
           {!mayPull.value && <p>{said("Only a page of a live run that may track or control pulls them.")}</p>}
         </section>
       )}
-      {refused.value && <p role="alert">{refused.value.reason}</p>}
+      {refused.value && <p role="alert">{told(refused.value.reason)}</p>}
       <section aria-label={said("Events")}>
         <h2>{said("Events")}</h2>
         {events.length === 0 && <p>{said("Nothing has happened yet.")}</p>}

@@ -179,3 +179,33 @@ def test_what_is_written_of_a_round_solid_is_its_own_mass(tmp_path):
         expected = 7850 * np.array(sorted([across, across, along]))
         assert sorted(row["written"]["inertia"][:3]) == pytest.approx(expected, rel=near)
         assert cli.main(["check-file", str(cell)]) == Exit.WITHIN
+
+
+def test_a_density_of_the_file_is_told_and_nobody_takes_it(tmp_path):
+    """OpenCASCADE reads one in kilograms a thousand times too light, so its figure is nobody's."""
+    pytest.importorskip("OCP")
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    label = shapes.AddShape(BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape(), False)
+    words = (
+        TCollection_HAsciiString(text)
+        for text in ("steel", "S235", "density measure", "POSITIVE_RATIO_MEASURE")
+    )
+    name, about, *kind = words
+    XCAFDoc_DocumentTool.MaterialTool_s(document.Main()).SetMaterial(label, name, about, 7.85, *kind)
+    writer = STEPCAFControl_Writer()
+    writer.Transfer(document)
+    file = tmp_path / "block.step"
+    writer.Write(str(file))
+    assembly = step.read(MeshSource(file, file.read_bytes(), 1 << 26, 1 << 20))
+    assert assembly.shapes[0].material == "steel"
+    assert any("states a density of steel, which is not taken" in f.text for f in assembly.findings)
+    assert cli.main(["import", str(file), str(tmp_path / "cell"), "--density", "steel=7850"]) == Exit.WITHIN
+    (row,) = json.loads((tmp_path / "cell/import.json").read_text())["parts"]
+    assert row["mass"] == pytest.approx(7.85, rel=1e-6)

@@ -166,6 +166,12 @@ def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: 
     solid, text = _solid(row, whole, deviation)
     if text:
         note("warning", text)
+    if row["dense"]:
+        material = printable(row["material"])[:200]
+        note(
+            "note",
+            f"the file states a density of {material}, which is not taken: give --density NAME=DENSITY",
+        )
     for text in _contradicted(row):
         note("warning", text)
     surfaces = tuple(

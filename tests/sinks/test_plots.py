@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from seerob.core.snapshot import Result, Verdict
-from seerob.outputs.report.plots import Axis, curve, lanes, ticks
+from seerob.outputs.report.plots import Axis, both, curve, lanes, ticks
 from seerob.recording.series import Series
 
 
@@ -110,3 +110,19 @@ def test_ticks_are_round_and_within():
         found = ticks(Axis(low, high, 0, 140))
         assert 2 <= len(found) <= 9
         assert all(low - 1e-9 <= v <= high + 1e-9 for v in found)
+
+
+def test_two_runs_are_on_one_axis_each_with_its_limit_and_its_own_end():
+    first = of([1.0, 2.0, 4.0], [3.0] * 3)
+    second = of([8.0, 6.0, 5.0, 1.0, 0.5], [7.0] * 5)
+    root = drawing(both([("before", first), ("after", second)]))
+    assert {"before", "after", "limit, before", "limit, after", "[m]"} <= set(words(root))
+    lines = [
+        places(e.get("d"))[0]
+        for e in root.iter("path")
+        if e.get("stroke-linejoin") == "round" and e.get("d").count("L") > 0
+    ]
+    x, y = scale(root, "x"), scale(root, "y")
+    for line, series in zip(lines, (first.values, first.limits, second.values, second.limits), strict=True):
+        assert [x(a) for a, _ in line] == pytest.approx([0.1 * k for k in range(len(series))], abs=2e-3)
+        assert [y(b) for _, b in line] == pytest.approx(list(series), abs=0.02)

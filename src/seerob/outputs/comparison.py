@@ -19,6 +19,7 @@ from seerob.core.printable import printable
 from seerob.core.snapshot import CriterionInfo, Finding, Scene, Verdict
 from seerob.outputs.html import Content, Html, table, tag, whole
 from seerob.outputs.report.page import document
+from seerob.outputs.report.plots import both
 from seerob.outputs.report.report import badge
 from seerob.outputs.sentences import bound, extremum, grouped, percent
 from seerob.recording.result_log import ResultLog
@@ -237,8 +238,18 @@ class Comparison:
         columns = ("criterion", "is now", "before", "after", "decided", "notes")
         yield table(columns, [self._row(one) for one in self.criteria], class_="overview")
         for one in self.criteria:
+            runs = [
+                (what, series)
+                for what, series in (("before", one.before), ("after", one.after))
+                if series is not None and series.known and len(series.t) > 1
+            ]
+            together = len(runs) == 2 and runs[0][1].unit == runs[1][1].unit
+            if not (together or one.name in self.pictures):
+                continue
+            yield tag("h3", one.name)
+            if together:
+                yield tag("figure", both(runs))
             if one.name in self.pictures:
-                yield tag("h3", one.name)
                 shown = [
                     _figure(one, png, series, what)
                     for png, series, what in zip(

@@ -38,7 +38,7 @@ p, ul {{ margin: .5rem 0; }}
 table {{ border-collapse: collapse; width: 100%; margin: .6rem 0; font-size: .88rem; line-height: 1.4; }}
 th, td {{ text-align: left; vertical-align: top; padding: .32rem .6rem; border-bottom: 1px solid var(--rule);
   font-variant-numeric: tabular-nums; font-weight: normal; }}
-thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink);
+thead th, thead td {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink);
   white-space: nowrap; }}
 tbody th {{ font-weight: 600; min-width: 7rem; }}
 .instants tbody th {{ min-width: 0; }}

@@ -29,6 +29,8 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 53.0, 8.0, 22.0, 34.0
 """Margins of a curve."""
 _FONT, _SMALL = 9.0, 8.0
 _INK, _TICK, _FRAME, _RULE = "#1A2430", "#44505C", "#6B7785", "#E1E6EB"
+_EARLIER, _EARLIER_LIMIT = "#5B8DB8", "#C79AA4"
+"""Of a run that another is compared with."""
 _TINT = {Verdict.EXCEEDED: 0.2, Verdict.UNDECIDED: 0.6}
 _DASH = "6.5 2.6"
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -103,25 +105,57 @@ def curve(series: Series, *, salt: str) -> Html:
         color = DARK_HEX[worst.verdict]
         over.append(_dot(x.place(worst.t), y.place(worst.value), 2.5, color))
         legend.append((said("worst, {t} s", t=f"{worst.t:.2f}"), [_dot(8, -2.5, 2.5, color)]))
-    unit = f"[{series.unit}]" if series.unit else ""
-    middle = _number((y.begin + y.end) / 2)
+    title = said("{name} over time", name=series.name)
+    return _svg(_HEIGHT, title, _hatches(salt), under, _axes(x, y, series.unit, over), _legend(legend))
+
+
+def both(runs: Sequence[tuple[str, Series]]) -> Html:
+    """Values and limits of one criterion in several runs, on one axis of run time.
+
+    Args:
+        runs: What each is called, and its series, all in one unit; the last is drawn darkest.
+    """
+    drawn = [(name, one, one.thinned(POINTS)) for name, one in runs]
+    figures = [_shown(each[i]) for _, one, i in drawn for each in (one.values, one.limits)]
+    begin = min(float(one.t[0]) for _, one in runs)
+    end = max(float(one.t[-1]) for _, one in runs)
+    span = end - begin or 1.0
+    x = Axis(begin - 0.01 * span, end + 0.01 * span, _LEFT, _WIDTH - _RIGHT)
+    y = Axis(*_room(np.concatenate([each[np.isfinite(each)] for each in figures])), _HEIGHT - _BOTTOM, _TOP)
+    lines: list[Html] = []
+    legend: list[tuple[str, list[Html]]] = []
+    for k, (name, one, i) in enumerate(drawn):
+        color, limit = (
+            (_INK, DARK_HEX[Verdict.EXCEEDED]) if k == len(drawn) - 1 else (_EARLIER, _EARLIER_LIMIT)
+        )
+        places = x.at(one.t[i])
+        lines += [
+            _line(places, y.at(figures[2 * k]), color),
+            _line(places, y.at(figures[2 * k + 1]), limit, dash=_DASH),
+        ]
+        legend.append((name, [_stroke("M0,-2.5H16", color)]))
+        if np.isfinite(figures[2 * k + 1]).any():
+            legend.append((f"limit, {name}", [_stroke("M0,-2.5H16", limit, dash=_DASH)]))
     return _svg(
-        _HEIGHT,
-        said("{name} over time", name=series.name),
-        _hatches(salt),
-        under,
-        [
+        _HEIGHT, f"{runs[-1][1].name} over time", _axes(x, y, runs[-1][1].unit, lines), _legend(legend)
+    )
+
+
+def _axes(x: Axis, y: Axis, unit: str, drawn: list[Html]) -> list[Html]:
+    """What is drawn between its axes, on rules."""
+    middle = _number((y.begin + y.end) / 2)
+    return [
+        *(
             _stroke(f"M{_number(x.begin)},{_number(y.place(v))}H{_number(x.end)}", _RULE, 0.6)
             for v in ticks(y)
-        ],
-        over,
-        _time_axis(x, y.begin),
+        ),
+        *drawn,
+        *_time_axis(x, y.begin),
         _stroke(f"M{_number(x.begin)},{_number(y.begin)}V{_number(y.end)}", _FRAME, 0.8),
-        [_tick(v, _LEFT - 5, y.place(v) + 3, y, "end") for v in ticks(y)],
-        [_stroke(f"M{_number(_LEFT - 3.5)},{_number(y.place(v))}h3.5", _TICK, 0.8) for v in ticks(y)],
-        _text(unit, 0, 0, "middle", transform=f"translate(10 {middle}) rotate(-90)"),
-        _legend(legend),
-    )
+        *(_tick(v, _LEFT - 5, y.place(v) + 3, y, "end") for v in ticks(y)),
+        *(_stroke(f"M{_number(_LEFT - 3.5)},{_number(y.place(v))}h3.5", _TICK, 0.8) for v in ticks(y)),
+        _text(f"[{unit}]" if unit else "", 0, 0, "middle", transform=f"translate(10 {middle}) rotate(-90)"),
+    ]
 
 
 def lanes(series: Sequence[Series], *, salt: str) -> Html:

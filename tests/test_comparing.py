@@ -197,6 +197,7 @@ def test_the_command_says_it_and_ends_with_what_turned(cells, capsys):
     assert "exceeded     gap: within → exceeded; " in said
     text = page.read_text()
     assert text.count("data:image/png;base64,") == 2  # one criterion turned, seen from one viewpoint
+    assert "<svg" not in text  # there is one instant
     assert "<script" not in text
     assert cli.main(["compare", str(cells / "run_near"), str(cells / "run_far")]) == 0
     capsys.readouterr()

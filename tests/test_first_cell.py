@@ -58,7 +58,11 @@ def test_figures_of_the_page_are_those_of_the_run(walked):
     found = [far["tcp speed"].max(), far["distance"].min(), inside, beyond]
     assert said == pytest.approx(found, abs=0.006)
     assert (folder / "my_cell/runs/far/report.html").stat().st_size > 1e5
-    assert (folder / "my_cell/compared.html").read_text().count("<img") == 2
+    compared = (folder / "my_cell/compared.html").read_text()
+    assert compared.count("<img") == 2
+    # Both runs on one axis, each criterion with both limits.
+    assert re.findall(r'aria-label="(.*?) over time"', compared) == ["distance", "tcp speed"]
+    assert compared.count(">limit, before<") == compared.count(">limit, after<") == 2
 
 
 def test_points_by_hand_name_no_file(walked):

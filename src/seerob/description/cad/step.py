@@ -168,10 +168,9 @@ def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: 
         note("warning", text)
     if row["dense"]:
         material = printable(row["material"])[:200]
-        note(
-            "note",
-            f"the file states a density of {material}, which is not taken: give --density NAME=DENSITY",
-        )
+        text = f"the file states a density of {material}, which is not taken: give --density NAME=DENSITY"
+        if all(finding.text != text for finding in findings):
+            note("note", text)
     for text in _contradicted(row):
         note("warning", text)
     surfaces = tuple(

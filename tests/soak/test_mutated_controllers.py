@@ -17,7 +17,7 @@ from seerob.devices.sources.rtde import FIELDS
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc import s7_web, sparkplug
 from seerob.protocols.plc.modbus import Block, Device, Place, Table, Type, Words, take
-from seerob.protocols.robots import doosan_drfl, fri, rtde, ur_primary
+from seerob.protocols.robots import abb_egm, doosan_drfl, fri, rtde, ur_primary
 from soak.mutations import refusals
 
 COUNTS = [pytest.param(1000, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]
@@ -64,6 +64,14 @@ def monitoring(edition):
 def an_answer(edition):
     answer = fri.answer_to(fri.decode_monitoring(monitoring(edition)), 3)
     return fri.encode_answer(answer)
+
+
+def guided():
+    six = (0.1,) * 6
+    said = abb_egm.Message(
+        7, 1e9, six, (1.0,), (1.0, 2.0, 3.0), motors=1, motion=2, program=2, force=six, utilization=50.0
+    )
+    return abb_egm.encode(said)
 
 
 def kinematics():
@@ -152,6 +160,7 @@ DECODERS = {
         lambda data: fri.decode_answer(data, fri.Edition.V1),
     ),
     "drfl": (lambda: DrflSender(swing((0.1,) * 6), to=("", 1)).message(3), doosan_drfl.decode),
+    "egm": (guided, abb_egm.decode),
     **{
         f"modbus {table}": (lambda t=table: modbus_frame(t), lambda data, t=table: read_modbus(data, t))
         for table in BLOCKS

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -181,9 +182,8 @@ def test_what_is_written_of_a_round_solid_is_its_own_mass(tmp_path):
         assert cli.main(["check-file", str(cell)]) == Exit.WITHIN
 
 
-def test_a_density_of_the_file_is_told_and_nobody_takes_it(tmp_path):
-    """OpenCASCADE reads one in kilograms a thousand times too light, so its figure is nobody's."""
-    pytest.importorskip("OCP")
+def block_with_a_density(file, unit, figure="7.85"):
+    """A cube of 0.1 m of steel, as OpenCASCADE writes it, with the unit of its density written anew."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
@@ -201,11 +201,70 @@ def test_a_density_of_the_file_is_told_and_nobody_takes_it(tmp_path):
     XCAFDoc_DocumentTool.MaterialTool_s(document.Main()).SetMaterial(label, name, about, 7.85, *kind)
     writer = STEPCAFControl_Writer()
     writer.Transfer(document)
-    file = tmp_path / "block.step"
     writer.Write(str(file))
+    mass, per, length, power = unit
+    text = file.read_text().replace("POSITIVE_RATIO_MEASURE(7.85)", f"POSITIVE_RATIO_MEASURE({figure})")
+    text, n = re.subn(r"(MASS_UNIT\(\) NAMED_UNIT\(\*\) SI_UNIT\()\$", rf"\g<1>{mass}", text)
+    text, k = re.subn(r"(DERIVED_UNIT_ELEMENT\(#\d+,)3\.", rf"\g<1>{per}", text)
+    text, m = re.subn(r"(DERIVED_UNIT_ELEMENT\(#\d+,)2\.", rf"\g<1>{power}", text)
+    text, c = re.subn(r"SI_UNIT\(\.CENTI\.,\.METRE\.\)", f"SI_UNIT({length},.METRE.)", text)
+    assert n == k == m == c == 1
+    file.write_text(text)
+
+
+KILO, GRAM, METRE, CENTI, MILLI = ".KILO.", "$", "$", ".CENTI.", ".MILLI."
+
+
+@pytest.mark.parametrize(
+    ("unit", "figure", "density"),
+    [
+        ((GRAM, "3.", CENTI, "2."), "7.85", 7850.0),  # as OpenCASCADE writes g/cm³
+        ((GRAM, "1.", CENTI, "-3."), "7.85", 7850.0),
+        ((KILO, "1.", METRE, "-3."), "7850.", 7850.0),
+        ((KILO, "1.", MILLI, "-3."), "7.85E-6", 7850.0),
+        ((GRAM, "1.", MILLI, "-3."), "7.85E-3", 7850.0),
+        ((KILO, "1.", CENTI, "-3."), "7.85", None),  # denser than anything
+        ((KILO, "1.", METRE, "-2."), "7850.", None),  # of an area
+        ((KILO, "3.", METRE, "2."), "7850.", None),
+        ((KILO, "1.", METRE, "-3."), "-7850.", None),
+        ((KILO, "1.", METRE, "-3."), "0.", None),
+    ],
+)
+def test_a_density_that_a_step_file_states_is_taken_in_its_own_unit(tmp_path, unit, figure, density):
+    pytest.importorskip("OCP")
+    file = tmp_path / "block.step"
+    block_with_a_density(file, unit, figure)
     assembly = step.read(MeshSource(file, file.read_bytes(), 1 << 26, 1 << 20))
-    assert assembly.shapes[0].material == "steel"
-    assert any("states a density of steel, which is not taken" in f.text for f in assembly.findings)
-    assert cli.main(["import", str(file), str(tmp_path / "cell"), "--density", "steel=7850"]) == Exit.WITHIN
-    (row,) = json.loads((tmp_path / "cell/import.json").read_text())["parts"]
-    assert row["mass"] == pytest.approx(7.85, rel=1e-6)
+    shape = assembly.shapes[0]
+    assert shape.material == "steel"
+    said = " ".join(finding.text for finding in assembly.findings)
+    if density is None:
+        assert shape.density is None
+        assert "states a density of steel that is not understood, and not taken" in said
+    else:
+        assert shape.density == pytest.approx(density)
+        assert "states a density of steel: 7850 kg/m³" in said
+    for more, mass in (
+        ((), None if density is None else 7.85),
+        (("--density", "2700"), 2.7),
+        (("--density", "steel=8000"), 8.0),
+    ):
+        folder = tmp_path / f"cell{len(more)}{more[-1:]}"
+        assert cli.main(["import", str(file), str(folder), *more]) == Exit.WITHIN
+        (row,) = json.loads((folder / "import.json").read_text())["parts"]
+        assert row["mass"] == (None if mass is None else pytest.approx(mass, rel=1e-6))
+
+
+def test_one_material_of_two_densities_has_none(tmp_path):
+    pytest.importorskip("OCP")
+    file = tmp_path / "block.step"
+    block_with_a_density(file, (KILO, "1.", METRE, "-3."), "7850.")
+    text = file.read_text()
+    measure = re.search(r"#(\d+) = MEASURE_REPRESENTATION_ITEM\('density measure',\s*[^;]*;", text)
+    shown = re.search(rf"REPRESENTATION\('density',\(#{measure[1]}\)", text)
+    other = measure[0].replace(f"#{measure[1]} =", "#99999 =").replace("7850.", "7900.")
+    text = text.replace(measure[0], f"{measure[0]}\n{other}")
+    file.write_text(text.replace(shown[0], shown[0][:-1] + ",#99999)"))
+    assembly = step.read(MeshSource(file, file.read_bytes(), 1 << 26, 1 << 20))
+    assert assembly.shapes[0].density is None
+    assert any("is not understood" in finding.text for finding in assembly.findings)

@@ -44,14 +44,15 @@ NEGLIGIBLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Densities:
-    """Densities that the user gave [kg/m³]."""
+    """Densities that the user gave [kg/m³], before those that the file states."""
 
     of_all: float | None = None
     by_material: dict[str, float] = field(default_factory=dict)
 
     def of(self, shape: Shape) -> float | None:
-        """Density of a shape; None when nobody gave it."""
-        return self.by_material.get(shape.material, self.of_all)
+        """Density of a shape; None when nobody gave it, nor does its file state it."""
+        of_all = shape.density if self.of_all is None else self.of_all
+        return self.by_material.get(shape.material, of_all)
 
     def weighed(self, shape: Shape) -> Inertial | None:
         """Mass properties of a shape: of its solids as the file has them, else of their triangles.

@@ -72,6 +72,8 @@ class Shape:
     solid: Moments | None = None
     """Of its solids as the file has them, where they agree with the triangles; None where nobody knows them
     better than the triangles do."""
+    density: float | None = None
+    """Of its material, as the file states it [kg/m³]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,6 +61,7 @@ def write(folder: Path, name: str, assembly: Assembly) -> None:
             "deviation": shape.deviation,
             "solids": shape.solids,
             "material": shape.material,
+            "density": shape.density,
             "solid": None
             if shape.solid is None
             else put([shape.solid.volume, *shape.solid.com, *shape.solid.inertia.ravel()]),
@@ -153,4 +154,6 @@ def _shape(row: dict[str, Any], array: Callable[[str], NDArray[Any]]) -> Shape:
     if row["solid"] is not None:
         volume, *rest = array(row["solid"])
         solid = Moments(float(volume), np.array(rest[:3]), np.array(rest[3:]).reshape(3, 3))
-    return Shape(row["name"], pieces, row["deviation"], row["solids"], row["material"], surfaces, solid)
+    return Shape(
+        row["name"], pieces, row["deviation"], row["solids"], row["material"], surfaces, solid, row["density"]
+    )

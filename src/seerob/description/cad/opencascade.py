@@ -7,6 +7,7 @@ would follow a path to anywhere.
 
 from __future__ import annotations
 
+import math
 import re
 import tempfile
 from collections.abc import Iterator
@@ -54,6 +55,21 @@ def plain(
         yield from _Document(source, Path(folder), iges, tolerance).described()
 
 
+_DENSITY = re.compile(rb"density", re.I)
+_PREFIXES = {
+    "spKilo": 3,
+    "spHecto": 2,
+    "spDeca": 1,
+    "spDeci": -1,
+    "spCenti": -2,
+    "spMilli": -3,
+    "spMicro": -6,
+}
+"""Powers of ten."""
+_LIGHTEST, _DENSEST = 1.0, 23e3
+"""Of what is a solid: from aerogel to osmium [kg/m³]; what is beyond has another unit than it says."""
+
+
 class _Document:
     """One file as OpenCASCADE has read it."""
 
@@ -66,6 +82,8 @@ class _Document:
         self.missing: list[str] = []
         self.copies: dict[bytes, bytes] = {}
         self.nameless: set[str] = set()
+        self.densities: dict[str, float | None] = {}
+        """Of materials, by name, as the file states them [kg/m³]; None of one that is not understood."""
         self.document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
         self.format, self.unit = ("IGES", "in the file") if iges else (_schema(source.data), "mm")
         if iges:
@@ -122,6 +140,8 @@ class _Document:
             self.source.note("the file does not say its unit of length: millimetres", level="assumed")
         if not reader.Transfer(self.document):
             self.source.fail("holds nothing that can be taken over", "export solids or surfaces")
+        if _DENSITY.search(self.source.data):
+            self.densities = _densities(reader.Reader().StepModel())
 
     def _local(self, data: bytes, folder: Path, depth: int) -> bytes:
         """Content whose references lead into a folder, to copies of the files they mean."""
@@ -276,7 +296,7 @@ class _Document:
             return "none of its faces could be cut into triangles"
         area = GProp_GProps()
         BRepGProp.SurfaceProperties_s(shape, area)
-        material, dense = _material(label)
+        material = _material(label)
         volume, off = _volume(shape) if solids else (GProp_GProps(), 0.0)
         return {
             "name": name,
@@ -289,7 +309,8 @@ class _Document:
             "area": float(area.Mass()) * 1e-6,
             "volume": float(volume.Mass()) * 1e-9 if solids else 0.0,
             "material": material,
-            "dense": dense,
+            "dense": material in self.densities,
+            "density": self.densities.get(material),
             "stated": _validation(label),
             "inertia": _inertia(volume) if solids else None,
             "off": off,
@@ -573,21 +594,92 @@ def _merged(parts: list[tuple[Array, NDArray[np.int32]]]) -> tuple[bytes, bytes]
     return np.ascontiguousarray(vertices, "<f8").tobytes(), np.ascontiguousarray(faces, "<i4").tobytes()
 
 
-def _material(label: Any) -> tuple[str, bool]:
-    """Name of a shape's material, and whether the file states a density of it.
-
-    Not which: what is stated in kilograms comes a thousand times too light (OpenCASCADE 8.0).
-    """
+def _material(label: Any) -> str:
+    """Name of a shape's material; empty where it has none."""
     from OCP.TDataStd import TDataStd_TreeNode
     from OCP.XCAFDoc import XCAFDoc, XCAFDoc_Material
 
-    # Attributes that are asked for by their identity are copies, whose links lead nowhere.
     for node in _attributes(label):
+        # Its tree of materials, as XCAFDoc_MaterialTool follows it.
         if isinstance(node, TDataStd_TreeNode) and node.ID().IsSame(XCAFDoc.MaterialRefGUID_s()):
             for attribute in _attributes(node.Father().Label()) if node.HasFather() else ():
                 if isinstance(attribute, XCAFDoc_Material) and attribute.GetName() is not None:
-                    return str(attribute.GetName().ToCString()).strip(), float(attribute.GetDensity()) > 0
-    return "", False
+                    return str(attribute.GetName().ToCString()).strip()
+    return ""
+
+
+def _densities(model: Any) -> dict[str, float | None]:
+    """Densities of materials as a STEP file states them, by name [kg/m³]; None of one that is not understood.
+
+    OpenCASCADE itself hands them over without their unit: what is in kilograms is a thousand times too light.
+
+    Args:
+        model: OpenCASCADE's ``StepData_StepModel``.
+    """
+    from OCP.StepRepr import (
+        StepRepr_DescriptiveRepresentationItem,
+        StepRepr_MeasureRepresentationItem,
+        StepRepr_PropertyDefinitionRepresentation,
+    )
+
+    owners: list[Any] = []
+    """Kept, so that the same one is known again."""
+    names, said = dict[int, str](), list[tuple[int, float | None]]()
+    for k in range(1, model.NbEntities() + 1):
+        entity = model.Value(k)
+        if not isinstance(entity, StepRepr_PropertyDefinitionRepresentation):
+            continue
+        defined, shown = entity.Definition().PropertyDefinition(), entity.UsedRepresentation()
+        owner = None if defined is None else defined.Definition().Value()
+        if owner is None or shown is None or _text(defined.Name()).lower() != "material property":
+            continue
+        owners.append(owner)
+        for i in range(1, shown.NbItems() + 1):
+            item = shown.ItemsValue(i)
+            if isinstance(item, StepRepr_DescriptiveRepresentationItem):
+                names[id(owner)] = _text(item.Name())
+            elif isinstance(item, StepRepr_MeasureRepresentationItem) and "density" in " ".join(
+                _text(words.Name()).lower() for words in (item, shown, defined)
+            ):
+                said.append((id(owner), _kilograms_per_cubic_metre(item.Measure())))
+    found: dict[str, float | None] = {}
+    for owner, density in said:
+        name = names.get(owner, "")
+        same = name not in found or found[name] == density
+        found[name] = density if same else None
+    return found
+
+
+def _text(said: Any) -> str:
+    return "" if said is None else str(said.ToCString()).strip()
+
+
+def _kilograms_per_cubic_metre(measure: Any) -> float | None:
+    """A density with its unit; None where the unit is none of density, or the figure that of no material."""
+    from OCP.StepBasic import StepBasic_SiUnitAndLengthUnit, StepBasic_SiUnitAndMassUnit
+
+    unit = measure.UnitComponent().DerivedUnit()
+    if unit is None:
+        return None
+    powers: dict[str, float] = {}
+    scale = 1e-3  # of a gram
+    for i in range(1, unit.NbElements() + 1):
+        element = unit.ElementsValue(i)
+        kind = element.Unit()
+        what = {StepBasic_SiUnitAndMassUnit: "mass", StepBasic_SiUnitAndLengthUnit: "length"}.get(type(kind))
+        if what is None or what in powers:
+            return None
+        powers[what] = float(element.Exponent())
+        prefix = _PREFIXES.get(kind.Prefix().name.rpartition("_")[2]) if kind.HasPrefix() else 0
+        if prefix is None:
+            return None
+        scale *= 10.0 ** (prefix * (1 if what == "mass" else -3))
+    # OpenCASCADE writes 3 and 2 and means g/cm³.
+    written = powers == {"mass": 3.0, "length": 2.0} and math.isclose(scale, 1e3)
+    if not (written or powers == {"mass": 1.0, "length": -3.0}):
+        return None
+    density = scale * float(measure.ValueComponent())
+    return density if _LIGHTEST <= density <= _DENSEST else None
 
 
 def _attributes(label: Any) -> Iterator[Any]:

@@ -168,7 +168,13 @@ def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: 
         note("warning", text)
     if row["dense"]:
         material = printable(row["material"])[:200]
-        text = f"the file states a density of {material}, which is not taken: give --density NAME=DENSITY"
+        if row["density"] is None:
+            text = (
+                f"the file states a density of {material} that is not understood, and not taken: "
+                "give --density NAME=DENSITY"
+            )
+        else:
+            text = f"the file states a density of {material}: {row['density']:g} kg/m³"
         if all(finding.text != text for finding in findings):
             note("note", text)
     for text in _contradicted(row):
@@ -177,7 +183,7 @@ def _shape(source: MeshSource, row: dict[str, Any], tolerance: float, findings: 
         Surface(kind, np.array(at), np.array(axis), tuple(figures), np.array(corners, float).reshape(-1, 3))
         for kind, at, axis, figures, corners in row["surfaces"]
     )
-    return Shape(name, pieces, deviation, row["solids"], row["material"], surfaces, solid)
+    return Shape(name, pieces, deviation, row["solids"], row["material"], surfaces, solid, row["density"])
 
 
 def _solid(row: dict[str, Any], whole: Mesh, deviation: float) -> tuple[Moments | None, str]:

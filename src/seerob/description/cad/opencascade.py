@@ -67,7 +67,7 @@ _PREFIXES = {
 }
 """Powers of ten."""
 _LIGHTEST, _DENSEST = 1.0, 23e3
-"""Of what is a solid: from aerogel to osmium [kg/m³]; what is beyond has another unit than it says."""
+"""Densities of solids, from aerogel to osmium [kg/m³]; a figure beyond them has another unit than it says."""
 
 
 class _Document:

@@ -36,7 +36,10 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("folder", type=Path, help="folder to make, or one that an older revision made")
     text = "how far triangles may be from a STEP or IGES surface [mm] (default: 0.1); counts as uncertainty"
     sub.add_argument("--tolerance", type=float, metavar="MM", help=text)
-    text = "density of every part [kg/m³], or of one material as S235JR=7850; may be given several times"
+    text = (
+        "density of every part [kg/m³], of one material as S235JR=7850, or library for those that come with "
+        "seerob, by words in the material's name; may be given several times"
+    )
     sub.add_argument("--density", action="append", default=[], metavar="[NAME=]DENSITY", help=text)
     text = "TOML file of densities by material name, S235JR = 7850 [kg/m³]; --density goes before it"
     sub.add_argument("--densities", type=Path, metavar="FILE", help=text)

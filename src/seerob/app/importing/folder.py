@@ -20,6 +20,7 @@ from seerob.core.shapes import Mesh
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array, wxyz_from_rotation
 from seerob.description.cad.assembly import ASKED, NOTHING, Assembly, Instance, Moving, Shape
+from seerob.description.cad.materials import Material, material
 from seerob.description.cad.names import plain_name, told_apart
 from seerob.description.description import Inertial
 from seerob.description.formats.urdf_writing import written
@@ -42,17 +43,31 @@ NEGLIGIBLE = 1e-6
 """Deviations up to this are not written [m]; meshes are simplified by as much when they are read."""
 
 
+LIBRARY = "library"
+"""Instead of a density: those of materials that come with seerob."""
+
+
 @dataclass(frozen=True, eq=False)
 class Densities:
-    """Densities that the user gave [kg/m³], before those that the file states."""
+    """Densities that the user gave [kg/m³], before those that the file states, and those of the library."""
 
     of_all: float | None = None
     by_material: dict[str, float] = field(default_factory=dict)
+    library: bool = False
+    """Whether those of `seerob.description.cad.materials` count."""
 
     def of(self, shape: Shape) -> float | None:
         """Density of a shape; None when nobody gave it, nor does its file state it."""
         of_all = shape.density if self.of_all is None else self.of_all
-        return self.by_material.get(shape.material, of_all)
+        stated = self.by_material.get(shape.material, of_all)
+        known = self.known(shape) if stated is None else None
+        return stated if known is None else known.density
+
+    def known(self, shape: Shape) -> Material | None:
+        """What the library knows of a shape's material, where nobody states its density."""
+        if not self.library or self.of_all is not None or shape.density is not None:
+            return None
+        return None if shape.material in self.by_material else material(shape.material)
 
     def weighed(self, shape: Shape) -> Inertial | None:
         """Mass properties of a shape: of its solids as the file has them, else of their triangles.
@@ -62,14 +77,20 @@ class Densities:
         density = self.of(shape)
         if density is None:
             return None
+        known = self.known(shape)
+        off = 0.0 if known is None else known.tolerance
         if shape.solid is not None:
             source = f"{density:g} kg/m³ × volume of the solids in the file"
             mass = density * shape.solid.volume
-            return shape.solid.inertial(mass=mass, origin=Origin.ESTIMATED, source=source)
+            return shape.solid.inertial(mass=mass, origin=Origin.ESTIMATED, source=source, error=off)
         try:
-            return from_shape(shape.pieces, density=density, deviation=shape.deviation, subject=shape.name)[0]
+            found, _ = from_shape(
+                shape.pieces, density=density, deviation=shape.deviation, subject=shape.name
+            )
         except InputError:
             return None
+        spread = (1 + max(found.error, found.spread_error)) * (1 + off) - 1 if off else found.spread_error
+        return replace(found, error=(1 + found.error) * (1 + off) - 1, spread_error=spread)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +160,14 @@ def files(
         row["mass"] = None if inertial is None else _number(inertial.mass, 12)
         row["mass_error"] = None if inertial is None else inertial.error
         row["written"] = part_values(row, instance.color)
+        family = densities.known(shape)
+        if family is not None:
+            text = (
+                f"{printable(shape.material)[:200]} is taken for {family.name}, "
+                f"{family.low:g} to {family.high:g} kg/m³ ({family.source})"
+            )
+            if all(finding.text != text for finding in findings):
+                findings.append(Finding(level="assumed", subject=source.name, text=text))
         if options.get("triangles"):
             row["written"]["triangles"] = options["triangles"]
         # Where triangles are not the surface, the mass is that of the solid, which they do not tell.
@@ -346,14 +375,17 @@ def _box(shape: Shape, instance: Instance) -> list[list[float]]:
 
 
 def densities(words: list[str]) -> Densities:
-    """What ``--density`` was given: ``2700`` for everything, ``S235JR=7850`` for a material.
+    """What ``--density`` was given: ``2700`` for everything, ``S235JR=7850`` for a material, ``library``.
 
     Raises:
         InputError: One is no density.
     """
     of_all: float | None = None
     by_material: dict[str, float] = {}
+    library = LIBRARY in words
     for word in words:
+        if word == LIBRARY:
+            continue
         name, _, figure = word.rpartition("=")
         try:
             density = float(figure)
@@ -361,12 +393,13 @@ def densities(words: list[str]) -> Densities:
             density = float("nan")
         if not 0 < density <= 1e5:
             what = f"{word!r} is no density"
-            raise InputError.at("--density", "", what, "2700 for everything, or S235JR=7850 [kg/m³]")
+            remedy = f"2700 for everything, S235JR=7850 [kg/m³], or {LIBRARY}"
+            raise InputError.at("--density", "", what, remedy)
         if name:
             by_material[name] = density
         else:
             of_all = density
-    return Densities(of_all, by_material)
+    return Densities(of_all, by_material, library)
 
 
 def densities_of_table(file: Path) -> list[str]:

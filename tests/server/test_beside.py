@@ -33,10 +33,10 @@ limit = 0.5
 
 @pytest.fixture
 def recorded(tmp_path):
-    def record(folder, **values):
+    def record(folder, text=CELL, **values):
         cell = tmp_path / folder
         cell.mkdir()
-        (cell / "workstation.toml").write_text(CELL.format(**values))
+        (cell / "workstation.toml").write_text(text.format(**values))
         sr.load(cell).run(folder=cell, sinks=[Recorder()])
         return cell / "run.mcap"
 
@@ -62,5 +62,23 @@ def test_a_page_is_told_of_the_same_criteria_of_another_run(recorded):
 def test_without_one_nothing_is_beside_and_another_criterion_is_refused(recorded):
     recording = sr.Recording.open(recorded("near", x=2, name="gap"))
     assert _beside(None, recording) == History(traces=())
-    with pytest.raises(InputError, match="no criterion with a name and unit"):
+    with pytest.raises(InputError, match="no criterion with a name, kind and unit"):
         _beside(recorded("far", x=4, name="other"), recording)
+
+
+AREA = """
+[[areas]]
+name = "zone"
+shape = {{ box = [1, 1, 1] }}
+at = {{ position = [{x}, 0, 0] }}
+"""
+
+
+def test_what_is_of_another_kind_is_not_beside_though_its_name_and_unit_are_the_same(recorded):
+    recording = sr.Recording.open(recorded("near", x=2, name="gap"))
+    rule = 'kind = "minimum_distance"\nname = "{name}"\nbetween = ["table", "person"]\nlimit = 0.5\n'
+    other = 'kind = "safety_area"\nname = "{name}"\nof = "person"\narea = "zone"\n'
+    assert rule in CELL
+    far = recorded("far", CELL.replace(rule, other) + AREA, x=4, name="gap")
+    with pytest.raises(InputError, match="no criterion with a name, kind and unit"):
+        _beside(far, recording)

@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from websockets.exceptions import InvalidStatus
 
 from model_io import made_mechanisms
 from seerob.app.commands.edit import serving
@@ -306,16 +307,38 @@ def test_only_a_page_that_may_control_edits_and_only_where_the_command_line_says
     tokens = Tokens.made()
     how = Visiting(tokens=tokens, tls=None, clear_text=False)
     server, desk, _ = serving(compiled(file), file, NOTHING, "127.0.0.1", 0, how)
-    edit = msgspec.msgpack.encode(Edit(id=7, action="change", revision=1, changes=(MOVE,)))
+    actions = ("change", "undo", "redo", "save", "discard", "run", "stop", "no such action")
+
+    def ask(page, action, revision=1):
+        changes = (MOVE,) if action == "change" else ()
+        edit = Edit(id=7, action=action, revision=revision, changes=changes)
+        page.socket.send(msgspec.msgpack.encode(edit))
+
     with server:
         for role in (Role.VIEW, Role.TRACK):
             with Visitor(server, path=f"/ws?token={tokens[list(Role).index(role)]}") as page:
                 assert "edit" not in page.read().may
-                page.socket.send(edit)
-                assert not page.of(Edited).accepted
+                for action in actions:
+                    ask(page, action)
+                    [mistake] = page.of(Edited).mistakes
+                    assert mistake.what == "this page may not edit"
+        # Nor does a page from elsewhere, in the browser of who may.
+        for origin in ("http://evil.example", "null", f"http://127.0.0.1:{server.port}0"):
+            with pytest.raises(InvalidStatus) as refused:
+                Page(server, path=f"/ws?token={tokens.control}", origin=origin)
+            assert refused.value.response.status_code == 403
         with Page(server, path=f"/ws?token={tokens.control}") as page:
             page.of(Draft)
+            assert page.draft.revision == 1
             assert page.edit(MOVE).accepted
+            # What is unsaved is neither saved, nor taken back, nor run by who may not.
+            for token in (tokens.view, tokens.track):
+                with Visitor(server, path=f"/ws?token={token}") as looker:
+                    for action in actions:
+                        ask(looker, action, revision=page.draft.revision)
+                        assert not looker.of(Edited).accepted
+            assert page.edit(action="undo").accepted
+            assert page.edit(action="redo").accepted
     assert desk.unsaved
     assert file.read_bytes() == CELL
 

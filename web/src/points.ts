@@ -8,6 +8,8 @@ export const VERDICT_CODES = { within: 0, exceeded: 1, undecided: 2 } as const s
   Verdict,
   number
 >;
+/** And back. */
+export const VERDICT_OF: Partial<Record<number, Verdict>> = { 0: "within", 1: "exceeded", 2: "undecided" };
 export const NO_VERDICT = 255;
 
 interface Gathered {

@@ -46,6 +46,13 @@ export class Trace {
     this.verdicts = new Uint8Array(1024);
   }
 
+  /** Index of the point that holds at `t`: the last at or before it; -1 before the first and after the last. */
+  indexHolding(t: number): number {
+    if (this.length === 0 || t > this.t[this.length - 1]!) return -1;
+    const i = this.indexAt(t);
+    return this.t[i] === t ? i : i - 1;
+  }
+
   /** Add points that follow in time; earlier ones are left out. */
   append(points: TracePoints): void {
     for (let i = 0; i < points.t.length; i += 1) {

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { assertShown, open, settled, show } from "./expect.mjs";
+import { serve } from "./served.mjs";
 import { load } from "./source.mjs";
 
 const { against, steady } = await load("figures");
@@ -194,6 +195,68 @@ test("a mesh that cannot be had becomes a finding, and the rest is shown", async
   );
   await assertShown(other, served, await settled(other));
   await other.close();
+});
+
+test("another run is on the same axis, with its own lanes and figures, and in no verdict", async () => {
+  const both = await serve("--mode", "replay", "--seconds", "20", "--beside");
+  const other = await browser.context.newPage();
+  await show(other, both.url);
+  await other.locator(".beside").getByText("other <img src=x onerror=window.hacked=1>/run.mcap").waitFor();
+  // The longer one is all on the axis.
+  await other.waitForFunction(() => document.querySelector(".strip").ariaValueMax === "26");
+  const strip = other.locator(".strip");
+  const box = await strip.boundingBox();
+  const visit = async (t) => {
+    await other.mouse.click(box.x + (box.width * t) / 26, box.y + 4);
+    await other.waitForFunction((to) => Math.abs(window.seerob.t - to) < 0.1, t);
+  };
+  await visit(10);
+  const select = async (name) => {
+    await other.locator(".lane-names button", { hasText: name }).click();
+    return other.locator(".plot.selected");
+  };
+  const area = await select("work area");
+  await area.locator(".plot-beside .badge.state-exceeded").waitFor();
+  assert.match(await area.locator(".plot-beside").innerText(), /other <img[\s\S]*−0\.2500\sm/);
+  assert.match(await area.locator("figcaption").innerText(), /0\.3000\sm[\s\S]*within/);
+  // Each lane: what this run was above, what the other was below, also after this one's end.
+  const names = await other.locator(".lane-names li").allInnerTexts();
+  const tall = (await other.locator(".lane-names li").first().boundingBox()).height;
+  const colour = async (name, t, below) => {
+    const y = names.indexOf(name) * tall + (below ? 17 : 7);
+    return strip.evaluate(
+      (canvas, [x, at]) => {
+        const k = devicePixelRatio;
+        return [...canvas.getContext("2d").getImageData(Math.round(x * k), Math.round(at * k), 1, 1).data];
+      },
+      [(box.width * t) / 26, y],
+    );
+  };
+  const [own, theirs, late, ended] = [
+    await colour("work area", 6, false),
+    await colour("work area", 6, true),
+    await colour("work area", 24, true),
+    await colour("work area", 24, false),
+  ];
+  assert.ok(own[1] > own[0], `${own} is not within`);
+  assert.ok(theirs[0] > 2 * theirs[1], `${theirs} is not exceeded`);
+  assert.deepEqual(late, theirs);
+  assert.notDeepEqual(ended, own);
+  // The other was undecided for a while, though it has figures there.
+  const energy = await select("arm energy");
+  await visit(6.5);
+  await energy.locator(".plot-beside .badge.state-undecided").waitFor();
+  await visit(10);
+  await energy.locator(".plot-beside .badge.state-within, .plot-beside .badge.state-close").waitFor();
+  assert.notDeepEqual(await colour("arm energy", 6.5, true), await colour("arm energy", 11, true));
+  const told = await select("separation").then(() => other.locator(".criteria").innerText());
+  assert.match(told, /work area/);
+  // Nothing of it is counted, and ] goes to nothing of it.
+  assert.doesNotMatch(await other.locator(".pill").innerText(), /work area/);
+  assert.equal(await other.locator('tr[data-criterion="work area"] .badge.state-exceeded').count(), 0);
+  assert.equal(await other.evaluate(() => window.hacked), undefined);
+  await other.close();
+  await both.close();
 });
 
 test("nothing complained", () => assert.deepEqual(browser.complaints, []));

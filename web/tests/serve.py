@@ -1,10 +1,10 @@
 """Serves a made-up workstation through the real server, for the page's tests.
 
-``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER] [--further N]`` prints one line
-of JSON with the address and when run time is zero by the machine's clock [s since 1970] (with ``--tls`` those
-of each role, by an authority that is made in the folder), then obeys lines on standard input (``freeze``,
-``go``, ``finish``, ``stop``, ``start``, ``told``, ``snapshot T``) and ends with it. Each answers with a line
-of JSON.
+``python serve.py [--mode live|replay] [--port N] [--seconds S] [--tls FOLDER] [--further N] [--beside]``
+prints one line of JSON with the address and when run time is zero by the machine's clock [s since 1970]
+(with ``--tls`` those of each role, by an authority that is made in the folder), then obeys lines on standard
+input (``freeze``, ``go``, ``finish``, ``stop``, ``start``, ``told``, ``snapshot T``) and ends with it. Each
+answers with a line of JSON.
 Everything is a function of run time: `snapshot`.
 """
 
@@ -26,7 +26,7 @@ import msgspec
 import numpy as np
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
-from made_up_cell import PERIOD, snapshot, workstation
+from made_up_cell import HOSTILE, PERIOD, snapshot, workstation
 
 from seerob.app.server import certificates
 from seerob.app.server.access import Tokens
@@ -34,7 +34,7 @@ from seerob.app.server.feed import Audience
 from seerob.app.server.live import Live
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
-from seerob.core.snapshot import Scene, Snapshot
+from seerob.core.snapshot import History, Scene, Snapshot, Verdict
 from seerob.recording.result_log import ResultLog
 
 
@@ -55,6 +55,24 @@ class Remembered:
     def snapshot_at(self, t: float) -> Snapshot:
         """The last snapshot at or before ``t`` [s]."""
         return next((s for s in reversed(self._snapshots) if s.t <= t), self._snapshots[0])
+
+
+def other_run(scene: Scene, seconds: float) -> History:
+    """Of a run that is longer, never in its work area, and of which energy is undecided from 5 to 8 s."""
+    log = ResultLog(scene.criteria)
+    for k in range(round(seconds / PERIOD) + 1):
+        made = snapshot(k, k * PERIOD)
+        results = {r.name: r for r in made.results if r.name != "manipulability"}
+        area, energy = results["work area"], results["arm energy"]
+        results["work area"] = msgspec.structs.replace(
+            area, value=-0.25, limit=-0.1, verdict=Verdict.EXCEEDED, markers=()
+        )
+        if 5 <= made.t < 8:
+            results["arm energy"] = msgspec.structs.replace(
+                energy, verdict=Verdict.UNDECIDED, reason="who knows"
+            )
+        log.add(msgspec.structs.replace(made, results=tuple(results.values())))
+    return History(traces=(), beside=log.history().traces, beside_title=f"other {HOSTILE}/run.mcap")
 
 
 def _say(**fields: object) -> None:
@@ -134,17 +152,19 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=24.0)
     parser.add_argument("--tls", type=Path)
     parser.add_argument("--further", type=int, default=0, help="boxes that move besides, in a live run")
+    parser.add_argument("--beside", action="store_true", help="another run, of a replay")
     options = parser.parse_args()
     tls = certificates.own(options.tls, "127.0.0.1") if options.tls else None
     scene, meshes = workstation(options.further)
     frozen, over = threading.Event(), threading.Event()
     recording = Remembered(scene, options.seconds) if options.mode == "replay" else None
+    beside = other_run(scene, options.seconds + 6) if options.beside else None
     begun, began = time.monotonic(), time.time()
     live = Timed(begun)
     live.log = ResultLog(scene.criteria)
 
     def open_server(port: int) -> Server:
-        feed = Player(recording) if recording else live
+        feed = Player(recording, beside=beside) if recording else live
         tokens = Tokens.made() if tls else None
         server = Server(scene=scene, meshes=meshes, feed=feed, port=port, tokens=tokens, tls=tls)
         pin = _pin(tls.authority) if tls and tls.authority else None

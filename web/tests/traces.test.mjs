@@ -52,6 +52,18 @@ test("previous and next violation over all traces", () => {
   assert.deepEqual([go(6, false), go(5, false), go(3, false), go(1, false)], [5, 3, 1, null]);
 });
 
+test("a point holds to the next one; before the first and after the last none does", () => {
+  const trace = traceOf([
+    [1, 5, 0, 0],
+    [2, 6, 0, 0],
+  ]);
+  assert.deepEqual(
+    [0.9, 1, 1.5, 2, 2.1].map((t) => trace.indexHolding(t)),
+    [-1, 0, 0, 1, -1],
+  );
+  assert.equal(traceOf([]).indexHolding(0), -1);
+});
+
 test("thinning keeps the extremes, the verdicts' changes and the order", () => {
   const spike = 1234;
   const points = Array.from({ length: 20_000 }, (_, i) => {

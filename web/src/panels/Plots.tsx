@@ -4,9 +4,11 @@ import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { ownDevice } from "../company";
 import { against, steady, withUnit } from "../figures";
+import { formatTime } from "../format";
 import {
   besideTitle,
   besideTraces,
+  clock,
   now,
   type Row,
   rows,
@@ -20,8 +22,10 @@ import {
 import { setWidth, shownRange, WIDTHS, width } from "../plots/axis";
 import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
+import { VERDICT_OF } from "../points";
 import { redrawEveryMs } from "../scene/effort";
 import { theme } from "../theme";
+import { stateOf } from "../verdicts";
 import { said } from "../words";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
@@ -45,7 +49,9 @@ export function Plots({ count }: { count: number }) {
         ))}
       </fieldset>
       {besideTitle.value !== "" && (
-        <p class="beside">{said("dashed: {title}, as it was recorded", { title: besideTitle.value })}</p>
+        <p class="beside">
+          {said("below, and dashed: {title}, as it was recorded", { title: besideTitle.value })}
+        </p>
       )}
       <div class="charts">
         {names.map((name) => (
@@ -104,10 +110,45 @@ function Plot({ name }: { name: string }) {
         <span class="plot-value">{row && figureOf(row)}</span>
         {row && <StateBadge state={row.state} />}
       </figcaption>
+      {besideTitle.value !== "" && <Beside name={name} row={row} />}
       <div class="plot-area" ref={place} />
     </figure>
   );
 }
+
+/** What the other run had is told with its time when that is longer ago [s]. */
+const LATE_S = 0.05;
+
+// What the other run had at the cursor, in its own words; nothing where it had none.
+function Beside({ name, row }: { name: string; row: Row | undefined }) {
+  void tracesRevision.value;
+  const trace = besideTraces.get(name);
+  const i = trace?.indexHolding(clock.value) ?? -1;
+  const shown = row && trace && i >= 0;
+  const [value, limit] = shown ? [trace.values[i]!, trace.limits[i]!].map(given) : [null, null];
+  const verdict = shown ? VERDICT_OF[trace.verdicts[i]!] : undefined;
+  const unit = row?.info.unit ?? "";
+  const at_most = row?.info.at_most ?? true;
+  return (
+    <p class="plot-beside" title={besideTitle.value}>
+      <i aria-hidden="true" />
+      <span class="plot-beside-title">{besideTitle.value}</span>
+      <span class="plot-value">
+        {shown
+          ? withUnit(steady(against(value!, limit!, unit, at_most).value, unit), unit)
+          : said("nothing at this time")}
+        {shown &&
+          clock.value - trace.t[i]! > LATE_S &&
+          ` ${said("at {time}", { time: formatTime(trace.t[i]!) })}`}
+      </span>
+      {shown && (
+        <StateBadge state={stateOf({ value: value!, limit: limit!, at_most, verdict: verdict ?? null })} />
+      )}
+    </p>
+  );
+}
+
+const given = (x: number): number | null => (Number.isNaN(x) ? null : x);
 
 function figureOf({ info, result }: Row): string {
   const { value } = against(result?.value ?? null, result?.limit ?? null, info.unit, info.at_most);

@@ -6,7 +6,7 @@ import { ownDevice } from "../company";
 import { formatTime } from "../format";
 import { clock, now, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { held, shownRange, timeAt } from "../plots/axis";
-import { drawLanes, LANE_PX } from "../plots/lanes";
+import { drawLanes, lanePx } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
 import { redrawEveryMs } from "../scene/effort";
 import { theme } from "../theme";
@@ -17,6 +17,7 @@ export function Timeline() {
   const { time } = useActions();
   const canvas = useRef<HTMLCanvasElement>(null);
   void tracesRevision.value;
+  const tall = lanePx();
   const judged = ranked((scene.value?.criteria ?? []).filter(isJudged));
   const names = judged.map((c) => c.name);
   const key = names.join("\n");
@@ -46,7 +47,7 @@ export function Timeline() {
       resized.disconnect();
       if (waiting !== null) clearTimeout(waiting);
     };
-  }, [key]);
+  }, [key, tall]);
 
   const seekTo = (event: PointerEvent): void => {
     const box = canvas.current!.getBoundingClientRect();
@@ -58,7 +59,7 @@ export function Timeline() {
       <div class="lanes scroll">
         <ul class="lane-names">
           {names.map((name) => (
-            <li key={name} style={{ height: `${LANE_PX}px` }}>
+            <li key={name} style={{ height: `${tall}px` }}>
               <button
                 type="button"
                 title={name}
@@ -73,7 +74,7 @@ export function Timeline() {
         <canvas
           ref={canvas}
           class="strip"
-          style={{ height: `${Math.max(1, names.length) * LANE_PX}px` }}
+          style={{ height: `${Math.max(1, names.length) * tall}px` }}
           tabIndex={0}
           role="slider"
           aria-label={said("Time cursor")}

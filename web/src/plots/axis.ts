@@ -1,7 +1,7 @@
 // The one time axis of plots and lanes: what of the run they show, and where the cursor is.
 
 import { computed, signal } from "@preact/signals";
-import { isLive, lookingAt, now, reach, traces, tracesRevision } from "../page_state";
+import { besideTraces, isLive, lookingAt, now, reach, traces, tracesRevision } from "../page_state";
 import { remembered } from "../remembered";
 
 export interface TimeRange {
@@ -54,11 +54,28 @@ export function shownRange(): TimeRange {
     const newest = Math.max(end, first + span);
     return { start: newest - span, end: newest };
   }
-  if (seconds === null || seconds >= end - start) return { start, end: Math.max(end, start + 1e-3) };
+  if (seconds === null || seconds >= end - start) {
+    // All of a longer run beside it is seen, too.
+    const { first, last } = beside.value;
+    const begin = Math.min(start, first);
+    const stop = seconds === null ? last : Math.min(last, begin + seconds);
+    return { start: begin, end: Math.max(end, stop, begin + 1e-3) };
+  }
   const middle = Number.isFinite(now.value) ? now.value : start;
   const left = Math.min(Math.max(middle - seconds / 2, start), end - seconds);
   return { start: left, end: left + seconds };
 }
+
+const beside = computed(() => {
+  void tracesRevision.value;
+  let [first, last] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  for (const { t, length } of besideTraces.values()) {
+    if (length === 0) continue;
+    first = Math.min(first, t[0]!);
+    last = Math.max(last, t[length - 1]!);
+  }
+  return { first, last };
+});
 
 // A page that came late was told what happened before.
 const firstTime = computed(() => {

@@ -5,7 +5,7 @@ import { formatNumber, formatTime } from "../format";
 import { colorOf } from "../theme";
 import type { Trace } from "../traces";
 import { hatchPattern } from "./hatch";
-import { windowOf } from "./window";
+import { type PlotData, windowOf } from "./window";
 
 const SYNC = "time";
 
@@ -19,7 +19,7 @@ export class Chart {
   private readonly plot: uPlot;
   private view: ChartView = { start: 0, end: 1, now: Number.NaN };
   private trace: Trace | null = null;
-  private beside: [t: readonly number[], values: (number | null)[]] | null = null;
+  private beside: PlotData | null = null;
   private readonly resized: ResizeObserver;
 
   /** @param seek Called with the run time that was clicked [s]. */
@@ -36,17 +36,17 @@ export class Chart {
     this.resized.observe(element);
   }
 
-  /** @param beside Of another run, drawn behind, dashed; its limits are not. */
+  /** @param beside Of another run, its values dashed, its limits dotted. */
   show(trace: Trace, view: ChartView, beside: Trace | null = null): void {
     this.view = view;
     this.trace = trace;
-    const other = beside && windowOf(beside, view.start, view.end, Math.max(100, this.element.clientWidth));
-    this.beside = other ? [other[0], other[1]] : null;
-    const data = windowOf(trace, view.start, view.end, Math.max(100, this.element.clientWidth));
+    const buckets = Math.max(100, this.element.clientWidth);
+    this.beside = beside && windowOf(beside, view.start, view.end, buckets);
+    const data = windowOf(trace, view.start, view.end, buckets);
     this.plot.setData(data, false);
     this.plot.batch(() => {
       this.plot.setScale("x", { min: view.start, max: view.end });
-      this.plot.setScale("y", valueRange(data[1], data[2], this.beside?.[1] ?? []));
+      this.plot.setScale("y", valueRange(...data.slice(1), ...(this.beside?.slice(1) ?? [])));
     });
   }
 
@@ -115,28 +115,31 @@ export class Chart {
 
   private other(plot: uPlot): void {
     if (!this.beside) return;
-    const [times, values] = this.beside;
+    const [times, values, limits] = this.beside;
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    ctx.beginPath();
-    let drawn = false;
-    values.forEach((value, i) => {
-      if (value === null) {
-        drawn = false;
-        return;
-      }
-      const at: [number, number] = [plot.valToPos(times[i]!, "x", true), plot.valToPos(value, "y", true)];
-      if (drawn) ctx.lineTo(...at);
-      else ctx.moveTo(...at);
-      drawn = true;
-    });
-    ctx.setLineDash([3, 3]);
     ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.strokeStyle = colorOf("--accent");
-    ctx.stroke();
+    for (const [column, color, dash] of [
+      [limits, "--exceeded-text", [1, 4]],
+      [values, "--accent", [4, 3]],
+    ] as const) {
+      ctx.beginPath();
+      let drawn = false;
+      column.forEach((value, i) => {
+        if (value !== null) {
+          const [x, y] = [plot.valToPos(times[i]!, "x", true), plot.valToPos(value, "y", true)];
+          if (drawn) ctx.lineTo(x, y);
+          else ctx.moveTo(x, y);
+        }
+        drawn = value !== null;
+      });
+      ctx.setLineDash(dash.map((px) => px * devicePixelRatio));
+      ctx.strokeStyle = colorOf(color);
+      ctx.stroke();
+    }
     ctx.restore();
   }
 

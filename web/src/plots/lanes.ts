@@ -1,13 +1,24 @@
-// Painting of the timeline's lanes.
+// Painting of the timeline's lanes; those of another run lie below, narrower and paler.
 
-import { traces } from "../page_state";
+import { untracked } from "@preact/signals";
+import { besideTitle, besideTraces, traces } from "../page_state";
 import { paintedBy } from "../scene/effort";
 import { colorOf } from "../theme";
+import type { Trace } from "../traces";
 import { VERDICT_COLORS } from "../verdicts";
 import type { TimeRange } from "./axis";
 import { hatchPattern } from "./hatch";
 
-export const LANE_PX = 15;
+const LANE_PX = 15;
+/** Of another run, below. */
+const BESIDE_PX = 6;
+/** How much paler that one is. */
+const PALER = 0.6;
+
+/** Height of a lane [px]; read inside a component or an effect, it is kept up to date. */
+export function lanePx(): number {
+  return besideTitle.value === "" ? LANE_PX : LANE_PX + BESIDE_PX + 1;
+}
 
 export function drawLanes(
   canvas: HTMLCanvasElement,
@@ -25,12 +36,9 @@ export function drawLanes(
   brush.scale(ratio, ratio);
   brush.globalAlpha = stale ? 0.4 : 1;
   const x = (t: number): number => ((t - range.start) / (range.end - range.start)) * width;
-  names.forEach((name, lane) => {
-    const top = lane * LANE_PX + 2;
-    const tall = LANE_PX - 4;
+  const paint = (trace: Trace | undefined, top: number, tall: number): void => {
     brush.fillStyle = colorOf("--lane");
     brush.fillRect(0, top, width, tall);
-    const trace = traces.get(name);
     if (!trace || trace.length === 0) return;
     const from = Math.max(0, x(trace.t[0]!));
     // What never was within only informs: it is grey where nothing was undecided.
@@ -45,6 +53,16 @@ export function drawLanes(
         brush.fillRect(left, top, Math.max(x(span.end) - left, 2), tall);
       }
     }
+  };
+  const each = untracked(lanePx);
+  names.forEach((name, lane) => {
+    const top = lane * each + 2;
+    paint(traces.get(name), top, LANE_PX - 4);
+    if (each === LANE_PX) return;
+    const before = brush.globalAlpha;
+    brush.globalAlpha = before * PALER;
+    paint(besideTraces.get(name), top + LANE_PX - 3, BESIDE_PX);
+    brush.globalAlpha = before;
   });
   brush.globalAlpha = 1;
   if (Number.isFinite(now)) {

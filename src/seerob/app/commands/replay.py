@@ -28,7 +28,8 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
     add_page(sub)
     text = (
-        "plot another recording's figures on the same axis, by names of criteria; run time 0 is that of each"
+        "show another recording's figures, limits and verdicts on the same axis, by names of criteria; "
+        "run time 0 is that of each"
     )
     sub.add_argument("--beside", type=Path, metavar="RECORDING", help=text)
     sub.add_argument("--seconds", type=seconds, help="end after this time, once all was read")
@@ -91,7 +92,7 @@ def _model(recording: Recording) -> Model:
 
 
 def _beside(path: Path | None, recording: Recording) -> History:
-    """What another recording holds of criteria of the same name and unit, as it was recorded.
+    """What another recording holds of criteria of the same name, kind and unit, as it was recorded.
 
     Raises:
         InputError: It is no recording, or has no such criterion.
@@ -103,15 +104,16 @@ def _beside(path: Path | None, recording: Recording) -> History:
     from seerob.recording.result_log import ResultLog
 
     other = Recording.open(path)
-    units = {info.name: info.unit for info in recording.scene.criteria}
-    same = {info.name for info in other.scene.criteria if units.get(info.name) == info.unit}
+    ours = {(info.name, info.kind, info.unit, info.at_most) for info in recording.scene.criteria}
+    theirs = {(info.name, info.kind, info.unit, info.at_most) for info in other.scene.criteria}
+    same = {name for name, *_ in ours & theirs}
     if not same:
-        what = "has no criterion with a name and unit of the one that is shown"
+        what = "has no criterion with a name, kind and unit of the one that is shown"
         raise InputError.at(path, "criteria", what, "name a recording of the same criteria")
     log = ResultLog(other.scene.criteria)
     for snapshot in other.snapshots():
         log.add(snapshot)
-    line("beside", f"{other.scene.title}: {other.duration:.1f} s, {len(same)} of {len(units)} criteria")
+    line("beside", f"{other.scene.title}: {other.duration:.1f} s, {len(same)} of {len(ours)} criteria")
     traces = tuple(trace for trace in log.history(POINTS).traces if trace.name in same)
     return History(traces=(), beside=traces, beside_title=f"{path.parent.name}/{path.name}")
 

@@ -84,3 +84,24 @@ def test_a_folder_that_is_there_is_not_touched(tmp_path, capsys):
     assert not (tmp_path / "new").exists()
     assert main(["capture", "keyframes", *arguments[2:], str(tmp_path / "new")]) == 3
     assert "reads no recording of a person" in capsys.readouterr().err
+
+
+def test_a_folder_that_is_moved_needs_nothing_from_where_its_recording_was(tmp_path, moved):
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    _, path = bvh(outside, moved)
+    size = ["--mass", "75", "--sex", "male", "--stature", "1.75"]
+    # Names that Windows takes for other things, or that another file of the folder has.
+    for name, copied in (
+        ("a\\b:c?.bvh", "a_b_c_.bvh"),
+        ("nul.bvh", "recording_nul.bvh"),
+        ("workstation.toml", "recording_workstation.toml"),
+    ):
+        path = path.rename(outside / name)
+        made = tmp_path / copied.partition(".")[0]
+        assert main(["capture", "bvh", str(path), *size, "-o", str(made)]) == 2
+        assert f'file = "{copied}"' in (made / "workstation.toml").read_text()
+        assert (made / copied).read_bytes() == path.read_bytes()
+    elsewhere = made.rename(tmp_path / "elsewhere")
+    path.unlink()
+    assert main(["assess", str(elsewhere), "-o", str(tmp_path / "again")]) == 2

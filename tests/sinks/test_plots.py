@@ -115,8 +115,8 @@ def test_ticks_are_round_and_within():
 def test_two_runs_are_on_one_axis_each_with_its_limit_and_its_own_end():
     first = of([1.0, 2.0, 4.0], [3.0] * 3)
     second = of([8.0, 6.0, 5.0, 1.0, 0.5], [7.0] * 5)
-    root = drawing(both([("before", first), ("after", second)]))
-    assert {"before", "after", "limit, before", "limit, after", "[m]"} <= set(words(root))
+    root = drawing(both([("before", first), ("after", second)], salt="x"))
+    assert {"before", "after", "limit (at most), before", "limit (at most), after", "[m]"} <= set(words(root))
     lines = [
         places(e.get("d"))[0]
         for e in root.iter("path")
@@ -126,3 +126,26 @@ def test_two_runs_are_on_one_axis_each_with_its_limit_and_its_own_end():
     for line, series in zip(lines, (first.values, first.limits, second.values, second.limits), strict=True):
         assert [x(a) for a, _ in line] == pytest.approx([0.1 * k for k in range(len(series))], abs=2e-3)
         assert [y(b) for _, b in line] == pytest.approx(list(series), abs=0.02)
+
+
+def test_of_two_runs_each_has_its_bands_in_its_own_half_so_that_no_line_looks_within_that_is_not():
+    within, exceeded, undecided = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+    first = of([1] * 4, [2] * 4, [within, undecided, undecided, within])
+    second = of([1, 1, 3, 3], [2] * 4, [within, within, exceeded, exceeded])
+    root = drawing(both([("before", first), ("after", second)], salt="s"))
+    when = scale(root, "x")
+    bands = [e for e in root.iter("rect") if float(e.get("height")) > 20 and e.get("fill").startswith("url")]
+    found = {
+        e.get("fill"): (
+            float(e.get("y")),
+            when(float(e.get("x"))),
+            when(float(e.get("x")) + float(e.get("width"))),
+        )
+        for e in bands
+    }
+    assert len(bands) == len(found) == 2
+    (above, *unsure), (below, *beyond) = found["url(#undecided-s)"], found["url(#exceeded-s)"]
+    assert above < below
+    assert unsure == pytest.approx([0.1, 0.3], abs=3e-3)
+    assert beyond == pytest.approx([0.2, 0.3], abs=5e-3)  # to the end of the drawing
+    assert "bands: before above, after below" in words(root)

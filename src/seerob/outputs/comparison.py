@@ -237,7 +237,7 @@ class Comparison:
         yield tag("h2", "Criteria")
         columns = ("criterion", "is now", "before", "after", "decided", "notes")
         yield table(columns, [self._row(one) for one in self.criteria], class_="overview")
-        for one in self.criteria:
+        for k, one in enumerate(self.criteria):
             runs = [
                 (what, series)
                 for what, series in (("before", one.before), ("after", one.after))
@@ -248,7 +248,7 @@ class Comparison:
                 continue
             yield tag("h3", one.name)
             if together:
-                yield tag("figure", both(runs))
+                yield tag("figure", both(runs, salt=f"both{k}"))
             if one.name in self.pictures:
                 shown = [
                     _figure(one, png, series, what)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,6 +42,10 @@ kind = "opensim"
 """
 
 
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
+"""Names that Windows takes for devices."""
+
+
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     add_person(sub)
@@ -68,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
             (working / FILE_NAME).write_text(text, encoding="utf-8")
             recording = Path(options.file)
             copied = shutil.copytree if recording.is_dir() else shutil.copyfile
-            copied(recording, working / recording.name)
+            copied(recording, working / _copied_as(recording))
     except OSError as error:
         what = f"cannot be made: {error.strerror}"
         raise InputError.at(options.output, "", what, "give a folder that may be written") from error
@@ -80,6 +85,13 @@ def run(options: argparse.Namespace) -> int:
     return assess.run(same.parse_args([str(options.output), *(["--json"] if options.json else [])]))
 
 
+def _copied_as(recording: Path) -> str:
+    """What a recording is called in the folder: a name that every system takes, and no other has there."""
+    name = re.sub(r'[<>:"|?*\\\x00-\x1f]', "_", recording.resolve().name).rstrip(". ") or "recording"
+    taken = name.casefold() in (FILE_NAME, "runs") or _DEVICE.match(name)
+    return f"recording_{name}" if taken else name
+
+
 def _workstation(options: argparse.Namespace, recording: Path) -> str:
     """The workstation file; what is wrong with the options is said before anything is made."""
     import tomllib
@@ -89,7 +101,7 @@ def _workstation(options: argparse.Namespace, recording: Path) -> str:
     from seerob.session.reading import convert_workstation
 
     table = _person(options, recording)
-    given = {"kind": options.kind, "human": options.name, "file": recording.name}
+    given = {"kind": options.kind, "human": options.name, "file": _copied_as(recording)}
     given |= {"subject": options.subject} if options.subject else {}
     given |= options_of(options.set, COMMAND)
     source = [f"{key} = {toml_value(value)}" for key, value in given.items()]

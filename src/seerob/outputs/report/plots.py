@@ -109,11 +109,14 @@ def curve(series: Series, *, salt: str) -> Html:
     return _svg(_HEIGHT, title, _hatches(salt), under, _axes(x, y, series.unit, over), _legend(legend))
 
 
-def both(runs: Sequence[tuple[str, Series]]) -> Html:
+def both(runs: Sequence[tuple[str, Series]], *, salt: str) -> Html:
     """Values and limits of one criterion in several runs, on one axis of run time.
 
+    Stretches that are exceeded or undecided are bands, each run's in a row of its own.
+
     Args:
-        runs: What each is called, and its series, all in one unit; the last is drawn darkest.
+        runs: What each is called, and its series, all in one unit; the last is drawn darkest and lowest.
+        salt: Makes the ids inside the drawing unique on the page.
     """
     drawn = [(name, one, one.thinned(POINTS)) for name, one in runs]
     figures = [_shown(each[i]) for _, one, i in drawn for each in (one.values, one.limits)]
@@ -123,8 +126,16 @@ def both(runs: Sequence[tuple[str, Series]]) -> Html:
     x = Axis(begin - 0.01 * span, end + 0.01 * span, _LEFT, _WIDTH - _RIGHT)
     y = Axis(*_room(np.concatenate([each[np.isfinite(each)] for each in figures])), _HEIGHT - _BOTTOM, _TOP)
     lines: list[Html] = []
+    bands: list[Html] = []
     legend: list[tuple[str, list[Html]]] = []
+    seen: set[Verdict] = set()
+    row = (y.begin - _TOP) / len(drawn)
     for k, (name, one, i) in enumerate(drawn):
+        for verdict in (Verdict.UNDECIDED, Verdict.EXCEEDED):
+            bars = _bands(one, verdict, span)
+            seen |= {verdict} if bars else set()
+            for start, stop in bars:
+                bands += _band(x, start, stop, _TOP + k * row, row, verdict, salt)
         color, limit = (
             (_INK, DARK_HEX[Verdict.EXCEEDED]) if k == len(drawn) - 1 else (_EARLIER, _EARLIER_LIMIT)
         )
@@ -135,10 +146,16 @@ def both(runs: Sequence[tuple[str, Series]]) -> Html:
         ]
         legend.append((name, [_stroke("M0,-2.5H16", color)]))
         if np.isfinite(figures[2 * k + 1]).any():
-            legend.append((f"limit, {name}", [_stroke("M0,-2.5H16", limit, dash=_DASH)]))
-    return _svg(
-        _HEIGHT, f"{runs[-1][1].name} over time", _axes(x, y, runs[-1][1].unit, lines), _legend(legend)
-    )
+            side = "at most" if one.at_most else "at least"
+            legend.append((f"limit ({side}), {name}", [_stroke("M0,-2.5H16", limit, dash=_DASH)]))
+    legend += [
+        (WORD[verdict], _patches(0, -6, 16, 7, verdict, salt)) for verdict in Verdict if verdict in seen
+    ]
+    if seen:
+        names = " above, ".join(name for name, _ in runs) + " below"
+        lines.append(_text(f"bands: {names}", x.end - 4, _TOP + 9, "end", font_size=_number(_SMALL)))
+    title = f"{runs[-1][1].name} over time"
+    return _svg(_HEIGHT, title, _hatches(salt), bands, _axes(x, y, runs[-1][1].unit, lines), _legend(legend))
 
 
 def _axes(x: Axis, y: Axis, unit: str, drawn: list[Html]) -> list[Html]:

@@ -10,8 +10,10 @@ import {
   WebGLRenderTarget,
 } from "three";
 
-/** Layer of what stands still, besides the one that cameras see. */
-export const STANDING_LAYER = 27;
+/** Layer of what is drawn to be kept, besides the one that cameras see. */
+const STANDING_LAYER = 27;
+const show = ({ layers }: Object3D): void => layers.enable(STANDING_LAYER);
+const unshow = ({ layers }: Object3D): void => layers.disable(STANDING_LAYER);
 
 /** What stands still. */
 export interface Standing {
@@ -30,7 +32,10 @@ export class Backdrop {
   private before = -1;
   private version = -1;
 
-  constructor(private readonly renderer: WebGLRenderer) {}
+  constructor(private readonly renderer: WebGLRenderer) {
+    // What the graphics card had is lost with it.
+    renderer.domElement.addEventListener("webglcontextrestored", () => this.dispose());
+  }
 
   /** Keep nothing of before: colours or cuts are others. */
   forget(): void {
@@ -62,10 +67,13 @@ export class Backdrop {
     const { background } = scene;
     const { mask } = camera.layers;
     if (this.version !== version) {
+      // Asked for now: what moves may have stood before, and is not to be seen where it was.
+      root.traverse(show);
       camera.layers.set(STANDING_LAYER);
       renderer.setRenderTarget(kept);
       renderer.render(scene, camera);
       camera.layers.mask = mask;
+      root.traverse(unshow);
       this.version = version;
     }
     renderer.initRenderTarget(whole);

@@ -12,7 +12,6 @@ import {
   Sphere,
   type Vector3,
 } from "three";
-import { STANDING_LAYER } from "./backdrop";
 import { drawnBySoftware } from "./effort";
 import { Levels, triangles } from "./levels";
 import { ownMaterial } from "./materials";
@@ -154,7 +153,6 @@ export class Crowd {
     drawn.castShadow = drawn.receiveShadow = true;
     drawn.frustumCulled = false;
     drawn.raycast = () => {};
-    drawn.layers.enable(STANDING_LAYER);
     this.root.add(drawn);
     this.levels.push({ drawn, off });
   }

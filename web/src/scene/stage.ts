@@ -66,6 +66,7 @@ export class Stage {
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     element.append(this.renderer.domElement);
+    this.renderer.domElement.addEventListener("webglcontextrestored", () => this.refresh());
     this.scene.background = this.ground;
     this.scene.fog = this.fog;
     this.world.rotation.x = -Math.PI / 2;

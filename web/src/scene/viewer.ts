@@ -195,15 +195,15 @@ export class Viewer {
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
     this.view.margins = !this.stage.renderer.xr.isPresenting;
     camera.updateWorldMatrix(true, false);
+    // Two figures for one thing at one instant would look like an error.
+    const { told } = this;
+    this.told = frame.peek();
+    if (!alike(told, this.told)) this.draw();
     // Through a real camera and in a headset pixels have another size.
     const plain = this.view.margins && this.through === null;
     if (this.bodies.arrange(camera, plain ? this.view.pixel : 0, time)) this.stage.invalidate();
     this.stage.standing = this.bodies.standing;
     this.fillVolumes();
-    // Two figures for one thing at one instant would look like an error.
-    const { told } = this;
-    this.told = frame.peek();
-    if (!alike(told, this.told)) this.draw();
     this.markers.face(this.view, this.doubts.captions);
   }
 

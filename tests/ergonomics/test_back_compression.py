@@ -186,7 +186,9 @@ def test_accelerations_are_those_of_a_parabola_and_nothing_is_made_up():
     for a in found[10:]:
         np.testing.assert_allclose(a, [[4.0, 0.0, -2.0]], atol=1e-6)
     np.testing.assert_allclose(seen.add(0.39, at(0.39)), [[4.0, 0.0, -2.0]], atol=1e-6)  # asked again
+    assert not seen.interrupted
     assert seen.add(0.1, at(0.1)) is None  # from another beginning
+    assert seen.interrupted
     noise = np.random.default_rng(2).normal(0, 1e-3, (200, 1, 3))
     seen = Accelerations()
     found = [seen.add(0.01 * k, noise[k]) for k in range(200)]
@@ -230,3 +232,37 @@ def test_a_motion_that_is_called_slow_and_is_not_is_never_within(tmp_path, load)
     seldom = verdicts(bends_forward(tmp_path / "seldom", 0.15, 10, f"{more}every = 0.5\n"), 2.0)
     assert Verdict.WITHIN not in {result.verdict for _, result in seldom}
     assert "nobody sees whether it is slow" in seldom[0][1].reason
+
+
+def test_who_was_not_looked_at_for_a_while_is_not_slow_until_that_is_seen(tmp_path):
+    cell = bends_forward(tmp_path, 4.0, 10, "load = 1\nslow = true\n")
+    engine, judge = Engine(cell.model), Judge(cell.bound)
+    feed = pump(cell.sources, cell.workstation.engine.tick)
+    found = []
+    for samples in feed:
+        engine.take(samples)
+        state = engine.tick() if found else engine.start()
+        looked = not 1.0 < state.t < 1.5
+        found.append((state.t, judge(state)[0] if looked else None))
+        if state.t >= 2.0:
+            break
+    after = [result for t, result in found if t >= 1.5]
+    assert [result.verdict for result in after[:5]] == [Verdict.UNDECIDED] * 5
+    assert "not seen throughout the last 0.1 s" in after[0].reason
+    assert {result.verdict for result in after[15:]} == {Verdict.WITHIN}
+
+
+def test_what_accelerations_bring_over_the_limit_is_not_within(tmp_path):
+    """A bend that presses a few per cent harder than its weight, under a limit that is as near."""
+
+    def bent(name, more):
+        cell = bends_forward(tmp_path / name, 2.0, 10, f"load = 1\nslow = true\n{more}")
+        return [result for _, result in verdicts(cell, 3.0)]
+
+    far = bent("far", "")
+    assert {result.verdict for result in far} == {Verdict.WITHIN}
+    most = max(result.interval[1] for result in far)
+    near = bent("near", f"limit = {1.001 * most:.6g}\n")
+    open_ = [result for result in near if result.verdict is not Verdict.WITHIN]
+    assert 0 < len(open_) < len(near) / 2
+    assert all("harder than their weight" in result.reason for result in open_)

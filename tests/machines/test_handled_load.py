@@ -124,6 +124,12 @@ def test_what_may_weigh_more_counts_with_what_it_weighs_at_most(tmp_path):
     # A box of 102 mm with rounded edges.
     assert 1.0603 < found.mass < 0.102**3 * 1000
     assert found.hands == {"left"}
+    # A tolerance makes it heavier still, and so it does what is given, mounted or taken.
+    heavier = Cell(tmp_path, PERSON + worn + "density = 1000\ndeviation_mm = 1\ndensity_tolerance = 0.1\n")
+    assert bind_handled(heavier.model, "operator")(heavier.state).mass == pytest.approx(1.1 * found.mass)
+    blank = BLANK.replace("mass = 0.8", "mass = 0.8\nmass_tolerance = 0.25")
+    cell = Cell(tmp_path, PERSON + TABLE + blank).go(3).grab(RIGHT, "blank").go(3)
+    assert bind_handled(cell.model, "operator")(cell.state).mass == pytest.approx(1.0)
 
 
 def test_two_hands_at_one_piece_carry_it_once_and_two_pieces_both(tmp_path):

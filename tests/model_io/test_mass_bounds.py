@@ -268,3 +268,27 @@ def test_one_material_of_two_densities_has_none(tmp_path):
     assembly = step.read(MeshSource(file, file.read_bytes(), 1 << 26, 1 << 20))
     assert assembly.shapes[0].density is None
     assert any("is not understood" in finding.text for finding in assembly.findings)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mass_that_is_given_is_spread_within_the_bounds_that_are_told(seed):
+    """Steps and dents within the deviation, or all of it at one corner of what is half missing."""
+    rng = np.random.default_rng(seed)
+    body = trimesh.creation.box(rng.uniform(0.05, 0.3, 3)).subdivide()
+    mesh, deviation = mesh_of(body), rng.uniform(1e-4, 2e-3)
+    made, _ = from_shape([mesh], mass=2.0, deviation=deviation)
+    assert made.error == 0 < made.spread_error
+    told = moments.Moments(2.0, made.com, made.inertia)
+    for _ in range(10):
+        moved = (
+            body.vertices
+            + deviation * rng.choice([-1, 0, 1], len(body.vertices))[:, None] * body.vertex_normals
+        )
+        truth = moments.of_closed_mesh(Mesh(moved, mesh.faces))
+        scaled = moments.Moments(2.0, truth.com, truth.inertia * 2.0 / truth.volume)
+        assert holds(told, scaled, made.spread_error)
+    trough, _ = from_shape([Mesh(mesh.vertices, mesh.faces[: len(mesh.faces) // 2])], mass=2.0)
+    told = moments.Moments(2.0, trough.com, trough.inertia)
+    for corner in mesh.vertices[np.unique(mesh.faces[: len(mesh.faces) // 2])]:
+        assert holds(told, moments.Moments(2.0, corner, np.zeros((3, 3))), trough.spread_error)
+    assert from_shape([mesh], mass=2.0)[0].spread_error == 0

@@ -11,6 +11,7 @@ from seerob.app import cli
 from seerob.app.console.terminal import Exit
 from seerob.core.errors import InputError
 from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Origin
 from seerob.description.cad import usd
 from seerob.description.cad.assembly import baked
 from seerob.description.cad.containing import ball, cylinder, rounded
@@ -277,3 +278,21 @@ def test_simple_shapes_of_a_density_weigh_what_they_do_and_not_what_is_around_th
     assert over.mass < 2700 * (ball + rod)
     assert 2700 * ball < over.mass * (1 + over.error)
     assert over.error > 0.01
+
+
+@pytest.mark.parametrize("what", ["density", "mass"])
+def test_what_a_simple_shape_cannot_weigh_is_nobodys_mass_and_a_given_one_is_given(tmp_path, what):
+    for number, value in enumerate((2.0, float("inf"))):
+        file = tmp_path / f"{number}.usda"
+        stage = scene(file, "Z")
+        body = UsdGeom.Xform.Define(stage, "/ball")
+        UsdPhysics.RigidBodyAPI.Apply(body.GetPrim())
+        mass = UsdPhysics.MassAPI.Apply(body.GetPrim())
+        (mass.CreateMassAttr if what == "mass" else mass.CreateDensityAttr)(value)
+        UsdGeom.Sphere.Define(stage, "/ball/shape").CreateRadiusAttr(5.0)
+        stage.Save()
+        (instance,) = read(file).instances
+        if value == 2.0:
+            assert instance.inertial.origin is (Origin.GIVEN if what == "mass" else Origin.ESTIMATED)
+        else:
+            assert instance.inertial is None

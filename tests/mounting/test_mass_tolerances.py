@@ -7,6 +7,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.core.tolerances import Tolerance
@@ -246,3 +247,28 @@ def test_wherever_masses_are_in_the_shapes_of_links_figures_are_within_their_bou
         assert low <= min(figures)
         assert max(figures) <= high < 8 * figure(plain)
         assert max(figures) > 2 * figure(plain), "it is no bound of nothing"
+
+
+@pytest.mark.parametrize("said", ["", "mass_tolerance = 0.1\n"])
+def test_a_centre_of_a_mass_that_is_estimated_is_off_with_all_that_it_may_weigh(tmp_path, said):
+    """A box by density, half a metre from the joint: heaviest and farthest at once."""
+    body = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((0.5, 0, 0))
+    tool = '[[tools]]\nname = "grip"\non = "arm/l1"\nmesh = "grip.stl"\nunits = "m"\ndensity = 1000\n'
+    more = tool + f"deviation_mm = 5\ncom_tolerance = 0.05\n{said}"
+    files = {"arm.urdf": one("revolute", 0.0), "grip.stl": body.export(file_type="stl")}
+    cell = made(tmp_path, FLOATING + TWO_R + more, files)
+    robot = cell.model.robot("arm")
+    found = MassTolerances(cell.model, robot)
+    matrices = found.matrices(state_at(cell, arm=([0.3], [1.0])))
+    (of,) = (body.mass for body in cell.model.bodies if body.owner == "grip")
+    factor = (1 + of.spread_error) * (1.1 if said else 1.0)
+    heaviest = I_Z + factor * of.value * (0.55**2 + 0.1**2 / 6)
+    ends = (1,) * len(found)
+    assert heaviest <= matrices.at(ends)[0, 0] * (1 + 1e-9) < 1.2 * heaviest
+    # What its file says of a link's spread alone counts too.
+    files["arm.urdf"] = files["arm.urdf"].replace('value="2.0"', 'value="2.0" spread_error="0.3"')
+    off = made(tmp_path / "link", FLOATING + TWO_R, files)
+    found = MassTolerances(off.model, off.model.robot("arm"))
+    assert found.tolerances == (Tolerance("masses of links of arm", pytest.approx(30), "%"),)
+    assert found.matrices(state_at(off, arm=([0.3], [1.0]))).at((1,))[0, 0] == pytest.approx(1.3 * I_Z)
+    assert "within bounds alone" in off.model.robot("arm").roughly_weighed

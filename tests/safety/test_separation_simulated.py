@@ -173,3 +173,8 @@ def test_the_simulated_stop_is_that_of_masses_at_the_ends_of_their_tolerance(tmp
     moved = separation(tmp_path / "com", SIMULATED, arm=ROTOR + "com_tolerance = 0.01\n")
     assert moved.verdict is Verdict.UNDECIDED
     assert "com_tolerance of arm ± 10 mm not followed" in moved.reason
+    # Nor is where the centre of a link is that its file knows within bounds alone.
+    spread = two_r().replace('<mass value="1.0"', '<mass value="1.0" error="0.1" spread_error="0.2"')
+    bounds = separation(tmp_path / "spread", SIMULATED, urdf=spread)
+    assert bounds.verdict is Verdict.UNDECIDED
+    assert "masses of links of arm ± 10 % not followed" in bounds.reason

@@ -264,6 +264,12 @@ def test_tokens_of_strangers_are_passed_over(tokens):
     assert len(rmw_zenoh.offered(tokens)) <= len(of_publishers)
 
 
+def test_names_that_are_longer_than_any_are_not_listed():
+    begin, kind = "@ros2_lv/0/a/0/1/MP/%/%/node", "std_msgs::msg::dds_::Bool_"
+    for topic, type_, listed in (("%x", kind, 1), ("%" + "x" * 300, kind, 0), ("%x", "x" * 300, 0)):
+        assert len(rmw_zenoh.offered([f"{begin}/{topic}/{type_}/hash/qos"])) == listed
+
+
 def test_who_publishes_faster_than_is_read_fills_no_memory():
     async def flooded():
         port = free_port()

@@ -19,7 +19,7 @@ from seerob.core.figures import rounded_up
 from seerob.core.snapshot import Result
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.question import Bound
-from seerob.criteria.scoring.handled import at_most, unweighed
+from seerob.criteria.scoring.handled import at_most, heavier, unweighed
 from seerob.criteria.scoring.phases import Phase, entered_for, phase_at
 from seerob.model.model import Model
 from seerob.twin.accuracy.tracking_error import TrackingError
@@ -48,6 +48,7 @@ class InHand:
         ]
         self._masses = {
             name: float(sum(model.mj.body_mass[mj] for mj in {model.bodies[i].mj for i in mechanism.bodies}))
+            * max(heavier(model, model.bodies[i]) for i in mechanism.bodies)
             for name, mechanism in model.mechanisms.items()
             if mechanism.role == "workpiece"
         }
@@ -58,7 +59,7 @@ class InHand:
         for name, mechanism in model.mechanisms.items():
             if mechanism.role == "human":
                 carried = (model.bodies[i] for i in mechanism.carried)
-                self._always[name] = {b.owner: at_most(b.mass) for b in carried if b.mass is not None}
+                self._always[name] = {b.owner: at_most(model, b) for b in carried if b.mass is not None}
                 self._always[name] |= dict.fromkeys(unweighed(model, name), math.inf)
         loads = ((i, _entered_load(model, each)) for i, each in enumerate(criteria))
         self._loads = {i: load for i, load in loads if load is not None}

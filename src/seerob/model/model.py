@@ -157,7 +157,7 @@ class Mechanism:
     def roughly_weighed(self) -> str:
         """Why masses of its links are figures of which intervals alone follow; empty where they are known."""
         inertials = [link.inertial for link in self.description.links if link.inertial is not None]
-        if not any(inertial.error or inertial.within for inertial in inertials):
+        if not any(one.error or one.spread_error or one.within for one in inertials):
             return ""
         return f"of the links of {self.name} masses are known within bounds alone: give them in masses"
 

@@ -186,10 +186,15 @@ def moved(found: Held, a: Array, lever: float) -> float:
 
 
 class Accelerations:
-    """Of points, out of where they were at the last instants: the parabola through those of `WINDOW`."""
+    """Of points, out of where they were at the last instants: the parabola through those of `WINDOW`.
+
+    Attributes:
+        interrupted: Whether nobody looked for longer than `SELDOM` before the instants that are kept.
+    """
 
     def __init__(self) -> None:
         self._seen = deque[tuple[float, Array]]()
+        self.interrupted = False
 
     def add(self, t: float, at: Array) -> Array | None:
         """Accelerations [m/s²], shape (n, 3); None while fewer than `FEWEST` instants are within the window.
@@ -199,8 +204,9 @@ class Accelerations:
             at: Points then [m], shape (n, 3).
         """
         seen = self._seen
-        if seen and t < seen[-1][0]:
+        if seen and not 0 <= t - seen[-1][0] <= SELDOM * (1 + 1e-9):
             seen.clear()
+            self.interrupted = True
         elif seen and t == seen[-1][0]:
             seen.pop()
         seen.append((t, at))
@@ -278,12 +284,14 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
             a, share = accelerations.add(twin.t, found.at), 0.0
             if a is not None:
                 share = moved(found, a, self.lever) / value - 1
+            fast = share > SHARE or high <= self.limit < high * (1 + share)
+            unwatched = seldom or (a is None and accelerations.interrupted)
             return Figure(
                 value if known else None,
                 self.limit,
                 interval=(low, high if known else math.inf),
-                open=not (known and self.slow) or seldom or share > SHARE,
-                beside=(found, known, share),
+                open=not (known and self.slow) or unwatched or fast,
+                beside=(found, known, share, fast, unwatched),
             )
 
         return compute
@@ -293,7 +301,7 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
         frame, seldom = model.frame(f"{self.human}/lumbar"), (self.every or 0.0) > SELDOM
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
-            posture, known, share = figure.beside
+            posture, known, share, fast, unwatched = figure.beside
             parts = tuple(
                 Result(name=name, value=moment, unit="N·m")
                 for name, moment in (
@@ -308,13 +316,15 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
                     reason = "not entered: load"
                 elif not self.slow and figure.interval is not None and figure.interval[1] <= self.limit:
                     reason = "what it takes to accelerate body and load is not counted: give slow = true"
-                elif share > SHARE:
+                elif fast:
                     reason = (
                         "slow = true, and body and load are seen to accelerate so that they press "
                         f"{share:.0%} harder than their weight"
                     )
                 elif seldom:
                     reason = f"every = {self.every:g}: so seldom nobody sees whether it is slow"
+                elif unwatched:
+                    reason = f"not seen throughout the last {WINDOW / 2:g} s: nobody knows whether it is slow"
                 else:
                     reason = "lever of the muscles, weight of the body and accuracy of the angles decide"
             place = state.drawn_point(frame, np.zeros(3))

@@ -15,8 +15,7 @@ import numpy as np
 from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
 from seerob.criteria.figure import Twin
-from seerob.description.description import Quantity
-from seerob.model.model import Model
+from seerob.model.model import Body, Model
 from seerob.twin.state import State
 
 
@@ -42,8 +41,8 @@ def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
     hand weighs, nobody knows what all of it does. Where workpieces are loose there is one instant at a time.
     """
     station = model.workstation
-    # By a mass that is given, or by density at most; one of several shapes has it on each.
-    weighed = {body.owner: at_most(body.mass) for body in model.bodies if body.mass is not None}
+    # By a mass that is given, or by density, at most; one of several shapes has it on each.
+    weighed = {body.owner: at_most(model, body) for body in model.bodies if body.mass is not None}
     worn = [
         ((thing.on or "").partition("/")[2], weighed[thing.name])
         for thing in (*station.workpieces, *station.tools)
@@ -58,7 +57,7 @@ def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
         if body.owner in loose:
             masses[body.owner] = None
             if before is not None and body.mass is not None and model.mass_origin(body) in KNOWN:
-                masses[body.owner] = before + body.mass.value
+                masses[body.owner] = before + at_most(model, body)
 
     def read(twin: Twin) -> Handled:
         if twin.many:
@@ -75,9 +74,17 @@ def bind_handled(model: Model, human: str) -> Callable[[Twin], Handled]:
     return read if loose else lambda twin: always
 
 
-def at_most(mass: Quantity) -> float:
-    """What something weighs at most [kg], where its volume is known within bounds alone."""
-    return mass.value * (1 + mass.error)
+def at_most(model: Model, body: Body) -> float:
+    """What a body weighs at most [kg]; 0 where nobody knows."""
+    return 0.0 if body.mass is None else body.mass.value * heavier(model, body)
+
+
+def heavier(model: Model, body: Body) -> float:
+    """Factor by which a body may be heavier: by tolerances, and by a volume that is within bounds alone."""
+    station = model.workstation
+    own = (thing for thing in (*station.tools, *station.workpieces) if thing.name == body.owner)
+    off = sum((thing.mass_tolerance or 0.0) + (thing.density_tolerance or 0.0) for thing in own)
+    return (1 + off) * (1 + (0.0 if body.mass is None else body.mass.error))
 
 
 def unweighed(model: Model, human: str) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -231,8 +232,12 @@ def _inertial(
         try:
             if solids is not None:
                 findings: tuple[Finding, ...] = ()
-                mass = row["density"] * solids.volume if row.get("density") else row["mass"]
-                made = solids.inertial(mass=mass, origin=Origin.ESTIMATED, source=str(source.path))
+                density = row.get("density")
+                mass = density * solids.volume if density else row["mass"]
+                if not (solids.volume > 0 and 0 < mass < math.inf):
+                    raise InputError.at(link, "mass", f"{mass!r} kg in {solids.volume!r} m³")
+                origin = Origin.ESTIMATED if density else Origin.GIVEN
+                made = solids.inertial(mass=mass, origin=origin, source=str(source.path))
             else:
                 made, findings = mass_properties.from_shape(
                     shape,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from seerob.core.errors import InputError
 from seerob.core.extras import edition, need
 from seerob.core.files.parser_process import parsed_one_by_one
 from seerob.core.printable import printable
@@ -194,7 +195,10 @@ def _solid(row: dict[str, Any], whole: Mesh, deviation: float) -> tuple[Moments 
         return None, ""
     triangles = of_closed_mesh(whole)
     if row["solids"] > 1:
-        once = mass_properties.from_shape([whole], density=1.0)[0]
+        try:
+            once = mass_properties.from_shape([whole], density=1.0)[0]
+        except InputError:
+            return None, ""
         if abs(once.mass / triangles.volume - 1) > INTEGRATED:  # some overlap, or are in others
             return None, ""
     solid = Moments(row["volume"], np.array(row["center"]), np.array(row["inertia"]))

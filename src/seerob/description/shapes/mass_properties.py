@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -189,9 +190,9 @@ def from_shape(
         subject: Full name of the part, for findings and errors.
 
     Returns:
-        The mass properties, whose ``error`` bounds the relative error of the mass and ``spread_error`` that
-        of all that they add to a mass matrix (0 for a closed mesh without a deviation, and for a given
-        mass), and what was noticed.
+        The mass properties, whose ``error`` bounds the relative error of the mass (0 of a given one) and
+        ``spread_error`` that of all that they add to a mass matrix (0 for a closed mesh without a
+        deviation), and what was noticed.
 
     Raises:
         InputError: neither or both are given, or not positive; there is no mesh; or no volume can be
@@ -226,6 +227,7 @@ def from_shape(
     else:
         source = f"mass given; centre and inertia from uniform density over {estimate.method}"
         inertial = moments.inertial(mass=mass, origin=Origin.GIVEN, source=source)
+        inertial = replace(inertial, spread_error=_of_given(mesh, deviation, moments, error, everything))
     notes = ((dropped,) if dropped else ()) + estimate.notes
     findings = [Finding(level="note", subject=subject, text=text) for text in notes]
     if error > 0 or estimate.method != _EXACT:
@@ -237,6 +239,20 @@ def from_shape(
             text += f"; in a mass matrix, with centre and inertia, {_within(everything)}"
         findings.append(Finding(level="warning" if error > 0.01 else "note", subject=subject, text=text))
     return inertial, tuple(findings)
+
+
+def _of_given(mesh: Mesh, deviation: float, moments: Moments, error: float, everything: float) -> float:
+    """Share by which what a given mass adds to a mass matrix may be off, of a volume that may be off."""
+    if not everything > 0:
+        return 0.0
+    hull = convex_hull(mesh.vertices)
+    assert hull is not None  # there is a volume
+    # All of it may be anywhere in the hull, out to the corners of a cube about each of the hull's.
+    corners = mesh.vertices[np.unique(hull)]
+    cube = deviation * np.array(list(product((-1.0, 1.0), repeat=3)))
+    points = (corners[:, None] + cube).reshape(-1, 3)
+    anywhere = max(1.0, mass_bounds.off_by_volume(points, moments.volume, moments) - 1)
+    return min(anywhere, (everything + error) / (1 - error)) if error < 1 else anywhere
 
 
 def _within(error: float) -> str:
@@ -275,19 +291,19 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool) -> _Estimate:
             off = mass_bounds.off_by_difference(flooded.moments, flooded.inside)
             method = "the mesh filled with voxels (open or tangled)"
             return _Estimate(flooded.moments, method, error, max(off, error))
+    if strict:
+        raise InputError.at(
+            subject,
+            "density",
+            f"the mesh is open and {100 * missing:.0f} % of a closed surface is missing: no volume within "
+            f"±{100 * WORST:.0f} %",
+            "give the mass, or close the mesh",
+        )
     # What is there bounds a hull from inside only while most of the surface is there.
-    inner = first.moments.volume if credible else 0.0
+    inner = first.moments.volume * (1 - min(first.error, 1.0)) if credible else 0.0
     error = 1 - inner / hull.volume
-    if error <= WORST or not strict:
-        off = mass_bounds.off_by_difference(hull, first.moments) if credible else 1.0
-        return _Estimate(hull, "the convex hull of the open mesh", error, max(off, error))
-    raise InputError.at(
-        subject,
-        "density",
-        f"the mesh is open and {100 * missing:.0f} % of a closed surface is missing: no volume within "
-        f"±{100 * WORST:.0f} %",
-        "give the mass, or close the mesh",
-    )
+    off = mass_bounds.off_by_difference(hull, first.moments) + first.inertia if credible else 1.0
+    return _Estimate(hull, "the convex hull of the open mesh", error, min(max(off, error), 1.0))
 
 
 def _is_sheet(mesh: Mesh, hull_volume: float) -> bool:

@@ -413,7 +413,8 @@ def overridden_link(
         if not link.solids:
             raise InputError.at(file, key, "has no shape to compute com and inertia from", "give both")
         meshes = [s.mesh if s.mesh is not None else solid_mesh(s) for s in link.solids]
-        return mass_properties.from_shape(meshes, mass=table.mass, subject=f"{robot}/{link.name}")
+        off, subject = max(s.deviation for s in link.solids), f"{robot}/{link.name}"
+        return mass_properties.from_shape(meshes, mass=table.mass, deviation=off, subject=subject)
 
     if table.com is not None and table.inertia is not None:
         inertial = given_inertial(table.mass, table.com, table.inertia, table.source)
@@ -421,7 +422,8 @@ def overridden_link(
         inertial = spread()[0]
         com = inertial.com if table.com is None else np.array(table.com, float)
         inertia = inertial.inertia if table.inertia is None else symmetric(table.inertia)
-        inertial = Inertial(table.mass, com, inertia, Origin.GIVEN, f"{table.source}; rest from the shape")
+        source = f"{table.source}; rest from the shape"
+        inertial = replace(inertial, com=com, inertia=inertia, source=source)
     return _possible(inertial, link.solids, table, f"{robot}/{link.name}", file, f"{key}.", spread)
 
 

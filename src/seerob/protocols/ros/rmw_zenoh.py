@@ -39,6 +39,8 @@ MOST_BYTES = 8 * MAX_MESSAGE
 """Of all that wait; likewise."""
 MOST_KEPT = 64
 """Messages of a topic that are kept for whoever comes later."""
+LONGEST_NAME = 255
+"""Of a topic or a type in ROS 2 [characters]: whoever announces a longer one is not listed."""
 NODE = "seerob"
 TOKENS = "@ros2_lv"
 PUBLISHER = "MP"
@@ -124,7 +126,8 @@ def offered(tokens: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for text in tokens:
         parts = text.split("/")
-        if len(parts) == 13 and parts[0] == TOKENS and parts[5] == PUBLISHER:
+        names = max(map(len, parts[9:11]), default=0)
+        if len(parts) == 13 and (parts[0], parts[5]) == (TOKENS, PUBLISHER) and names <= LONGEST_NAME:
             found[parts[9].replace("%", "/")] = message_type(parts[10])
     return found
 
@@ -186,8 +189,9 @@ class Router:
             # What is too long is cut by one byte more than is read, so that whoever decodes it refuses it.
             payload = sample.payload
             raw = payload.to_bytes() if len(payload) <= MAX_MESSAGE else bytes(MAX_MESSAGE + 1)
-            self._add(Put(time.monotonic(), topic, raw))
-            self._loop.call_soon_threadsafe(self._some.set)
+            # Who has not come for what waits was called already: of a flood the loop hears once.
+            if self._add(Put(time.monotonic(), topic, raw)):
+                self._loop.call_soon_threadsafe(self._some.set)
 
         for one in keys:
             if kept:
@@ -197,12 +201,15 @@ class Router:
                 made = self._session.declare_subscriber(one, take)
             self._declared.append(made)
 
-    def _add(self, put: Put) -> None:
+    def _add(self, put: Put) -> bool:
+        """Have it wait; whether nothing else did."""
         with self._lock:
+            first = not self._waiting
             self._waiting.append(put)
             self._bytes += len(put.payload)
             while len(self._waiting) > MOST_WAITING or self._bytes > MOST_BYTES:
                 self._bytes -= len(self._waiting.popleft().payload)
+            return first
 
     def publisher(self, topic: str, message: str, definition: str, domain: int) -> Publisher:
         """Announce a topic; arguments as of `Publisher`."""

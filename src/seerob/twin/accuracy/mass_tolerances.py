@@ -40,6 +40,7 @@ import numpy as np
 
 from seerob.core.tolerances import Shifts, Tolerance
 from seerob.core.transforms import Array
+from seerob.description.description import Inertial, Quantity
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State
 
@@ -66,19 +67,29 @@ class MassTolerances:
             if table.name == robot.name:
                 own = robot.links
                 links = [i for i, name in names.items() if name in own]
-                found += _offs(table.name, links, mass=table.mass_tolerance, com=table.com_tolerance)
+                found += _offs(
+                    table.name,
+                    links,
+                    mass=table.mass_tolerance,
+                    com=table.com_tolerance,
+                    estimated=max(
+                        (_estimated(link.inertial) for link in robot.description.links), default=0.0
+                    ),
+                )
                 found += _of_links(robot, {name: i for i, name in names.items()}, table.mass_tolerance or 0.0)
                 if share := table.rotor_tolerance:
                     tolerance = Tolerance(f"rotor_tolerance of {table.name}", 100 * share, "%")
                     found.append(_Off(tolerance, (), share=share, rotors=True))
         for thing in (*station.tools, *station.workpieces):
             bodies = [i for i, name in names.items() if name == thing.name]
+            known = (model.bodies[i].mass for i in robot.carried if model.bodies[i].owner == thing.name)
             found += _offs(
                 thing.name,
                 bodies,
                 mass=thing.mass_tolerance,
                 density=thing.density_tolerance,
                 com=thing.com_tolerance,
+                estimated=max(map(_estimated, known), default=0.0),
             )
         found += _estimates(model, robot)
         self.tolerances = tuple(off.tolerance for off in found)
@@ -142,8 +153,8 @@ class MassTolerances:
 
     @property
     def moved(self) -> tuple[str, ...]:
-        """Tolerances of centres of mass, in words."""
-        return tuple(str(off.tolerance) for off in self._offs if off.ways)
+        """What leaves centres of mass open, in words."""
+        return tuple(str(off.tolerance) for off in self._offs if off.ways or off.spread > off.share)
 
     def matrices(self, state: State, rates: Array | None = None) -> Matrices:
         """Mass matrices of a state, to be asked at shifted masses.
@@ -285,8 +296,9 @@ def _offs(
     mass: float | None = None,
     density: float | None = None,
     com: float | None = None,
+    estimated: float = 0.0,
 ) -> Iterator[_Off]:
-    """What of a robot, tool or workpiece is said to be off."""
+    """What of a robot, tool or workpiece is said to be off; by how much its estimated masses are, besides."""
     if not bodies:
         return
     for key, share in (("mass_tolerance", mass), ("density_tolerance", density)):
@@ -295,7 +307,7 @@ def _offs(
     if com:
         either = (mass or 0.0) + (density or 0.0)
         tolerance = Tolerance(f"com_tolerance of {name}", com, "m")
-        lighter, heavier = max(1 - either, 0.0), 1 + either
+        lighter, heavier = max(1 - either, 0.0), (1 + either) * (1 + estimated)
         ways = (com,) * len(bodies)
         yield _Off(tolerance, tuple(bodies), ways=ways, lighter=lighter, heavier=heavier)
 
@@ -310,19 +322,18 @@ def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Ite
     """
     full = {f"{robot.name}/{link.name}": link.inertial for link in robot.description.links}
     known = [(bodies[name], of) for name, of in full.items() if of is not None and name in bodies]
-    for share, spread in sorted({(of.error, of.spread_error) for _, of in known if of.error}):
+    for share, spread in sorted({(of.error, of.spread_error) for _, of in known if _estimated(of)}):
         off = tuple(body for body, of in known if (of.error, of.spread_error) == (share, spread))
-        tolerance = Tolerance(f"masses of links of {robot.name}", 100 * share, "%")
-        yield _Off(tolerance, off, share=share, spread=spread)
+        yield _off_by(f"masses of links of {robot.name}", off, share, spread, either)
     if anyhow := [(body, of) for body, of in known if of.within]:
-        widest, error = max(of.within for _, of in anyhow), max(of.error for _, of in anyhow) + either
+        widest, error = max(of.within for _, of in anyhow), max(of.error for _, of in anyhow)
         yield _Off(
             Tolerance(f"where masses are in links of {robot.name}", widest, "m"),
             tuple(body for body, _ in anyhow),
             ways=tuple(of.within for _, of in anyhow),
             anyhow=True,
-            lighter=max(1 - error, 0.0),
-            heavier=1 + error,
+            lighter=max(1 - error - either, 0.0),
+            heavier=(1 + error) * (1 + either),
         )
 
 
@@ -331,11 +342,24 @@ def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
     given = {thing.name: thing for thing in (*model.workstation.tools, *model.workstation.workpieces)}
     for index in robot.carried:
         body = model.bodies[index]
-        if body.mass is not None and max(body.mass.error, body.mass.spread_error) > EXACT:
-            dense = getattr(given.get(body.owner), "density_tolerance", None) or 0.0
-            share, spread = body.mass.error * (1 + dense), body.mass.spread_error * (1 + dense)
-            tolerance = Tolerance(f"volume of {body.owner}", 100 * share, "%")
-            yield _Off(tolerance, (body.mj,), share=share, spread=spread)
+        if body.mass is not None and _estimated(body.mass) > EXACT:
+            thing = given.get(body.owner)
+            either = (
+                0.0 if thing is None else (thing.mass_tolerance or 0.0) + (thing.density_tolerance or 0.0)
+            )
+            name = f"volume of {body.owner}"
+            yield _off_by(name, (body.mj,), body.mass.error, body.mass.spread_error, either)
+
+
+def _estimated(of: Inertial | Quantity | None) -> float:
+    """Share by which all that an estimated mass adds to a mass matrix may be off."""
+    return 0.0 if of is None else max(of.error, of.spread_error)
+
+
+def _off_by(name: str, bodies: tuple[int, ...], share: float, spread: float, either: float) -> _Off:
+    """Estimated masses of which the workstation file says, besides, that they may be off by a share."""
+    share, spread = share * (1 + either), spread * (1 + either)
+    return _Off(Tolerance(name, 100 * (share or spread), "%"), bodies, share=share, spread=spread)
 
 
 class Matrices:

@@ -198,7 +198,13 @@ def test_weights_that_are_roughly_known_leave_forces_undecided(tmp_path):
     """Of the Niryo One's links only round masses are published, anywhere in their shapes."""
     robot = '[[robots]]\nname = "arm"\nmodel = "library:niryo_one"\n'
     robot += f"torque_limits = {[9.0] * 6}\n"
-    for k, (name, why) in enumerate((("gravity", "rough masses"), ("motion", "rough masses"), ("none", ""))):
+    for k, (name, why) in enumerate(
+        (
+            ("gravity", "masses are known within bounds"),
+            ("motion", "masses are known within bounds"),
+            ("none", ""),
+        )
+    ):
         station = made(tmp_path / str(k), f'{robot}{ARM}limit = 1e6\nload = "{name}"\n')
         result = next(iter(results_at(station, arm=(np.full(6, 0.3), np.zeros(6))).values()))
         assert (result.value is None) == bool(why), name

@@ -10,7 +10,9 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.core.snapshot import Origin
 from seerob.core.tolerances import Tolerance
+from seerob.description.description import Inertial, rigid
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
 M, I_Z = 2.0, 0.05
@@ -272,3 +274,16 @@ def test_a_centre_of_a_mass_that_is_estimated_is_off_with_all_that_it_may_weigh(
     assert found.tolerances == (Tolerance("masses of links of arm", pytest.approx(30), "%"),)
     assert found.matrices(state_at(off, arm=([0.3], [1.0]))).at((1,))[0, 0] == pytest.approx(1.3 * I_Z)
     assert "within bounds alone" in off.model.robot("arm").roughly_weighed
+
+
+def test_the_centre_of_several_bodies_is_open_where_each_may_weigh_more_or_less():
+    def ball(x, error):
+        of = np.diag([0.01] * 3)
+        return Inertial(1.0, np.array([x, 0, 0]), of, Origin.ESTIMATED, "", error=error), np.eye(4)
+
+    two = rigid([ball(-1.0, 0.05), ball(1.0, 0.05)])
+    assert (two.mass, two.error, two.spread_error) == (2.0, 0.05, 0.05)
+    assert rigid([ball(0.0, 0.05)]).spread_error == 0
+    uneven = rigid([ball(-1.0, 0.1), ball(1.0, 0.0)])
+    assert (uneven.error, uneven.spread_error) == (0.05, 0.1)
+    assert rigid([ball(-1.0, 0.0), ball(1.0, 0.0)]).spread_error == 0

@@ -93,7 +93,7 @@ class Inertial:
     """Relative uncertainty of the mass, of an estimate; 0 when stated."""
     spread_error: float = 0.0
     """By which share all that it adds to a mass matrix may be off in any motion, with centre and moments,
-    where that is more than ``error``."""
+    no less than ``error``; 0 where the mass alone is uncertain."""
     within: float = 0.0
     """How far from ``com`` any of the mass may lie, where nobody knows how it is spread [m]; 0 where that is
     known."""
@@ -119,8 +119,10 @@ def rigid(parts: Sequence[tuple[Inertial, Array]]) -> Inertial:
         parts[0][0].origin,
         "; ".join(dict.fromkeys(one.source for one, _ in parts)),
         error=sum(one.mass * one.error for one, _ in parts) / mass,
-        # What holds of each by itself holds of their sum by the largest.
-        spread_error=max(max(one.error, one.spread_error) for one, _ in parts),
+        # What holds of each by itself holds of their sum by the largest; their centre moves with each.
+        spread_error=max(
+            max(one.error, one.spread_error) if len(parts) > 1 else one.spread_error for one, _ in parts
+        ),
     )
 
 

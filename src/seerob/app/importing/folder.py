@@ -89,7 +89,7 @@ class Densities:
             )
         except InputError:
             return None
-        spread = (1 + max(found.error, found.spread_error)) * (1 + off) - 1 if off else found.spread_error
+        spread = (1 + found.spread_error) * (1 + off) - 1 if found.spread_error else 0.0
         return replace(found, error=(1 + found.error) * (1 + off) - 1, spread_error=spread)
 
 

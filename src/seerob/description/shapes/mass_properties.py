@@ -223,7 +223,7 @@ def from_shape(
         inertial = moments.inertial(
             mass=given * moments.volume, origin=Origin.ESTIMATED, source=source, error=error
         )
-        inertial = replace(inertial, spread_error=everything if everything > error else 0.0)
+        inertial = replace(inertial, spread_error=max(everything, error))
     else:
         source = f"mass given; centre and inertia from uniform density over {estimate.method}"
         inertial = moments.inertial(mass=mass, origin=Origin.GIVEN, source=source)

@@ -154,7 +154,7 @@ class MassTolerances:
     @property
     def moved(self) -> tuple[str, ...]:
         """What leaves centres of mass open, in words."""
-        return tuple(str(off.tolerance) for off in self._offs if off.ways or off.spread > off.share)
+        return tuple(str(off.tolerance) for off in self._offs if off.ways or off.spread)
 
     def matrices(self, state: State, rates: Array | None = None) -> Matrices:
         """Mass matrices of a state, to be asked at shifted masses.
@@ -194,7 +194,8 @@ class _Off:
     share: float = 0.0
     """Of their masses."""
     spread: float = 0.0
-    """Of all that they add to a mass matrix; no less than the share of their masses."""
+    """Of all that they add to a mass matrix, no less than the share of their masses; 0 where these alone are
+    off."""
     ways: tuple[float, ...] = ()
     """Of the centre of mass of each, or of all its parts [m]; empty where only masses are off."""
     anyhow: bool = False

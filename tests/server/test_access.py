@@ -53,7 +53,14 @@ def test_who_may_not_control_changes_nothing_and_stays(server, role):
         assert looker.of(Hello).may == tuple(sorted({"view", role}))
         assert controller.of(Hello).may == ("control", "view")
         looker.of(Snapshot)
-        for action, value in (("play", None), ("seek", 0.5), ("speed", 9.0), ("step", 3), ("loop", 1)):
+        for action, value in (
+            ("play", None),
+            ("seek", 0.5),
+            ("speed", 9.0),
+            ("step", 3),
+            ("loop", 1),
+            ("beside", -1),
+        ):
             looker.ask(action, value)
             assert looker.of(Transport) == Transport(playing=False, t=0.0)
         controller.ask("seek", 0.5)
@@ -61,7 +68,7 @@ def test_who_may_not_control_changes_nothing_and_stays(server, role):
         assert looker.until(lambda m: isinstance(m, Snapshot) and m.t == 0.5)
     server.stop()
     refused = next(v.refused for v in server.visits.take(end=True) if v.role == role and v.event == "left")
-    assert refused == dict.fromkeys(("play", "seek", "speed", "step", "loop"), 1)
+    assert refused == dict.fromkeys(("play", "seek", "speed", "step", "loop", "beside"), 1)
 
 
 def test_where_no_token_is_asked_everything_is_allowed():

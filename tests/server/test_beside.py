@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import seerob as sr
-from seerob.app.commands.replay import _beside
+from seerob.app.commands.replay import _beside, _others
+from seerob.app.server.access import Tokens
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
 from seerob.core.errors import InputError
@@ -35,7 +36,7 @@ limit = 0.5
 def recorded(tmp_path):
     def record(folder, text=CELL, **values):
         cell = tmp_path / folder
-        cell.mkdir()
+        cell.mkdir(parents=True)
         (cell / "workstation.toml").write_text(text.format(**values))
         sr.load(cell).run(folder=cell, sinks=[Recorder()])
         return cell / "run.mcap"
@@ -82,3 +83,40 @@ def test_what_is_of_another_kind_is_not_beside_though_its_name_and_unit_are_the_
     far = recorded("far", CELL.replace(rule, other) + AREA, x=4, name="gap")
     with pytest.raises(InputError, match="no criterion with a name, kind and unit"):
         _beside(far, recording)
+
+
+def test_a_page_chooses_among_other_runs_of_the_folder_and_who_only_looks_does_not(recorded):
+    ours = recorded("runs/b", x=2, name="gap")
+    recorded("runs/c", x=4, name="gap")
+    recorded("runs/a", x=4, name="other")
+    recorded("elsewhere", x=5, name="gap")
+    assert _others(recorded("alone", x=2, name="gap")) == {}
+    recording = sr.Recording.open(ours)
+    player = Player(recording, others=_others(ours))
+    tokens = Tokens.made()
+    with (
+        Server(scene=recording.scene, meshes=recording.meshes, feed=player, port=0, tokens=tokens) as server,
+        Visitor(server, path=f"/ws?token={tokens.view}") as looker,
+        Visitor(server, path=f"/ws?token={tokens.control}") as page,
+    ):
+        told = page.until(lambda m: isinstance(m, History) and m.traces and len(m.traces[0].values))
+        assert told.others == ("c/run.mcap", "a/run.mcap")
+        assert (told.beside, told.beside_title) == ((), "")
+        looker.ask("beside", 1.0)  # is not done
+        page.ask("beside", 0.0)
+        told = page.until(lambda m: isinstance(m, History) and (m.beside_title or m.beside_refusal))
+        assert (told.beside_title, told.beside_refusal) == ("c/run.mcap", "")
+        assert [trace.name for trace in told.beside] == ["gap"]
+        assert looker.until(lambda m: isinstance(m, History) and m.beside_title) == told
+        page.ask("beside", 1.0)
+        told = page.until(lambda m: isinstance(m, History) and m.beside_title != "c/run.mcap")
+        assert (told.beside, told.beside_title) == ((), "")
+        assert told.beside_refusal.startswith("a/run.mcap: has no criterion with a name, kind and unit")
+        page.ask("beside", -1.0)
+        assert page.until(lambda m: isinstance(m, History) and not m.beside_refusal).beside == ()
+        page.ask("beside", 2.0)
+        assert page.end()[0] == 1007
+    server.stop()
+    assert [v.refused for v in server.visits.take(end=True) if v.role == "view" and v.event == "left"] == [
+        {"beside": 1}
+    ]

@@ -7,6 +7,7 @@ import { Form } from "./form";
 import { DRAWN, type Frame, type FromWorker, PANELS, type ToldResult, type ToWorker } from "./messages";
 import {
   beginScene,
+  besideRefusal,
   besideTitle,
   besideTraces,
   frame,
@@ -15,6 +16,7 @@ import {
   link,
   lookingAt,
   now,
+  otherRuns,
   reach,
   registered,
   soFar,
@@ -228,9 +230,12 @@ export class Connection {
       traces.set(wire.name, trace);
       if (trace.length > 0) start = Math.min(start, trace.t[0]!);
     }
+    besideTraces.clear();
     for (const wire of history.beside ?? [])
       besideTraces.set(wire.name, traceFromWire(wire, Number.POSITIVE_INFINITY));
     besideTitle.value = history.beside_title ?? "";
+    besideRefusal.value = history.beside_refusal ?? "";
+    otherRuns.value = history.others ?? [];
     if (!isLive.value && Number.isFinite(start))
       reach.value = { start: Math.min(start, reach.value.end), end: reach.value.end };
     tracesRevision.value += 1;

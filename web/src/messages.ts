@@ -31,7 +31,7 @@ import type {
 } from "./wire";
 
 /** What a page asks of the server; `ack` is the worker's own affair. */
-export type Action = "play" | "pause" | "seek" | "speed" | "step" | "loop";
+export type Action = "play" | "pause" | "seek" | "speed" | "step" | "loop" | "beside";
 
 export type LinkState = "connecting" | "open" | "lost" | "refused";
 

@@ -73,6 +73,9 @@ export const tracesRevision = signal(0);
 /** Traces of another run, on the same axis, and what it is called; empty without one. */
 export const besideTraces = new Map<string, Trace>();
 export const besideTitle = signal("");
+/** Why the one that was asked for is not there, and those that can be. */
+export const besideRefusal = signal("");
+export const otherRuns = signal<readonly string[]>([]);
 
 /** Whether this page may play, pause and seek; a live run can be held back in any page. */
 export const mayControl = computed(() => isLive.value || (hello.value?.may.includes("control") ?? false));
@@ -182,6 +185,8 @@ export function beginScene(next: Scene): void {
     traces.clear();
     besideTraces.clear();
     besideTitle.value = "";
+    besideRefusal.value = "";
+    otherRuns.value = [];
     for (const { name } of next.criteria) traces.set(name, new Trace(name));
     tracesRevision.value += 1;
   });

@@ -74,6 +74,11 @@ export class TimeControl {
     if (!isLive.value) this.command("loop", on ? 1 : 0);
   }
 
+  /** Show another run beside the one that is replayed, by its number among those that are offered; -1 for none. */
+  beside(number: number): void {
+    this.command("beside", number);
+  }
+
   /** To where a limit begins to be exceeded, before or after the cursor. */
   violation(forward: boolean): void {
     const t = neighbourViolation(traces.values(), now.value, forward);

@@ -12,7 +12,7 @@
 export const PROTOCOL = "seerob.v2.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "298a222e73facaef";
+export const SCHEMA = "bf9da54d7b9c42dd";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -626,6 +626,10 @@ export interface History {
   beside: Trace[];
   /** What that run is called. */
   beside_title: string;
+  /** Why the run that was asked for is not there. */
+  beside_refusal: string;
+  /** What can be asked for: other runs in the folder of the one that is replayed, newest first. */
+  others: string[];
 }
 
 /** What one criterion came to. */
@@ -795,11 +799,12 @@ export interface Tracked {
 /** What a page asks of the server. */
 export interface Command {
   type: "command";
-  /** `play`, `pause`, `seek`, `speed`, `step`, `loop` or `ack`. */
+  /** `play`, `pause`, `seek`, `speed`, `step`, `loop`, `beside` or `ack`. */
   action: string;
   /**
    * `seek`: run time [s]; `speed`: factor; `step`: recorded snapshots forward or back;
-   * `loop`: 1 or 0; `ack`: `Snapshot.seq` that was received.
+   * `loop`: 1 or 0; `beside`: number in `History.others`, -1 for none;
+   * `ack`: `Snapshot.seq` that was received.
    */
   value?: number | null;
 }

@@ -255,6 +255,17 @@ test("another run is on the same axis, with its own lanes and figures, and in no
   assert.doesNotMatch(await other.locator(".pill").innerText(), /work area/);
   assert.equal(await other.locator('tr[data-criterion="work area"] .badge.state-exceeded').count(), 0);
   assert.equal(await other.evaluate(() => window.hacked), undefined);
+  // Another one is chosen in the page, for all pages, and none.
+  const third = await browser.context.newPage();
+  await show(third, both.url);
+  await other.getByLabel("Another run").selectOption("later/run.mcap");
+  await third.locator(".beside").getByText("dashed: later/run.mcap").waitFor();
+  await other.waitForFunction(() => document.querySelector(".strip").ariaValueMax === "23");
+  await other.locator(".plot-beside .badge.state-within").first().waitFor();
+  await other.getByLabel("Another run").selectOption("–");
+  await third.locator(".plot-beside").first().waitFor({ state: "detached" });
+  await other.waitForFunction(() => document.querySelector(".strip").ariaValueMax === "20");
+  await other.screenshot({ path: process.env.R3_SHOT ?? "/dev/null", type: "png" });
   await other.close();
   await both.close();
 });

@@ -159,12 +159,13 @@ def main() -> None:
     frozen, over = threading.Event(), threading.Event()
     recording = Remembered(scene, options.seconds) if options.mode == "replay" else None
     beside = other_run(scene, options.seconds + 6) if options.beside else None
+    others = {"later/run.mcap": lambda: Remembered(scene, options.seconds + 3)} if beside else None
     begun, began = time.monotonic(), time.time()
     live = Timed(begun)
     live.log = ResultLog(scene.criteria)
 
     def open_server(port: int) -> Server:
-        feed = Player(recording, beside=beside) if recording else live
+        feed = Player(recording, beside=beside, others=others) if recording else live
         tokens = Tokens.made() if tls else None
         server = Server(scene=scene, meshes=meshes, feed=feed, port=port, tokens=tokens, tls=tls)
         pin = _pin(tls.authority) if tls and tls.authority else None

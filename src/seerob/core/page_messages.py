@@ -49,6 +49,10 @@ class History(Struct, frozen=True, kw_only=True, tag="history"):
     """Of another run, on the same axis: to look at, and of no verdict here."""
     beside_title: str = ""
     """What that run is called."""
+    beside_refusal: str = ""
+    """Why the run that was asked for is not there."""
+    others: tuple[str, ...] = ()
+    """What can be asked for: other runs in the folder of the one that is replayed, newest first."""
 
 
 class CriterionSoFar(Struct, frozen=True, kw_only=True):
@@ -198,10 +202,11 @@ class Command(Struct, frozen=True, kw_only=True, tag="command"):
     """What a page asks of the server."""
 
     action: str
-    """``play``, ``pause``, ``seek``, ``speed``, ``step``, ``loop`` or ``ack``."""
+    """``play``, ``pause``, ``seek``, ``speed``, ``step``, ``loop``, ``beside`` or ``ack``."""
     value: float | None = None
     """``seek``: run time [s]; ``speed``: factor; ``step``: recorded snapshots forward or back;
-    ``loop``: 1 or 0; ``ack``: `Snapshot.seq` that was received."""
+    ``loop``: 1 or 0; ``beside``: number in `History.others`, -1 for none;
+    ``ack``: `Snapshot.seq` that was received."""
 
 
 class Change(Struct, frozen=True, kw_only=True):

@@ -6,10 +6,13 @@ import { ownDevice } from "../company";
 import { against, steady, withUnit } from "../figures";
 import { formatTime } from "../format";
 import {
+  besideRefusal,
   besideTitle,
   besideTraces,
   clock,
+  mayControl,
   now,
+  otherRuns,
   type Row,
   rows,
   scene,
@@ -25,6 +28,7 @@ import { ranked } from "../plots/ranking";
 import { VERDICT_OF } from "../points";
 import { redrawEveryMs } from "../scene/effort";
 import { theme } from "../theme";
+import { spoken } from "../units";
 import { stateOf } from "../verdicts";
 import { said } from "../words";
 import { useActions } from "./app_context";
@@ -48,17 +52,43 @@ export function Plots({ count }: { count: number }) {
           </button>
         ))}
       </fieldset>
-      {besideTitle.value !== "" && (
-        <p class="beside">
-          {said("below, and dashed: {title}, as it was recorded", { title: besideTitle.value })}
-        </p>
-      )}
+      <OtherRun />
       <div class="charts">
         {names.map((name) => (
           <Plot key={name} name={name} />
         ))}
       </div>
     </section>
+  );
+}
+
+// Which run is beside this one: all pages of a replay see the same.
+function OtherRun() {
+  const { time } = useActions();
+  const [title, refusal, offered] = [besideTitle.value, besideRefusal.value, otherRuns.value];
+  if (title === "" && refusal === "" && offered.length === 0) return null;
+  return (
+    <div class="beside">
+      {offered.length > 0 && (
+        <label>
+          {said("Another run")}{" "}
+          <select
+            value={offered.indexOf(title)}
+            disabled={!mayControl.value}
+            onChange={(event) => time.beside(Number(event.currentTarget.value))}
+          >
+            <option value={-1}>–</option>
+            {offered.map((one, k) => (
+              <option key={one} value={k}>
+                {one}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
+      {title !== "" && <p>{said("below, and dashed: {title}, as it was recorded", { title })}</p>}
+      {refusal !== "" && <p role="alert">{spoken(refusal)}</p>}
+    </div>
   );
 }
 

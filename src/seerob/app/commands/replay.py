@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,7 +57,9 @@ def show(path: Path, options: argparse.Namespace) -> int:
     for finding in recording.findings:
         line(finding.level, finding.text, "yellow")
     ruler = Ruler(lambda: _model(recording))
-    player = Player(recording, beside=_beside(getattr(options, "beside", None), recording))
+    player = Player(
+        recording, beside=_beside(getattr(options, "beside", None), recording), others=_others(path)
+    )
     server = Server(
         scene=recording.scene,
         meshes=recording.meshes,
@@ -92,30 +96,45 @@ def _model(recording: Recording) -> Model:
 
 
 def _beside(path: Path | None, recording: Recording) -> History:
-    """What another recording holds of criteria of the same name, kind and unit, as it was recorded.
+    """What another recording holds of the criteria of this one.
 
     Raises:
-        InputError: It is no recording, or has no such criterion.
+        InputError: It is no recording, or has no criterion of the same name, kind and unit.
     """
     if path is None:
         return History(traces=())
-    from seerob.app.server.player import POINTS
+    from seerob.app.server.player import beside
     from seerob.recording.recording import Recording
-    from seerob.recording.result_log import ResultLog
+    from seerob.recording.result_log import log_of
 
     other = Recording.open(path)
-    ours = {(info.name, info.kind, info.unit, info.at_most) for info in recording.scene.criteria}
-    theirs = {(info.name, info.kind, info.unit, info.at_most) for info in other.scene.criteria}
-    same = {name for name, *_ in ours & theirs}
-    if not same:
-        what = "has no criterion with a name, kind and unit of the one that is shown"
-        raise InputError.at(path, "criteria", what, "name a recording of the same criteria")
-    log = ResultLog(other.scene.criteria)
-    for snapshot in other.snapshots():
-        log.add(snapshot)
-    line("beside", f"{other.scene.title}: {other.duration:.1f} s, {len(same)} of {len(ours)} criteria")
-    traces = tuple(trace for trace in log.history(POINTS).traces if trace.name in same)
-    return History(traces=(), beside=traces, beside_title=f"{path.parent.name}/{path.name}")
+    log = log_of(other.snapshots(), other.scene.criteria)
+    found = beside(recording.scene, other.scene, log, _title(path))
+    same, all_ = len(found.beside), len(recording.scene.criteria)
+    line("beside", f"{other.scene.title}: {other.duration:.1f} s, {same} of {all_} criteria")
+    return found
+
+
+MOST_OTHERS = 100
+"""Runs that a page is offered."""
+
+
+def _others(path: Path) -> dict[str, Callable[[], Recording]]:
+    """Other recordings in the folder ``runs`` that one is in, newest first; none of another place."""
+    from seerob.recording.recording import Recording
+
+    own = path.resolve()
+    runs = own.parent.parent
+    if runs.name != "runs":
+        return {}
+    there = ((other, other.resolve()) for other in runs.glob("*/*.mcap"))
+    found = sorted((a for a, b in there if b != own and b.parent.parent == runs), reverse=True)
+    return {_title(other): partial(Recording.open, other) for other in found[:MOST_OTHERS]}
+
+
+def _title(path: Path) -> str:
+    path = path.resolve()
+    return f"{path.parent.name}/{path.name}"
 
 
 def _verdict(recording: Recording, player: Player) -> Exit:

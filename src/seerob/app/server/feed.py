@@ -68,5 +68,5 @@ class Feed(Protocol):
         """Show snapshots until cancelled."""
 
 
-KNOWN_ACTIONS = frozenset({"play", "pause", "seek", "speed", "step", "loop"})
+KNOWN_ACTIONS = frozenset({"play", "pause", "seek", "speed", "step", "loop", "beside"})
 """What a page may ask for; ``ack`` is between the page and the server only."""

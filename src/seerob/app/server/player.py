@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from math import inf, nan, nextafter
 from struct import Struct
@@ -146,6 +146,7 @@ class Player:
         loop: Whether it starts again at the end; otherwise it pauses there.
         rate: Frames sent per second at most [1/s].
         beside: What of another run is plotted on the same axis (`History.beside`).
+        others: Runs that a page may ask for instead, by what they are called; opened when it does.
     """
 
     mode = "replay"
@@ -158,6 +159,7 @@ class Player:
         loop: bool = False,
         rate: float = 60.0,
         beside: History | None = None,
+        others: Mapping[str, Callable[[], Recorded]] | None = None,
     ) -> None:
         self._recording = recording
         self._playing, self._loop, self._speed = playing, loop, 1.0
@@ -169,8 +171,10 @@ class Player:
         self._wake = asyncio.Event()
         self._visitors = recording if isinstance(recording, RemembersVisitors) else None
         self._log = ResultLog(recording.scene.criteria)
+        self._others = others or {}
         self._beside = beside or History(traces=())
-        self._history = self._so_far_history()
+        self._asked, self._asking = -1, asyncio.Event()
+        self._traces = self._log.history(POINTS).traces
         self._so_far = printable_record(self._log.so_far(whole=False))
         self.reading = True
         """Whether the recording is still read through; then `so_far` is ``whole``, or reading failed."""
@@ -180,12 +184,9 @@ class Player:
         """Length of the recording [s]."""
         return self._recording.end - self._recording.start
 
-    def _so_far_history(self) -> History:
-        return printable_record(replace(self._beside, traces=self._log.history(POINTS).traces))
-
     def history(self) -> History:
         """The whole recording, or as much of it as was read by now."""
-        return self._history
+        return printable_record(replace(self._beside, traces=self._traces, others=tuple(self._others)))
 
     def so_far(self) -> SoFar:
         """What the recorded run came to, as far as it was read by now."""
@@ -200,10 +201,10 @@ class Player:
         return self._recording.snapshot_at(self._now() if t is None else t)
 
     def command(self, command: Command) -> None:
-        """Play, pause, seek, speed, step or loop.
+        """Play, pause, seek, speed, step, loop or beside.
 
         Raises:
-            ValueError: A ``step`` that is no whole number.
+            ValueError: A ``step`` that is no whole number, or a run ``beside`` that is not offered.
         """
         value = command.value or 0.0
         match command.action:
@@ -227,6 +228,11 @@ class Player:
                 self._steps = max(-LONGEST_STEP, min(LONGEST_STEP, self._steps + int(value)))
             case "loop":
                 self._loop = bool(value)
+            case "beside":
+                if value not in range(-1, len(self._others)):
+                    raise ValueError("beside needs the number of another run")
+                self._asked = int(value)
+                self._asking.set()
         self._dirty = True
         self._wake.set()
 
@@ -239,6 +245,7 @@ class Player:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._read_all(audience))
             tasks.create_task(self._show(audience))
+            tasks.create_task(self._put_beside(audience))
 
     async def _show(self, audience: Audience) -> None:
         while True:
@@ -311,18 +318,58 @@ class Player:
         try:
             while more:
                 more = await asyncio.to_thread(self._read_some, snapshots, monotonic() + _TELL_EVERY)
-                audience.tell(self._history)
+                audience.tell(self.history())
                 audience.tell(self._so_far)
         finally:
             self.reading = False
 
     def _read_some(self, snapshots: Iterator[Snapshot], until: float) -> bool:
-        more = False
-        for snapshot in snapshots:
-            self._log.add(snapshot)
-            if monotonic() > until:
-                more = True
-                break
-        self._history = self._so_far_history()
+        more = _add(self._log, snapshots, until)
+        self._traces = self._log.history(POINTS).traces
         self._so_far = printable_record(self._log.so_far(whole=not more))
         return more
+
+    async def _put_beside(self, audience: Audience) -> None:
+        """Show the run that was asked for last beside this one, or why it is not."""
+        while True:
+            await self._asking.wait()
+            self._asking.clear()
+            self._beside = History(traces=())
+            if self._asked >= 0:
+                title, opened = list(self._others.items())[self._asked]
+                try:
+                    other = await asyncio.to_thread(opened)
+                    log, snapshots = ResultLog(other.scene.criteria), other.snapshots()
+                    # In parts: another one may be asked for meanwhile.
+                    while await asyncio.to_thread(_add, log, snapshots, monotonic() + _TELL_EVERY):
+                        if self._asking.is_set():
+                            break
+                    self._beside = beside(self._recording.scene, other.scene, log, title)
+                except InputError as error:
+                    self._beside = History(traces=(), beside_refusal=f"{title}: {error.problems[0].what}")
+            if not self._asking.is_set():
+                audience.tell(self.history())
+
+
+def _add(log: ResultLog, snapshots: Iterator[Snapshot], until: float) -> bool:
+    """Add snapshots to a log until an instant [s], monotonic time; whether there are more."""
+    for snapshot in snapshots:
+        log.add(snapshot)
+        if monotonic() > until:
+            return True
+    return False
+
+
+def beside(ours: Scene, theirs: Scene, log: ResultLog, title: str) -> History:
+    """What another run holds of criteria of the same name, kind and unit, as it was recorded.
+
+    Raises:
+        InputError: It has no such criterion.
+    """
+    asked = {(info.name, info.kind, info.unit, info.at_most) for info in ours.criteria}
+    same = {info.name for info in theirs.criteria if (info.name, info.kind, info.unit, info.at_most) in asked}
+    if not same:
+        what = "has no criterion with a name, kind and unit of the one that is shown"
+        raise InputError.at(title, "criteria", what, "name a recording of the same criteria")
+    traces = tuple(trace for trace in log.history(POINTS).traces if trace.name in same)
+    return History(traces=(), beside=traces, beside_title=title)

@@ -19,6 +19,8 @@ from made_cell import made
 from seerob.app.emulators.egm import EPOCH, EgmServer
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, SignalSample
+from seerob.devices.live.device_clock import RESTART_HOLD, SETTLED, DeviceClock
+from seerob.devices.live.differentiation import Differentiator
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.egm import GUIDED, Egm
 from seerob.protocols import ProtocolError
@@ -215,3 +217,17 @@ def test_damaged_bytes_are_a_message_or_a_sentence(raw, at, some):
     ):
         with contextlib.suppress(ProtocolError):
             assert 0 < len(abb_egm.decode(damaged).joints) <= abb_egm.MOST
+
+
+def test_milliseconds_that_begin_anew_after_49_days_are_doubted_for_a_moment_and_make_no_speed():
+    clock, slope, doubts, speeds = DeviceClock(), Differentiator(5 * abb_egm.PERIOD), [], []
+    for k in range(2000):
+        t = 2**32 / 1000 - 4 + k * abb_egm.PERIOD
+        said = abb_egm.decode(abb_egm.encode(Message(k, t, (0.25 * k,) * 6), clock=False))
+        heard = clock.hear(said.time, 100 + k * abb_egm.PERIOD, hash(said.joints), forgeable=True)
+        assert heard.t == pytest.approx(100 + k * abb_egm.PERIOD, abs=SETTLED)
+        doubts.append(bool(heard.invalid_reason))
+        speeds += slope.add(said.time, said.joints) or ()
+    # 250 in a second, by milliseconds, and 2.5 s of doubt.
+    np.testing.assert_allclose(speeds, 0.25 / abb_egm.PERIOD, rtol=1e-6)
+    assert doubts == [1000 <= k <= 1000 + RESTART_HOLD / abb_egm.PERIOD for k in range(2000)]

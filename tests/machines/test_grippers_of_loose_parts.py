@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from seerob import load
 from seerob.core.errors import Undecided
 from seerob.core.samples import GrabSample, JointSample, SignalSample
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.engine import Engine
 
 ARM = """
@@ -133,6 +135,25 @@ def test_it_is_taken_from_a_belt_that_runs_and_rides_on_once_it_is_put_back(tmp_
     put = cell.at()
     cell.go(50)
     assert cell.at() - put == pytest.approx([50 * TICK * BELT, 0, 0], abs=2e-3)
+
+
+def test_what_is_held_may_weigh_more_by_its_tolerance_and_by_what_its_volume_may_be_off(tmp_path):
+    trimesh.creation.box((0.10, 0.05, 0.04)).export(tmp_path / "blank.stl")
+    mesh = 'mesh = "blank.stl"\nunits = "m"\ndeviation_mm = 1\n'
+    given = BLANK.replace("mass", "mass_tolerance = 0.25\nmass")
+    dense = BLANK.replace("shape = { box = [0.10, 0.05, 0.04] }\n", mesh).replace(
+        "mass = 0.8", "density = 4000"
+    )
+    for blank, off in ((given, 0.25), (dense, None)):
+        cell = Cell(tmp_path, ARM + blank).held().go(60, UP)
+        lift = cell.model.mechanisms["lift"]
+        found = MassTolerances(cell.model, lift)
+        (piece,) = (body.mass for body in cell.model.bodies if body.owner == "blank")
+        share = piece.spread_error if off is None else off
+        most = found.matrices(cell.state).at((1,) * len(found))[0, 0]
+        assert len(found) == 1
+        assert most - cell.mass() == pytest.approx(share * 0.8, rel=1e-6)
+        assert share > 0.1
 
 
 def test_it_is_part_of_the_gripper_while_it_is_held(tmp_path):

@@ -43,6 +43,7 @@ from seerob.core.transforms import Array
 from seerob.description.description import Inertial, Quantity
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State
+from seerob.workstation.workstation import Mounted, Workpiece
 
 EXACT = 1e-4
 """Relative error of a volume up to which it is told as exact."""
@@ -81,8 +82,8 @@ class MassTolerances:
                     tolerance = Tolerance(f"rotor_tolerance of {table.name}", 100 * share, "%")
                     found.append(_Off(tolerance, (), share=share, rotors=True))
         for thing in (*station.tools, *station.workpieces):
-            bodies = [i for i, name in names.items() if name == thing.name]
-            known = (model.bodies[i].mass for i in robot.carried if model.bodies[i].owner == thing.name)
+            bodies = [i for i, name in names.items() if name == thing.name or i in _held(model, thing)]
+            known = (body.mass for body in model.bodies if body.owner == thing.name)
             found += _offs(
                 thing.name,
                 bodies,
@@ -340,16 +341,24 @@ def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Ite
 
 def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
     """Masses that follow from a density and a volume of which only bounds are known."""
-    given = {thing.name: thing for thing in (*model.workstation.tools, *model.workstation.workpieces)}
-    for index in robot.carried:
-        body = model.bodies[index]
+    things = (*model.workstation.tools, *model.workstation.workpieces)
+    given = {thing.name: thing for thing in things}
+    found = [(model.bodies[i], model.bodies[i].mj) for i in robot.carried]
+    for thing in things:
+        in_hand = _held(model, thing).intersection(robot.mj_bodies)
+        found += [(body, i) for body in model.bodies if body.owner == thing.name for i in in_hand]
+    for body, mj in found:
         if body.mass is not None and _estimated(body.mass) > EXACT:
-            thing = given.get(body.owner)
-            either = (
-                0.0 if thing is None else (thing.mass_tolerance or 0.0) + (thing.density_tolerance or 0.0)
-            )
-            name = f"volume of {body.owner}"
-            yield _off_by(name, (body.mj,), body.mass.error, body.mass.spread_error, either)
+            of = given.get(body.owner)
+            either = 0.0 if of is None else (of.mass_tolerance or 0.0) + (of.density_tolerance or 0.0)
+            yield _off_by(f"volume of {body.owner}", (mj,), body.mass.error, body.mass.spread_error, either)
+
+
+def _held(model: Model, thing: Mounted) -> set[int]:
+    """Bodies of `mujoco` that are a loose workpiece in grippers that may hold it."""
+    if not (isinstance(thing, Workpiece) and thing.loose):
+        return set()
+    return {body.mj for body in model.bodies if body.name == f"{body.owner}/{thing.name}"}
 
 
 def _estimated(of: Inertial | Quantity | None) -> float:

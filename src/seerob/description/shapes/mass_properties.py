@@ -243,16 +243,16 @@ def from_shape(
 
 def _of_given(mesh: Mesh, deviation: float, moments: Moments, error: float, everything: float) -> float:
     """Share by which what a given mass adds to a mass matrix may be off, of a volume that may be off."""
-    if not everything > 0:
-        return 0.0
+    of_volume = (everything + error) / (1 - error) if error < 1 else np.inf
+    if of_volume <= 1:
+        return of_volume
     hull = convex_hull(mesh.vertices)
     assert hull is not None  # there is a volume
     # All of it may be anywhere in the hull, out to the corners of a cube about each of the hull's.
     corners = mesh.vertices[np.unique(hull)]
     cube = deviation * np.array(list(product((-1.0, 1.0), repeat=3)))
     points = (corners[:, None] + cube).reshape(-1, 3)
-    anywhere = max(1.0, mass_bounds.off_by_volume(points, moments.volume, moments) - 1)
-    return min(anywhere, (everything + error) / (1 - error)) if error < 1 else anywhere
+    return min(of_volume, max(1.0, mass_bounds.off_by_volume(points, moments.volume, moments) - 1))
 
 
 def _within(error: float) -> str:

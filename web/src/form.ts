@@ -1,8 +1,8 @@
 // What is drawn of a run: its form, and its numbers. From one snapshot to the next numbers alone change mostly, and
 // those go through shared memory: without a message, and without anything made anew for a picture.
 
-import type { Shown, ShownResult } from "./messages";
-import { type State, stateOf } from "./verdicts";
+import type { Shown } from "./messages";
+import { type State, stateAt } from "./verdicts";
 
 /** Before the numbers: run time [s], when that was heard [ms since 1970], whether it is silent. */
 export const HEAD = 3;
@@ -56,10 +56,6 @@ export class Form {
   /** By each result, where its value and its limit are; −1 where they are no numbers. */
   private readonly values: number[] = [];
   private readonly limits: number[] = [];
-  private readonly judged = { value: null, limit: null, at_most: true, verdict: null } as Pick<
-    ShownResult,
-    "value" | "limit" | "at_most" | "verdict"
-  >;
 
   constructor(readonly shown: Shown) {
     this.list(shown as unknown as Tree);
@@ -75,13 +71,13 @@ export class Form {
 
   /** The state of a result; with other numbers, where they are given. */
   stateOf(k: number, numbers: Float64Array | null): State {
-    const { judged, values, limits } = this;
     const { value, limit, at_most, verdict } = this.shown.results[k]!;
-    judged.value = numbers && values[k]! >= 0 ? numbers[HEAD + values[k]!]! : value;
-    judged.limit = numbers && limits[k]! >= 0 ? numbers[HEAD + limits[k]!]! : limit;
-    judged.at_most = at_most;
-    judged.verdict = verdict;
-    return stateOf(judged);
+    return stateAt(
+      verdict,
+      at_most,
+      figure(numbers, this.values[k]!, value),
+      figure(numbers, this.limits[k]!, limit),
+    );
   }
 
   /** Take other numbers; whether it looks different now. */
@@ -127,6 +123,10 @@ export class Form {
     this.firsts.push(this.count);
     this.count += count;
   }
+}
+
+function figure(numbers: Float64Array | null, at: number, drawn: number | null): number {
+  return numbers && at >= 0 ? numbers[HEAD + at]! : (drawn ?? Number.NaN);
 }
 
 function taken(into: Float64Array, numbers: Float64Array, from: number): boolean {

@@ -60,13 +60,21 @@ export function margin(result: Pick<Result, "value" | "limit" | "at_most">): num
 
 /** How one result is shown. */
 export function stateOf(result: Pick<Result, "value" | "limit" | "at_most" | "verdict">): State {
-  if (result.verdict === "exceeded") return "exceeded";
-  if (result.verdict === "undecided") return "undecided";
-  if (result.verdict === "within") {
-    const left = margin(result);
-    return left !== null && left < CLOSE_MARGIN ? "close" : "within";
-  }
-  return "none";
+  const { verdict, at_most, value, limit } = result;
+  return stateAt(verdict, at_most, value ?? Number.NaN, limit ?? Number.NaN);
+}
+
+/** The same of figures that stand alone; NaN for none. Nothing is made anew: it is asked for with every picture. */
+export function stateAt(
+  verdict: Result["verdict"],
+  atMost: Result["at_most"],
+  value: number,
+  limit: number,
+): State {
+  if (verdict === "exceeded" || verdict === "undecided") return verdict;
+  if (verdict !== "within") return "none";
+  const left = (atMost ? limit - value : value - limit) / Math.abs(limit);
+  return limit !== 0 && left < CLOSE_MARGIN ? "close" : "within";
 }
 
 /** The worst of several states; `none` for none. */

@@ -17,7 +17,7 @@ import { built, load } from "./source.mjs";
 
 globalThis.location = { search: "?draw=full" };
 const { ALONE_LAYER, crowdsOf } = await load("scene/crowds");
-const { coarser } = await load("scene/coarser");
+const { coarsening } = await load("scene/coarser");
 // One who draws by the processor.
 globalThis.location = { search: "?draw=light" };
 const light = await import(`${await built("scene/crowds")}?light`);
@@ -77,7 +77,10 @@ test("a coarser shape has fewer corners, and none of its points is off by more t
     return Array.from({ length: at.count }, (_, k) => Math.hypot(at.getX(k), at.getY(k), at.getZ(k)));
   };
   const counts = [0, 0.02, 0.1, 0.25].map((cell) => {
-    const { shape: made, off } = coarser(ball, cell);
+    const work = coarsening(ball, { shape: ball, off: 0 }, cell);
+    let step = work.next();
+    while (!step.done) step = work.next();
+    const { shape: made, off } = step.value;
     assert.ok(off <= cell * Math.sqrt(3) && off >= cell / 2, `${off} m of a cell of ${cell}`);
     made.computeBoundingBox();
     // Corners stay on the surface; triangles between them sag by less than a cell.

@@ -102,17 +102,23 @@ async function traced() {
   return { slots: slots.map(({ ms }) => ms), collected: collected.length };
 }
 
+/** Functions that ask WebXR for poses: what it tells is made anew by the browser, each number of a point an object. */
+const POSES = ["hold"];
+/** What this measurement asks the page. */
+const ASKED = ["get t", "get posed"];
+
 /** Functions that write figures, in the page or in the room: four times a second, not once per picture. */
 const FIGURES = ["publish", "paint"];
 
 /**
- * Bytes by function, of what is done for a picture, of three.js's own drawing in it, of figures that are written in it,
+ * Bytes by function, of what is done for a picture, of poses that WebXR tells for it, of three.js's own drawing in it, of figures that are written in it,
  * of what comes by message, and of the rest: panels and plots, at their own pace. What the browser makes of a call is
  * the caller's, of an emulator's or this measurement's nobody's.
  */
 function allocated(head) {
   const into = {
     picture: new Map(),
+    poses: new Map(),
     drawing: new Map(),
     figures: new Map(),
     heard: new Map(),
@@ -125,7 +131,9 @@ function allocated(head) {
     if (within === "picture" && FIGURES.includes(functionName)) within = "figures";
     // Functions of the browser's own have no line.
     const own = url.includes("/assets/") || (url === "" && lineNumber < 0 && (ours || within === "heard"));
-    const to = into[own ? within : "theirs"];
+    const asked = within === "picture" && ASKED.includes(functionName);
+    const told = within === "picture" && POSES.includes(functionName) ? "poses" : within;
+    const to = into[own && !asked ? told : "theirs"];
     const key = `${functionName || "(anonymous)"}:${lineNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
     to.set(key, (to.get(key) ?? 0) + selfSize);
     const mine = url.includes("/assets/") ? functionName || "(anonymous)" : url === "" ? ours : "";
@@ -206,13 +214,13 @@ async function measure(name) {
       `  script per picture  mean ${mean.toFixed(2)}, ${both(slots)} of processor time (${collected} collections in ${slots.length} pictures)\n` +
       `  ${sent} snapshots sent, ${skipped} replaced before they were\n` +
       `  age when offered ${both(ages.slice(-100 * SECONDS).map((s) => 1000 * s))}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
-      `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("drawing")} by three.js's own drawing, ${kilobytes("figures")} by figures written then, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
+      `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("poses")} by poses that WebXR tells, ${kilobytes("drawing")} by three.js's own drawing, ${kilobytes("figures")} by figures written then, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
   );
   if (!WHERE) return;
   process.stdout.write("  whose the time is, ms per picture by the clock\n");
   for (const [whose, ms] of (await spent(count)).slice(0, 24))
     process.stdout.write(`    ${ms.toFixed(3).padStart(8)} ${whose}\n`);
-  for (const part of ["picture", "drawing", "figures", "heard", "panels"]) {
+  for (const part of ["picture", "poses", "drawing", "figures", "heard", "panels"]) {
     process.stdout.write(`  ${part}\n`);
     const most = [...parts[part]].sort((a, b) => b[1] - a[1]).slice(0, 30);
     for (const [key, bytes] of most)

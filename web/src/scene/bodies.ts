@@ -18,7 +18,7 @@ import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Doubts, doubtOf } from "../doubts";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
-import { coarser } from "./coarser";
+import { coarsening } from "./coarser";
 import { type Crowd, crowdsOf, type Dressed, type Sight } from "./crowds";
 import { drawnBySoftware } from "./effort";
 import { featureEdges, turnOutward } from "./feature_edges";
@@ -55,6 +55,9 @@ const HEAVY = 20_000;
 const COARSER_MS = 4;
 const COARSER_SHARE = 0.2;
 
+/** Longest time for which normals are worked on at a stretch [ms]: the page answers between two. */
+const STRETCH_MS = 6;
+
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
 
@@ -62,19 +65,44 @@ type Looks = Snapshot["looks"];
 
 const ONE = new Vector3(1, 1, 1);
 
-const sharp = new WeakMap<BufferGeometry, BufferGeometry>();
+const sharp = new WeakMap<BufferGeometry, Promise<BufferGeometry>>();
 
 /** A geometry with a normal for each of its triangles, one for all bodies that share it. */
-function withNormals(geometry: BufferGeometry): BufferGeometry {
+function withNormals(geometry: BufferGeometry): Promise<BufferGeometry> {
   let made = sharp.get(geometry);
   if (!made) {
-    const apart = geometry.toNonIndexed();
-    apart.computeVertexNormals();
-    // Corners of a flat face are worked out once.
-    made = Object.keys(apart.attributes).length === 2 ? coarser(apart, 0).shape : apart;
+    made = sharpened(geometry);
     sharp.set(geometry, made);
   }
   return made;
+}
+
+let stretchOver = 0;
+
+async function sharpened(geometry: BufferGeometry): Promise<BufferGeometry> {
+  const apart = geometry.toNonIndexed();
+  apart.computeVertexNormals();
+  if (Object.keys(apart.attributes).length !== 2) return apart;
+  // Corners of a flat face are worked out once.
+  const work = coarsening(apart, { shape: apart, off: 0 }, 0);
+  for (;;) {
+    // Where nobody looks, a page gets its turn but once a second.
+    if (performance.now() > stretchOver && !document.hidden) {
+      await new Promise((resolve) => setTimeout(resolve));
+      stretchOver = performance.now() + STRETCH_MS;
+    }
+    const step = work.next();
+    if (step.done) return step.value.shape;
+  }
+}
+
+/** Have what came without normals drawn with some, where light falls on corners. */
+async function lit(model: Object3D): Promise<void> {
+  const meshes: Mesh[] = [];
+  model.traverse((part) => {
+    if (part instanceof Mesh && !part.geometry.hasAttribute("normal")) meshes.push(part);
+  });
+  for (const mesh of meshes) mesh.geometry = await withNormals(mesh.geometry);
 }
 
 /** Give back what a model takes of the graphics card, with the shapes that were made of its own. */
@@ -82,10 +110,12 @@ function drop(model: Object3D): void {
   model.traverse((part) => {
     if (!(part instanceof Mesh)) return;
     const { geometry } = part as Mesh;
-    for (const one of [geometry, sharp.get(geometry)]) {
-      if (one) Levels.drop(one);
-      one?.dispose();
-    }
+    const give = (one: BufferGeometry): void => {
+      Levels.drop(one);
+      one.dispose();
+    };
+    give(geometry);
+    void sharp.get(geometry)?.then(give);
   });
 }
 
@@ -145,9 +175,6 @@ export class Body {
       }
       const given = part.material;
       part.material = worn(given, 0);
-      if (drawnBySoftware() && !part.geometry.hasAttribute("normal")) {
-        part.geometry = withNormals(part.geometry);
-      }
       drawnTwice(part.geometry);
       this.meshes.push({ mesh: part, given, local: part.matrixWorld.clone() });
     }
@@ -300,6 +327,7 @@ export class Bodies {
         }
         try {
           const shape = (await model).clone();
+          if (drawnBySoftware() && body.node.role !== AREA) await lit(shape);
           if (generation === this.generation) body.dress(shape);
         } catch {
           models.delete(hash);

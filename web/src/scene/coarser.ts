@@ -14,15 +14,6 @@ export interface Coarser {
 /** Corners between two looks at the clock. */
 const AT_ONCE = 2048;
 
-/** A coarser surface at once, as `coarsening` makes it bit by bit. */
-export function coarser(surface: BufferGeometry, cell: number): Coarser {
-  const work = coarsening(surface, { shape: surface, off: 0 }, cell);
-  for (;;) {
-    const step = work.next();
-    if (step.done) return step.value;
-  }
-}
-
 /**
  * Corners that lie in one cell of a grid, and of which the triangles face alike, made one, some at each step.
  *

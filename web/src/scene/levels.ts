@@ -15,6 +15,8 @@ const known = new WeakMap<BufferGeometry, Levels>();
 export class Levels {
   /** From the true shape to the coarsest one that there is. */
   readonly made: Coarser[];
+  /** How far off something must not look so that a shape would do that there is not yet [m]. */
+  next = Number.POSITIVE_INFINITY;
   private readonly cells: number[];
   private making: Generator<undefined, Coarser> | null = null;
 
@@ -24,6 +26,7 @@ export class Levels {
     const plain = Object.keys(shape.attributes).every((name) => name === "position" || name === "normal");
     const coarse = drawnBySoftware() && plain && shape.hasAttribute("normal");
     this.cells = coarse ? CELLS.map((share) => share * shape.boundingSphere!.radius) : [];
+    this.look();
   }
 
   static of(shape: BufferGeometry): Levels {
@@ -39,11 +42,6 @@ export class Levels {
     for (const { shape: one } of there?.made.slice(1) ?? []) one.dispose();
   }
 
-  /** How far off something must not look so that a shape would do that there is not yet [m]. */
-  get next(): number {
-    return this.cells.length > 0 ? this.made.at(-1)!.off + this.cells[0]! / 2 : Number.POSITIVE_INFINITY;
-  }
-
   /** Make the next one, as far as it comes until a time [ms]. */
   work(until: number): void {
     const [cell] = this.cells;
@@ -56,8 +54,15 @@ export class Levels {
       this.making = null;
       this.cells.shift();
       if (cost(step.value.shape) <= WORTH * cost(last.shape)) this.made.push(step.value);
+      this.look();
       return;
     }
+  }
+
+  // Kept: it is asked for with every picture.
+  private look(): void {
+    const [cell] = this.cells;
+    this.next = cell === undefined ? Number.POSITIVE_INFINITY : this.made.at(-1)!.off + cell / 2;
   }
 }
 

@@ -62,7 +62,9 @@ def test_figures_of_the_page_are_those_of_the_run(walked):
     assert compared.count("<img") == 2
     # Both runs on one axis, each criterion with both limits.
     assert re.findall(r'aria-label="(.*?) over time"', compared) == ["distance", "tcp speed"]
-    assert compared.count(">limit, before<") == compared.count(">limit, after<") == 2
+    for which in ("before", "after"):
+        sides = re.findall(rf">limit \(at (most|least)\), {which}<", compared)
+        assert sorted(sides) == ["least", "most"]
 
 
 def test_points_by_hand_name_no_file(walked):

@@ -26,7 +26,8 @@ from seerob.description.shapes.shapes import box_mesh
         *((word, "cast iron") for word in ("EN-GJL-250", "Cast Iron", "GG25")),
         *((word, "brass") for word in ("CuZn39Pb3", "Messing")),
         *((word, None) for word in ("", "Steelcase blue", "PA6", "POM-C", "unsteel", "generic", "glasses")),
-        ("steel on glass", None),
+        ("steel on brass", None),
+        ("PA66, glass filled", None),
         ("brass or bronze", None),
     ],
 )

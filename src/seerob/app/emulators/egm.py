@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import math
 import time
 from collections.abc import Callable
 from typing import Annotated
 
-from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.message_sender import MessageSender, Way
 from seerob.app.emulation.motions import Motion
-from seerob.app.emulation.options import Ready, RobotOptions, option, port
+from seerob.app.emulation.options import Ready, RobotOptions, To, option, port
 from seerob.protocols.robots import abb_egm
 from seerob.protocols.robots.abb_egm import JOINTS, Message, MotionState, MotorState, RapidState
 
@@ -19,15 +17,15 @@ EPOCH = 1_700_000_000.0
 """What its clock begins at [s]."""
 
 
-class EgmServer(LoopEmulator):
+class EgmServer(MessageSender):
     """A stream of positions, in a thread of its own.
 
     Args:
         motion: What the robot does; time counts from when this was made, also through a stop.
         to: Own address of the client, and the port that it listens on.
-        host: Address to send from.
-        period: Between messages [s].
+        rate: Messages per second [Hz].
         clock: Whether messages say when they were measured; else their header alone has a time.
+        way: What happens to each message on the way.
     """
 
     def __init__(
@@ -35,47 +33,36 @@ class EgmServer(LoopEmulator):
         motion: Motion,
         *,
         to: tuple[str, int],
-        host: str = "127.0.0.1",
-        period: float = abb_egm.PERIOD,
+        rate: float = 1 / abb_egm.PERIOD,
         clock: bool = True,
+        way: Way | None = None,
     ) -> None:
-        super().__init__()
-        self.motion, self.to, self.host, self.period = motion, to, host, period
-        self.guided = MotionState.STOPPED
-        self._clock, self._sequence, self._made = clock, 0, time.monotonic()
+        super().__init__(to=to, port=to[1], rate=rate, way=way)
+        self.motion, self.guided = motion, MotionState.STOPPED
+        self._clock, self._made, self._since = clock, time.monotonic(), 0.0
 
-    def message(self, t: float) -> Message:
-        """What it says at a time since it was made [s]; as its clock has it, the motion is too."""
-        t = round(t, 6 if self._clock else 3)
+    def begin(self) -> Callable[[], object]:
+        """Its clock went on meanwhile, as that of a controller whose program pauses."""
+        self._since = time.monotonic() - self._made
+        return super().begin()
+
+    def t(self, k: int) -> float:
+        """When the message number ``k`` is [s]."""
+        return self._since + super().t(k)
+
+    def message(self, k: int) -> bytes:
+        """The message number ``k``; as its clock has the time, the motion has it too."""
+        t = round(self.t(k), 6 if self._clock else 3)
         q, _ = self.motion(t)
-        return Message(
-            sequence=self._sequence,
+        said = Message(
+            sequence=k & 0xFFFF_FFFF,
             time=(EPOCH if self._clock else 0.0) + t,
             joints=tuple(map(math.degrees, q)),
             motors=MotorState.ON,
             motion=self.guided,
             program=RapidState.RUNNING,
         )
-
-    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
-        """Send at a steady rate."""
-        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            asyncio.DatagramProtocol, local_addr=(self.host, 0)
-        )
-        ready()
-        begun, k = time.monotonic(), 0
-        try:
-            while not over.is_set():
-                message = self.message(begun - self._made + k * self.period)
-                transport.sendto(abb_egm.encode(message, clock=self._clock), self.to)
-                self._sequence, k = self._sequence + 1, k + 1
-                wait = begun + k * self.period - time.monotonic()
-                if wait < -1.0:  # this machine slept: what was not sent is not made up for
-                    k = int((time.monotonic() - begun) / self.period)
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(over.wait(), max(wait, 0.0))
-        finally:
-            transport.abort()
+        return abb_egm.encode(said, clock=self._clock)
 
 
 # -- options ------------------------------------------------------------------------------------
@@ -85,14 +72,13 @@ class Egm(RobotOptions, frozen=True, kw_only=True):
     """An ABB controller that streams positions (EGM) to a client."""
 
     robot: Annotated[str, option("robot of the library, whose limits hold")] = "crb15000_5_95"
-    to: Annotated[str, option("address of the client")] = "127.0.0.1"
-    port: Annotated[int, port("port of the client")] = abb_egm.PORT
+    to: To = "127.0.0.1"
+    port: Annotated[int, port("port to send to")] = abb_egm.PORT
     period: Annotated[int, option("between messages", "ms", ge=4, le=1000)] = 4
 
     def ready(self) -> Ready:
         """The controller."""
         target = self.target(joints=JOINTS, whose="it")
         motion, what = self.motion(target)
-        server = EgmServer(motion, to=(self.to, self.port), host=self.host, period=1e-3 * self.period)
-        where = f"{self.host}, to {self.to}:{self.port}"
-        return Ready(server, f"{target.name}, {what}", where, (f"seerob probe egm {self.host}{{option}}",))
+        sender = EgmServer(motion, to=(self.to, self.port), rate=1e3 / self.period)
+        return Ready(sender, f"{target.name}, {what}", f"to {self.to}:{self.port}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from pathlib import Path
 from typing import ClassVar
 
@@ -9,6 +10,11 @@ from seerob.core.motion_origin import MotionOrigin
 from seerob.core.plugin import kind_of
 from seerob.devices.live.listening import LiveSource
 from seerob.workstation.source import Opened, Target, driven_robot
+
+
+def state_name(kind: type[IntEnum], number: int) -> str:
+    """Name of a state as the maker has it; the number of one that nobody explained."""
+    return kind(number).name if number in kind.__members__.values() else str(number)
 
 
 class RobotController(LiveSource, frozen=True, kw_only=True):

@@ -16,7 +16,7 @@ from msgspec import Meta
 from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
-from seerob.devices.live.robot_controller import RobotController
+from seerob.devices.live.robot_controller import RobotController, state_name
 from seerob.protocols.robots import dobot
 from seerob.protocols.robots.dobot import JOINTS, Message, RobotMode
 from seerob.workstation.source import Target
@@ -64,9 +64,8 @@ def joint_sample(message: Message, *, target: str, arrived: float) -> JointSampl
 
 def states(message: Message) -> dict[str, float | bool | str]:
     """State of the robot in words; a number that nobody explained as such."""
-    mode = message.mode
     return {
-        "robot_mode": RobotMode(mode).name.lower() if mode in list(RobotMode) else str(mode),
+        "robot_mode": state_name(RobotMode, message.mode).lower(),
         "enabled": message.enabled,
         "dragged": message.dragged,
         "program_running": message.running,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
-from enum import IntEnum
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -19,7 +18,7 @@ from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import REORDERED
 from seerob.devices.live.differentiation import SAMPLES, Differentiator
-from seerob.devices.live.robot_controller import RobotController
+from seerob.devices.live.robot_controller import RobotController, state_name
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import abb_egm
@@ -42,9 +41,9 @@ GUIDED = (
 def states(message: Message) -> dict[str, float | bool | str]:
     """State of motors, motion and program in words; a number that nobody explained as such."""
     return {
-        "motors": _name(MotorState, message.motors),
-        "guided_motion": _name(MotionState, message.motion),
-        "program": _name(RapidState, message.program),
+        "motors": state_name(MotorState, message.motors).lower(),
+        "guided_motion": state_name(MotionState, message.motion).lower(),
+        "program": state_name(RapidState, message.program).lower(),
     }
 
 
@@ -53,10 +52,6 @@ def figures(message: Message) -> dict[str, float | bool | str]:
     found: dict[str, float | bool | str] = {f"force.{k + 1}": x for k, x in enumerate(message.force)}
     found |= {f"external_axis.{k + 1}": x for k, x in enumerate(message.external)}
     return found if message.utilization is None else {**found, "utilization": 0.01 * message.utilization}
-
-
-def _name(kind: type[IntEnum], number: int) -> str:
-    return kind(number).name.lower() if number in kind.__members__.values() else str(number)
 
 
 class Egm(RobotController, frozen=True, kw_only=True):

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
-from enum import IntEnum
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -20,7 +19,7 @@ from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.device_clock import REORDERED
 from seerob.devices.live.differentiation import SAMPLES, Differentiator
-from seerob.devices.live.robot_controller import RobotController
+from seerob.devices.live.robot_controller import RobotController, state_name
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.robots import fri
@@ -76,8 +75,8 @@ def joint_sample(
 def states(m: Monitoring) -> dict[str, float | bool | str]:
     """State of session and robot in words; a number that nobody explained as such."""
     found: dict[str, float | bool | str] = {
-        "session": _name(SessionState, m.session),
-        "quality": _name(fri.Quality, m.quality),
+        "session": state_name(SessionState, m.session),
+        "quality": state_name(fri.Quality, m.quality),
     }
     for key, kind, value in (
         ("safety", fri.SafetyState, m.safety),
@@ -85,9 +84,9 @@ def states(m: Monitoring) -> dict[str, float | bool | str]:
         ("control_mode", fri.ControlMode, m.control),
     ):
         if value is not None:
-            found[key] = _name(kind, value)
+            found[key] = state_name(kind, value)
     if m.drives:
-        found["drives"] = _name(fri.DriveState, min(m.drives))
+        found["drives"] = state_name(fri.DriveState, min(m.drives))
     return found
 
 
@@ -97,10 +96,6 @@ def figures(m: Monitoring) -> dict[str, float | bool | str]:
         f"external_torque.{k + 1}": x for k, x in enumerate(m.external_tau)
     }
     return found | {f"io.{name}": value for name, value in m.io}
-
-
-def _name(kind: type[IntEnum], number: int) -> str:
-    return kind(number).name if number in kind.__members__.values() else str(number)
 
 
 class DeviceTime:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Annotated
 
 from seerob.app.emulation.message_sender import MessageSender, Way
@@ -80,5 +82,10 @@ class Egm(RobotOptions, frozen=True, kw_only=True):
         """The controller."""
         target = self.target(joints=JOINTS, whose="it")
         motion, what = self.motion(target)
+        said, where = f"{target.name}, {what}", f"to {self.to}:{self.port}"
         sender = EgmServer(motion, to=(self.to, self.port), rate=1e3 / self.period)
-        return Ready(sender, f"{target.name}, {what}", f"to {self.to}:{self.port}")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link, suppress(OSError):
+            link.connect((self.to, self.port))
+            own = link.getsockname()[0]  # by which the client knows it
+            return Ready(sender, said, where, (f"seerob probe egm {own}{{option}}",))
+        return Ready(sender, said, where)

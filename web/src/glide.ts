@@ -8,6 +8,8 @@ import { FLOATS_PER_NODE } from "./poses";
 const LONGEST_MS = 150;
 /** A step in run time larger than this, or backwards, is a jump and is shown as one [s]. */
 const JUMP_S = 0.5;
+/** A body that is faster than this from one frame to the next has leapt, and nothing was in between [m/s]. */
+const FASTEST = 20;
 
 export class Glide {
   private from: Float32Array | null = null;
@@ -50,7 +52,8 @@ export class Glide {
       since < LONGEST_MS &&
       since > 1.5 * drawnEvery &&
       step > 0 &&
-      step < JUMP_S;
+      step < JUMP_S &&
+      !leaps(this.to, block, FASTEST * step);
     if (!this.to || this.to.length !== block.length) {
       this.from = block.slice();
       this.to = block.slice();
@@ -82,6 +85,16 @@ export class Glide {
     }
     return this.shown;
   }
+}
+
+function leaps(from: Float32Array, to: Float32Array, most: number): boolean {
+  for (let k = 0; k < to.length; k += FLOATS_PER_NODE) {
+    const x = to[k]! - from[k]!;
+    const y = to[k + 1]! - from[k + 1]!;
+    const z = to[k + 2]! - from[k + 2]!;
+    if (x * x + y * y + z * z > most * most) return true;
+  }
+  return false;
 }
 
 /** Positions along the line, orientations along the shorter arc (normalised chord: frames are close). */

@@ -6,7 +6,7 @@ import trimesh
 from scipy.ndimage import distance_transform_edt
 
 from concave import bumpy_ball
-from seerob.kernels.fields import cells_field, mesh_field, square_at_least
+from seerob.kernels.fields import Region, cells_field, mesh_field, square_at_least
 from seerob.kernels.tree_file import tree_of
 
 
@@ -43,7 +43,8 @@ def test_bound_between_nodes_is_never_above_the_truth_and_of_second_order():
     for spacing in (0.1, 0.05):
         field, start = field_of(mesh.vertices, mesh.faces, spacing, 0.3)
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        bound = np.array([square_at_least(field, start, spacing, low, high, *p, np.inf) for p in points])
+        region = Region(field, start, spacing, low, high)
+        bound = np.array([square_at_least(region, *p, np.inf) for p in points])
         assert (bound <= exact**2 + 1e-6).all()
         some = (bound > 0) & (exact > 0.15) & (exact < 0.25)
         errors.append((exact[some] ** 2 - bound[some]).mean())

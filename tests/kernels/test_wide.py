@@ -7,10 +7,11 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from seerob.kernels import wide
 from seerob.kernels.primitives import segment_triangle, triangles
 from seerob.kernels.search import row_in
 from seerob.kernels.tree_file import tree_of
-from seerob.kernels.wide import NONE, STACK, nearest_of_meshes, nearest_to_segment
+from seerob.kernels.wide import NONE, Trees, nearest_of_meshes, nearest_to_segment
 
 
 def tree(mesh):
@@ -25,8 +26,7 @@ def ball():
 
 @pytest.fixture(scope="module")
 def scratch():
-    singles = np.empty(STACK, np.float32), np.empty(16, np.float32), np.empty(16, np.float32)
-    return np.empty((STACK, 2), np.int32), *singles, np.empty((1, 13)), np.empty(36)
+    return wide.scratch()
 
 
 def first_least(values):
@@ -35,8 +35,7 @@ def first_least(values):
 
 @pytest.mark.parametrize("away", [0.0, 0.301, 0.5, 3.0, 1e3, 1e7, 1e25, 1e60])
 def test_nearest_to_a_segment_is_the_first_of_all_triangles(ball, scratch, away):
-    stack, bounds, given, low, _, W = scratch
-    rng = np.random.default_rng(1)
+    rng, W, trees = np.random.default_rng(1), scratch.W, Trees(ball.boxes, ball.kids, ball.triangles)
     for n in range(12):
         direction = rng.normal(size=3)
         a = away * direction / np.linalg.norm(direction)
@@ -47,21 +46,7 @@ def test_nearest_to_a_segment_is_the_first_of_all_triangles(ball, scratch, away)
         ]
         k, least = first_least([one[0] for one in all_of_them])
         for first in (-1, int(rng.integers(len(ball.triangles)))):
-            found = nearest_to_segment(
-                ball.boxes,
-                ball.kids,
-                0,
-                ball.triangles,
-                *a,
-                *d,
-                np.inf,
-                first,
-                stack[:, 0],
-                bounds,
-                given,
-                low,
-                W,
-            )
+            found = nearest_to_segment(trees, 0, tuple(a), tuple(d), np.inf, first, scratch)
             assert found == (least, k)
             assert W[:3].tolist() == list(all_of_them[k][2:])
 
@@ -88,8 +73,9 @@ def test_nearest_of_two_meshes_is_the_first_of_all_pairs(ball, scratch, away):
             values[:, b] = [triangles(T, a, row, 0, np.inf, W)[0] for a in range(m)]
         k, least = first_least(values.ravel().tolist())
         pair = k // values.shape[1], m + k % values.shape[1]
+        scratch.R[:], scratch.t[:] = R, t
         for first in ((-1, -1), (int(rng.integers(m)), m)):
-            found = nearest_of_meshes(boxes, kids, T, 0, len(ball.boxes), R, t, np.inf, *first, *scratch)
+            found = nearest_of_meshes(Trees(boxes, kids, T), 0, len(ball.boxes), np.inf, *first, scratch)
             assert found == (least, *pair)
 
 

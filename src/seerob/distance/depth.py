@@ -9,6 +9,7 @@ import numpy as np
 
 from seerob.core.transforms import Array
 from seerob.kernels.depth import deepest
+from seerob.kernels.pairs import BoundSolids
 from seerob.kernels.shapes import Shapes
 
 TOLERANCE = 1e-3
@@ -51,6 +52,7 @@ class Depths:
             fewest: Cells that each pair has all the same; ``cells`` for each when not given.
         """
         self.shapes, self.tolerance, self.cells, self.fewest = shapes, tolerance, cells, fewest
+        self._bound = BoundSolids(shapes.arrays())
 
     def ask(self, rotations: Array, positions: Array, entered: Sequence[tuple[int, int]]) -> list[Depth]:
         """The largest distance to the surface of an outer body of any point of an inner one inside it.
@@ -77,8 +79,7 @@ class Depths:
         at, least, most = np.empty((n, 3)), np.empty(n), np.empty(n)
         deepest(
             np.ascontiguousarray(table[:, 1:]), np.ascontiguousarray(rotations, float),
-            np.ascontiguousarray(positions, float), s.which, s.local, s.corners, s.radius, s.nodes, s.links,
-            s.triangles, self.tolerance, share, at, least, most,
+            np.ascontiguousarray(positions, float), self._bound.table, self.tolerance, share, at, least, most,
         )  # fmt: skip
         found = [NONE] * len(entered)
         for (k, _, _), low, high, point in zip(rows, least.tolist(), most.tolist(), at, strict=True):

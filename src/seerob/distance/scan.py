@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from seerob.core.shapes import signed_area
 from seerob.core.transforms import Array
+from seerob.kernels.pairs import BoundSolids
 from seerob.kernels.rays import CLOSE, STEPS, cast
 from seerob.kernels.shapes import Shapes
 from seerob.kernels.signed_distance import place
@@ -26,6 +27,7 @@ class Rays:
     def __init__(self, shapes: Shapes, bodies: Iterable[int]) -> None:
         """Of a model, and indices of the bodies that can stop a ray; none is allowed."""
         self.shapes, self.bodies = shapes, tuple(dict.fromkeys(bodies))
+        self._bound = BoundSolids(shapes.arrays())
         self._solids = np.array([s for b in self.bodies for s in shapes.solids[b]], np.int64)
 
     def cast(
@@ -58,10 +60,7 @@ class Rays:
         )  # fmt: skip
         starts = np.ascontiguousarray(origins, float)
         along = np.ascontiguousarray(directions, float)
-        cast(
-            starts, along, self._solids, s.which, s.ball, s.corners, s.radius, s.nodes, s.links, s.triangles,
-            world, distance, met,
-        )  # fmt: skip
+        cast(starts, along, self._solids, self._bound.table, world, distance, met)
 
 
 def met_beside(length: float) -> float:

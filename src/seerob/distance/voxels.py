@@ -20,7 +20,7 @@ from seerob.core.transforms import Array
 from seerob.description.shapes.hull import convex_hull
 from seerob.kernels import surface_nets as nets
 from seerob.kernels.fields import Cells
-from seerob.kernels.voxels import TOP
+from seerob.kernels.voxels import TOP, Voxels
 
 Triangles = tuple[tuple[int, int, int], ...]
 
@@ -117,6 +117,10 @@ class VoxelGrid:
     def origin(self) -> Array:
         """Lower corner of the first voxel [m], shape (3,)."""
         return np.asarray(self.first * self.pitch, float)
+
+    def arrays(self) -> Voxels:
+        """The grid as kernels take it."""
+        return Voxels(self.cells, self.full, self.origin, self.pitch)
 
     @property
     def volume(self) -> float:

@@ -24,12 +24,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.pairs import CORNERS, MESH
+from seerob.kernels.pairs import CORNERS, MESH, SOLIDS, Solids
+from seerob.kernels.search import Work, work
 from seerob.kernels.signed_distance import bounds_of, place_one, signed_distance
 
-Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
 
+_solids_in = SOLIDS.read
 PIECES = 24
 """Of a capsule's axis, at most."""
 
@@ -48,22 +49,10 @@ def _apart(x: Array, y: Array) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _along_axis(
-    i: int,
-    j: int,
-    which: Indices,
-    corners: Array,
-    radius: Array,
-    nodes: Array,
-    links: Links,
-    T: Array,
-    world: Array,
-    tolerance: float,
-    stack: Links,
-    bounds: Array,
-    W: Array,
-    at: Array,
+    i: int, j: int, solids: Solids, world: Array, tolerance: float, work: Work, at: Array
 ) -> tuple[float, float]:
     """Interval of how deep a capsule j reaches into solid i, from pieces of its axis; `deepest`."""
+    which, corners, radius = solids.which, solids.corners, solids.radius
     ends = np.empty((2, 3))
     for k in range(2):
         for c in range(3):
@@ -110,10 +99,7 @@ def _along_axis(
                 sign = -1 if depth[k] > 0.0 else 1
         else:
             near[0] = np.nan
-        depth[asked] = -signed_distance(
-            i, which, corners, radius, nodes, links, T, world, x, near[asked], sign, stack, bounds, W,
-            near[asked],
-        )  # fmt: skip
+        depth[asked] = -signed_distance(i, solids, world, x, near[asked], sign, work, near[asked])
         room = abs(depth[asked])
         if room > 1e-12:
             way = r / room if depth[asked] > 0.0 else -r / room
@@ -121,9 +107,7 @@ def _along_axis(
                 y[c] = x[c] + way * (x[c] - near[asked, c])
             _put(near[asked], other)
             sign = -1 if radius[i] == 0.0 and depth[asked] > 1.001 * r else 0
-            deep = -signed_distance(
-                i, which, corners, radius, nodes, links, T, world, y, other, sign, stack, bounds, W, other
-            )
+            deep = -signed_distance(i, solids, world, y, other, sign, work, other)
             if deep > best:
                 best = deep
                 _put(y, at)
@@ -167,29 +151,21 @@ def _along_axis(
 def _in_cells(
     i: int,
     j: int,
-    which: Indices,
-    corners: Array,
-    radius: Array,
-    nodes: Array,
-    links: Links,
-    T: Array,
+    solids: Solids,
     world: Array,
-    low: Array,
-    high: Array,
+    box: Array,
     tolerance: float,
     cells: int,
-    best: float,
-    most: float,
-    stack: Links,
-    bounds: Array,
-    W: Array,
+    known: tuple[float, float],
+    work: Work,
     at: Array,
 ) -> tuple[float, float]:
-    """Interval of how deep solid j reaches into solid i, between ``best`` and ``most``; `deepest`."""
+    """Interval of how deep solid j reaches into solid i in a ``box``, within the ``known`` one; `deepest`."""
+    best, most = known
     x, y = np.empty(3), np.empty(3)
     near, other, parent = np.full(3, np.nan), np.full(3, np.nan), np.empty(3)
     for k in range(3):
-        x[k], y[k] = (low[k] + high[k]) / 2.0, (high[k] - low[k]) / 2.0
+        x[k], y[k] = (box[0, k] + box[1, k]) / 2.0, (box[1, k] - box[0, k]) / 2.0
     heap = [(-most, x[0], x[1], x[2], y[0], y[1], y[2])]
     used = 0
     done = best
@@ -204,9 +180,7 @@ def _in_cells(
         half = np.array([hx, hy, hz])
         x[0], x[1], x[2] = cx, cy, cz
         # Along the axis that the last bound hung on most.
-        room = signed_distance(
-            i, which, corners, radius, nodes, links, T, world, x, near, either, stack, bounds, W, near
-        )
+        room = signed_distance(i, solids, world, x, near, either, work, near)
         _put(near, parent)
         axis = 0
         gain = -1.0
@@ -218,21 +192,17 @@ def _in_cells(
         half[axis] /= 2.0
         reach = math.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
         # No surface is crossed within the distance to it.
-        same = radius[i] == 0.0 and half[axis] < 0.999 * abs(room)
+        same = solids.radius[i] == 0.0 and half[axis] < 0.999 * abs(room)
         for side in range(2):
             used += 1
             x[0], x[1], x[2] = cx, cy, cz
             x[axis] += half[axis] if side == 1 else -half[axis]
-            gap = signed_distance(
-                j, which, corners, radius, nodes, links, T, world, x, other, either, stack, bounds, W, other
-            )
+            gap = signed_distance(j, solids, world, x, other, either, work, other)
             if gap > reach + 1e-12:
                 continue
             sign = 0 if not same else (-1 if room < 0.0 else 1)
             _put(parent, near)
-            depth = -signed_distance(
-                i, which, corners, radius, nodes, links, T, world, x, near, sign, stack, bounds, W, near
-            )
+            depth = -signed_distance(i, solids, world, x, near, sign, work, near)
             far = 0.0
             for k in range(3):
                 far += (abs(x[k] - near[k]) + half[k]) ** 2
@@ -240,9 +210,7 @@ def _in_cells(
             _put(x, y)
             if gap > 0.0:
                 _put(other, y)
-                depth = -signed_distance(
-                    i, which, corners, radius, nodes, links, T, world, y, near, either, stack, bounds, W, near
-                )
+                depth = -signed_distance(i, solids, world, y, near, either, work, near)
             if depth > best:
                 best = depth
                 _put(y, at)
@@ -258,13 +226,7 @@ def deepest(
     pairs: Indices,
     rotations: Array,
     positions: Array,
-    which: Indices,
-    local: Array,
-    corners: Array,
-    radius: Array,
-    nodes: Array,
-    links: Links,
-    T: Array,
+    table: Indices,
     tolerance: float,
     cells: int,
     at: Array,
@@ -277,47 +239,34 @@ def deepest(
         pairs: The solid that is entered and the one that enters, shape (n, 2).
         rotations: world_from_body of every body, shape (nb, 3, 3).
         positions: Likewise [m], shape (nb, 3).
-        which: See `seerob.kernels.shapes.Shapes`; ``local`` to ``T`` likewise.
-        local: Likewise.
-        corners: Likewise.
-        radius: Likewise.
-        nodes: Likewise.
-        links: Likewise.
-        T: Likewise.
+        table: Of all solids, see `seerob.kernels.pairs.BoundSolids`.
         tolerance: Width of an interval that is enough [m].
         cells: Largest number of cells of each pair.
         at: Receives the deepest points found, NaN where there is none [m], shape (n, 3).
         least: Receives at least how deep [m], shape (n,); 0 when they have no point in common.
         most: Likewise at most.
     """
-    stack = np.empty(128, np.int32)
-    bounds = np.empty(128)
-    W = np.empty(6)
+    solids, room = _solids_in(table, 0), work()
+    which = solids.which
     world = np.zeros((len(which), 12))
-    first, second = np.empty((2, 3)), np.empty((2, 3))
-    low, high = np.empty(3), np.empty(3)
+    first, second, box = np.empty((2, 3)), np.empty((2, 3)), np.empty((2, 3))
     for n in range(len(pairs)):
         i, j = pairs[n, 0], pairs[n, 1]
         at[n] = np.nan
         least[n] = most[n] = 0.0
         for s in (i, j):
-            place_one(rotations[which[s, 0]], positions[which[s, 0]], local, s, world)
-        bounds_of(which, corners, radius, world, i, first)
-        bounds_of(which, corners, radius, world, j, second)
+            place_one(rotations[which[s, 0]], positions[which[s, 0]], solids.local, s, world)
+        bounds_of(i, solids, world, first)
+        bounds_of(j, solids, world, second)
         empty = False
         for c in range(3):
-            low[c], high[c] = max(first[0, c], second[0, c]), min(first[1, c], second[1, c])
-            empty = empty or low[c] > high[c]
+            box[0, c], box[1, c] = max(first[0, c], second[0, c]), min(first[1, c], second[1, c])
+            empty = empty or box[0, c] > box[1, c]
         if empty:
             continue
         best, top = 0.0, np.inf
         if which[j, MESH] == 0:
-            best, top = _along_axis(
-                i, j, which, corners, radius, nodes, links, T, world, tolerance, stack, bounds, W, at[n]
-            )
+            best, top = _along_axis(i, j, solids, world, tolerance, room, at[n])
         if top > best + tolerance:
-            best, top = _in_cells(
-                i, j, which, corners, radius, nodes, links, T, world, low, high, tolerance, cells,
-                best, top, stack, bounds, W, at[n],
-            )  # fmt: skip
+            best, top = _in_cells(i, j, solids, world, box, tolerance, cells, (best, top), room, at[n])
         least[n], most[n] = best, max(top, best)

@@ -15,13 +15,14 @@ A field holds :math:`f^2` outside S and :math:`-g^2` inside, with g a lower boun
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.search import mesh_segment
+from seerob.kernels.search import POINT, Mesh, mesh_segment, work
 from seerob.kernels.winding import contains
 
 Field = NDArray[np.float32]
@@ -31,6 +32,20 @@ Indices = NDArray[np.int64]
 
 DOWN = 1.0 - 1e-6
 """Rounds a squared distance down by more than float32 rounds it up."""
+
+
+class Region(NamedTuple):
+    """A set by its field."""
+
+    field: Field
+    """Empty when the set is the box itself."""
+    start: Array
+    """First node of the field [m], shape (3,)."""
+    spacing: float
+    """Of the nodes [m]."""
+    low: Array
+    """A box that contains the set [m], shape (3,)."""
+    high: Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -60,9 +75,7 @@ def mesh_field(
         Shape ``shape`` [m²].
     """
     field = np.empty((shape[0], shape[1], shape[2]), np.float32)
-    stack = np.empty(128, np.int32)
-    bounds = np.empty(128)
-    W = np.empty(6)
+    mesh, room = Mesh(nodes, links, T), work()
     for i in range(shape[0]):
         x = start[0] + i * spacing
         for j in range(shape[1]):
@@ -79,9 +92,7 @@ def mesh_field(
                 if closed and sign != 0.0 and left > (band if sign > 0.0 else 2.0 * spacing):
                     field[i, j, k] = sign * left * left * DOWN
                     continue
-                d2, winner = mesh_segment(
-                    nodes, links, T, x, y, z, 0.0, 0.0, 0.0, np.inf, winner, stack, bounds, W
-                )
+                d2, winner = mesh_segment(mesh, (x, y, z), POINT, np.inf, winner, room)
                 d = math.sqrt(d2)
                 # Balls that overlap leave no room for a surface; those that touch may have one between them.
                 if not closed or sign == 0.0 or before + d <= since * spacing * (1.0 + 1e-6):
@@ -166,28 +177,15 @@ def _out(value: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def square_at_least(
-    field: Field,
-    start: Array,
-    spacing: float,
-    low: Array,
-    high: Array,
-    x: float,
-    y: float,
-    z: float,
-    enough: float,
-) -> float:
+def square_at_least(region: Region, x: float, y: float, z: float, enough: float) -> float:
     """Lower bound of the squared distance of a point to a set [m²]; 0 or less when it may be inside.
 
     Args:
-        field: Its field, empty when the set is the box from ``low`` to ``high`` itself.
-        start: First node of the field [m], shape (3,).
-        spacing: Of the nodes [m].
-        low: A box that contains the set [m], shape (3,).
-        high: Likewise.
+        region: The set.
         x: The point [m]; ``y`` and ``z`` likewise.
         enough: A bound above this need not be a better one [m²].
     """
+    field, start, spacing, low, high = region
     least = box_square(low, high, x, y, z)
     nx, ny, nz = field.shape
     if nx == 0 or least > enough:
@@ -212,10 +210,9 @@ def square_at_least(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def signed_at_most(
-    field: Field, start: Array, spacing: float, low: Array, high: Array, x: float, y: float, z: float
-) -> float:
+def signed_at_most(region: Region, x: float, y: float, z: float) -> float:
     """Upper bound of the signed distance of a point to a set (negative inside) [m]; infinity if unknown."""
+    field, start, spacing, low, high = region
     nx, ny, nz = field.shape
     if nx == 0:
         out = box_square(low, high, x, y, z)

@@ -28,17 +28,15 @@ from seerob.core.transforms import Array
 from seerob.kernels.bound import Layout
 from seerob.kernels.pairs import (
     CLOSED,
-    SCRATCH,
     SOLIDS,
     VOLUME,
-    Scratch,
     Solids,
     core_distance,
     inside,
     place,
     root_bound,
-    scratch,
 )
+from seerob.kernels.wide import SCRATCH, Scratch, scratch
 
 Indices = NDArray[np.int64]
 Links = NDArray[np.int32]

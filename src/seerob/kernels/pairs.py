@@ -18,10 +18,9 @@ from seerob.core.transforms import Array
 from seerob.kernels.bound import Layout
 from seerob.kernels.boxes import box_box, segment_box
 from seerob.kernels.crossings import encloses
-from seerob.kernels.lanes import WIDTH
 from seerob.kernels.primitives import segment_segment
-from seerob.kernels.search import first_crossing
-from seerob.kernels.wide import STACK, nearest_of_meshes, nearest_to_segment
+from seerob.kernels.search import Mesh, first_crossing
+from seerob.kernels.wide import Scratch, Trees, nearest_of_meshes, nearest_to_segment
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
@@ -57,20 +56,6 @@ class Solids(NamedTuple):
     """A vertex of each connected piece of each core [m], shape (np, 3)."""
 
 
-class Scratch(NamedTuple):
-    """Where one search works."""
-
-    stack: Links
-    bounds: Boxes
-    given: Boxes
-    low: Boxes
-    R: Array
-    t: Array
-    row: Array
-    W: Array
-    """Receives the points on both, shape (36,)."""
-
-
 _FLOAT, _SINGLE, _INT, _WHOLE = np.float64, np.float32, np.int32, np.int64
 SOLIDS = Layout(
     Solids,
@@ -79,27 +64,25 @@ SOLIDS = Layout(
         (_SINGLE, 2), (_INT, 2), (_FLOAT, 2),
     ],
 )  # fmt: skip
-SCRATCH = Layout(
-    Scratch,
-    [
-        (_INT, 2),
-        (_SINGLE, 1),
-        (_SINGLE, 1),
-        (_SINGLE, 1),
-        (_FLOAT, 1),
-        (_FLOAT, 1),
-        (_FLOAT, 2),
-        (_FLOAT, 1),
-    ],
-)
 
 
-def scratch() -> Scratch:
-    """Room for one search at a time."""
-    return Scratch(
-        np.empty((STACK, 2), np.int32), np.empty(STACK, np.float32), np.empty(16, np.float32),
-        np.empty(2 * WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty(36),
-    )  # fmt: skip
+class BoundSolids:
+    """Solids bound for many calls; keeps their arrays."""
+
+    def __init__(self, solids: Solids) -> None:
+        self._kept, self.table = solids, SOLIDS.rows(solids)
+
+    def __reduce__(self) -> tuple[type[BoundSolids], tuple[Solids]]:
+        # A copy has arrays of its own, at addresses of their own.
+        return BoundSolids, (self._kept,)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def mesh_of(solids: Solids, s: int) -> Mesh:
+    """The mesh of a solid."""
+    which = solids.which
+    n0, n1, t0, t1 = which[s, NODE], which[s, NODE_END], which[s, TRIANGLE], which[s, TRIANGLE_END]
+    return Mesh(solids.nodes[n0:n1], solids.links[n0:n1], solids.T[t0:t1])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -176,7 +159,7 @@ def _into(world: Array, s: int, x: float, y: float, z: float) -> tuple[float, fl
 @njit(cache=True, nogil=True, error_model="numpy")
 def inside(i: int, j: int, solids: Solids, world: Array) -> bool:
     """Whether a connected piece of core i begins inside the mesh of solid j."""
-    which, probes = solids.which, solids.probes
+    which, probes, mesh = solids.which, solids.probes, mesh_of(solids, j)
     for k in range(which[i, PROBE], which[i, PROBE_END]):
         x = world[i, 0] * probes[k, 0] + world[i, 1] * probes[k, 1] + world[i, 2] * probes[k, 2] + world[i, 9]
         y = (
@@ -192,15 +175,7 @@ def inside(i: int, j: int, solids: Solids, world: Array) -> bool:
             + world[i, 11]
         )
         x, y, z = _into(world, j, x, y, z)
-        if encloses(
-            solids.nodes[which[j, NODE] : which[j, NODE_END]],
-            solids.links[which[j, NODE] : which[j, NODE_END]],
-            solids.T[which[j, TRIANGLE] : which[j, TRIANGLE_END]],
-            which[j, CLOSED] == 1,
-            x,
-            y,
-            z,
-        ):
+        if encloses(mesh.nodes, mesh.links, mesh.T, which[j, CLOSED] == 1, x, y, z):
             return True
     return False
 
@@ -241,10 +216,8 @@ def core_distance(
     i: int, j: int, limit: float, solids: Solids, world: Array, at: Array, first: Indices, scratch: Scratch
 ) -> float:
     """Squared distance of two cores, with world points on i and j in ``W[:6]``; i is a mesh where one is."""
-    which, nodes, links, T, boxes, kids = (
-        solids.which, solids.nodes, solids.links, solids.T, solids.boxes, solids.kids,
-    )  # fmt: skip
-    stack, bounds, given, low, R, t, row, W = scratch
+    which, trees = solids.which, Trees(solids.boxes, solids.kids, solids.T)
+    R, t, W = scratch.R, scratch.t, scratch.W
     if not which[i, MESH]:
         a = at[i]
         b = at[j]
@@ -259,23 +232,13 @@ def core_distance(
     if which[j, MESH]:
         _relative(world, i, j, R, t)
         wa, wb = which[i, WIDE], which[j, WIDE]
-        d2, ka, kb = nearest_of_meshes(
-            boxes, kids, T, wa, wb, R, t, limit, first[0], first[1], stack, bounds, given, low, row, W
-        )
+        d2, ka, kb = nearest_of_meshes(trees, wa, wb, limit, first[0], first[1], scratch)
         if d2 == 0.0:
-            a = which[i, TRIANGLE]
-            b = which[j, TRIANGLE]
             ka, kb = first_crossing(
-                nodes[which[i, NODE] : which[i, NODE_END]],
-                links[which[i, NODE] : which[i, NODE_END]],
-                T[a : which[i, TRIANGLE_END]],
-                nodes[which[j, NODE] : which[j, NODE_END]],
-                links[which[j, NODE] : which[j, NODE_END]],
-                T[b : which[j, TRIANGLE_END]],
-                R, t, stack, row, W,
-            )  # fmt: skip
-            ka += a
-            kb += b
+                mesh_of(solids, i), mesh_of(solids, j), R, t, scratch.stack, scratch.row, W
+            )
+            ka += which[i, TRIANGLE]
+            kb += which[j, TRIANGLE]
         if ka >= 0:
             first[0] = ka
             first[1] = kb
@@ -283,9 +246,8 @@ def core_distance(
         ax, ay, az = _into(world, i, at[j, 0, 0], at[j, 0, 1], at[j, 0, 2])
         bx, by, bz = _into(world, i, at[j, 1, 0], at[j, 1, 1], at[j, 1, 2])
         d2, ka = nearest_to_segment(
-            boxes, kids, which[i, WIDE], T, ax, ay, az, bx - ax, by - ay, bz - az, limit, first[0],
-            stack[:, 0], bounds, given, low, W,
-        )  # fmt: skip
+            trees, which[i, WIDE], (ax, ay, az), (bx - ax, by - ay, bz - az), limit, first[0], scratch
+        )
         if ka >= 0:
             first[0] = ka
     for e in (0, 3):

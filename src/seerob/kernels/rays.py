@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.crossings import encloses
-from seerob.kernels.pairs import CLOSED, CORNERS, MESH, NODE, NODE_END, TRIANGLE, TRIANGLE_END, VOLUME
-from seerob.kernels.search import mesh_segment
+from seerob.kernels.pairs import CLOSED, CORNERS, MESH, SOLIDS, VOLUME, mesh_of
+from seerob.kernels.search import POINT, Mesh, Work, mesh_segment, work
 
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
 
+_solids_in = SOLIDS.read
 CLOSE = 1e-5
 """Distance to a dilated core at which a ray meets it [m]."""
 STEPS = 500
@@ -70,7 +71,8 @@ def _box(nodes: Array, i: int, o: Array, u: Array, most: float) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _mesh(nodes: Array, links: Links, T: Array, o: Array, u: Array, most: float, stack: Links) -> float:
+def _mesh(mesh: Mesh, o: Array, u: Array, most: float, stack: Links) -> float:
+    nodes, links, T = mesh
     best = np.inf
     stack[0] = 0
     depth = 1
@@ -139,26 +141,13 @@ def _capsule(a: Array, b: Array, r: float, o: Array, u: Array, most: float) -> f
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _traced(
-    nodes: Array,
-    links: Links,
-    T: Array,
-    o: Array,
-    u: Array,
-    r: float,
-    most: float,
-    stack: Links,
-    bounds: Array,
-    W: Array,
-) -> float:
+def _traced(mesh: Mesh, o: Array, u: Array, r: float, most: float, work: Work) -> float:
     """Where a ray comes within `CLOSE` of a mesh dilated by r."""
     t = 0.0
     winner = -1
     for _ in range(STEPS):
-        d2, winner = mesh_segment(
-            nodes, links, T, o[0] + t * u[0], o[1] + t * u[1], o[2] + t * u[2], 0.0, 0.0, 0.0, np.inf, winner,
-            stack, bounds, W,
-        )  # fmt: skip
+        x = o[0] + t * u[0], o[1] + t * u[1], o[2] + t * u[2]
+        d2, winner = mesh_segment(mesh, x, POINT, np.inf, winner, work)
         d = math.sqrt(d2) - r
         if d <= CLOSE:
             return t
@@ -172,14 +161,8 @@ def _traced(
 def cast(
     origins: Array,
     directions: Array,
-    solids: Indices,
-    which: Indices,
-    ball: Array,
-    corners: Array,
-    radius: Array,
-    nodes: Array,
-    links: Links,
-    T: Array,
+    those: Indices,
+    table: Indices,
     world: Array,
     distance: Array,
     met: Indices,
@@ -189,25 +172,17 @@ def cast(
     Args:
         origins: World [m], shape (n, 3).
         directions: Unit vectors, shape (n, 3).
-        solids: What they can meet, shape (k,).
-        which: See `seerob.kernels.shapes.Shapes`; ``ball`` to ``T`` likewise.
-        ball: Likewise.
-        corners: Likewise.
-        radius: Likewise.
-        nodes: Likewise.
-        links: Likewise.
-        T: Likewise.
+        those: What they can meet, shape (k,).
+        table: Of all solids, see `seerob.kernels.pairs.BoundSolids`.
         world: world_from_solid, nine of the rotation and three of the position, shape (ns, 12).
         distance: Length of each ray, shortened where it meets something [m], shape (n,).
         met: Set to the body that a ray meets, where it does, shape (n,).
     """
-    stack = np.empty(128, np.int32)
-    bounds = np.empty(128)
-    W = np.empty(6)
+    solids, room = _solids_in(table, 0), work()
+    which, ball, corners, radius = solids.which, solids.ball, solids.corners, solids.radius
     o, u, p = np.empty(3), np.empty(3), np.empty(3)
-    for s in solids:
-        n0, n1 = which[s, NODE], which[s, NODE_END]
-        t0, t1 = which[s, TRIANGLE], which[s, TRIANGLE_END]
+    for s in those:
+        mesh = mesh_of(solids, s)
         for c in range(3):
             p[c] = world[s, 9 + c]
             for d in range(3):
@@ -230,13 +205,13 @@ def cast(
                 far = corners[s, 1] if which[s, CORNERS] > 1 else corners[s, 0]
                 t = _capsule(corners[s, 0], far, radius[s], o, u, best)
             elif which[s, VOLUME] == 1 and encloses(
-                nodes[n0:n1], links[n0:n1], T[t0:t1], which[s, CLOSED] == 1, o[0], o[1], o[2]
+                mesh.nodes, mesh.links, mesh.T, which[s, CLOSED] == 1, o[0], o[1], o[2]
             ):
                 t = 0.0
             elif radius[s] > 0.0:
-                t = _traced(nodes[n0:n1], links[n0:n1], T[t0:t1], o, u, radius[s], best, stack, bounds, W)
+                t = _traced(mesh, o, u, radius[s], best, room)
             else:
-                t = _mesh(nodes[n0:n1], links[n0:n1], T[t0:t1], o, u, best, stack)
+                t = _mesh(mesh, o, u, best, room.stack)
             if t < distance[k] or (t == distance[k] and met[k] < 0):
                 distance[k] = t
                 met[k] = which[s, 0]

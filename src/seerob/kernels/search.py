@@ -8,6 +8,8 @@ tried first change the time spent, never a bit of the answer.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -17,6 +19,32 @@ from seerob.kernels.boxes import box_box, segment_box
 from seerob.kernels.primitives import index, on_edges, segment_triangle, triangles
 
 Links = NDArray[np.int32]
+Vec = tuple[float, float, float]
+POINT = (0.0, 0.0, 0.0)
+"""Direction of a segment that is a point."""
+
+
+class Mesh(NamedTuple):
+    """One mesh in a tree, as `seerob.kernels.tree.build_tree` lays it out."""
+
+    nodes: Array
+    links: Links
+    T: Array
+
+
+class Work(NamedTuple):
+    """Where `mesh_segment` works."""
+
+    stack: Links
+    bounds: Array
+    W: Array
+    """Receives the points on mesh and segment, shape (6,)."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def work() -> Work:
+    """Room for one search at a time."""
+    return Work(np.empty(128, np.int32), np.empty(128), np.empty(6))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -26,38 +54,24 @@ def cut_of(best: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def mesh_segment(
-    nodes: Array,
-    links: Links,
-    T: Array,
-    ax: float,
-    ay: float,
-    az: float,
-    dx: float,
-    dy: float,
-    dz: float,
-    limit: float,
-    first: int,
-    stack: Links,
-    bounds: Array,
-    W: Array,
-) -> tuple[float, int]:
+def mesh_segment(mesh: Mesh, a: Vec, d: Vec, limit: float, first: int, work: Work) -> tuple[float, int]:
     """Nearest point of a mesh to the segment ``a + s·d``, both in the mesh's frame.
 
     Args:
-        nodes: Tree of the mesh, see `seerob.kernels.tree.build_tree`.
-        links: Likewise.
-        T: Likewise.
-        ax: Segment [m]; ``ay`` to ``dz`` likewise.
+        mesh: The mesh.
+        a: Begin of the segment [m].
+        d: From there to its end [m]; `POINT` of a point.
         limit: Squared distance above which nothing is looked for [m²].
         first: Triangle to begin with, -1 for none.
-        stack: Scratch, shape (128,).
-        bounds: Scratch, shape (128,).
-        W: Receives the points on mesh and segment, shape (6,).
+        work: Receives the points, too.
 
     Returns:
         Squared distance and triangle; infinity and -1 when all exceed ``limit``.
     """
+    nodes, links, T = mesh
+    stack, bounds, W = work
+    ax, ay, az = a
+    dx, dy, dz = d
     best = np.inf
     cut = limit
     winner = -1
@@ -91,17 +105,17 @@ def mesh_segment(
         else:
             left = i + 1
             right = links[i, 0]
-            a = segment_box(nodes, left, ax, ay, az, dx, dy, dz, dd, cut)
-            b = segment_box(nodes, right, ax, ay, az, dx, dy, dz, dd, cut)
-            if a < b:
-                left, right, a, b = right, left, b, a
-            if a <= cut:
+            far = segment_box(nodes, left, ax, ay, az, dx, dy, dz, dd, cut)
+            near = segment_box(nodes, right, ax, ay, az, dx, dy, dz, dd, cut)
+            if far < near:
+                left, right, far, near = right, left, near, far
+            if far <= cut:
                 stack[depth] = left
-                bounds[depth] = a
+                bounds[depth] = far
                 depth += 1
-            if b <= cut:
+            if near <= cut:
                 stack[depth] = right
-                bounds[depth] = b
+                bounds[depth] = near
                 depth += 1
     return best, winner
 
@@ -120,33 +134,21 @@ def row_in(T: Array, k: int, R: Array, t: Array, row: Array) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def first_crossing(
-    A: Array,
-    LA: Links,
-    TA: Array,
-    B: Array,
-    LB: Links,
-    TB: Array,
-    R: Array,
-    t: Array,
-    pairs: Links,
-    row: Array,
-    W: Array,
+    first: Mesh, second: Mesh, R: Array, t: Array, pairs: Links, row: Array, W: Array
 ) -> tuple[int, int]:
     """The first two triangles that touch, down two trees, of meshes that do; -1, -1 where none does.
 
     Args:
-        A: Tree of the first mesh.
-        LA: Likewise.
-        TA: Likewise.
-        B: Tree of the second mesh.
-        LB: Likewise.
-        TB: Likewise.
+        first: The first mesh.
+        second: The second one.
         R: Rotation a_from_b, shape (9,).
         t: Position a_from_b [m], shape (3,).
         pairs: Scratch, shape (256, 2).
         row: Scratch, shape (1, 13).
         W: Receives the point on each in the frame of the first, shape (12,), of which 6 are scratch.
     """
+    A, LA, TA = first
+    B, LB, TB = second
     cut = cut_of(0.0)
     pairs[0, 0] = 0
     pairs[0, 1] = 0

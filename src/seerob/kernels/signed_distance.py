@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.crossings import encloses
-from seerob.kernels.pairs import CLOSED, CORNERS, MESH, NODE, NODE_END, TRIANGLE, TRIANGLE_END, VOLUME
+from seerob.kernels.pairs import CLOSED, CORNERS, MESH, VOLUME, Solids, mesh_of
 from seerob.kernels.primitives import point_segment
-from seerob.kernels.search import cut_of, mesh_segment
+from seerob.kernels.search import POINT, Mesh, Work, cut_of, mesh_segment, work
 from seerob.kernels.winding import contains
 
 Links = NDArray[np.int32]
@@ -21,41 +21,21 @@ Indices = NDArray[np.int64]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def signed_distance(
-    s: int,
-    which: Indices,
-    corners: Array,
-    radius: Array,
-    nodes: Array,
-    links: Links,
-    T: Array,
-    world: Array,
-    x: Array,
-    known: Array,
-    sign: int,
-    stack: Links,
-    bounds: Array,
-    W: Array,
-    near: Array,
+    s: int, solids: Solids, world: Array, x: Array, known: Array, sign: int, work: Work, near: Array
 ) -> float:
     """Distance of a point to the surface of a solid, negative inside; ``near`` is its nearest surface point.
 
     Args:
         s: The solid.
-        which: See `seerob.kernels.shapes.Shapes`; ``corners`` to ``T`` likewise.
-        corners: Likewise.
-        radius: Likewise.
-        nodes: Likewise.
-        links: Likewise.
-        T: Likewise.
+        solids: Of all.
         world: world_from_solid, nine of the rotation and three of the position, shape (ns, 12).
         x: The point in the world [m], shape (3,).
         known: A point of its surface in the world [m], or NaN, shape (3,).
         sign: -1 where it is known to be inside the core, 1 outside, 0 where that is not known.
-        stack: Scratch, shape (128,).
-        bounds: Scratch, shape (128,).
-        W: Scratch, shape (6,).
+        work: Room for a search.
         near: Receives the point in the world [m], shape (3,); may be ``known``.
     """
+    which, corners, radius = solids.which, solids.corners, solids.radius
     p = np.empty(3)
     for c in range(3):
         p[c] = 0.0
@@ -64,20 +44,15 @@ def signed_distance(
     q = np.empty(3)
     outside = 1.0
     if which[s, MESH] == 1:
-        n0, n1 = which[s, NODE], which[s, NODE_END]
-        t0, t1 = which[s, TRIANGLE], which[s, TRIANGLE_END]
-        limit = np.inf
+        mesh, limit = mesh_of(solids, s), np.inf
         if radius[s] == 0.0 and not math.isnan(known[0]):
             limit = cut_of((x[0] - known[0]) ** 2 + (x[1] - known[1]) ** 2 + (x[2] - known[2]) ** 2) + 1e-12
-        d2, _ = mesh_segment(
-            nodes[n0:n1], links[n0:n1], T[t0:t1], p[0], p[1], p[2], 0.0, 0.0, 0.0, limit, int(np.int64(-1)),
-            stack, bounds, W,
-        )  # fmt: skip
+        d2, _ = mesh_segment(mesh, (p[0], p[1], p[2]), POINT, limit, int(np.int64(-1)), work)
         for c in range(3):
-            q[c] = W[c]
+            q[c] = work.W[c]
         if which[s, VOLUME] == 1 and sign <= 0:
             closed = which[s, CLOSED] == 1
-            if sign < 0 or encloses(nodes[n0:n1], links[n0:n1], T[t0:t1], closed, p[0], p[1], p[2]):
+            if sign < 0 or encloses(mesh.nodes, mesh.links, mesh.T, closed, p[0], p[1], p[2]):
                 outside = -1.0
     else:
         a = corners[s, 0]
@@ -123,8 +98,9 @@ def place(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bounds_of(which: Indices, corners: Array, radius: Array, world: Array, s: int, box: Array) -> None:
+def bounds_of(s: int, solids: Solids, world: Array, box: Array) -> None:
     """Upright box around a solid in the world, to ``box`` (2, 3)."""
+    which, corners, radius = solids.which, solids.corners, solids.radius
     box[0], box[1] = np.inf, -np.inf
     for k in range(which[s, CORNERS]):
         for c in range(3):
@@ -153,13 +129,11 @@ def outside(nodes: Array, links: Links, T: Array, points: Array) -> Array:
         points: In the mesh's frame [m].
     """
     distance = np.zeros(len(points))
-    stack = np.empty(128, np.int32)
-    bounds = np.empty(128)
-    W = np.empty(6)
+    mesh, room = Mesh(nodes, links, T), work()
     hint = -1
     for n in range(len(points)):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        squared, hint = mesh_segment(nodes, links, T, x, y, z, 0.0, 0.0, 0.0, np.inf, hint, stack, bounds, W)
+        squared, hint = mesh_segment(mesh, (x, y, z), POINT, np.inf, hint, room)
         d = math.sqrt(squared)
         if d > NEGLIGIBLE and contains(nodes, links, T, x, y, z):
             d = 0.0
@@ -182,13 +156,11 @@ def farthest_outside(nodes: Array, links: Links, T: Array, closed: bool, points:
         points: In the mesh's frame [m].
     """
     far = 0.0
-    stack = np.empty(128, np.int32)
-    bounds = np.empty(128)
-    W = np.empty(6)
+    mesh, room = Mesh(nodes, links, T), work()
     hint = -1
     for n in range(len(points)):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        squared, hint = mesh_segment(nodes, links, T, x, y, z, 0.0, 0.0, 0.0, np.inf, hint, stack, bounds, W)
+        squared, hint = mesh_segment(mesh, (x, y, z), POINT, np.inf, hint, room)
         d = math.sqrt(squared)
         if d > far and (d <= NEGLIGIBLE or not closed or not encloses(nodes, links, T, closed, x, y, z)):
             far = d

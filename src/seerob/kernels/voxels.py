@@ -11,19 +11,33 @@ reach grows by less than a tenth of a voxel that way, and by what the field's bo
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.fields import Cells, Field, signed_at_most, square_at_least
+from seerob.kernels.fields import Cells, Region, signed_at_most, square_at_least
 
 TOP = 8
 """Edge of the blocks that a pose's box is cut into [voxels]; a power of 2."""
 MARGIN = 1e-9
 """What every bound gives away against rounding [m]."""
 HALF_DIAGONAL = math.sqrt(3.0) / 2.0
+
+
+class Voxels(NamedTuple):
+    """Which voxels are marked."""
+
+    cells: Cells
+    """1 where marked, shape (nx, ny, nz). What lies outside of it is not marked."""
+    full: NDArray[np.int16]
+    """How many are marked in each block of `TOP`³, shape (⌈nx / TOP⌉, …)."""
+    origin: Array
+    """Lower corner of the first voxel [m], shape (3,)."""
+    pitch: float
+    """Edge of a voxel [m]."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -49,27 +63,17 @@ def _all_marked(cells: Cells, i: int, j: int, k: int) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _part_touched(
-    field: Field,
-    start: Array,
-    spacing: float,
-    low: Array,
-    high: Array,
-    R: Array,
-    wx: float,
-    wy: float,
-    wz: float,
-    part: int,
-    pitch: float,
-    reach: float,
+    region: Region, R: Array, w: tuple[float, float, float], part: int, pitch: float, reach: float
 ) -> bool:
     """Whether an eighth of the voxel around ``w`` may be touched; itself cut into eighths where in doubt."""
     half = pitch / 4.0
+    wx, wy, wz = w
     wx += half if part & 1 else -half
     wy += half if part & 2 else -half
     wz += half if part & 4 else -half
     x, y, z = _in_set(R, wx, wy, wz)
     out = (reach + HALF_DIAGONAL * 2.0 * half) ** 2
-    square = square_at_least(field, start, spacing, low, high, x, y, z, out)
+    square = square_at_least(region, x, y, z, out)
     if square > out:
         return False
     if square <= (reach + half) ** 2:
@@ -83,22 +87,15 @@ def _part_touched(
             wy + (half if e & 2 else -half),
             wz + (half if e & 4 else -half),
         )
-        if square_at_least(field, start, spacing, low, high, x, y, z, out) <= out:
+        if square_at_least(region, x, y, z, out) <= out:
             return True
     return False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stamp(
-    cells: Cells,
-    full: NDArray[np.int16],
-    origin: Array,
-    pitch: float,
-    field: Field,
-    start: Array,
-    spacing: float,
-    low: Array,
-    high: Array,
+    voxels: Voxels,
+    region: Region,
     rotations: Array,
     positions: Array,
     reaches: Array,
@@ -108,15 +105,8 @@ def stamp(
     """Mark the voxels that a set touches at each of its poses.
 
     Args:
-        cells: 1 where marked, shape (nx, ny, nz). What lies outside of it is not marked.
-        full: How many are marked in each block of `TOP`³, shape (⌈nx / TOP⌉, …).
-        origin: Lower corner of the first voxel [m], shape (3,).
-        pitch: Edge of a voxel [m].
-        field: Field of the set, empty when it is the box itself.
-        start: See `seerob.kernels.fields.square_at_least`.
-        spacing: Likewise.
-        low: Likewise.
-        high: Likewise.
+        voxels: Receive the marks.
+        region: The set.
         rotations: world_from_set, shape (N, 3, 3).
         positions: Likewise [m], shape (N, 3).
         reaches: How far the set is dilated at each pose [m], shape (N,).
@@ -126,6 +116,8 @@ def stamp(
     Returns:
         How many voxels were marked anew.
     """
+    cells, full, origin, pitch = voxels
+    low, high = region.low, region.high
     nx, ny, nz = cells.shape
     stack = np.empty((64, 4), np.int64)
     first = np.empty(3, np.int64)
@@ -169,15 +161,12 @@ def stamp(
                         x, y, z = _in_set(R, wx, wy, wz)
                         ball = HALF_DIAGONAL * pitch * b
                         out = (reach + ball) ** 2
-                        square = square_at_least(field, start, spacing, low, high, x, y, z, out)
+                        square = square_at_least(region, x, y, z, out)
                         if square > out:
                             continue
                         if b > 1:
                             # A block of two is done sooner than it is looked up.
-                            if (
-                                b > 2
-                                and signed_at_most(field, start, spacing, low, high, x, y, z) + ball <= reach
-                            ):
+                            if b > 2 and signed_at_most(region, x, y, z) + ball <= reach:
                                 for p in range(i, min(i + b, nx)):
                                     for q in range(j, min(j + b, ny)):
                                         for s in range(k, min(k + b, nz)):
@@ -198,9 +187,7 @@ def stamp(
                             continue
                         touched = square <= (reach + 0.5 * pitch) ** 2
                         for part in range(0 if touched else 8):
-                            if _part_touched(
-                                field, start, spacing, low, high, R, wx, wy, wz, part, pitch, reach
-                            ):
+                            if _part_touched(region, R, (wx, wy, wz), part, pitch, reach):
                                 touched = True
                                 break
                         if touched:

@@ -24,18 +24,8 @@ from seerob.core.transforms import Array
 from seerob.kernels.bound import Layout
 from seerob.kernels.chain import followed
 from seerob.kernels.nearest import MARGIN
-from seerob.kernels.pairs import (
-    MESH,
-    SCRATCH,
-    SOLIDS,
-    VOLUME,
-    Solids,
-    core_distance,
-    inside,
-    place,
-    root_bound,
-    scratch,
-)
+from seerob.kernels.pairs import MESH, SOLIDS, VOLUME, Solids, core_distance, inside, place, root_bound
+from seerob.kernels.wide import SCRATCH, scratch
 
 Indices = NDArray[np.int64]
 Random = NDArray[np.uint64]

@@ -19,16 +19,18 @@ nodes, triangles as ``~k``, or `NONE` from the first that is missing. Node 0 has
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
 from seerob.kernels.boxes import fit_box
 from seerob.kernels.lanes import WIDTH, Lanes, asked_soon, first_lane, of_rows
 from seerob.kernels.primitives import index, on_edges, segment_triangle, triangles
-from seerob.kernels.search import cut_of, row_in
+from seerob.kernels.search import Vec, cut_of, row_in
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
@@ -42,6 +44,51 @@ STACK = 1100
 nodes two at a time fourteen for each of 72 levels, and sixteen more."""
 DOWN = 1.0 - 1e-5
 """Rounds squares down by more than single precision rounds them up."""
+
+
+class Trees(NamedTuple):
+    """Meshes in wide trees, in numbers of all their nodes and triangles."""
+
+    boxes: Boxes
+    """By nodes, shape (k, 120)."""
+    kids: Links
+    """By nodes, shape (k, 8)."""
+    T: Array
+    """Triangles, shape (n, 13), as `seerob.kernels.primitives` lays them out."""
+
+
+class Scratch(NamedTuple):
+    """Where one search works."""
+
+    stack: Links
+    bounds: Boxes
+    given: Boxes
+    low: Boxes
+    R: Array
+    """Rotation a_from_b of two meshes, shape (9,)."""
+    t: Array
+    """Position a_from_b [m], shape (3,)."""
+    row: Array
+    W: Array
+    """Receives the points on both, shape (36,), of which 30 are scratch."""
+
+
+_FLOAT, _SINGLE, _INT = np.float64, np.float32, np.int32
+SCRATCH = Layout(
+    Scratch,
+    [
+        (_INT, 2), (_SINGLE, 1), (_SINGLE, 1), (_SINGLE, 1),
+        (_FLOAT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 1),
+    ],
+)  # fmt: skip
+
+
+def scratch() -> Scratch:
+    """Room for one search at a time."""
+    return Scratch(
+        np.empty((STACK, 2), np.int32), np.empty(STACK, np.float32), np.empty(16, np.float32),
+        np.empty(2 * WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty(36),
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -180,43 +227,26 @@ _two_to_segment = of_rows(ROWS, 8, _to_segment_formula, rows=2)
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def nearest_to_segment(
-    boxes: Boxes,
-    kids: Links,
-    root: int,
-    T: Array,
-    ax: float,
-    ay: float,
-    az: float,
-    dx: float,
-    dy: float,
-    dz: float,
-    limit: float,
-    first: int,
-    stack: Links,
-    bounds: Boxes,
-    given: Boxes,
-    low: Boxes,
-    W: Array,
+    trees: Trees, root: int, a: Vec, d: Vec, limit: float, first: int, scratch: Scratch
 ) -> tuple[float, int]:
     """Nearest point of a mesh to the segment ``a + s·d``, both in the mesh's frame.
 
     Args:
-        boxes: Trees of meshes, see `widen`; in numbers of all nodes and triangles where there are several.
-        kids: Likewise.
+        trees: Of the mesh, and maybe of others.
         root: First node of the mesh.
-        T: Triangles of all, see `seerob.kernels.primitives`.
-        ax: Segment [m]; ``ay`` to ``dz`` likewise.
+        a: Begin of the segment [m].
+        d: From there to its end [m].
         limit: Squared distance above which nothing is looked for [m²].
         first: Triangle to begin with, -1 for none.
-        stack: Scratch, shape (`STACK`,).
-        bounds: Scratch, shape (`STACK`,).
-        given: Scratch, shape (16,).
-        low: Scratch, shape (16,).
-        W: Receives the points on mesh and segment, shape (6,).
+        scratch: Receives the points on mesh and segment, too.
 
     Returns:
         Squared distance and triangle; infinity and -1 when all exceed ``limit``.
     """
+    boxes, kids, T = trees
+    stack, bounds, given, low, W = scratch.stack[:, 0], scratch.bounds, scratch.given, scratch.low, scratch.W
+    ax, ay, az = a
+    dx, dy, dz = d
     best = np.inf
     cut = limit
     winner = -1
@@ -363,48 +393,26 @@ def _radius(boxes: Boxes, ref: int) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def nearest_of_meshes(
-    boxes: Boxes,
-    kids: Links,
-    T: Array,
-    root_a: int,
-    root_b: int,
-    R: Array,
-    t: Array,
-    limit: float,
-    first_a: int,
-    first_b: int,
-    pairs: Links,
-    bounds: Boxes,
-    given: Boxes,
-    low: Boxes,
-    row: Array,
-    W: Array,
+    trees: Trees, root_a: int, root_b: int, limit: float, first_a: int, first_b: int, scratch: Scratch
 ) -> tuple[float, int, int]:
     """Nearest points of two meshes, in the frame of the first.
 
     Args:
-        boxes: Trees of both, see `nearest_to_segment`; ``kids`` and ``T`` likewise.
-        kids: Likewise.
-        T: Likewise.
+        trees: Of both.
         root_a: First nodes.
         root_b: Likewise.
-        R: Rotation a_from_b, shape (9,).
-        t: Position a_from_b [m], shape (3,).
         limit: Squared distance above which nothing is looked for [m²].
         first_a: Triangles to begin with, -1 for none.
         first_b: Likewise.
-        pairs: Scratch, shape (`STACK`, 2).
-        bounds: Scratch, shape (`STACK`,).
-        given: Scratch, shape (16,).
-        low: Scratch, shape (8,).
-        row: Scratch, shape (1, 13).
-        W: Receives the points, shape (36,), of which 30 are scratch.
+        scratch: With where b is in a; receives the points, too.
 
     Returns:
         Squared distance and the two triangles; infinity and -1 when all exceed ``limit``.
         Stops at an intersection, which depends on ``limit`` and ``first``: `first_crossing` has *the*
         first one.
     """
+    boxes, kids, T = trees
+    pairs, bounds, given, low, R, t, row, W = scratch
     points, Q, p = W[12:24], W[24:33], W[33:36]
     for c in range(3):
         p[c] = 0.0

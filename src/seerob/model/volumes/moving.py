@@ -14,7 +14,7 @@ from seerob.core.shapes import Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.mesh_bodies import is_closed
 from seerob.description.shapes.mesh_mending import enclosing
-from seerob.kernels.fields import Field, mesh_field
+from seerob.kernels.fields import Field, Region, mesh_field
 from seerob.kernels.tree_file import tree_of
 from seerob.model.model import Model
 
@@ -53,6 +53,10 @@ class Core:
     def corners(self) -> Array:
         """Corners of the box, shape (8, 3) [m]."""
         return np.where(np.indices((2, 2, 2)).reshape(3, 8).T, self.high, self.low)
+
+    def region(self) -> Region:
+        """The core as kernels take it."""
+        return Region(self.nodes, self.start, self.spacing, self.low, self.high)
 
 
 def core_of(body: int, solid: Solid) -> Core:

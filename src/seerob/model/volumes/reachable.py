@@ -224,9 +224,14 @@ class _Work:
                 return None
             some = slice(k, k + 16)
             grid.count += stamp(
-                grid.cells, grid.full, grid.origin, pitch, core.nodes, core.start, core.spacing,
-                core.low, core.high, R[some], x[some], np.full(len(R[some]), reach), 0, grid.full.shape[0],
-            )  # fmt: skip
+                grid.arrays(),
+                core.region(),
+                R[some],
+                x[some],
+                np.full(len(R[some]), reach),
+                0,
+                grid.full.shape[0],
+            )
         self.stamps += count
         return _stamped_excess(core, bound, pitch)
 

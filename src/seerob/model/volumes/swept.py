@@ -223,12 +223,9 @@ class Sweep:
 
         def mark(begin: int, end: int) -> int:
             return sum(
-                stamp(
-                    grid.cells, grid.full, grid.origin, grid.pitch, core.nodes, core.start, core.spacing,
-                    core.low, core.high, R, x, reach + core.radius, begin, end,
-                )
+                stamp(grid.arrays(), core.region(), R, x, reach + core.radius, begin, end)
                 for core, R, x, reach in work
-            )  # fmt: skip
+            )
 
         stamps = sum(len(reach) for *_, reach in work)
         if stamps < MANY:

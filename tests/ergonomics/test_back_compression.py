@@ -13,6 +13,7 @@ from seerob.core.errors import InputError
 from seerob.core.verdict import Verdict
 from seerob.criteria.ergonomics.back_compression import (
     UPPER,
+    WINDOW,
     Accelerations,
     G,
     compression,
@@ -21,7 +22,7 @@ from seerob.criteria.ergonomics.back_compression import (
 )
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
-from seerob.session.run import Judge, pump
+from seerob.session.run import Judge, looks_ahead, pump
 from seerob.twin.engine import Engine
 
 MODEL = pinocchio_model(PERSON)
@@ -186,29 +187,30 @@ def test_accelerations_are_those_of_a_parabola_and_nothing_is_made_up():
     for a in found[10:]:
         np.testing.assert_allclose(a, [[4.0, 0.0, -2.0]], atol=1e-6)
     np.testing.assert_allclose(seen.add(0.39, at(0.39)), [[4.0, 0.0, -2.0]], atol=1e-6)  # asked again
-    assert not seen.interrupted
     assert seen.add(0.1, at(0.1)) is None  # from another beginning
-    assert seen.interrupted
     noise = np.random.default_rng(2).normal(0, 1e-3, (200, 1, 3))
     seen = Accelerations()
     found = [seen.add(0.01 * k, noise[k]) for k in range(200)]
     assert np.abs([a for a in found if a is not None]).max() < 0.8
 
 
-def bends_forward(folder, lasts, bend, more):
+def bends_forward(folder, lasts, bend, more, stands=1.0):
     """A person who stands for a second, and bends forward."""
     (folder / "motion").mkdir(parents=True, exist_ok=True)
     at = '[[keyframes]]\nposture = "standing"\nt ='
     bent = f"joints = {{ pelvis_tilt_back_deg = {-bend} }}"
-    keys = f'title = "bend"\n{at} 0\n{at} 1\n{at} {1 + lasts}\n{bent}\n'
+    before = f"{at} {stands}\n" if stands else ""
+    keys = f'title = "bend"\n{at} 0\n{before}{at} {stands + lasts}\n{bent}\n'
     (folder / "motion/bend.toml").write_text(keys)
     source = '[[sources]]\nkind = "keyframes"\nhuman = "op"\nfile = "motion/bend.toml"\n'
     return made(folder, person("op") + source + TABLE + more)
 
 
-def verdicts(cell, until):
-    engine, judge = Engine(cell.model), Judge(cell.bound)
-    feed = pump(cell.sources, cell.workstation.engine.tick)
+def verdicts(cell, until, live=False):
+    engine, judge = Engine(cell.model, driven={"op": 0.2}), Judge(cell.bound)
+    if live:
+        engine.ahead.clear()
+    feed = pump(cell.sources, cell.workstation.engine.tick, ahead=looks_ahead(cell.model))
     found = []
     for samples in feed:
         engine.take(samples)
@@ -250,6 +252,19 @@ def test_who_was_not_looked_at_for_a_while_is_not_slow_until_that_is_seen(tmp_pa
     assert [result.verdict for result in after[:5]] == [Verdict.UNDECIDED] * 5
     assert "not seen throughout the last 0.1 s" in after[0].reason
     assert {result.verdict for result in after[15:]} == {Verdict.WITHIN}
+
+
+def test_at_first_a_file_says_whether_it_is_slow_and_nobody_does_of_who_is_heard_live(tmp_path):
+    """A person who bends from the first instant on, with the motion known ahead, and as heard live."""
+    more = "load = 1\nslow = true\n"
+    for name, lasts, first in (("slow", 4.0, Verdict.WITHIN), ("quick", 0.12, Verdict.UNDECIDED)):
+        cell = bends_forward(tmp_path / name, lasts, 10, more, stands=0.0)
+        assert {result.verdict for _, result in verdicts(cell, 0.05)} == {first}, name
+        heard = verdicts(cell, 0.5, live=True)
+        assert {result.verdict for t, result in heard if t < 0.095} == {Verdict.UNDECIDED}
+        assert "not seen throughout the last 0.1 s" in heard[0][1].reason
+    assert {result.verdict for _, result in verdicts(cell, 0.05)} == {Verdict.UNDECIDED}
+    assert looks_ahead(cell.model) == {"op": WINDOW}
 
 
 def test_what_accelerations_bring_over_the_limit_is_not_within(tmp_path):

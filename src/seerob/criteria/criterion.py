@@ -249,7 +249,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         raise NotImplementedError
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
-        """Name of a robot → how far ahead it asks what its recorded motion does [s], `State.foresee`."""
+        """Name of a robot or person → how far ahead its recorded motion is asked [s], `State.foresee`."""
         return {}
 
     def claims(self, model: Model) -> Sequence[Claim]:

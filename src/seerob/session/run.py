@@ -104,9 +104,9 @@ def bind(model: Model) -> tuple[Bound, ...]:
 
 
 def looks_ahead(model: Model) -> Mapping[str, float]:
-    """Name of a robot → how far ahead criteria ask what its recorded motion does [s]."""
+    """Name of a robot or person → how far ahead criteria ask what its recorded motion does [s]."""
     found: dict[str, float] = {}
-    for criterion in model.workstation.safety:
+    for criterion in (*model.workstation.safety, *model.workstation.ergonomics):
         for name, span in criterion.looks_ahead(model).items():
             found[name] = max(span, found.get(name, 0.0))
     return found

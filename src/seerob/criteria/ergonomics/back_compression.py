@@ -11,16 +11,18 @@ with :math:`M_\perp` the moment across the spine's axis :math:`u`, :math:`d` the
 
 That the motion is slow is the file's word. It is held against what is seen: with the accelerations of the
 last `WINDOW` seconds the same formula says what it takes to move body and load, and where that is more by
-`SHARE`, the weights are not all that acts.
+`SHARE`, the weights are not all that acts. Where nobody looked so long, as at first, what a file says of the
+next seconds counts instead; of who is heard live, nobody knows then.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
+import mujoco
 import numpy as np
 from msgspec import Meta
 
@@ -37,7 +39,7 @@ from seerob.criteria.scoring.phases import Kilograms
 from seerob.criteria.scoring.rule import PostureRule, bone_rows
 from seerob.description.humans.skeleton import BONES
 from seerob.model import provenance
-from seerob.model.model import Model
+from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State
 
 G = 9.81
@@ -186,15 +188,10 @@ def moved(found: Held, a: Array, lever: float) -> float:
 
 
 class Accelerations:
-    """Of points, out of where they were at the last instants: the parabola through those of `WINDOW`.
-
-    Attributes:
-        interrupted: Whether nobody looked for longer than `SELDOM` before the instants that are kept.
-    """
+    """Of points, out of where they were at the last instants: the parabola through those of `WINDOW`."""
 
     def __init__(self) -> None:
         self._seen = deque[tuple[float, Array]]()
-        self.interrupted = False
 
     def add(self, t: float, at: Array) -> Array | None:
         """Accelerations [m/s²], shape (n, 3); None while fewer than `FEWEST` instants are within the window.
@@ -206,7 +203,6 @@ class Accelerations:
         seen = self._seen
         if seen and not 0 <= t - seen[-1][0] <= SELDOM * (1 + 1e-9):
             seen.clear()
-            self.interrupted = True
         elif seen and t == seen[-1][0]:
             seen.pop()
         seen.append((t, at))
@@ -214,10 +210,47 @@ class Accelerations:
             seen.popleft()
         if len(seen) < FEWEST or t - seen[0][0] < WINDOW / 2:
             return None
-        times = np.array([each for each, _ in seen]) - t
-        places = np.stack([each for _, each in seen]).reshape(len(seen), -1)
-        found: Array = 2 * np.linalg.lstsq(np.vander(times, 3), places, rcond=None)[0][0].reshape(at.shape)
-        return found
+        return of_parabola([each - t for each, _ in seen], [each for _, each in seen])
+
+
+def of_parabola(t: Sequence[float] | Array, places: Sequence[Array] | Array) -> Array:
+    """Acceleration of points that the parabola nearest to them has [m/s²], shape (n, 3).
+
+    Args:
+        t: Instants [s], shape (k,).
+        places: Where the points are then [m], shape (k, n, 3).
+    """
+    rows = np.asarray(places)
+    found: Array = 2 * np.linalg.lstsq(np.vander(t, 3), rows.reshape(len(rows), -1), rcond=None)[0][0]
+    return found.reshape(rows.shape[1:])
+
+
+def bind_ahead(model: Model, human: Mechanism, bones: Sequence[int]) -> Callable[[State], Array | None]:
+    """Return what says how a file, or nobody, goes on to move the centres of mass of bones.
+
+    Args:
+        model: The workstation.
+        human: The person.
+        bones: Of MuJoCo.
+
+    Returns:
+        A function that returns accelerations over the next `WINDOW` seconds [m/s²], shape (n, 3); None where
+        nobody knows, or something else moves the person along.
+    """
+    data, ahead = mujoco.MjData(model.mj), np.linspace(0.0, WINDOW, 2 * FEWEST)
+
+    def accelerations(state: State) -> Array | None:
+        foreseen = None if human.on else state.foresee(human.name, state.t + ahead)
+        if foreseen is None or foreseen[2]:
+            return None
+        places = []
+        for q in foreseen[0]:
+            data.qpos[human.q_address] = human.coupling @ q + human.offset
+            mujoco.mj_kinematics(model.mj, data)
+            places.append(data.xipos[bones].copy())
+        return of_parabola(ahead, places)
+
+    return accelerations
 
 
 class BackCompression(PostureRule, frozen=True, kw_only=True):
@@ -261,6 +294,7 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
         sides = ("right", "left") if self.hands == "both" else (self.hands,)
         unmeasured = {bone for bone in self.unmeasured if bone in UPPER}
         accelerations, seldom = Accelerations(), (self.every or 0.0) > SELDOM
+        ahead = bind_ahead(model, human, mj)
 
         def compute(twin: Twin) -> Figure:
             assert isinstance(twin, State)
@@ -282,10 +316,12 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
             )
             known = math.isfinite(most)
             a, share = accelerations.add(twin.t, found.at), 0.0
+            if a is None and self.slow:
+                a = ahead(twin)
             if a is not None:
                 share = moved(found, a, self.lever) / value - 1
             fast = share > SHARE or high <= self.limit < high * (1 + share)
-            unwatched = seldom or (a is None and accelerations.interrupted)
+            unwatched = self.slow and (seldom or a is None)
             return Figure(
                 value if known else None,
                 self.limit,
@@ -346,6 +382,10 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
 
         return draw
 
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """Look ahead where nobody has looked back long enough [s], for accelerations."""
+        return {self.human: WINDOW} if self.slow else {}
+
     def remembers(self, model: Model) -> bool:
         """Say that accelerations follow from earlier instants."""
         return True
@@ -386,8 +426,8 @@ class BackCompression(PostureRule, frozen=True, kw_only=True):
             ),
             not_modelled=(
                 "what it takes to accelerate body and load: with slow = false nothing is within, nor where "
-                f"they are seen to press {SHARE:.0%} harder than their weight, which the first "
-                f"{WINDOW / 2:g} s do not show",
+                f"they are seen to press {SHARE:.0%} harder than their weight; in the first {WINDOW / 2:g} s "
+                "what a file says of the next ones counts, and without one nothing is within",
                 "a load whose centre is farther from the body than the hands, or that pushes or pulls",
                 "muscles that work against each other, and pressure in the abdomen",
                 "twisting moments, shear, and how often it is done",

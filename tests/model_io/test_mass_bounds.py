@@ -182,8 +182,8 @@ def test_what_is_written_of_a_round_solid_is_its_own_mass(tmp_path):
         assert cli.main(["check-file", str(cell)]) == Exit.WITHIN
 
 
-def block_with_a_density(file, unit, figure="7.85"):
-    """A cube of 0.1 m of steel, as OpenCASCADE writes it, with the unit of its density written anew."""
+def block_with_a_density(file, unit, figure="7.85", solid=None):
+    """A cube of 0.1 m of steel, or another solid, by OpenCASCADE, the unit of its density written anew."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
     from OCP.STEPCAFControl import STEPCAFControl_Writer
     from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
@@ -192,7 +192,7 @@ def block_with_a_density(file, unit, figure="7.85"):
 
     document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    label = shapes.AddShape(BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape(), False)
+    label = shapes.AddShape(solid or BRepPrimAPI_MakeBox(100.0, 100.0, 100.0).Shape(), False)
     words = (
         TCollection_HAsciiString(text)
         for text in ("steel", "S235", "density measure", "POSITIVE_RATIO_MEASURE")
@@ -292,3 +292,78 @@ def test_a_mass_that_is_given_is_spread_within_the_bounds_that_are_told(seed):
     for corner in mesh.vertices[np.unique(mesh.faces[: len(mesh.faces) // 2])]:
         assert holds(told, moments.Moments(2.0, corner, np.zeros((3, 3))), trough.spread_error)
     assert from_shape([mesh], mass=2.0)[0].spread_error == 0
+
+
+def cut(rng):
+    """A body, its mesh with a hole, and how far what is cut away lies from the hole's rim at most [m]."""
+    bodies = [
+        trimesh.creation.icosphere(3, 0.05),
+        trimesh.creation.cylinder(0.04, 0.1, sections=48).subdivide().subdivide(),
+        trimesh.creation.torus(0.06, 0.02, 48, 32),
+        trimesh.creation.annulus(0.02, 0.05, 0.1, sections=32).subdivide(),
+    ]
+    body = bodies[rng.integers(len(bodies))].apply_translation(rng.uniform(-0.3, 0.3, 3))
+    center = body.triangles_center[rng.integers(len(body.faces))]
+    near = np.linalg.norm(body.triangles_center - center, axis=1) < rng.uniform(0.01, 0.06)
+    left, gone = np.unique(body.faces[~near]), np.unique(body.faces[near])
+    rim, inner = body.vertices[np.intersect1d(left, gone)], body.vertices[gone]
+    if not len(rim):
+        return body, None, 0.0
+    depth = np.linalg.norm(inner[:, None] - rim[None], axis=2).min(axis=1).max()
+    return body, Mesh(np.array(body.vertices), body.faces[~near].astype(np.int32)), float(depth)
+
+
+def test_what_a_mesh_lacks_is_within_the_bounds_as_far_as_it_is_said_where_that_lies():
+    """Caps, walls and bores are missing: that they are flat would often be false."""
+    rng = np.random.default_rng(3)
+    bounded, outside = 0, 0
+    for _ in range(150):
+        body, mesh, depth = cut(rng)
+        if mesh is None:
+            continue
+        truth = moments.of_closed_mesh(mesh_of(body))
+        for said in (depth, 0.0):
+            try:
+                made, _ = from_shape([mesh], density=1000, hole_depth=said)
+            except InputError:
+                continue
+            told = moments.Moments(made.mass / 1000, made.com, made.inertia / 1000)
+            share = max(made.error, made.spread_error)
+            if said:
+                assert holds(told, truth, share)
+                bounded += 1
+            else:
+                outside += not holds(told, truth, share)
+            given, _ = from_shape([mesh], mass=2.0, hole_depth=said)
+            scaled = moments.Moments(2.0, truth.com, truth.inertia * 2.0 / truth.volume)
+            if said:
+                assert holds(moments.Moments(2.0, given.com, given.inertia), scaled, given.spread_error)
+    assert bounded > 20
+    assert outside > 3
+
+
+def test_where_nobody_says_what_a_mesh_lacks_a_density_is_refused_and_a_mass_is_anywhere_in_the_hull():
+    box = trimesh.creation.box((0.1, 0.2, 0.3)).subdivide().subdivide()
+    mesh = Mesh(np.array(box.vertices), box.faces[1:].astype(np.int32))
+    with pytest.raises(InputError, match="nobody says where the surface is that it lacks") as caught:
+        from_shape([mesh], density=1000)
+    assert "hole_depth" in caught.value.problems[0].remedy
+    assert from_shape([mesh], density=1000, hole_depth=0.0)[0].mass == pytest.approx(6.0)
+    given, findings = from_shape([mesh], mass=2.0)
+    assert any("the mass may be anywhere in its convex hull" in finding.text for finding in findings)
+    told = moments.Moments(2.0, given.com, given.inertia)
+    for corner in mesh.vertices:
+        assert holds(told, moments.Moments(2.0, corner, np.zeros((3, 3))), given.spread_error)
+    assert from_shape([mesh], mass=2.0, hole_depth=0.0)[0].spread_error < 1e-9
+
+
+def test_edges_of_unequal_length_that_meet_are_no_hole():
+    box = trimesh.creation.box((0.1, 0.2, 0.3))
+    a, b, c = box.faces[0]
+    middle = len(box.vertices)
+    faces = np.vstack([box.faces[1:], [[a, middle, c], [middle, b, c]]])
+    vertices = np.vstack([box.vertices, box.vertices[[a, b]].mean(axis=0)])
+    mesh = Mesh(vertices, faces.astype(np.int32))
+    made, _ = from_shape([mesh], density=1000)
+    assert made.mass == pytest.approx(6.0)
+    assert made.error < 1e-9

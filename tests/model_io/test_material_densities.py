@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from test_mass_bounds import KILO, METRE, block_with_a_density
 
+from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.app import cli
 from seerob.app.console.terminal import Exit
-from seerob.app.importing.folder import Densities
+from seerob.app.importing.folder import Densities, _stated_mass
 from seerob.core.shapes import Mesh
+from seerob.core.snapshot import Origin
 from seerob.description.cad.assembly import Shape
 from seerob.description.cad.materials import _families, material
+from seerob.description.description import Inertial
 from seerob.description.shapes.shapes import box_mesh
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
 
 @pytest.mark.parametrize(
@@ -86,6 +91,41 @@ def test_what_is_imported_says_what_it_is_taken_for_and_by_how_much_it_may_be_of
     assert row["mass"] == pytest.approx(7.9)
     assert row["mass_error"] == pytest.approx(200 / 7900)
     assert table["options"]["density"] == ["library"]
+    assert row["written"]["density_tolerance"] == pytest.approx(200 / 7900, abs=1e-6)
+    assert row["written"]["density_tolerance"] >= 200 / 7900
     assert cli.main(["check-file", str(folder)]) == Exit.WITHIN
     assert cli.main(["import", str(file), str(folder)]) == Exit.WITHIN  # another revision
     assert json.loads((folder / "import.json").read_text())["parts"][0]["mass"] == pytest.approx(7.9)
+
+
+@pytest.mark.parametrize("becomes", ["workpieces", "tools"])
+@pytest.mark.parametrize("what", ["block", "ball"])
+def test_what_was_imported_is_off_by_as_much_when_a_robot_carries_it(tmp_path, what, becomes):
+    """The table of a part as it was written, under another heading and with a link that carries it."""
+    pytest.importorskip("OCP")
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
+
+    file, folder = tmp_path / f"{what}.step", tmp_path / "cell"
+    ball = BRepPrimAPI_MakeSphere(50.0).Shape() if what == "ball" else None
+    block_with_a_density(file, (KILO, "1.", METRE, "-2."), solid=ball)
+    assert cli.main(["import", str(file), str(folder), "--density", "library"]) == Exit.WITHIN
+    text = (folder / "workstation.toml").read_text()
+    table = text[text.index("[[parts]]") :].replace("[[parts]]", f"[[{becomes}]]\non = 'arm/tip'")
+    assert ("density_tolerance" if what == "block" else "mass_tolerance") in table
+    cell = made(folder, FLOATING + TWO_R + table, {"arm.urdf": two_r()})
+    found = MassTolerances(cell.model, cell.model.robot("arm"))
+    volume = 1e-3 if what == "block" else 4 / 3 * np.pi * 0.05**3
+    assert 8100 * volume * (1 - 2e-6) <= found.heaviest_load() < 8110 * volume
+
+
+def test_of_a_mass_that_is_spread_nobody_knows_how_only_the_mass_is_written():
+    sure = Inertial(2.0, np.zeros(3), np.eye(3), Origin.GIVEN, "file")
+    assert _stated_mass(sure).keys() == {"mass", "com", "inertia"}
+    assert _stated_mass(replace(sure, spread_error=0.1)) == {"mass": 2}
+    assert _stated_mass(replace(sure, error=0.1, spread_error=0.1)).keys() == {
+        "mass", "mass_tolerance", "com", "inertia",
+    }  # fmt: skip
+    assert _stated_mass(replace(sure, error=1 / 3, spread_error=0.5)) == {
+        "mass": 2,
+        "mass_tolerance": 0.333334,
+    }

@@ -216,6 +216,10 @@ class Thing(_Table, frozen=True, kw_only=True):
     """How far the real surface may lie outside the mesh [m], as of a round one that was cut into triangles;
     every distance is uncertain by it, or by what the reader of the file leaves out where that is more. A mass
     by `density` is uncertain as if it lay as far inside, too."""
+    hole_depth: Annotated[float, unit("m", ge=0, le=1)] | None = None
+    """How far the surface that a mesh lacks at its holes may lie beyond the convex hull of each hole's rim,
+    of a heap of triangles from these [m]: 0 where all holes are flat. A mass by `density` needs it of a mesh
+    with holes; without it, a given mass may be anywhere in the hull of the mesh."""
     triangles: Annotated[int, Meta(ge=100, le=20_000_000)] | None = None
     """Most triangles of each of its meshes on the screen, 20 000 when not given; how far what is shown is off
     then is a finding. Distances use all."""
@@ -245,6 +249,8 @@ class Thing(_Table, frozen=True, kw_only=True):
             raise ValueError("give either mesh or shape")
         if self.deviation and self.mesh is None:
             raise ValueError("deviation is of a mesh: leave it out beside a shape")
+        if self.hole_depth is not None and self.mesh is None:
+            raise ValueError("hole_depth is of a mesh: leave it out beside a shape")
         if self.triangles is not None and self.mesh is None:
             raise ValueError("triangles are of a mesh: leave it out beside a shape")
         if self.mass is not None and self.density is not None:
@@ -272,8 +278,12 @@ class Mounted(Thing, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.density_tolerance is not None and self.density is None:
-            raise ValueError("density_tolerance is of a density, which is not given: give mass_tolerance")
+        _toleranced(self)
+
+
+def _toleranced(thing: Mounted | Part) -> None:
+    if thing.density_tolerance is not None and thing.density is None:
+        raise ValueError("density_tolerance is of a density, which is not given: give mass_tolerance")
 
 
 class Tool(Mounted, frozen=True, kw_only=True):
@@ -330,9 +340,18 @@ class Part(Thing, frozen=True, kw_only=True):
 
     conveyor: Conveyor | None = None
     """Its surface runs: loose workpieces on it ride along."""
+    mass_tolerance: Tolerance | None = None
+    """How far its mass may be off, as a share: what stands still is not judged by it, and what becomes a
+    workpiece or a tool keeps it. ``seerob import`` writes it."""
+    density_tolerance: Tolerance | None = None
+    """How far its ``density`` may be off, as a share, and with it its mass."""
     real: bool = False
     """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
     there, hides what is behind it, and counts in every figure as before."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _toleranced(self)
 
 
 class Machine(Thing, frozen=True, kw_only=True):

@@ -39,6 +39,8 @@ LARGEST_TABLE = 1 << 20
 """Of densities [byte]."""
 GRID = 8
 """Decimals of a coordinate [m] that are kept: what differs by less is one corner."""
+INTEGRATED = 1e-6
+"""Share of a mass, by integration, that is not written as a tolerance."""
 NEGLIGIBLE = 1e-6
 """Deviations up to this are not written [m]; meshes are simplified by as much when they are read."""
 
@@ -157,10 +159,12 @@ def files(
         if instance.shape not in weighed:
             weighed[instance.shape] = densities.weighed(shape)
         inertial = weighed[instance.shape] if density is not None else instance.inertial
+        family = densities.known(shape)
         row["mass"] = None if inertial is None else _number(inertial.mass, 12)
         row["mass_error"] = None if inertial is None else inertial.error
         row["written"] = part_values(row, instance.color)
-        family = densities.known(shape)
+        if family is not None:
+            row["written"]["density_tolerance"] = _share(family.tolerance)
         if family is not None:
             text = (
                 f"{printable(shape.material)[:200]} is taken for {family.name}, "
@@ -174,6 +178,7 @@ def files(
         better = shape.solid is not None and shape.deviation > NEGLIGIBLE
         if inertial is not None and (density is None or better):
             row["written"].pop("density", None)
+            row["written"].pop("density_tolerance", None)
             row["written"] |= _stated_mass(inertial)
         del row["world"]
         parts.append(row)
@@ -273,13 +278,26 @@ def _robot(moving: Moving, name: str, files: dict[str, bytes]) -> dict[str, Any]
 
 
 def _stated_mass(inertial: Inertial) -> dict[str, Any]:
+    """Mass properties as a workstation file has them, with what is known of how far they are off.
+
+    Where it is not known how the mass is spread, that follows from the shape again, as far as it tells it.
+    """
+    values: dict[str, Any] = {"mass": _number(inertial.mass, 12)}
+    if inertial.error > INTEGRATED:
+        values["mass_tolerance"] = _share(inertial.error)
+    if inertial.spread_error > inertial.error + INTEGRATED:
+        return values
     i = np.where(np.abs(inertial.inertia) > 1e-12 * np.trace(inertial.inertia), inertial.inertia, 0.0)
     six = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
-    return {
-        "mass": _number(inertial.mass, 12),
+    return values | {
         "com": [_number(x, 12) for x in inertial.com.round(12)],
         "inertia": [_number(x, 12) for x in six],
     }
+
+
+def _share(share: float) -> float:
+    """A share as it is written: no less, and no more than what a tolerance can be."""
+    return min(math.ceil(share * 1e6) / 1e6, 0.999999)
 
 
 def _head(assembly: Assembly, source: Path) -> list[str]:

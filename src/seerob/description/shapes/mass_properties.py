@@ -3,19 +3,26 @@
 A closed mesh is integrated exactly; an inverted one is turned; an open one is mended, flooded or wrapped in
 its hull, and the result says so with a bound; what has no volume is refused.
 
+Where the surface is that an open mesh lacks, no mesh tells: a lid is flat, a dome, or the bottom of a bore.
+So its volume has a bound only where somebody says how far it may be from what is there (``hole_depth``), and
+a mass that is given may be anywhere in the hull else.
+
 The volume inside a heap of triangles lies between two bounds, by a flood from outside. Every voxel that a
-triangle touches is *surface*; what a flood through faces cannot reach from outside is *inside*. Unless a hole
-is wider than a voxel the true volume lies between the inside voxels and inside and surface voxels together.
+triangle touches, or that is so near to one, is *surface*; what a flood through faces cannot reach from
+outside is *inside*. The true volume then lies between the inside voxels, and inside and surface voxels
+together.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
@@ -59,17 +66,29 @@ class Filled(NamedTuple):
     """Of the inside voxels alone."""
 
 
-def voxel_fill(mesh: Mesh, *, cells: int = 64) -> Filled | None:
-    """Flood-filled moments with ``cells`` voxels along the longest side; None when nothing is inside."""
+def voxel_fill(mesh: Mesh, *, cells: int = 64, beyond: float = 0.0) -> Filled | None:
+    """Flood-filled moments with ``cells`` voxels along the longest side; None when nothing is inside.
+
+    Args:
+        mesh: A heap of triangles.
+        cells: How many.
+        beyond: How far what it lacks may be from its triangles [m].
+    """
     low = mesh.vertices.min(axis=0)
     extent = np.ptp(mesh.vertices, axis=0)
     h = float(extent.max()) / cells
     if not h > 0:
         return None
-    shape = np.ceil(extent / h).astype(int) + 3
+    more = math.ceil(beyond / h - 1e-9)
+    if 2 * more >= cells:
+        return None
+    shape = np.ceil(extent / h).astype(int) + 3 + 2 * more
     # An odd offset keeps faces that lie on round coordinates off the voxels' faces.
-    origin = low - 1.37 * h
+    origin = low - (1.37 + more) * h
     surface = _touched((mesh.vertices[mesh.faces] - origin) / h, shape)
+    for axis in range(3) if more else ():
+        window = np.pad(surface, [(more, more) if k == axis else (0, 0) for k in range(3)])
+        surface = np.asarray(sliding_window_view(window, 2 * more + 1, axis).any(axis=-1))
     inside = ~surface & ~_around(~surface)
     if not inside.any():
         return None
@@ -160,6 +179,10 @@ PATCHED = 0.2
 """Largest share of the surface that may have been missing before mending stops being credible."""
 
 
+SLITS = 1e-9
+"""Share of the surface that is none: edges of unequal length that meet leave holes without an area."""
+
+
 class _Estimate(NamedTuple):
     moments: Moments
     method: str
@@ -170,6 +193,10 @@ class _Estimate(NamedTuple):
     notes: tuple[str, ...] = ()
     provided: str = ""
     """What the error bound rests on."""
+    moved: float = 0.0
+    """How far corners were moved [m]."""
+    bounded: bool = True
+    """Whether somebody says where the surface is that the mesh lacks."""
 
 
 def from_shape(
@@ -178,6 +205,7 @@ def from_shape(
     density: float | None = None,
     mass: float | None = None,
     deviation: float = 0.0,
+    hole_depth: float | None = None,
     subject: str = "mass properties",
 ) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties of a part of uniform density.
@@ -187,6 +215,8 @@ def from_shape(
         density: Mass per volume [kg/m³]; the mass follows from it.
         mass: Mass [kg]; the inertia is scaled to it. Exactly one of the two.
         deviation: How far the real surface may lie from the meshes, on either side [m].
+        hole_depth: How far the surface that they lack may lie beyond the convex hull of each hole's rim [m],
+            of a heap of triangles from these; None where nobody says so.
         subject: Full name of the part, for findings and errors.
 
     Returns:
@@ -195,8 +225,8 @@ def from_shape(
         deviation), and what was noticed.
 
     Raises:
-        InputError: neither or both are given, or not positive; there is no mesh; or no volume can be
-            had from it within `WORST`.
+        InputError: neither or both are given, or not positive; there is no mesh; no volume can be had from it
+            within `WORST`; or a density is given of a mesh with holes, without ``hole_depth``.
     """
     name = "density" if mass is None else "mass"
     given = density if mass is None else mass
@@ -211,9 +241,9 @@ def from_shape(
     mesh, dropped = joined(filled)
     if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
         raise InputError.at(subject, name, "the mesh has no area or is not finite", "export it again")
-    estimate = _estimate(mesh, subject, strict=mass is None)
+    estimate = _estimate(mesh, subject, strict=mass is None, depth=hole_depth)
     moments = estimate.moments
-    near = mass_bounds.off_by(mesh, deviation, moments)
+    near = mass_bounds.off_by(mesh, deviation + estimate.moved, moments)
     error, everything = estimate.error + near.volume, estimate.inertia + near.inertia
     if mass is None and error > WORST:
         what = f"its surface is known within {deviation * 1e3:.3g} mm: no volume within ±{100 * WORST:.0f} %"
@@ -227,7 +257,8 @@ def from_shape(
     else:
         source = f"mass given; centre and inertia from uniform density over {estimate.method}"
         inertial = moments.inertial(mass=mass, origin=Origin.GIVEN, source=source)
-        inertial = replace(inertial, spread_error=_of_given(mesh, deviation, moments, error, everything))
+        around = deviation + estimate.moved + (hole_depth or 0.0)
+        inertial = replace(inertial, spread_error=_of_given(mesh, around, moments, error, everything))
     notes = ((dropped,) if dropped else ()) + estimate.notes
     findings = [Finding(level="note", subject=subject, text=text) for text in notes]
     if error > 0 or estimate.method != _EXACT:
@@ -237,11 +268,16 @@ def from_shape(
             text += f", as its surface lies within {deviation * 1e3:.3g} mm"
         if everything > max(error, 1e-4):
             text += f"; in a mass matrix, with centre and inertia, {_within(everything)}"
+        if not estimate.bounded:
+            text = (
+                f"centre of mass and inertia from {estimate.method}; what lies beyond its holes nobody says "
+                "(hole_depth): the mass may be anywhere in its convex hull"
+            )
         findings.append(Finding(level="warning" if error > 0.01 else "note", subject=subject, text=text))
     return inertial, tuple(findings)
 
 
-def _of_given(mesh: Mesh, deviation: float, moments: Moments, error: float, everything: float) -> float:
+def _of_given(mesh: Mesh, around: float, moments: Moments, error: float, everything: float) -> float:
     """Share by which what a given mass adds to a mass matrix may be off, of a volume that may be off."""
     of_volume = (everything + error) / (1 - error) if error < 1 else np.inf
     if of_volume <= 1:
@@ -250,7 +286,7 @@ def _of_given(mesh: Mesh, deviation: float, moments: Moments, error: float, ever
     assert hull is not None  # there is a volume
     # All of it may be anywhere in the hull, out to the corners of a cube about each of the hull's.
     corners = mesh.vertices[np.unique(hull)]
-    cube = deviation * np.array(list(product((-1.0, 1.0), repeat=3)))
+    cube = around * np.array(list(product((-1.0, 1.0), repeat=3)))
     points = (corners[:, None] + cube).reshape(-1, 3)
     return min(of_volume, max(1.0, mass_bounds.off_by_volume(points, moments.volume, moments) - 1))
 
@@ -263,7 +299,7 @@ _EXACT = "the closed mesh"
 _NOTHING = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
-def _estimate(mesh: Mesh, subject: str, *, strict: bool) -> _Estimate:
+def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) -> _Estimate:
     """The first of: exact integral, mended mesh, voxels, hull, whose bound is good enough."""
     hull = _hull(mesh)
     if hull is None:
@@ -277,20 +313,32 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool) -> _Estimate:
     elif is_closed(single) and not _is_sheet(single, hull.volume):
         first = _of_bodies(single, _EXACT, ("its triangles are double-sided: one side was used",))
     else:
-        patched = mended(single)
+        patched = mended(single, depth or 0.0)
         missing = patched.filled
-        first = _of_mended(patched)
+        first = _of_mended(patched, depth or 0.0)
     credible = _is_credible(first, hull) and missing <= PATCHED
+    bounded = depth is not None or missing <= SLITS
+    if strict and not bounded:
+        raise InputError.at(
+            subject,
+            "density",
+            "the mesh is open, and nobody says where the surface is that it lacks",
+            "give the mass, close the mesh, or say how far beyond its holes' rims that lies: hole_depth",
+        )
     if credible and first.error <= WORST:
-        return first
-    flooded = voxel_fill(mesh)
+        return first if bounded else _unbounded(first)
+    flooded = voxel_fill(mesh, beyond=depth or 0.0)
     if flooded is not None:
         error = (flooded.high - flooded.low) / (flooded.high + flooded.low)
         if error <= WORST:
             # Of the half of what is on the surface that may be there or not.
             off = mass_bounds.off_by_difference(flooded.moments, flooded.inside)
             method = "the mesh filled with voxels (open or tangled)"
-            return _Estimate(flooded.moments, method, error, max(off, error))
+            provided = (
+                f", if no surface is missing farther than {_depth(depth)} from it" if missing > SLITS else ""
+            )
+            found = _Estimate(flooded.moments, method, error, max(off, error), provided=provided)
+            return found if bounded else _unbounded(found)
     if strict:
         raise InputError.at(
             subject,
@@ -303,7 +351,17 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool) -> _Estimate:
     inner = first.moments.volume * (1 - min(first.error, 1.0)) if credible else 0.0
     error = 1 - inner / hull.volume
     off = mass_bounds.off_by_difference(hull, first.moments) + first.inertia if credible else 1.0
-    return _Estimate(hull, "the convex hull of the open mesh", error, min(max(off, error), 1.0))
+    found = _Estimate(hull, "the convex hull of the open mesh", error, min(max(off, error), 1.0))
+    return found if bounded and not (depth and missing > SLITS) else _unbounded(found)
+
+
+def _unbounded(estimate: _Estimate) -> _Estimate:
+    """The estimate of a mesh of which nobody says where the surface is that it lacks."""
+    return estimate._replace(error=np.inf, inertia=np.inf, provided="", bounded=False)
+
+
+def _depth(depth: float | None) -> str:
+    return f"{(depth or 0.0) * 1e3:.3g} mm"
 
 
 def _is_sheet(mesh: Mesh, hull_volume: float) -> bool:
@@ -327,18 +385,20 @@ def _hull(mesh: Mesh) -> Moments | None:
     return moments if moments.volume > 1e-9 * size**3 else None
 
 
-def _of_mended(patched: Mended) -> _Estimate:
+def _of_mended(patched: Mended, depth: float) -> _Estimate:
     if not np.isfinite(patched.slack):
         return _Estimate(_NOTHING, "a heap of triangles", np.inf)
     method = "the mended mesh (" + ", ".join(patched.steps) + ")"
     estimate = _of_bodies(patched.mesh, method, ())
     volume = estimate.moments.volume
     error = estimate.error + patched.slack / volume if volume > 0 else np.inf
-    provided = ", if the holes' true surface lies in the hull of their rims" if patched.filled else ""
+    provided = ""
+    if patched.filled:
+        provided = f", if the holes' true surface lies within {_depth(depth)} of the hulls of their rims"
     off = estimate.inertia
     if volume > 0 and patched.slack > 0:
-        off += mass_bounds.off_by_volume(patched.mesh.vertices, patched.slack, estimate.moments)
-    return estimate._replace(error=float(error), inertia=off, provided=provided)
+        off += mass_bounds.off_by_volume(patched.within, patched.slack, estimate.moments)
+    return estimate._replace(error=float(error), inertia=off, provided=provided, moved=patched.moved)
 
 
 def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:

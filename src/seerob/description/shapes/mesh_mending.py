@@ -1,4 +1,4 @@
-"""Open meshes closed, with a bound on what the missing surface can change.
+"""Open meshes closed, with a bound on what a missing surface can change that lies near the rims of its holes.
 
 Only mass properties use what is mended: distances never see a triangle that the file does not have.
 
@@ -145,17 +145,28 @@ class Mended(NamedTuple):
     steps: tuple[str, ...]
     """What was done, in words."""
     slack: float
-    """Volume of the convex hulls of the loops that were spanned [m³]: how much a missing surface that
-    stays within the hull of its border can add or take away."""
+    """Volume of the convex hulls of the loops that were spanned, as much larger as was asked [m³]: how much a
+    missing surface that stays within them can add or take away. Both it and what spans the hole close the
+    rest, so that what lies between them is in the hull, whatever the rest is."""
     filled: float
     """Area of what was added over the area of the whole, 0…1."""
+    within: Array
+    """Corners of what contains those hulls [m], shape (n, 3)."""
+    moved: float
+    """How far corners were moved to weld them, at most [m]."""
 
 
-def mended(mesh: Mesh) -> Mended:
-    """Weld, orient and span holes until every edge is balanced."""
+def mended(mesh: Mesh, depth: float) -> Mended:
+    """Weld, orient and span holes until every edge is balanced.
+
+    Args:
+        mesh: With holes.
+        depth: How far the missing surface may lie beyond the convex hull of each hole's rim [m].
+    """
     steps: list[str] = []
+    nowhere, moved = np.zeros((0, 3)), 0.0
     if not is_closed(mesh):
-        welded = _welded(mesh)
+        welded, moved = _welded(mesh)
         if len(welded.vertices) < len(mesh.vertices):
             steps.append(f"{len(mesh.vertices) - len(welded.vertices)} near vertices welded")
             mesh = welded
@@ -165,15 +176,18 @@ def mended(mesh: Mesh) -> Mended:
             steps.append(f"{turned} triangles turned over")
             mesh = agreed
     if is_closed(mesh):
-        return Mended(mesh, tuple(steps), 0.0, 0.0)
+        return Mended(mesh, tuple(steps), 0.0, 0.0, nowhere, moved)
     loops = _open_loops(mesh)
     if len(loops) > MAX_HOLES:
-        return Mended(mesh, (*steps, f"{len(loops)} holes"), np.inf, 1.0)
+        return Mended(mesh, (*steps, f"{len(loops)} holes"), np.inf, 1.0, nowhere, moved)
     before = _area(mesh)
-    slack = sum(hull_volume(mesh.vertices[loop]) for loop in loops)
+    # A cube about each corner holds the ball about it.
+    cube = depth * np.array(list(product((-1.0, 1.0), repeat=3))) if depth else np.zeros((1, 3))
+    around = [(mesh.vertices[loop][:, None] + cube).reshape(-1, 3) for loop in loops]
+    slack = sum(map(hull_volume, around))
     mesh = _spanned(mesh, loops)
     steps.append(f"{len(loops)} holes spanned")
-    return Mended(mesh, tuple(steps), slack, 1 - before / _area(mesh))
+    return Mended(mesh, tuple(steps), slack, 1 - before / _area(mesh), np.concatenate(around), moved)
 
 
 CROWD = 64
@@ -222,8 +236,11 @@ def _area(mesh: Mesh) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def _welded(mesh: Mesh) -> Mesh:
-    """Vertices on open edges merged when closer than 1e-5 of the size: writers round and split."""
+def _welded(mesh: Mesh) -> tuple[Mesh, float]:
+    """Vertices on open edges merged when closer than 1e-5 of the size; how far they were moved at most [m].
+
+    Writers round and split.
+    """
     edges, balance, _ = edge_balance(mesh.faces)
     rim = np.unique(edges[balance != 0])
     tolerance = 1e-5 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
@@ -231,7 +248,8 @@ def _welded(mesh: Mesh) -> Mesh:
     _, first = np.unique(label, return_index=True)
     target = np.arange(len(mesh.vertices))
     target[rim] = rim[first[label]]
-    return tidied(Mesh(mesh.vertices, target[mesh.faces].astype(np.int32), mesh.color))[0]
+    moved = float(np.linalg.norm(mesh.vertices[target] - mesh.vertices, axis=1).max(initial=0.0))
+    return tidied(Mesh(mesh.vertices, target[mesh.faces].astype(np.int32), mesh.color))[0], moved
 
 
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:

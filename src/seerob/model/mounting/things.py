@@ -242,7 +242,12 @@ def _spread(thing: Thing, meshes: list[Mesh], deviation: float) -> tuple[Inertia
     if closed is None:
         try:
             return mass_properties.from_shape(
-                meshes, density=thing.density, mass=thing.mass, deviation=deviation, subject=thing.name
+                meshes,
+                density=thing.density,
+                mass=thing.mass,
+                deviation=deviation,
+                hole_depth=thing.hole_depth,
+                subject=thing.name,
             )
         except InputError as error:
             raise InputError(

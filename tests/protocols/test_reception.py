@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from live_story import wait_for
+from seerob.protocols.links import reception as module
 from seerob.protocols.links.connection import CHUNK, MOST, connected
 from seerob.protocols.links.datagrams import listening
 from seerob.protocols.links.reception import Reception, instant
@@ -28,7 +29,7 @@ class Windows(asyncio.SelectorEventLoop):
         raise NotImplementedError
 
 
-LOOPS = [asyncio.SelectorEventLoop, Windows]
+LOOPS = [asyncio.SelectorEventLoop, Windows, getattr(module, "PromptLoop", Windows)]
 
 
 def run(loop, coroutine):
@@ -194,3 +195,49 @@ def test_who_waits_for_a_datagram_has_it_before_it_is_answered():
 
     run(asyncio.SelectorEventLoop, talk())
     assert happened == [(what, b"%d" % k) for k in range(3) for what in ("heard", "answered")]
+
+
+@pytest.mark.skipif(not hasattr(module, "PromptLoop"), reason="a loop of Linux")
+def test_a_loop_whose_readers_are_called_at_once_has_time_for_everything_else():
+    failed, times = [], []
+
+    async def talk():
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, said: failed.append(said["exception"]))
+        one, other = pair(socket.SOCK_STREAM)
+
+        def answer(_, writer):
+            writer.write(b"answer")
+            writer.close()
+
+        server = await asyncio.start_server(answer, "127.0.0.1")
+        with one, other:
+            one.send(b"is never read, and there at every look")
+            turn = loop.create_future()
+
+            def read():
+                times.append(loop.time())
+                if len(times) == 3:
+                    loop.call_soon(turn.set_result, None)
+                if len(times) == 5:
+                    raise ValueError("of this reader")
+
+            loop.add_reader(other, read)
+            await turn
+            begun = loop.time()
+            await asyncio.sleep(0.02)
+            assert loop.time() - begun >= 0.02
+            reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+            assert await reader.read(10) == b"answer"
+            writer.close()
+
+            await asyncio.to_thread(time.sleep, 0.01)
+            assert loop.remove_reader(other)
+            count = len(times)
+            await asyncio.sleep(0.01)
+            assert len(times) == count
+        server.close()
+
+    run(module.PromptLoop, talk())
+    assert [str(error) for error in failed] == ["of this reader"]
+    assert len(times) > 10

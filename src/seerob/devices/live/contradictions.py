@@ -25,8 +25,9 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from numbers import Real
 from operator import le, lt, sub
-from typing import NamedTuple, get_args
+from typing import get_args
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, SeerobError
@@ -99,7 +100,7 @@ SILENCE = 0.5
 """After it what was before says nothing of now [s]."""
 
 
-class _Motion(NamedTuple):
+class _Motion(Struct, frozen=True):
     t: float
     q: tuple[float, ...]
     qd: tuple[float, ...]

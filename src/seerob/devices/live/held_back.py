@@ -9,7 +9,9 @@ nobody judged what was done meanwhile.
 from __future__ import annotations
 
 import math
-from functools import cache, cached_property
+from collections.abc import Sequence
+from functools import lru_cache
+from operator import add, le, sub
 
 from seerob.core.samples import NO_PLACE, BodySample, JointSample, Sample
 
@@ -27,6 +29,9 @@ HELD_UP = 0.05
 Said = dict[str, float]
 """What a sample says, by what it is about: places [rad or m], and speeds after `RATE`."""
 RATE = "rate of "
+Layout = tuple[tuple[str, bool, bool] | int, ...]
+"""What the numbers of a sample are about: numbers of joints and of their speeds, else each point's name, and
+whether its place and its turn are said."""
 
 
 class HeldBack:
@@ -40,8 +45,8 @@ class HeldBack:
         self._behind = behind
         self._taken = _Told(None)
         """By the last sample that a run has taken."""
-        self._missed: dict[str, tuple[float, float]] = {}
-        """Least and largest by those since then that none may have taken."""
+        self._missed: list[tuple[Layout, list[float], list[float]]] = []
+        """Least and largest by those since then that none may have taken, by layout."""
         self._since = math.inf
         """When the first of those arrived [s]."""
         self._last = _Told(None)
@@ -62,34 +67,59 @@ class HeldBack:
         since = host - self._late
         together = since <= TOGETHER and since < FASTER * (t - self._t)
         # Before any was taken nothing is judged.
-        if together or (waits and self._taken.said):
-            self._miss(self._last.said)
+        if together or (waits and self._taken.said[1]):
+            self._miss(*self._last.said)
             self._since = min(self._since, self._host)
         elif not waits:
             self._begin()
         self._last, self._t, self._host = _Told(sample), t, host
         self._late = host if host - t > self._behind else -math.inf
-        if not (together or host - self._since > HELD_UP) or not any(map(self._beyond, self._missed)):
+        if not (together or host - self._since > HELD_UP) or not self._beyond():
             return ""
         self._begin()  # is said once
         return "its packets were held back, and what it did meanwhile and undid was judged at no instant"
 
     def _begin(self) -> None:
         """The last one was taken."""
-        self._taken, self._missed, self._since = self._last, {}, math.inf
+        self._taken, self._missed, self._since = self._last, [], math.inf
 
-    def _miss(self, said: Said) -> None:
-        for what, value in said.items():
-            number = math.inf if math.isnan(value) else value  # which lies nowhere
-            low, high = self._missed.get(what, (number, number))
-            self._missed[what] = min(low, number), max(high, number)
+    def _miss(self, layout: Layout, said: Sequence[float]) -> None:
+        if not said:
+            return
+        if math.isnan(sum(said)):
+            said = [math.inf if math.isnan(value) else value for value in said]  # which lies nowhere
+        for k, (other, low, high) in enumerate(self._missed):
+            if other == layout:
+                self._missed[k] = layout, [*map(min, low, said)], [*map(max, high, said)]
+                return
+        self._missed.append((layout, [*said], [*said]))
 
-    def _beyond(self, what: str) -> bool:
+    def _beyond(self) -> bool:
         """Whether any that was missed lies beyond what the last that was taken and the newest say."""
-        low, high = self._missed[what]
-        ends = [each.said[what] for each in (self._taken, self._last) if what in each.said]
-        room = SPEED if what.startswith(RATE) else PLACE
-        return not ends or not (min(ends) - room <= low and high <= max(ends) + room)
+        if not self._missed:
+            return False
+        (layout, taken), (newest, last) = self._taken.said, self._last.said
+        about, low, high = self._missed[0]
+        if layout == newest == about and len(self._missed) == 1:
+            # As nearly always: number by number.
+            room = _rooms(layout)
+            lows, highs = map(sub, map(min, taken, last), room), map(add, map(max, taken, last), room)
+            return not (all(map(le, lows, low)) and all(map(le, high, highs)))
+        ends = [
+            dict(zip(_names(each), said, strict=True)) for each, said in ((layout, taken), (newest, last))
+        ]
+        missed: dict[str, tuple[float, float]] = {}
+        for each, low, high in self._missed:
+            for what, a, b in zip(_names(each), low, high, strict=True):
+                least, most = missed.get(what, (a, b))
+                missed[what] = min(least, a), max(most, b)
+        return any(_lies_beyond(what, *bounds, ends) for what, bounds in missed.items())
+
+
+def _lies_beyond(what: str, low: float, high: float, said: Sequence[Said]) -> bool:
+    ends = [each[what] for each in said if what in each]
+    room = SPEED if what.startswith(RATE) else PLACE
+    return not ends or not (min(ends) - room <= low and high <= max(ends) + room)
 
 
 class _Told:
@@ -99,38 +129,53 @@ class _Told:
         sample: None before there is one.
     """
 
+    __slots__ = ("_said", "_sample")
+
     def __init__(self, sample: Sample | None) -> None:
         self._sample = sample
+        self._said: tuple[Layout, Sequence[float]] | None = None
 
-    @cached_property
-    def said(self) -> Said:
-        """By what it is about."""
-        return {} if self._sample is None else said_by(self._sample)
-
-
-@cache
-def _names(joints: int) -> tuple[str, ...]:
-    return tuple(map(str, range(joints)))
+    @property
+    def said(self) -> tuple[Layout, Sequence[float]]:
+        """What its numbers are about, and they."""
+        if self._said is None:
+            self._said = ((0, 0), ()) if self._sample is None else said_by(self._sample)
+        return self._said
 
 
-@cache
-def _rates(joints: int) -> tuple[str, ...]:
-    return tuple(f"{RATE}{j}" for j in range(joints))
+@lru_cache(8)
+def _names(layout: Layout) -> tuple[str, ...]:
+    """What each number is about."""
+    found: list[str] = []
+    for k, part in enumerate(layout):
+        if isinstance(part, int):
+            found += [f"{RATE * k}{j}" for j in range(part)]  # joints, then their speeds
+        else:
+            name, placed, turned = part
+            found += [f"{name} {j}" for j in range(3 * placed)]
+            found += [f"{name} turned {j}" for j in range(4 * turned)]
+    return tuple(found)
 
 
-def said_by(sample: Sample) -> Said:
+@lru_cache(8)
+def _rooms(layout: Layout) -> tuple[float, ...]:
+    return tuple(SPEED if name.startswith(RATE) else PLACE for name in _names(layout))
+
+
+def said_by(sample: Sample) -> tuple[Layout, Sequence[float]]:
     """What a sample says of places and speeds; nothing of signals and grabs, which are told one by one."""
-    if isinstance(sample, NO_PLACE):
-        return {}
     if isinstance(sample, JointSample):
-        found = dict(zip(_names(len(sample.q)), sample.q, strict=True))
         qd = sample.qd or ()
-        return found | dict(zip(_rates(len(qd)), qd, strict=True))
-    found = {}
+        return (len(sample.q), len(qd)), (*sample.q, *qd)
+    if isinstance(sample, NO_PLACE):
+        return (0, 0), ()
+    found: list[float] = []
+    layout: list[tuple[str, bool, bool]] = []
     for point in sample.points if isinstance(sample, BodySample) else (sample,):
-        name, turn = getattr(point, "name", ""), point.wxyz
-        found |= {f"{name} {k}": x for k, x in enumerate(point.position or ())}
+        place, turn = point.position, point.wxyz
+        layout.append((getattr(point, "name", ""), place is not None, turn is not None))
+        found += place or ()
         if turn is not None:
             side = math.copysign(1.0, turn[0])  # both signs of a quaternion are one orientation
-            found |= {f"{name} turned {k}": side * x for k, x in enumerate(turn)}
-    return found
+            found += [side * x for x in turn]
+    return tuple(layout), found

@@ -38,10 +38,11 @@ from seerob.core.printable import printable
 from seerob.core.samples import NO_PLACE, BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding, SourceLine
 from seerob.devices.live.contradictions import Contradictions
-from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock, Instant
+from seerob.devices.live.device_clock import AFTER, HOLD, ClockState, DeviceClock
 from seerob.devices.live.held_back import HeldBack
 from seerob.protocols import NotLetIn
 from seerob.protocols.links.datagrams import DISTRUST, HEARD
+from seerob.protocols.links.reception import run_promptly
 from seerob.workstation.source import Opened, Source, Target
 
 
@@ -384,16 +385,12 @@ class Listener:
         self._source, self._target, self._post = source, target, post
         self._clock, self._arrivals = DeviceClock(known), Arrivals(source.period())
         self._bound = source.timeout
-        self._contradictions: dict[tuple[str, ...], Contradictions] = {}
-        self._found: dict[tuple[str, ...], tuple[str, float]] = {}
-        """What contradicted itself, and until when that counts [s]."""
         self._distrusted = "", -math.inf
         """Why it may be somebody else who is heard, and until when that counts [s]."""
         self._senders: dict[int, str] = {}
         """Who was heard at which port, by datagrams."""
-        self._posted: dict[tuple[str, ...], Sample] = {}
-        self._people: dict[tuple[str, ...], _Person] = {}
-        self._held: dict[tuple[str, ...], HeldBack] = {}
+        self._told: dict[tuple[str, ...], _Told] = {}
+        """What was said of each thing, by what it is about."""
         self._lock = Lock()
         self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -442,7 +439,7 @@ class Listener:
 
     def _run(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
-            asyncio.run(self._listen())
+            run_promptly(self._listen())
 
     async def _listen(self) -> None:
         with self._lock:
@@ -500,48 +497,55 @@ class Listener:
         if isinstance(sample, BodySample):  # whose key says who sees it
             sample = replace(sample, source=self.name)
         host, what = sample.t, key(sample)
-        heard = Instant(host)
-        if sample.t_device is not None:
-            heard = self._clock.hear(sample.t_device, host, _content(sample), forgeable=bool(self._senders))
-        if heard.t is None:
+        told = self._told.get(what) or self._begin(what)
+        device, timed = sample.t_device, sample.t_device is not None
+        t: float | None
+        doubt: str
+        t, doubt = host, ""
+        if device is not None:
+            t, doubt = self._clock.hear(device, host, _content(sample), forgeable=bool(self._senders))
+        if t is None:
             self._arrivals.repeat()
-            if heard.invalid_reason and what in self._posted:
+            if doubt:
                 # No news, and a doubt about what was said before.
-                self._invalidate(what, heard.invalid_reason)
+                self._invalidate(told, doubt)
             return
         if isinstance(sample, BodySample):
-            person = self._people.setdefault(what, _Person())
+            person = told.person = told.person or _Person()
             stood = person.stood(sample, host)
             if stood is not None:
                 self._arrivals.repeat()
-                if stood > self._source.timeout and what in self._posted:
-                    self._invalidate(what, STILL)
+                if stood > self._source.timeout:
+                    self._invalidate(told, STILL)
                 return
-            sample = replace(sample, points=person.frozen(sample.points, heard.t))
-        late = (self._source.delay or 0.0) * (not self._source.asked)
-        if sample.t_device is not None:
-            late = self._clock.latency
+            sample = replace(sample, points=person.frozen(sample.points, t))
+        late = self._clock.latency if timed else (self._source.delay or 0.0) * (not self._source.asked)
         distrusted, until = self._distrusted
         # Also beside another doubt: what stands at once is seen by the one sample in which it stopped.
-        reason = self._contradiction(sample, what, heard.t, host) or heard.invalid_reason
+        reason = told.contradiction(sample, t, host, waits=self._waits(what)) or doubt
         if host <= until:
             reason = distrusted
-        if sample.t_device is None and not self._source.asked and self._source.delay is None:
+        if not timed and not self._source.asked and self._source.delay is None:
             reason = reason or UNTIMED
         reason = reason or sample.reason
         quality = sample.quality
-        if late > self._bound and sample.t_device is not None:
+        if timed and late > self._bound:
             reason = f"heard {late:.2f} s later than at its best (bound {self._bound:g} s)"
             quality = Quality.LATE if quality is Quality.GOOD else quality
         if reason and quality is Quality.GOOD:
             quality = Quality.DEGRADED
         reason = reason and f"{self.name}: {reason}"
-        seq = 0 if (last := self._posted.get(what)) is None else last.seq + 1
-        self._heard(host, sample.t_device)
-        sample = self._posted[what] = replace(
-            sample, source=self.name, seq=seq, t=heard.t, quality=quality, reason=reason, late=late
+        seq = 0 if told.posted is None else told.posted.seq + 1
+        self._heard(host, device)
+        sample = told.posted = replace(
+            sample, source=self.name, seq=seq, t=t, quality=quality, reason=reason, late=late
         )
         self._post(sample)
+
+    def _begin(self, what: tuple[str, ...]) -> _Told:
+        """Of something that was not heard of before."""
+        self._told[what] = told = _Told(self._target, self._source.behind())
+        return told
 
     def _news(self, sample: Sample, host: float, quiet: bool) -> None:
         """Post what is new.
@@ -555,8 +559,9 @@ class Listener:
             self._heard(host, sample.t_device)
         # Counted for what it is about alone: what is heard of variables meanwhile makes up for no sample
         # of the robot that is missing.
-        last = self._posted.get(key(sample))
-        sample = self._posted[key(sample)] = replace(sample, seq=0 if last is None else last.seq + 1)
+        told = self._told.get(what := key(sample)) or self._begin(what)
+        seq = 0 if told.posted is None else told.posted.seq + 1
+        sample = told.posted = replace(sample, seq=seq)
         self._post(sample)
 
     def _heard(self, host: float, device: float | None) -> None:
@@ -566,41 +571,22 @@ class Listener:
             _log.warning("%s: heard again", self.name)
         self._up = True
 
-    def _invalidate(self, what: tuple[str, ...], reason: str) -> None:
-        """Say again what was said last, with a doubt: whoever has taken it would not know."""
-        last = self._posted[what]
-        reason = f"{self.name}: {reason}"
-        if last.reason == reason:
+    def _invalidate(self, told: _Told, reason: str) -> None:
+        """Say again what was said last, if anything, with a doubt: whoever has taken it would not know."""
+        last, reason = told.posted, f"{self.name}: {reason}"
+        if last is None or last.reason == reason:
             return
         quality = Quality.DEGRADED if last.quality is Quality.GOOD else last.quality
-        self._posted[what] = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=last.seq + 1)
-        self._post(self._posted[what])
+        told.posted = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=last.seq + 1)
+        self._post(told.posted)
 
     def _distrust(self, reason: str) -> None:
         """Doubt what was said last, and what comes for a while: it may be of somebody else."""
         self._distrusted = reason, time.monotonic() + HOLD
         say_once(_log, logging.WARNING, f"{self.name}: {reason}")
-        for what in tuple(self._posted):
-            if not isinstance(self._posted[what], SignalSample):
-                self._invalidate(what, reason)
-
-    def _contradiction(self, sample: Sample, what: tuple[str, ...], t: float, host: float) -> str:
-        """What in it contradicts what was said before, now or a moment ago, or shows that nobody judged that.
-
-        Args:
-            sample: As it was heard.
-            what: It is about.
-            t: When what it says was so, on the host's clock [s].
-            host: When it arrived [s].
-        """
-        if what not in self._contradictions:
-            self._contradictions[what] = Contradictions(self._target)
-            self._held[what] = HeldBack(self._source.behind())
-        unseen = self._held[what].reason(sample, t, host, waits=self._waits(what))
-        if found := self._contradictions[what].find(sample) or unseen:
-            self._found[what] = found, host + HOLD
-        found, until = self._found.get(what, ("", 0.0))
-        return found if host <= until else ""
+        for told in tuple(self._told.values()):
+            if not isinstance(told.posted, SignalSample):
+                self._invalidate(told, reason)
 
     def _lose(self, word: str, reason: str) -> None:
         """One line per loss, and per answer that is another, however often it is tried again."""
@@ -608,6 +594,37 @@ class Listener:
             _log.warning("%s: %s: %s", self.name, word, reason)
             self._arrivals.lose()
         self._up, self._word, self._reason = False, word, reason
+
+
+class _Told:
+    """What was said of one thing.
+
+    Args:
+        target: What the source drives.
+        behind: How far a run is behind the world [s].
+    """
+
+    def __init__(self, target: Target | None, behind: float) -> None:
+        self.posted: Sample | None = None
+        """The last one."""
+        self.person: _Person | None = None
+        self._contradictions, self._held = Contradictions(target), HeldBack(behind)
+        self._found, self._until = "", 0.0
+        """What contradicted itself, and until when that counts [s]."""
+
+    def contradiction(self, sample: Sample, t: float, host: float, *, waits: bool) -> str:
+        """What in it contradicts what was said before, now or a moment ago, or shows that nobody judged that.
+
+        Args:
+            sample: As it was heard.
+            t: When what it says was so, on the host's clock [s].
+            host: When it arrived [s].
+            waits: Whether the one before was taken by nobody yet.
+        """
+        unseen = self._held.reason(sample, t, host, waits=waits)
+        if found := self._contradictions.find(sample) or unseen:
+            self._found, self._until = found, host + HOLD
+        return self._found if host <= self._until else ""
 
 
 class _Person:
@@ -641,13 +658,16 @@ def _content(sample: Sample) -> int:
         return 0
     said: tuple[tuple[float, ...] | None, ...]
     if isinstance(sample, JointSample):
-        said = sample.q, sample.qd
-    elif isinstance(sample, BodySample):
-        said = tuple([each for p in sample.points for each in (p.position, p.wxyz)])
+        q, qd = said = sample.q, sample.qd
+        unsure = math.isnan(sum(q) if qd is None else sum(q) + sum(qd))
     else:
-        said = sample.position, sample.wxyz
+        if isinstance(sample, BodySample):
+            said = tuple([each for p in sample.points for each in (p.position, p.wxyz)])
+        else:
+            said = sample.position, sample.wxyz
+        unsure = math.isnan(sum(map(sum, filter(None, said))))
     # What is no number differs from itself; its words do not.
-    return hash(repr(said) if math.isnan(sum(map(sum, filter(None, said)))) else said)
+    return hash(repr(said) if unsure else said)
 
 
 def name_of(source: LiveSource) -> str:

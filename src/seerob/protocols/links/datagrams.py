@@ -16,8 +16,6 @@ from seerob.protocols.links.reception import Reception, Wakeup
 
 WAITING = 512
 """Datagrams that wait for whoever reads; after that the oldest is dropped."""
-AT_ONCE = 64
-"""Datagrams that are read before others in the same loop have their turn."""
 LARGEST = 1 << 16
 """More than any datagram has [B]."""
 
@@ -88,7 +86,7 @@ class Datagrams(asyncio.DatagramProtocol):
 
     def attach(self, link: socket.socket) -> Callable[[], None]:
         """Call back for a loop that says when the socket can be read."""
-        reception, loop = Reception(link), self._loop
+        reception = Reception(link)
         self.port = link.getsockname()[1]
 
         def send(data: bytes, to: Address) -> None:
@@ -96,15 +94,13 @@ class Datagrams(asyncio.DatagramProtocol):
             with contextlib.suppress(OSError):
                 link.sendto(data, to)
 
-        def read(left: int = AT_ONCE) -> None:
+        def read() -> None:
+            # One at a time, whoever waits for it has it first: the loop calls again while there are more.
             try:
                 arrived, data, sender = reception.read(LARGEST)
             except OSError:  # all was read, or an answer was refused
                 return
             self._take(arrived, data, sender)
-            if left > 1:
-                # Whoever waits for it has it first: each look at the socket lets other threads go ahead.
-                loop.call_soon(read, left - 1)
 
         self._send = send
         return read

@@ -7,19 +7,26 @@ is stamped when it is read.
 
 What asyncio's events and futures wake is run in the next turn of the loop, which asks the kernel for news
 before: there a thread gives up the interpreter's lock and waits for it anew, behind one that computes.
+
+A packet that comes every few milliseconds finds the processor's caches with what others have computed
+meanwhile: what it costs is what is touched for the first time again, and asyncio's turn of the loop is as
+much of that as decoding. `PromptLoop` calls who reads a socket where it learns that there is something.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
+import select
+import selectors
 import socket
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterable
-from contextvars import Context
-from typing import Any, NamedTuple
+from collections.abc import Callable, Coroutine, Iterable
+from contextvars import Context, copy_context
+from typing import Any, NamedTuple, TypeVarTuple
 
 _NANOSECONDS = getattr(socket, "SO_TIMESTAMPNS", 35) if sys.platform == "linux" else None
 """Option, and kind of message; Python names it from 3.14 on, the number is that of most architectures."""
@@ -191,3 +198,107 @@ class Wakeup:
             self._set()
         else:
             self._wait.end(TimeoutError())
+
+
+def run_promptly(main: Coroutine[Any, Any, None]) -> None:
+    """Run what listens in a loop of its own, of which this thread has none: as `asyncio.run`, sooner read."""
+    factory = PromptLoop if hasattr(select, "epoll") else None
+    with asyncio.Runner(loop_factory=factory) as runner:
+        runner.run(main)
+
+
+_Ts = TypeVarTuple("_Ts")
+
+if hasattr(select, "epoll"):
+    _READABLE = select.EPOLLIN
+
+    class _PromptSelector(selectors.EpollSelector):
+        """Calls who reads a socket as soon as there is something, and tells asyncio of everything else."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self._epoll = select.epoll.fromfd(os.dup(self.fileno()))
+            self.readers: dict[int, Callable[[], object]] = {}
+            """Who is called, by descriptor."""
+            self.asked = False
+            """Whether the loop has been asked to do something since it began to wait."""
+
+        def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+            """Wait for what asyncio has to do itself: another socket, what a reader has begun, or the time.
+
+            Args:
+                timeout: Longest time [s]; None for no end.
+            """
+            self.asked = False
+            end = None if timeout is None else time.monotonic() + timeout
+            while True:
+                events = self._epoll.poll(timeout)
+                others = False
+                for file, what in events:
+                    reader = self.readers.get(file)
+                    if reader is None or what != _READABLE:
+                        others = True
+                    else:
+                        reader()
+                if others:
+                    return super().select(0)  # what is there is still there
+                if self.asked or not events:
+                    return []
+                if end is not None:
+                    timeout = end - time.monotonic()
+                    if timeout <= 0:
+                        return []
+
+        def close(self) -> None:
+            """Give its descriptors back."""
+            self._epoll.close()
+            super().close()
+
+    class PromptLoop(asyncio.SelectorEventLoop):
+        """asyncio's loop, but for `add_reader`, whose callback is called without a turn of the loop."""
+
+        def __init__(self) -> None:
+            self._prompt = _PromptSelector()
+            super().__init__(self._prompt)
+
+        def add_reader(self, fd: Any, callback: Callable[[*_Ts], Any], *args: *_Ts) -> None:
+            """Call back whenever there is something to read, in the context of whoever asks for it now."""
+            super().add_reader(fd, callback, *args)
+            context = copy_context()
+
+            def read() -> None:
+                try:
+                    context.run(callback, *args)
+                except (SystemExit, KeyboardInterrupt):
+                    raise
+                except BaseException as error:  # as asyncio does
+                    self.call_exception_handler({"message": "a reader failed", "exception": error})
+
+            self._prompt.readers[_descriptor(fd)] = read
+
+        def remove_reader(self, fd: Any) -> bool:
+            """Call back no more."""
+            self._prompt.readers.pop(_descriptor(fd), None)
+            return super().remove_reader(fd)
+
+        def call_soon(
+            self, callback: Callable[[*_Ts], object], *args: *_Ts, context: Context | None = None
+        ) -> asyncio.Handle:
+            """Call in the next turn of the loop, which begins when the reader that asks has returned."""
+            self._prompt.asked = True
+            return super().call_soon(callback, *args, context=context)
+
+        def call_at(
+            self,
+            when: float,
+            callback: Callable[[*_Ts], object],
+            *args: *_Ts,
+            context: Context | None = None,
+        ) -> asyncio.TimerHandle:
+            """Call at an instant of the loop's time [s]; who waits learns of it."""
+            self._prompt.asked = True
+            return super().call_at(when, callback, *args, context=context)
+
+
+def _descriptor(file: Any) -> int:
+    return file if isinstance(file, int) else int(file.fileno())

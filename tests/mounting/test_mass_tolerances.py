@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, judged, made, state_at, two_r
 from seerob.core.snapshot import Origin
 from seerob.core.tolerances import Tolerance
+from seerob.criteria.scoring.handled import heavier
 from seerob.description.description import Inertial, rigid
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
@@ -287,3 +288,30 @@ def test_the_centre_of_several_bodies_is_open_where_each_may_weigh_more_or_less(
     uneven = rigid([ball(-1.0, 0.1), ball(1.0, 0.0)])
     assert (uneven.error, uneven.spread_error) == (0.05, 0.1)
     assert rigid([ball(-1.0, 0.0), ball(1.0, 0.0)]).spread_error == 0
+
+
+def test_what_is_off_by_its_mass_and_its_density_is_off_by_their_product(tmp_path):
+    """7850 kg/m³ ± 20 %, of which the mass may be off by 25 % besides: 1.5 times as heavy, not 1.45."""
+    more = f"density = {DENSITY!r}\ndensity_tolerance = 0.2\nmass_tolerance = 0.25"
+    cell = made(tmp_path, FLOATING + TWO_R + TOOL.format(more), {"arm.urdf": two_r()})
+    found = MassTolerances(cell.model, cell.model.robot("arm"))
+    assert found.heaviest_load() == pytest.approx(1.5 * 0.7)
+    body = next(body for body in cell.model.bodies if body.owner == "grip")
+    assert heavier(cell.model, body) == pytest.approx(1.5)
+    assert found.heaviest(body.mj)[0] == pytest.approx(1.5)
+
+
+def test_of_a_body_that_several_inputs_leave_open_no_less_is_left_than_nothing(tmp_path):
+    """Its centre may be elsewhere, and so may its surface: together more than it weighs."""
+    box = trimesh.creation.box((0.05, 0.05, 0.05)).export(file_type="stl")
+    tool = TOOL.replace("shape = {{ sphere = 0.02 }}", 'mesh = "box.stl"\nunits = "m"\ndeviation_mm = 2')
+    more = 'mass = 4\ncom_tolerance = 0.02\n[[safety]]\nkind = "effective_mass"\nat = "arm"\nlimit = 900'
+    text = FLOATING + TWO_R + tool.format(more)
+    cell = made(tmp_path, text, {"arm.urdf": two_r(masses=(0.1, 0.1)), "box.stl": box})
+    state = state_at(cell, arm=((0.2, 1.0), (1.0, -2.0)))
+    found = MassTolerances(cell.model, cell.model.robot("arm"))
+    least = found.matrices(state).at((-1,) * len(found))
+    assert np.linalg.eigvalsh(least)[0] > 0
+    (result,) = judged(cell.bound, state)
+    assert result.interval is not None
+    assert 0 < result.interval[0] < result.value < result.interval[1]

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, basis_in, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, basis_in, heard, judged, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.tolerances import Tolerance, deciding, spread
 from seerob.criteria.contact.impact_mass import simplified_mass
@@ -16,6 +16,7 @@ from seerob.description.humans.skeleton import BONES
 from seerob.distance.least import Query
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.accuracy.tracking_error import TrackingError
+from seerob.twin.engine import Engine
 
 POSE = ((0.0, np.pi / 2), (1.0, -2.0))
 GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nmass = {mass}\n{more}\n'
@@ -371,3 +372,20 @@ def test_tolerances_of_what_is_not_given_are_refused(tmp_path):
         )
         with pytest.raises(InputError, match=key):
             made(tmp_path, FLOATING + TWO_R + text, {"arm.urdf": two_r()})
+
+
+def test_noise_of_speeds_counts_with_the_heaviest_masses(tmp_path):
+    """Of a load that may weigh twice as much, noise of speeds has its energy, too."""
+
+    def interval(name, **masses):
+        cell = loaded(
+            tmp_path / name, criteria=PLATE + criterion("kinetic_energy", 'robot = "arm"'), **masses
+        )
+        engine = Engine(cell.model, controllers=False)
+        engine.take([heard("arm", 0.0, *POSE, qd_error=(0.2, 0.2))])
+        return judged(cell.bound, engine.start())[0].interval
+
+    heavy = interval("heavy", links=(1.1, 1.1), tool=1.05)
+    off = interval("off", robot="mass_tolerance = 0.1\n", grip="mass_tolerance = 0.5")
+    assert off[1] == pytest.approx(heavy[1], rel=1e-9)
+    assert off[0] <= interval("light", links=(0.9, 0.9), tool=0.35)[0]

@@ -111,7 +111,10 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             error = twin.speed_error(robot)
             if error is not None:
                 # √(2E) is a norm of the velocities: it is off by no more than that of their errors.
-                off = np.sqrt(np.einsum("...ii,...i->...", twin.mass_matrix(robot), error**2))
+                M = twin.mass_matrix(robot)
+                if len(masses):
+                    M = masses.matrices(cast("State", twin)).at((1,) * len(masses))
+                off = np.sqrt(np.einsum("...ii,...i->...", M, error**2))
                 low = 0.5 * np.maximum(np.sqrt(2 * np.maximum(low, 0.0)) - off, 0.0) ** 2
                 high = 0.5 * (np.sqrt(2 * np.maximum(high, 0.0)) + off) ** 2
             interval, open_ = None if low is high else (low, high), others_noisy(twin, others)

@@ -16,6 +16,7 @@ from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
 from seerob.criteria.figure import Twin
 from seerob.model.model import Body, Model
+from seerob.twin.accuracy.mass_tolerances import heavier_by_tolerances
 from seerob.twin.state import State
 
 
@@ -83,8 +84,8 @@ def heavier(model: Model, body: Body) -> float:
     """Factor by which a body may be heavier: by tolerances, and by a volume that is within bounds alone."""
     station = model.workstation
     own = (thing for thing in (*station.tools, *station.workpieces) if thing.name == body.owner)
-    off = sum((thing.mass_tolerance or 0.0) + (thing.density_tolerance or 0.0) for thing in own)
-    return (1 + off) * (1 + (0.0 if body.mass is None else body.mass.error))
+    off = math.prod(map(heavier_by_tolerances, own))
+    return off * (1 + (0.0 if body.mass is None else body.mass.error))
 
 
 def unweighed(model: Model, human: str) -> list[str]:

@@ -31,7 +31,7 @@ inertia of its own on either side.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -171,7 +171,17 @@ class MassTolerances:
         M = state.mass_matrix(self.robot)
         rates = state.qd(self.robot) if rates is None else rates
         parts = [off.parts(state, self.robot, rates) for off in self._offs]
-        return Matrices(M, parts)
+        return Matrices(M, parts, lambda: self._without(state, M))
+
+    def _without(self, state: State, M: Array) -> Array:
+        """A mass matrix without all bodies that may be off by anything: no less is ever left of it."""
+        off = {body for each in self._offs for body in each.bodies}
+        found = M - sum((_Part.of(state, self.robot, body).matrix for body in sorted(off)), np.zeros_like(M))
+        rates = np.zeros(len(M))
+        return found - sum(
+            (each.parts(state, self.robot, rates).lost for each in self._offs if each.rotors),
+            np.zeros_like(M),
+        )
 
 
 class _Bounds(NamedTuple):
@@ -303,11 +313,16 @@ def _offs(
     """What of a robot, tool or workpiece is said to be off; by how much its estimated masses are, besides."""
     if not bodies:
         return
-    for key, share in (("mass_tolerance", mass), ("density_tolerance", density)):
-        if share:
-            yield _Off(Tolerance(f"{key} of {name}", 100 * share, "%"), tuple(bodies), share=share)
+    # A mass that is off by a share, of a density that is off, is off by the product of both.
+    of_density = (density or 0.0) * (1 + (mass or 0.0))
+    for key, told, share in (
+        ("mass_tolerance", mass, mass),
+        ("density_tolerance", density, of_density),
+    ):
+        if told and share:
+            yield _Off(Tolerance(f"{key} of {name}", 100 * told, "%"), tuple(bodies), share=share)
     if com:
-        either = (mass or 0.0) + (density or 0.0)
+        either = (mass or 0.0) + of_density
         tolerance = Tolerance(f"com_tolerance of {name}", com, "m")
         lighter, heavier = max(1 - either, 0.0), (1 + either) * (1 + estimated)
         ways = (com,) * len(bodies)
@@ -350,8 +365,13 @@ def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
     for body, mj in found:
         if body.mass is not None and _estimated(body.mass) > EXACT:
             of = given.get(body.owner)
-            either = 0.0 if of is None else (of.mass_tolerance or 0.0) + (of.density_tolerance or 0.0)
+            either = 0.0 if of is None else heavier_by_tolerances(of) - 1
             yield _off_by(f"volume of {body.owner}", (mj,), body.mass.error, body.mass.spread_error, either)
+
+
+def heavier_by_tolerances(thing: Mounted) -> float:
+    """Factor by which a thing may be heavier by the tolerances of its mass and of its density."""
+    return (1 + (thing.mass_tolerance or 0.0)) * (1 + (thing.density_tolerance or 0.0))
 
 
 def _held(model: Model, thing: Mounted) -> set[int]:
@@ -375,8 +395,8 @@ def _off_by(name: str, bodies: tuple[int, ...], share: float, spread: float, eit
 class Matrices:
     """Mass matrices of one state at the ends of what may be off."""
 
-    def __init__(self, M: Array, parts: Sequence[_Bounds]) -> None:
-        self.M, self.parts = M, parts
+    def __init__(self, M: Array, parts: Sequence[_Bounds], without: Callable[[], Array]) -> None:
+        self.M, self.parts, self._without = M, parts, without
 
     def at(self, shifts: Shifts) -> Array:
         """M at shifted inputs, shape (n, n): no less than it can be with 1, no more with −1."""
@@ -385,6 +405,9 @@ class Matrices:
         found = self._at(shifts, 0)
         if np.linalg.eigvalsh(found)[0] <= share * np.trace(self.M):
             found = self._at(shifts, 1) + share * self.M
+            if np.linalg.eigvalsh(found)[0] < 0:
+                # Of one body, which several inputs leave open, they would take more than there is.
+                found = self._without() + NOTHING * self.M
         return found
 
     def _at(self, shifts: Shifts, bound: int) -> Array:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import basis_in, state_at, two_r
+from made_cell import basis_in, results_at, state_at, two_r
 from made_separation import ROTOR, SIMULATED, K, V, part, separation, station, terms
 from seerob.core.verdict import Verdict
 from seerob.criteria.stopping import models as stop_models
 from seerob.criteria.stopping.simulated import StopSimulation
+from seerob.session.station import load
 
 
 def test_simulated_stop_of_one_joint_is_the_constant_deceleration(tmp_path):
@@ -170,11 +171,52 @@ def test_the_simulated_stop_is_that_of_masses_at_the_ends_of_their_tolerance(tmp
     near = separation(tmp_path / "near", SIMULATED, arm=MASSES_OFF, x=x)
     assert near.verdict is Verdict.UNDECIDED
     assert "mass_tolerance of arm ± 25 %" in near.reason
-    moved = separation(tmp_path / "com", SIMULATED, arm=ROTOR + "com_tolerance = 0.01\n")
-    assert moved.verdict is Verdict.UNDECIDED
-    assert "com_tolerance of arm ± 10 mm not followed" in moved.reason
-    # Nor is where the centre of a link is that its file knows within bounds alone.
+
+
+def test_of_centres_and_moments_that_are_off_a_simulated_stop_is_bounded_by_its_energy(tmp_path):
+    """No more than the bound, far from it; what is nearer is open, and so is what brakes may not hold."""
+    plain = separation(tmp_path / "plain", SIMULATED)
     spread = two_r().replace('<mass value="1.0"', '<mass value="1.0" error="0.1" spread_error="0.2"')
-    bounds = separation(tmp_path / "spread", SIMULATED, urdf=spread)
-    assert bounds.verdict is Verdict.UNDECIDED
-    assert "masses of links of arm ± 10 % not followed" in bounds.reason
+    for name, off, said in (
+        ("com", {"arm": ROTOR + "com_tolerance = 0.01\n"}, "com_tolerance of arm ± 10 mm"),
+        ("spread", {"urdf": spread}, "masses of links of arm ± 10 %"),
+    ):
+        found = separation(tmp_path / name, SIMULATED, **off)
+        more = part(found, "S_p may be larger by").value
+        assert found.limit == plain.limit
+        assert found.verdict is Verdict.WITHIN
+        heavy = separation(tmp_path / f"{name} heavy", SIMULATED, urdf=two_r(masses=(1.2, 1.2)))
+        assert more > heavy.limit - plain.limit > 0 or name == "com"
+        x = 6.0 - found.value + plain.limit + more / 2
+        near = separation(tmp_path / f"{name} near", SIMULATED, x=x, **off)
+        assert near.verdict is Verdict.UNDECIDED
+        assert f"if masses are off: {said}" in near.reason
+        folder = tmp_path / f"{name} falling"
+        station(folder, SIMULATED, **off)
+        text = (
+            (folder / "workstation.toml").read_text().replace("gravity = [0, 0, 0]", "gravity = [-90, 0, 0]")
+        )
+        (folder / "workstation.toml").write_text(text)
+        slack = results_at(load(folder), arm=((0.0, 0.0), (0.01, 0.0)))["S"]
+        assert slack.verdict is Verdict.UNDECIDED
+        assert f"{said} not followed" in slack.reason
+
+
+@pytest.mark.parametrize("direction", ["path", "toward"])
+def test_whatever_a_tool_weighs_within_its_bounds_its_stop_is_no_longer_than_is_told(tmp_path, direction):
+    """Centres and moments anywhere within what is told, at random postures and speeds, with gravity."""
+    rng = np.random.default_rng(7)
+    stop = SIMULATED.replace("[40.0, 20.0]", "[400.0, 200.0]") + f', direction = "{direction}"'
+    tool = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ box = [0.1, 0.2, 0.3] }}\nmass = {}\n'
+    for k in range(8):
+        q, qd = rng.uniform(-3, 3, 2), rng.uniform(-3, 3, 2)
+        off = ROTOR + tool.format(2.0) + "mass_tolerance = 0.2\ncom_tolerance = 0.05\n"
+        told = separation(tmp_path / f"a{k}", stop, q=q, qd=qd, arm=off, x=9.0)
+        most = told.limit + part(told, "S_p may be larger by").value
+        for i in range(3):
+            way = rng.normal(size=3)
+            com = (0.05 * way / np.linalg.norm(way)).tolist()
+            inertia = (np.array([0.2**2 + 0.3**2, 0.1**2 + 0.3**2, 0.1**2 + 0.2**2]) * 2.4 / 12).tolist()
+            real = tool.format(2.4) + f"com = {com}\ninertia = {[*inertia, 0, 0, 0]}\n"
+            true = separation(tmp_path / f"b{k}{i}", stop, q=q, qd=qd, arm=ROTOR + real, x=9.0)
+            assert true.limit <= most

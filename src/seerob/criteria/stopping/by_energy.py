@@ -1,4 +1,4 @@
-r"""What a simulated stop needs at most, whenever it begins within a span of time: by its energy.
+r"""What a simulated stop needs at most, whenever in a span of time it begins, of whatever mass: by energy.
 
 How a stop goes hangs on everything that it begins with. But brakes take energy out with every angle that a
 joint turns, gravity can give back no more than the masses allow, and so whatever the posture both way and
@@ -20,6 +20,7 @@ from seerob.criteria.stopping.terms import Course
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.spans import ROUNDING, Points, Span
+from seerob.twin.state import State
 
 
 class _Levers:
@@ -79,6 +80,29 @@ class _Levers:
             self._all = parts, np.sqrt(self._masses @ far**2 + self._rotors), weight @ loaded
         return self._all
 
+    def braked(self, brakes: Array, u: Array, out: Array, T_r: float) -> Course | None:
+        """What bounds a stop; None where nothing does.
+
+        Args:
+            brakes: Torque of each joint's brake [N·m or N], shape (j,).
+            u: Largest speeds of the joints until it begins [rad/s or m/s], shape (j,).
+            out: As of `at_all`, when the brakes set in.
+            T_r: Reaction time [s].
+        """
+        _, r, G = self.at_all(out)
+        root = float(r @ u)
+        if not (np.isfinite(root) and (brakes > G).all()):
+            return None
+        # No slide goes on by more than the energy can move it.
+        R, r, G = self.at_all(out + np.abs(self._robot.coupling) @ (root**2 / 2 / (brakes - G)))
+        left = brakes - G
+        if not (np.isfinite(R).all() and np.isfinite(r).all() and (left > 0).all()):
+            return None
+        v = R @ u
+        # A simulation counts the faster end of every step.
+        way = root**2 / 2 * (R / left).max(axis=1) + 2 * STEP * v
+        return Course(v, v * T_r + ROUNDING, way, root * float((r / left).max()) + 2 * STEP)
+
 
 def bind_braked_in_span(
     model: Model, robot: Mechanism, gap: Gap, brakes: Array, *, T_r: float, held: bool
@@ -113,12 +137,10 @@ def bind_braked_in_span(
     Returns:
         None where others move with it, its parts change hands, or a joint both turns and slides something.
     """
-    carries = robot.on or robot.riders or any(model.bodies[i].holder for i in gap.b)
-    turns = model.mj.jnt_type[model.mj.dof_jntid[robot.v_address]] == mujoco.mjtJoint.mjJNT_HINGE
-    moves = robot.coupling != 0
-    if carries or T_r > LARGEST_WINDOW or (moves[turns].any(axis=0) & moves[~turns].any(axis=0)).any():
+    if T_r > LARGEST_WINDOW or not _by_itself(model, robot, gap):
         return None
     own_v, period = robot.v_address[robot.own], model.workstation.engine.tick
+    moving = np.abs(robot.coupling)
 
     def bind(points: Points) -> Callable[[Span], Course | None]:
         levers = _Levers(model, robot, gap, points)
@@ -130,22 +152,46 @@ def bind_braked_in_span(
                 if known is None:
                     return None
                 u = np.maximum(u, known[0] + span.joint_noise[own_v])
-            moving = np.abs(robot.coupling)
-            out = span.away[robot.v_address] + moving @ u * T_r
-            _, r, G = levers.at_all(out)
-            root = float(r @ u)
-            if not (np.isfinite(root) and (brakes > G).all()):
-                return None
-            # No slide goes on by more than the energy can move it.
-            R, r, G = levers.at_all(out + moving @ (root**2 / 2 / (brakes - G)))
-            left = brakes - G
-            if not (np.isfinite(R).all() and np.isfinite(r).all() and (left > 0).all()):
-                return None
-            v = R @ u
-            # A simulation counts the faster end of every step.
-            way = root**2 / 2 * (R / left).max(axis=1) + 2 * STEP * v
-            return Course(v, v * T_r + ROUNDING, way, root * float((r / left).max()) + 2 * STEP)
+            return levers.braked(brakes, u, span.away[robot.v_address] + moving @ u * T_r, T_r)
 
         return at_most
 
     return bind
+
+
+def bind_braked(
+    model: Model, robot: Mechanism, gap: Gap, brakes: Array, *, T_r: float
+) -> Callable[[State, Array], Course | None] | None:
+    """Resolve what bounds a simulated stop that begins now, of whatever masses tolerances allow.
+
+    Args:
+        model: The workstation.
+        robot: Who stops.
+        gap: Its second set are the moving parts.
+        brakes: Torque of each joint's brake [N·m or N], shape (j,).
+        T_r: Reaction time [s].
+
+    Returns:
+        From a state and the largest speeds of the joints until the brakes act, shape (j,), to the bound, None
+        where brakes do not hold what gravity may load them with; None where `bind_braked_in_span` has none.
+    """
+    if not _by_itself(model, robot, gap):
+        return None
+    points = Points(model)
+    levers = _Levers(model, robot, gap, points)
+    moving, rest = np.abs(robot.coupling), model.mj.qpos0[robot.q_address]
+
+    def at_most(state: State, u: Array) -> Course | None:
+        points.chains(np.zeros(0, np.int64), state.attachments.ids, model.mj)
+        away = np.abs(robot.coupling @ state.q(robot) + robot.offset - rest)
+        return levers.braked(brakes, u, away + moving @ u * T_r, T_r)
+
+    return at_most
+
+
+def _by_itself(model: Model, robot: Mechanism, gap: Gap) -> bool:
+    """Whether nobody moves with it, its parts do not change hands, and no joint both turns and slides."""
+    carries = robot.on or robot.riders or any(model.bodies[i].holder for i in gap.b)
+    turns = model.mj.jnt_type[model.mj.dof_jntid[robot.v_address]] == mujoco.mjtJoint.mjJNT_HINGE
+    moves = robot.coupling != 0
+    return not (carries or (moves[turns].any(axis=0) & moves[~turns].any(axis=0)).any())

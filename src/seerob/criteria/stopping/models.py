@@ -16,7 +16,7 @@ from seerob.core.snapshot import Input, Origin
 from seerob.core.tolerances import Shifts
 from seerob.core.transforms import Array
 from seerob.criteria.stopping import table as stopping_table
-from seerob.criteria.stopping.by_energy import bind_braked_in_span
+from seerob.criteria.stopping.by_energy import bind_braked, bind_braked_in_span
 from seerob.criteria.stopping.by_table import (
     InSpan,
     Stopping,
@@ -442,6 +442,8 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     masses = simulation.masses
     followed = not masses.moved and len(masses) <= MOST_OFF
     corners = [*product((-1, 1), repeat=len(masses))] if followed and len(masses) else []
+    loose = f"{', '.join(map(str, masses.tolerances))} not followed in a simulated stop"
+    by_energy = None if followed or unknown else bind_braked(model, robot, gap, brakes, T_r=stop.reaction)
 
     def bound(state: State) -> Callable[[Onset, float], Course]:
         if unknown:
@@ -479,6 +481,11 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
 
         def at(onset: Onset, scale: float) -> Course:
             every = [weighing(onset, scale, shifts) for shifts in ((), *corners)]
+            if by_energy is not None:
+                u = np.abs(scale * state.qd(robot))
+                if onset.qd is not None:
+                    u = np.maximum(u, np.abs(onset.qd))
+                return _bounded(every[0], onset, by_energy(state, u), loose)
             if not corners:
                 return every[0]
             least, most = (_each(ends, every) for ends in (np.min, np.max))
@@ -501,10 +508,7 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
                 if robot.rotor_inertia_known
                 else (f"{robot.name}: rotor inertia is not given, so the simulated stop may be too short",)
             ),
-            *(
-                (f"{', '.join(map(str, masses.tolerances))} not followed in a simulated stop",)
-                * (not followed)
-            ),
+            *((loose,) * (not followed and by_energy is None)),
         ),
         not_modelled=(
             *(("masses between the ends of their tolerances: only the ends are asked",) * bool(corners)),
@@ -515,8 +519,17 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         if known
         else None,
         costly=True,
-        more=f"if masses are off: {', '.join(map(str, masses.tolerances))}" if corners else "",
+        more=f"if masses are off: {', '.join(map(str, masses.tolerances))}" if corners or by_energy else "",
     )
+
+
+def _bounded(found: Course, onset: Onset, most: Course | None, reason: str) -> Course:
+    """A course of masses as given, up to a bound for all that tolerances allow."""
+    if most is None:
+        return replace(found, unbounded_reason=found.unbounded_reason or reason)
+    # What comes nearer in all is no more than the way.
+    S_r, S_s = np.maximum(most.S_r, onset.S_r), np.maximum(most.S_s, found.S_s)
+    return replace(found, most=Course(found.v_r, S_r, S_s, max(most.T_s, found.T_s), found.unbounded_reason))
 
 
 def _each(ends: Callable[..., Array], courses: Sequence[Course]) -> Course:

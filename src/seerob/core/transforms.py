@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -164,7 +165,18 @@ def wxyz_from_rotation(rotation: ArrayLike) -> Array:
     Returns:
         Quaternion w, x, y, z, shape (4,).
     """
-    m = np.asarray(rotation, float).tolist()
+    return np.array(wxyz_from_rows(np.asarray(rotation, float).tolist()))
+
+
+def wxyz_from_rows(m: Sequence[Sequence[float]]) -> tuple[float, float, float, float]:
+    """Unit quaternion with w >= 0 of a rotation matrix, both of plain numbers.
+
+    Args:
+        m: Rotation matrix, row by row.
+
+    Returns:
+        Quaternion w, x, y, z.
+    """
     # Shepperd's method: divide by the largest of the four, so that nothing cancels.
     trace = m[0][0] + m[1][1] + m[2][2]
     squares = [trace, m[0][0], m[1][1], m[2][2]]
@@ -180,7 +192,9 @@ def wxyz_from_rotation(rotation: ArrayLike) -> Array:
     length = math.sqrt(sum(x * x for x in q))
     if q[0] < 0:
         length = -length
-    return np.array(q) / length
+    if not length:
+        return math.nan, math.nan, math.nan, math.nan
+    return q[0] / length, q[1] / length, q[2] / length, q[3] / length
 
 
 def turned(rotation: ArrayLike, wxyz: ArrayLike) -> Array:

@@ -170,8 +170,11 @@ class _Whole:
 
 def _way(a: Array, b: Array) -> Array:
     """By how much the middle of the points seen at both instants moved [m], shape (3,)."""
-    both = ~np.isnan(a + b).any(axis=1)
-    return (b[both] - a[both]).mean(axis=0) if both.any() else np.zeros(3)
+    ways = b - a
+    known = ~np.isnan(a + b).any(axis=1)
+    if not known.all():
+        ways = ways[known]
+    return ways.sum(axis=0) / len(ways) if len(ways) else np.zeros(3)
 
 
 def _rms_distance(a: Array, b: Array) -> float:

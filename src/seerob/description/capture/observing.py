@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from seerob.core.samples import BodyPoint, Vec3, Vec4
-from seerob.core.transforms import Array, rotation_from_wxyz, wxyz_from_rotation
+from seerob.core.transforms import Array, rotation_from_wxyz, wxyz_from_rows
 from seerob.description.capture.captured import CaptureFrame, Layout
 from seerob.description.capture.mapping import Convention, Place
 from seerob.description.description import Description
@@ -129,21 +130,26 @@ class Observer:
             positions = seen @ R.T + origin
             near = (np.abs(seen) < LARGEST).all(axis=1)  # false for NaN
         turned, known = _turned(frame, R)
+        indices, segments = self._mounted
+        turns = dict(zip(indices, (turned[indices] @ segments).tolist(), strict=True)) if indices else {}
+        places, seen_near, seen_turn = positions.tolist(), near.tolist(), known.tolist()
+        sure: float | None = None
         out = []
-        for row in self.rows:
+        for row, at in zip(self.rows, self._at, strict=True):
             i = row.index
-            sure = None if frame.confidence is None else _share(float(frame.confidence[i]))
-            factor = 1.0 if sure is None else sure
-            wp, wo = row.position * factor, row.orientation * factor
+            wp, wo = row.position, row.orientation
+            if frame.confidence is not None:
+                sure = _share(float(frame.confidence[i]))
+                wp, wo = wp * sure, wo * sure
             wxyz: Vec4 | None = None
-            if wo > 0 and row.segment_from_bone is not None and known[i]:
-                wxyz = _four(wxyz_from_rotation(turned[i] @ row.segment_from_bone))
+            if wo > 0 and seen_turn[i] and i in turns:
+                wxyz = wxyz_from_rows(turns[i])
             out.append(
                 BodyPoint(
                     name=row.name,
                     bone=row.bone,
-                    at=_three(row.at),
-                    position=_three(positions[i]) if wp > 0 and near[i] else None,
+                    at=at,
+                    position=tuple(places[i]) if wp > 0 and seen_near[i] else None,
                     wxyz=wxyz,
                     position_weight=wp,
                     orientation_weight=wo,
@@ -152,6 +158,17 @@ class Observer:
                 )
             )
         return tuple(out)
+
+    @cached_property
+    def _mounted(self) -> tuple[list[int], Array]:
+        """Rows of the layout of which it is known how their bone is turned, and how: (n, 3, 3)."""
+        known = {row.index: row.segment_from_bone for row in self.rows if row.segment_from_bone is not None}
+        return list(known), np.array(list(known.values()), float).reshape(-1, 3, 3)
+
+    @cached_property
+    def _at(self) -> tuple[Vec3, ...]:
+        """Where each row is in its bone's frame [m]."""
+        return tuple(_three(row.at) for row in self.rows)
 
 
 def bind(
@@ -287,7 +304,3 @@ def _share(value: float) -> float:
 
 def _three(v: Array) -> Vec3:
     return float(v[0]), float(v[1]), float(v[2])
-
-
-def _four(v: Array) -> Vec4:
-    return float(v[0]), float(v[1]), float(v[2]), float(v[3])

@@ -189,10 +189,11 @@ def _frame(
     """Rows in the order of ``ids``; NaN for what was not tracked."""
     rows = {number: row for row, number in enumerate(ids)}
     positions, turns = np.full((len(ids), 3), np.nan), np.full((len(ids), 4), np.nan)
-    for body in bodies:
-        row = rows.get(body.id)
-        if row is not None and body.tracked:
-            positions[row], turns[row] = world @ body.position, body.xyzw[[3, 0, 1, 2]]
+    seen = [(row, b) for b in bodies if b.tracked and (row := rows.get(b.id)) is not None]
+    if seen:
+        where = [row for row, _ in seen]
+        positions[where] = np.array([body.position for _, body in seen]) @ world.T
+        turns[where] = np.array([body.xyzw for _, body in seen])[:, [3, 0, 1, 2]]
     return CaptureFrame(t=t, positions=positions, orientations=turned(world, turns), subject=subject)
 
 

@@ -103,6 +103,10 @@ class Field(NamedTuple):
         return tuple(found)
 
 
+_field = tuple.__new__
+"""A `Field` without a call of Python's."""
+
+
 def fields(data: bytes) -> Iterator[Field]:
     """The fields of a message in the order in which they stand.
 
@@ -123,17 +127,19 @@ def fields(data: bytes) -> Iterator[Field]:
         wire = _WIRES.get(kind)
         if wire is None:
             raise ProtocolError(f"field {number} has the unknown wire type {kind}")
-        if wire is _VARINT:
-            value, at = _varint(data, at)
-            yield Field(number, _VARINT, value)
-            continue
-        if wire is _LENGTH:
-            length, at = _varint(data, at)
+        if wire is _VARINT or wire is _LENGTH:
+            if at < end and (length := data[at]) < 0x80:
+                at += 1
+            else:
+                length, at = _varint(data, at)
+            if wire is _VARINT:
+                yield _field(Field, (number, _VARINT, length))
+                continue
         else:
             length = 8 if wire is _FIXED64 else 4
         if length > end - at:
             raise ProtocolError(f"field {number} of {length} bytes, {end - at} are left")
-        yield Field(number, wire, data[at : at + length])
+        yield _field(Field, (number, wire, data[at : at + length]))
         at += length
 
 

@@ -1,5 +1,9 @@
 """What a process that listens to a live source takes of a core, and its memory; of every live kind in turn.
 
+Its memory is said three times: resident, with what all processes of this Python share; its share of that
+(PSS), by how many have each page; and its own alone, which is what one more listener takes, and what the goal
+is of.
+
 Its processor time, as the kernel counts it, by the time that passed, while the emulator of that kind sends at
 its usual rate; so also by sample. Processor time depends on what else the machine does: the load is printed.
 ``--against FOLDER`` measures, in turns, the listeners of another checkout beside these, at the same load.
@@ -44,11 +48,12 @@ def used(pid: int) -> float:
         return (int(found[11]) + int(found[12])) / TICK
 
 
-def memory(pid: int) -> tuple[float, float]:
-    """Resident, and of that its own alone [MB]."""
+def memory(pid: int) -> tuple[float, float, float]:
+    """Resident, its share of that, and its own alone [MB]."""
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]
     kilobytes = {line.split(":")[0]: int(line.split()[1]) for line in lines}
-    return kilobytes["Rss"] / 1e3, (kilobytes["Private_Clean"] + kilobytes["Private_Dirty"]) / 1e3
+    own = kilobytes["Private_Clean"] + kilobytes["Private_Dirty"]
+    return kilobytes["Rss"] / 1e3, kilobytes["Pss"] / 1e3, own / 1e3
 
 
 class Listening(SourceProcess):
@@ -81,8 +86,8 @@ class Listening(SourceProcess):
         return self._process.pid
 
 
-def measured(pair: bytes, root: Path, seconds: float) -> tuple[float, float, float, float]:
-    """Share of a core [%], time by sample [µs], resident and own memory [MB]."""
+def measured(pair: bytes, root: Path, seconds: float) -> tuple[float, float, float, float, float]:
+    """Share of a core [%], time by sample [µs], memory as `memory` says it [MB]."""
     process = Listening(pair, root)
     process.begin()
     try:
@@ -111,7 +116,7 @@ def main() -> None:
     kinds, seconds = (["rtde"], 0.5) if options.smoke else (options.kinds, options.seconds)
     roots = [HERE] if options.against is None else [HERE, options.against.resolve()]
     print(f"work that waits on this machine: {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores")
-    print(f"{'kind':<18} {'core':>7} {'a sample':>10} {'resident':>9} {'its own':>8}")
+    print(f"{'kind':<18} {'core':>7} {'a sample':>10} {'resident':>11} {'its share':>11} {'its own':>11}")
     for kind in kinds:
         with pytest.MonkeyPatch.context() as patch:
             server, source, target = KINDS[kind](patch)
@@ -124,11 +129,12 @@ def main() -> None:
             assert pair is not None, kind
             try:
                 for root in roots:
-                    share, each, whole, own = measured(pair, root, seconds)
+                    share, each, whole, part, own = measured(pair, root, seconds)
                     which = "" if root == HERE else "  " + str(root)
-                    over = " !" if share > GOAL_SHARE or whole > GOAL_MEMORY else ""
+                    over = " !" if share > GOAL_SHARE or own > GOAL_MEMORY else ""
                     print(
-                        f"{kind:<18} {share:6.2f}% {each:7.0f} us {whole:6.1f} MB {own:5.1f} MB{over}{which}",
+                        f"{kind:<18} {share:6.2f}% {each:7.0f} us "
+                        f"{whole:8.1f} MB {part:8.1f} MB {own:8.1f} MB{over}{which}",
                         flush=True,
                     )
             finally:

@@ -238,9 +238,20 @@ def test_who_needs_no_links_listens_without_numpy():
         "seerob.devices.live.listening_process",
         *(f"seerob.devices.sources.{kind}" for kind in kinds_of),
     ]
-    code = f"import sys, {', '.join(modules)}; print('numpy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
+    code = f"""
+import sys, types, {", ".join(modules)}
+from seerob.workstation.source import Target
+from seerob.devices.sources.opcua_robot import another_robot
+
+assert another_robot(types.SimpleNamespace(about={{"Model": "UR3e"}}), Target(model="library:ur5e"))
+print(sorted({{"numpy", "numba", "mujoco", "importlib.metadata"}} & {{*sys.modules}}))
+"""
+    # -S: what other packages have Python load at its start is none of ours.
+    path = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", code], capture_output=True, text=True, check=True, env=path
+    )
+    assert done.stdout.strip() == "[]"
 
 
 def test_links_of_the_target_are_told_to_whom_they_are_of_use():

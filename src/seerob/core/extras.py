@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 
 from seerob.core.errors import InputError, Problem
 
@@ -40,6 +39,8 @@ EXTRAS = {
 
 def edition(*names: str) -> str | None:
     """Which of these distributions is installed, with its version, unimported; None where none is."""
+    from importlib.metadata import PackageNotFoundError, version  # and with it email, which few need
+
     for name in names:
         with suppress(PackageNotFoundError):
             return f"{name} {version(name)}"

@@ -17,12 +17,14 @@ import sys
 from collections.abc import Hashable, Sequence
 from functools import cache
 from importlib.machinery import PathFinder
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Protocol, TypeVar, cast, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast, runtime_checkable
 
 from seerob.core.errors import SeerobError, UnknownName
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
 
@@ -96,6 +98,8 @@ def _changed(path: str) -> int:
 @cache
 def _offered(package: str, _paths: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
     """`offered`, of folders that are as they were: every package that is installed has a file to be read."""
+    from importlib.metadata import entry_points  # and with it email, which who listens needs not
+
     found = entry_points(group=f"seerob.{package}")
     return {point.name: point for point in sorted(found) if "." in point.name}
 

@@ -30,6 +30,7 @@ from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array
 from seerob.description import lint
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
+from seerob.description.robots import library_names
 from seerob.description.shapes import moments, shapes
 
 NOTE = "envelope made by seerob, not the maker's mesh"
@@ -117,12 +118,7 @@ def _rounded_in_box(lower: Array, upper: Array, color: shapes.Color) -> Mesh:
 
 
 Table = Mapping[str, Any]
-
-
-def names() -> tuple[str, ...]:
-    """Names of the robots in the library, sorted."""
-    files = resources.files(__package__).iterdir()
-    return tuple(sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml")))
+names = library_names.names
 
 
 @dataclass(frozen=True)

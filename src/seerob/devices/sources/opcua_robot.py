@@ -18,6 +18,7 @@ from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
+from seerob.description.robots import library_names
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.variables.access import missing, with_absolute_paths
 from seerob.devices.variables.live_source import PULSES
@@ -305,9 +306,7 @@ def another_robot(robot: Robot, target: Target | None) -> str:
     """Why a server speaks of another robot of the library than the twin; empty where it may be that one."""
     prefix, _, own = ("" if target is None else target.model).partition(":")
     said = robot.about.get("Model", "")
-    from seerob.description.robots import library  # reads meshes, which most sources need not
-
-    names = {_spelt(name): name for name in library.names() if _spelt(name) in _spelt(said)}
+    names = {_spelt(name): name for name in library_names.names() if _spelt(name) in _spelt(said)}
     if prefix != "library" or not names or names[max(names, key=len)] == own:
         return ""
     return f"the server says that its robot is {said}, and the twin is library:{own}"

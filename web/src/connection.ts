@@ -98,7 +98,8 @@ export class Connection {
     if (numbers && this.form) {
       this.heard = numbers[1]!;
       this.silent = numbers[2] === 1;
-      this.show(numbers[0]!, this.form, numbers);
+      this.shownT = numbers[0]!;
+      this.show(this.form, numbers);
     }
     const drawn = this.drawnId !== this.formId;
     const due = !this.asked && this.due(time);
@@ -203,7 +204,8 @@ export class Connection {
         this.numbers = message.numbers && new FormNumbers(message.numbers);
         if (this.numbers) this.numbers.form = message.id;
         if (this.poses) this.poses.form = message.id;
-        this.show(message.shown.t, this.form, null);
+        this.shownT = message.shown.t;
+        this.show(this.form, null);
         return;
       case "silence":
         this.silent = true;
@@ -241,13 +243,12 @@ export class Connection {
     tracesRevision.value += 1;
   }
 
-  private show(t: number, form: Form, numbers: Float64Array | null): void {
+  private show(form: Form, numbers: Float64Array | null): void {
     // Whatever got worse is not waited for: no text says within beside what is drawn as exceeded.
     const before = (this.pending ?? frame.peek())?.results;
     if (before && worse(form, numbers, before)) this.numbersAt = Number.NEGATIVE_INFINITY;
-    this.shownT = t;
     // Panels that follow it cost more than a picture, and in the room nobody sees them.
-    if (ownDevice.peek() === "desk") now.value = t;
+    if (ownDevice.peek() === "desk") now.value = this.shownT;
     this.watch();
     this.events.drawn(form, numbers);
   }

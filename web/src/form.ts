@@ -47,86 +47,93 @@ export function numbersOf(form: unknown, value: unknown, into: Float64Array, at:
   return keys === 0 ? next : -1;
 }
 
-/** The page's end: something drawn whose numbers are changed in place. What is numbers alone is a typed array in it. */
+/**
+ * The page's end: something drawn whose numbers are changed in place. What is numbers alone is a typed array in it, and
+ * what differs with each picture, value and limit of a result, is kept beside it: a number in an object would be an
+ * object of its own each time.
+ */
 export class Form {
-  /** By each number, what holds it and by which name; null where that is a typed array. */
-  private readonly holders: (Float64Array | Tree)[] = [];
-  private readonly keys: (string | null)[] = [];
+  /** Lists of numbers, and where each begins in `numbers`. */
+  private readonly lists: Float64Array[] = [];
   private readonly firsts: number[] = [];
+  /** Numbers that stand alone: what has them, by which name, and where they are. */
+  private readonly holders: Tree[] = [];
+  private readonly keys: string[] = [];
+  private readonly places: number[] = [];
   /** By each result, where its value and its limit are; −1 where they are no numbers. */
   private readonly values: number[] = [];
   private readonly limits: number[] = [];
+  /** All numbers as they are now, after `HEAD` others. */
+  readonly numbers: Float64Array;
 
   constructor(readonly shown: Shown) {
-    this.list(shown as unknown as Tree);
-    const at = (k: number, key: string) => {
-      const of: unknown = shown.results[k];
-      return this.firsts[this.holders.findIndex((holder, i) => holder === of && this.keys[i] === key)] ?? -1;
-    };
-    for (let k = 0; k < shown.results.length; k += 1) {
-      this.values.push(at(k, "value"));
-      this.limits.push(at(k, "limit"));
+    const numbers: number[] = new Array(HEAD).fill(Number.NaN);
+    this.list(shown as unknown as Tree, numbers);
+    this.numbers = Float64Array.from(numbers);
+    for (const result of shown.results) {
+      const at = (key: string) => this.places[this.placeOf(result, key)] ?? -1;
+      this.values.push(at("value"));
+      this.limits.push(at("limit"));
     }
+    // What differs with each picture and is not drawn itself.
+    const beside = (holder: Tree, key: string): boolean =>
+      key === "t" || ((key === "value" || key === "limit") && shown.results.includes(holder as never));
+    for (let i = this.keys.length - 1; i >= 0; i -= 1)
+      if (beside(this.holders[i]!, this.keys[i]!))
+        for (const each of [this.holders, this.keys, this.places]) each.splice(i, 1);
   }
 
   /** The state of a result; with other numbers, where they are given. */
   stateOf(k: number, numbers: Float64Array | null): State {
-    const { value, limit, at_most, verdict } = this.shown.results[k]!;
-    return stateAt(
-      verdict,
-      at_most,
-      figure(numbers, this.values[k]!, value),
-      figure(numbers, this.limits[k]!, limit),
-    );
+    const { verdict, at_most } = this.shown.results[k]!;
+    return stateAt(verdict, at_most, numbers ?? this.numbers, this.values[k]!, this.limits[k]!);
   }
 
   /** Take other numbers; whether it looks different now. */
   fill(numbers: Float64Array): boolean {
     let differs = false;
-    for (let k = 0; !differs && k < this.values.length; k += 1)
-      differs = this.stateOf(k, numbers) !== this.stateOf(k, null);
-    const { holders, keys, firsts } = this;
-    for (let i = 0; i < holders.length; i += 1) {
-      const holder = holders[i]!;
-      const key = keys[i]!;
-      const next = numbers[HEAD + firsts[i]!]!;
-      if (key === null) differs = taken(holder as Float64Array, numbers, HEAD + firsts[i]!) || differs;
-      else {
-        const before = (holder as Tree)[key] as number;
-        if (next === before) continue;
-        // Of a result's figures its state is seen.
-        if (key !== "t" && key !== "value" && key !== "limit" && !(Math.abs(next - before) <= UNSEEN))
-          differs = true;
-        (holder as Tree)[key] = next;
-      }
+    for (let k = 0; k < this.values.length; k += 1) {
+      if (this.stateOf(k, numbers) === this.stateOf(k, null)) continue;
+      differs = true;
+      // Whoever compares it with a result of another form finds the state that it has.
+      const result = this.shown.results[k]!;
+      if (this.values[k]! >= 0) result.value = numbers[this.values[k]!]!;
+      if (this.limits[k]! >= 0) result.limit = numbers[this.limits[k]!]!;
     }
+    for (let i = 0; i < this.lists.length; i += 1)
+      if (taken(this.lists[i]!, numbers, this.firsts[i]!)) differs = true;
+    const now = this.numbers;
+    for (let i = 0; i < this.places.length; i += 1) {
+      const at = this.places[i]!;
+      if (numbers[at] === now[at]) continue;
+      if (!(Math.abs(numbers[at]! - now[at]!) <= UNSEEN)) differs = true;
+      this.holders[i]![this.keys[i]!] = numbers[at];
+    }
+    for (let at = HEAD; at < now.length; at += 1) now[at] = numbers[at]!;
     return differs;
   }
 
-  private count = 0;
+  private placeOf(holder: unknown, key: string): number {
+    return this.holders.findIndex((one, i) => one === holder && this.keys[i] === key);
+  }
 
-  private list(tree: Tree): void {
+  private list(tree: Tree, numbers: number[]): void {
     for (const key in tree) {
       const value = tree[key];
-      if (typeof value === "number") this.add(tree, key, 1);
-      else if (Array.isArray(value) && value.length > 0 && value.every((x) => typeof x === "number")) {
+      if (typeof value === "number") {
+        this.holders.push(tree);
+        this.keys.push(key);
+        this.places.push(numbers.length);
+        numbers.push(value);
+      } else if (Array.isArray(value) && value.length > 0 && value.every((x) => typeof x === "number")) {
         const typed = Float64Array.from(value);
         tree[key] = typed;
-        this.add(typed, null, typed.length);
-      } else if (typeof value === "object" && value !== null) this.list(value as Tree);
+        this.lists.push(typed);
+        this.firsts.push(numbers.length);
+        for (const x of value) numbers.push(x);
+      } else if (typeof value === "object" && value !== null) this.list(value as Tree, numbers);
     }
   }
-
-  private add(holder: Float64Array | Tree, key: string | null, count: number): void {
-    this.holders.push(holder);
-    this.keys.push(key);
-    this.firsts.push(this.count);
-    this.count += count;
-  }
-}
-
-function figure(numbers: Float64Array | null, at: number, drawn: number | null): number {
-  return numbers && at >= 0 ? numbers[HEAD + at]! : (drawn ?? Number.NaN);
 }
 
 function taken(into: Float64Array, numbers: Float64Array, from: number): boolean {

@@ -21,6 +21,8 @@ export class Glide {
   private fromT = Number.NaN;
   /** Run time of what `at` returned last [s]. */
   shownT = Number.NaN;
+  /** Time between two pictures [ms]: where frames come as often as pictures are drawn, gliding would only add delay. */
+  drawnEvery = Number.NaN;
 
   /** Whether the newest frame is not reached yet. */
   get moving(): boolean {
@@ -39,21 +41,20 @@ export class Glide {
    * Take a received block; it is copied.
    *
    * @param block x, y, z [m], w, x, y, z per body.
-   * @param t Its run time [s].
+   * @param of Who has its run time [s].
    * @param now When it arrived [ms].
-   * @param drawnEvery Time between two pictures [ms]: where frames come as often as pictures are drawn,
-   *   gliding would only add delay.
    */
-  take(block: Float32Array, t: number, now: number, drawnEvery: number): void {
+  take(block: Float32Array, of: { readonly t: number }, now: number): void {
+    const { t } = of;
     const since = now - this.arrived;
     const step = t - this.t;
     const glides =
       this.to?.length === block.length &&
       since < LONGEST_MS &&
-      since > 1.5 * drawnEvery &&
+      since > 1.5 * this.drawnEvery &&
       step > 0 &&
       step < JUMP_S &&
-      !leaps(this.to, block, FASTEST * step);
+      !leaps(this.to, block, step);
     if (!this.to || this.to.length !== block.length) {
       this.from = block.slice();
       this.to = block.slice();
@@ -87,7 +88,8 @@ export class Glide {
   }
 }
 
-function leaps(from: Float32Array, to: Float32Array, most: number): boolean {
+function leaps(from: Float32Array, to: Float32Array, step: number): boolean {
+  const most = FASTEST * step;
   for (let k = 0; k < to.length; k += FLOATS_PER_NODE) {
     const x = to[k]! - from[k]!;
     const y = to[k + 1]! - from[k + 1]!;

@@ -60,21 +60,34 @@ export function margin(result: Pick<Result, "value" | "limit" | "at_most">): num
 
 /** How one result is shown. */
 export function stateOf(result: Pick<Result, "value" | "limit" | "at_most" | "verdict">): State {
-  const { verdict, at_most, value, limit } = result;
-  return stateAt(verdict, at_most, value ?? Number.NaN, limit ?? Number.NaN);
+  ALONE[0] = result.value ?? Number.NaN;
+  ALONE[1] = result.limit ?? Number.NaN;
+  return stateAt(result.verdict, result.at_most, ALONE, 0, 1);
 }
 
-/** The same of figures that stand alone; NaN for none. Nothing is made anew: it is asked for with every picture. */
+const ALONE = new Float64Array(2);
+
+/**
+ * The same of figures that stand among others; NaN for none.
+ *
+ * It is asked for with every picture, and a number that is handed over by itself would be an object each time.
+ *
+ * @param value Where in `numbers` the value stands; −1 for none.
+ * @param limit Where in them the limit stands; −1 for none.
+ */
 export function stateAt(
   verdict: Result["verdict"],
   atMost: Result["at_most"],
+  numbers: Float64Array,
   value: number,
   limit: number,
 ): State {
   if (verdict === "exceeded" || verdict === "undecided") return verdict;
   if (verdict !== "within") return "none";
-  const left = (atMost ? limit - value : value - limit) / Math.abs(limit);
-  return limit !== 0 && left < CLOSE_MARGIN ? "close" : "within";
+  if (value < 0 || limit < 0) return "within";
+  const most = numbers[limit]!;
+  const left = (atMost ? most - numbers[value]! : numbers[value]! - most) / Math.abs(most);
+  return most !== 0 && left < CLOSE_MARGIN ? "close" : "within";
 }
 
 /** The worst of several states; `none` for none. */

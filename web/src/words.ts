@@ -32,8 +32,12 @@ export function said(text: string, values?: Readonly<Record<string, string | num
   const chosen = language.value;
   const found = chosen === "en" ? text : (CATALOGUES[chosen][text] ?? text);
   // Without values nothing is made: buttons in the room are asked for their words ten times a second.
-  if (!values) return found;
-  return found.replace(/\{(\w+)\}/g, (all, name: string) => String(values[name] ?? all));
+  return values ? filled(found, values) : found;
+}
+
+// Apart, as what a function closes over is made whenever that is called.
+function filled(text: string, values: Readonly<Record<string, string | number>>): string {
+  return text.replace(/\{(\w+)\}/g, (all, name: string) => String(values[name] ?? all));
 }
 
 interface Sentence {

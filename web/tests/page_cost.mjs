@@ -1,59 +1,30 @@
 // What a picture costs the page, on the desk and in an emulated headset, with 50 bodies at 100 Hz:
 // `node tests/page_cost.mjs [seconds] [--where]`.
 // Told are the script's time per picture (processor time of the page's thread, from the browser's trace), what is
-// allocated per picture, and how old the poses are, by the clock that both ends share: when the server offers them to
-// pages, when they are taken for a picture, and when the script is done with it; and how many
-// snapshots were sent and how many replaced before they were. `--where` tells which functions allocate, and whose the
-// script's time is; a build with `npx vite build --minify false --sourcemap` names them.
+// allocated per picture by the page, by three.js and by WebXR (garbage.mjs; by the page there is to be nothing), and how
+// old the poses are, by the clock that both ends share: when the server offers them to pages, when they are taken for a
+// picture, and when the script is done with it; and how many snapshots were sent and how many replaced before they were.
+// `--where` tells which functions allocate, and whose the script's time is; a build with
+// `npx vite build --minify false --sourcemap` names them.
 
 import { SourceMap } from "node:module";
 import { openBrowser } from "./browser.mjs";
 import { enterRoom, HEADSET, pictures, put } from "./emulated_headset.mjs";
+import { allocated, COMPILED, drawn, hold, most, pass, WARM, WRAPPED } from "./garbage.mjs";
 import { serve } from "./served.mjs";
 
 const SECONDS = Number(process.argv[2] ?? 10);
-/** Until V8 has compiled what each picture does [s]. */
-const WARM = 25;
 const WHERE = process.argv.includes("--where");
 const BODIES = 50;
 /** Of the cell itself. */
 const OWN = 22;
-// Told in arrays that are made once: measuring allocates nothing.
-const WRAPPED = `
-(() => {
-  const most = 1 << 16;
-  const cost = { n: 0, begun: 0, taken: new Float64Array(most), done: new Float64Array(most), said: new Float64Array(most) };
-  window.cost = cost;
-  const wrapped = (own) => {
-    const kept = new WeakMap();
-    return function (act) {
-      let timed = kept.get(act);
-      if (!timed) {
-        timed = function timed(time, frame) {
-          const begun = performance.now();
-          act(time, frame);
-          const now = performance.now();
-          const { seerob } = window;
-          if (!seerob || !(seerob.posed >= 0) || cost.n >= most || seerob.posed === cost.last) return;
-          cost.last = seerob.posed;
-          const zero = cost.begun - performance.timeOrigin;
-          cost.taken[cost.n] = begun - zero - 1000 * seerob.posed;
-          cost.done[cost.n] = now - zero - 1000 * seerob.posed;
-          cost.said[cost.n] = now - zero - 1000 * seerob.t;
-          cost.n += 1;
-        };
-        kept.set(act, timed);
-      }
-      return own.call(this, timed);
-    };
-  };
-  window.requestAnimationFrame = wrapped(window.requestAnimationFrame);
-  const session = window.XRSession?.prototype;
-  if (session?.requestAnimationFrame) session.requestAnimationFrame = wrapped(session.requestAnimationFrame);
-})();`;
 
 const served = await serve("--mode", "live", "--seconds", "3600", "--further", String(BODIES - OWN));
-const browser = await openBrowser({ width: 640, height: 360, flags: ["--enable-precise-memory-info"] });
+const browser = await openBrowser({
+  width: 640,
+  height: 360,
+  flags: ["--enable-precise-memory-info", COMPILED],
+});
 const { page } = browser;
 await page.addInitScript(`${HEADSET}\n${WRAPPED}\nwindow.cost.begun = ${1000 * served.begun};`);
 await page.goto(served.url);
@@ -102,47 +73,6 @@ async function traced() {
   return { slots: slots.map(({ ms }) => ms), collected: collected.length };
 }
 
-/** Functions that ask WebXR for poses: what it tells is made anew by the browser, each number of a point an object. */
-const POSES = ["hold"];
-/** What this measurement asks the page. */
-const ASKED = ["get t", "get posed"];
-
-/** Functions that write figures, in the page or in the room: four times a second, not once per picture. */
-const FIGURES = ["publish", "paint"];
-
-/**
- * Bytes by function, of what is done for a picture, of poses that WebXR tells for it, of three.js's own drawing in it, of figures that are written in it,
- * of what comes by message, and of the rest: panels and plots, at their own pace. What the browser makes of a call is
- * the caller's, of an emulator's or this measurement's nobody's.
- */
-function allocated(head) {
-  const into = {
-    picture: new Map(),
-    poses: new Map(),
-    drawing: new Map(),
-    figures: new Map(),
-    heard: new Map(),
-    panels: new Map(),
-    theirs: new Map(),
-  };
-  const walk = ({ callFrame: { url, functionName, lineNumber }, selfSize, children }, part, ours) => {
-    let within = functionName === "timed" ? "picture" : functionName.endsWith("onmessage") ? "heard" : part;
-    if (within === "picture" && functionName.endsWith(".render")) within = "drawing";
-    if (within === "picture" && FIGURES.includes(functionName)) within = "figures";
-    // Functions of the browser's own have no line.
-    const own = url.includes("/assets/") || (url === "" && lineNumber < 0 && (ours || within === "heard"));
-    const asked = within === "picture" && ASKED.includes(functionName);
-    const told = within === "picture" && POSES.includes(functionName) ? "poses" : within;
-    const to = into[own && !asked ? told : "theirs"];
-    const key = `${functionName || "(anonymous)"}:${lineNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
-    to.set(key, (to.get(key) ?? 0) + selfSize);
-    const mine = url.includes("/assets/") ? functionName || "(anonymous)" : url === "" ? ours : "";
-    for (const child of children) walk(child, within, mine);
-  };
-  walk(head, "panels", "");
-  return into;
-}
-
 const maps = new Map();
 
 /** Whose a function is: of three.js, of another package, a file of the page, or of the emulator and of this. */
@@ -182,7 +112,7 @@ async function spent(pictures) {
 }
 
 async function measure(name) {
-  await page.waitForTimeout(1000 * WARM);
+  await pass(page, WARM);
   const { slots, collected } = await traced();
   await page.evaluate(() => {
     window.cost.n = 0;
@@ -195,37 +125,29 @@ async function measure(name) {
     const of = (key) => [...window.cost[key].subarray(0, window.cost.n)];
     return { taken: of("taken"), done: of("done"), said: of("said") };
   });
-  await cdp.send("HeapProfiler.startSampling", {
-    samplingInterval: 256,
-    includeObjectsCollectedByMajorGC: true,
-    includeObjectsCollectedByMinorGC: true,
-  });
-  const count = () => page.evaluate(() => window.cost.n);
-  const from = await count();
-  await page.waitForTimeout(1000 * SECONDS);
-  const drawn = (await count()) - from;
-  const { profile } = await cdp.send("HeapProfiler.stopSampling");
-  const parts = allocated(profile.head);
-  const kilobytes = (part) =>
-    `${([...parts[part].values()].reduce((a, b) => a + b, 0) / drawn / 1000).toFixed(1)} kB`;
+  const during = () => page.waitForTimeout(1000 * SECONDS);
+  const all = await allocated(page, cdp, during);
+  await hold(page, true);
+  const alone = await allocated(page, cdp, during);
+  await hold(page, false);
+  const kilobytes = (bytes) => `${(bytes / 1000).toFixed(2)} kB`;
   const mean = slots.reduce((a, b) => a + b, 0) / slots.length;
   process.stdout.write(
     `${name}: ${BODIES} bodies at 100 Hz, ${taken.length} pictures in ${SECONDS} s\n` +
       `  script per picture  mean ${mean.toFixed(2)}, ${both(slots)} of processor time (${collected} collections in ${slots.length} pictures)\n` +
       `  ${sent} snapshots sent, ${skipped} replaced before they were\n` +
       `  age when offered ${both(ages.slice(-100 * SECONDS).map((s) => 1000 * s))}; of poses when taken ${both(taken)}; when the picture's script is done ${both(done)}; of markers and figures then ${both(said)}\n` +
-      `  allocated per picture ${kilobytes("picture")} for it, ${kilobytes("poses")} by poses that WebXR tells, ${kilobytes("drawing")} by three.js's own drawing, ${kilobytes("figures")} by figures written then, ${kilobytes("heard")} by what is heard, ${kilobytes("panels")} by panels; ${kilobytes("theirs")} by emulator and measurement\n`,
+      `  allocated per picture, by itself (${alone.pictures} pictures): ${kilobytes(alone.sum.picture)} by the page, of which there is to be none; ${kilobytes(alone.sum.drawing)} by three.js's own drawing; ${kilobytes(alone.sum.poses)} by poses that WebXR tells\n` +
+      `  spread over pictures, what is done a few times a second: ${kilobytes(Math.max(all.sum.picture - alone.sum.picture, 0) + all.sum.figures)} by figures written then, ${kilobytes(all.sum.heard)} by what is heard, ${kilobytes(all.sum.panels)} by panels; ${kilobytes(all.sum.theirs)} by emulator and measurement\n`,
   );
   if (!WHERE) return;
   process.stdout.write("  whose the time is, ms per picture by the clock\n");
-  for (const [whose, ms] of (await spent(count)).slice(0, 24))
+  for (const [whose, ms] of (await spent(() => drawn(page))).slice(0, 24))
     process.stdout.write(`    ${ms.toFixed(3).padStart(8)} ${whose}\n`);
-  for (const part of ["picture", "poses", "drawing", "figures", "heard", "panels"]) {
-    process.stdout.write(`  ${part}\n`);
-    const most = [...parts[part]].sort((a, b) => b[1] - a[1]).slice(0, 30);
-    for (const [key, bytes] of most)
-      process.stdout.write(`    ${(bytes / drawn).toFixed(0).padStart(8)} ${key}\n`);
-  }
+  for (const part of ["picture", "poses", "drawing"])
+    process.stdout.write(`  ${part}, by itself [B]\n${most(alone.by[part], 30).join("\n")}\n`);
+  for (const part of ["picture", "figures", "heard", "panels"])
+    process.stdout.write(`  ${part}, with what is told [B]\n${most(all.by[part], 30).join("\n")}\n`);
 }
 
 await measure("desk");

@@ -8,17 +8,14 @@ const { placeCaptions } = await load("markers/placing");
 const view = { camera: { fov: 90, aspect: 1 }, pixel: 1 / 400, margins: true };
 
 function captionAt(x, y, widthPx, aside = false, heightPx = aside ? 36 : 24) {
-  const caption = { lifted: 0, right: 0, widthPx, heightPx, aside, side: 0, object: {} };
+  const caption = { liftedPx: 0, rightPx: 0, widthPx, heightPx, aside, side: 0, object: {} };
   const at = { x, y };
   caption.object.getWorldPosition = (to) => {
     to.set(at.x / 400, at.y / 400, 0);
     to.project = () => to;
     return to;
   };
-  caption.lift = (px, right = 0) => {
-    caption.lifted = px;
-    caption.right = right;
-  };
+  caption.lift = () => {};
   return { caption, at, x, y, widthPx, heightPx };
 }
 
@@ -28,7 +25,7 @@ const place = (all, seen = view) =>
     seen,
   );
 const boxOf = ({ caption, at, widthPx, heightPx }) => {
-  const [x, low] = [at.x + caption.right, at.y + caption.lifted];
+  const [x, low] = [at.x + caption.rightPx, at.y + caption.liftedPx];
   return { left: x - widthPx / 2, right: x + widthPx / 2, low, high: low + heightPx };
 };
 
@@ -58,8 +55,8 @@ test("no two names cover each other, and one alone stays where it belongs", () =
       captionAt(next() * 100, next() * 60, 20 + Math.round(next() * 80)),
     );
     place(all);
-    assert.equal(all[0].caption.lifted, 0);
-    for (const { caption } of all) assert.ok(caption.lifted >= 0);
+    assert.equal(all[0].caption.liftedPx, 0);
+    for (const { caption } of all) assert.ok(caption.liftedPx >= 0);
     assertApart(all);
   }
 });
@@ -98,13 +95,13 @@ test("in a narrow room figures are at its upper edge; in a headset they stay at 
   place([one], { camera: { fov: 90, aspect: 0.5 }, pixel: 1 / 400, margins: true });
   assert.ok(boxOf(one).high > 330);
   place([one], { ...view, margins: false });
-  assert.deepEqual([one.caption.lifted, one.caption.right], [0, 0]);
+  assert.deepEqual([one.caption.liftedPx, one.caption.rightPx], [0, 0]);
 });
 
 test("at the upper edge of the room names go down, not behind the tools", () => {
   const all = Array.from({ length: 5 }, () => captionAt(0, 300, 60));
   place(all);
-  const places = all.map((c) => 300 + c.caption.lifted).sort((a, b) => a - b);
+  const places = all.map((c) => 300 + c.caption.liftedPx).sort((a, b) => a - b);
   assert.ok(places.at(-1) + 24 <= 400 - 50);
   for (const [i, y] of places.slice(1).entries()) assert.ok(y - places[i] >= 24, `${places}`);
 });
@@ -113,7 +110,7 @@ test("at a side of the room names stay in sight, as far as the room is wide enou
   const shifted = (x, width) => {
     const one = captionAt(x, 0, width);
     place([one]);
-    return one.caption.right;
+    return one.caption.rightPx;
   };
   assert.equal(shifted(100, 200), 0);
   assert.ok(Math.abs(shifted(390, 200) + 90) < 1e-9);

@@ -181,7 +181,10 @@ const HALF = 0.5;
 /** The axis that is pointed at, as a marker of the room. */
 export function axisMarker(): Result | null {
   const axis = pointedAt.value;
-  if (!axis) return null;
+  return axis && drawnAs(axis);
+}
+
+function drawnAs(axis: Axis): Result {
   const end = (sign: number): [number, number, number] => {
     const [x, y, z] = axis.point.map((at, k) => at + sign * HALF * axis.axis[k]!);
     return [x!, y!, z!];

@@ -49,7 +49,7 @@ export class Caption {
   text = "";
   private verdict: Verdict | null = null;
   private lines: string[] = [];
-  /** How much higher than where it belongs it is, negative for lower; and how much further right [px]. */
+  /** How much higher than where it belongs it is, negative for lower; and how much further right [px]: then `lift`. */
   liftedPx = 0;
   rightPx = 0;
   /** Side of the room where it is; 0 before it was at any. */
@@ -65,7 +65,7 @@ export class Caption {
     this.object = new Sprite(this.material);
     this.object.renderOrder = 10;
     this.object.raycast = () => {};
-    this.lift(0);
+    this.lift();
   }
 
   say(said: string, verdict: Verdict | null): void {
@@ -89,7 +89,9 @@ export class Caption {
 
   face({ camera, pixel }: View): void {
     const size = pixel * depthOf(this.object, camera);
-    this.object.scale.set((this.canvas.width / SHARPNESS) * size, (this.canvas.height / SHARPNESS) * size, 1);
+    const { scale } = this.object;
+    scale.x = (this.canvas.width / SHARPNESS) * size;
+    scale.y = (this.canvas.height / SHARPNESS) * size;
   }
 
   get widthPx(): number {
@@ -106,11 +108,11 @@ export class Caption {
     return RAISED_PX + this.liftedPx;
   }
 
-  /** Draw it so much higher on the screen than where it belongs, and so much further right [px]. */
-  lift(px: number, rightPx = 0): void {
-    this.liftedPx = px;
-    this.rightPx = rightPx;
-    this.object.center.set(0.5 - rightPx / Math.max(this.widthPx, 1), -this.bottomPx / this.heightPx);
+  /** Draw it so much higher on the screen than where it belongs, and so much further right, as is noted. */
+  lift(): void {
+    const { center } = this.object;
+    center.x = 0.5 - this.rightPx / Math.max(this.widthPx, 1);
+    center.y = -this.bottomPx / this.heightPx;
   }
 
   dispose(): void {

@@ -52,7 +52,7 @@ export class Leaders {
       // The point of the plate that is nearest to where it belongs.
       const right = rightPx - Math.sign(rightPx) * Math.min(Math.abs(rightPx), widthPx / 2);
       const up = Math.min(Math.max(bottomPx, 0), bottomPx + heightPx);
-      if (Math.hypot(right, up) < LEAST_PX || count === MOST) continue;
+      if (right * right + up * up < LEAST_PX * LEAST_PX || count === MOST) continue;
       const depth = depthOf(caption.object, camera);
       caption.object.getWorldPosition(this.from);
       this.to.setFromMatrixColumn(camera.matrixWorld, 0).multiplyScalar(right * pixel * depth);

@@ -15,20 +15,25 @@ const SIDE_PX = 10;
 const NARROW_PX = 520;
 /** Share of the half room in which a caption keeps the side that it has, so that it does not jump. */
 const KEEPS_SIDE = 0.12;
+/** Of a caption in turn: where its point is, first as a share of the half room, then in pixels from its middle. */
 const at = new Vector3();
+/** Half height of the room, its right edge, and what is below tools [px]: a number handed over would be an object. */
+const room = { half: 0.5, edge: 0.5, top: 0.5 };
 
-interface Place {
-  x: number;
+// Classes, as V8 lets literals with the same names share what it knows of them: where one of those has something else
+// than a number, numbers of all of them are objects.
+class Place {
+  x = 0.5;
   /** Lower edge. */
-  y: number;
-  width: number;
-  height: number;
+  y = 0.5;
+  width = 0.5;
+  height = 0.5;
 }
 
-interface Belonging {
-  caption: Caption | null;
-  x: number;
-  y: number;
+class Belonging {
+  caption: Caption | null = null;
+  x = 0.5;
+  y = 0.5;
 }
 
 // Made once, as a picture allocates nothing of ours: so many of each are in use.
@@ -43,84 +48,92 @@ export function placeCaptions(
 ): void {
   const half = Math.tan((camera.fov * Math.PI) / 360) / pixel;
   const edge = half * camera.aspect;
-  const top = half - toolsPx;
+  room.half = half;
+  room.edge = edge;
+  room.top = half - toolsPx;
   placedCount = 0;
   let asideCount = 0;
   for (let k = 0; k < captions.length; k += 1) {
     const caption = captions[k]!;
     caption.object.getWorldPosition(at).project(camera);
-    const x = at.x * edge;
-    const y = at.y * half;
     // Beside the picture or behind the eye: nobody sees it, and there is no room to look for.
     const far = !(Math.abs(at.x) < 2 && Math.abs(at.y) < 2);
     const seen = Math.abs(at.x) < 1 && Math.abs(at.y) < 1 && at.z < 1;
-    if (far) caption.lift(0);
-    else if (margins && seen && caption.aside) {
-      keep(asideCount, caption, x, y);
+    at.x *= edge;
+    at.y *= half;
+    if (far) {
+      caption.liftedPx = caption.rightPx = 0;
+      caption.lift();
+    } else if (margins && seen && caption.aside) {
+      keep(asideCount, caption);
       asideCount += 1;
-    } else stack(caption, x, y, top, edge, seen);
+    } else stack(caption, seen);
   }
   // From above, so that lines to what they are about seldom cross.
-  for (let k = 0; k < asideCount; k += 1) {
-    const { caption, x, y } = aside[k]!;
-    putAside(caption!, x, y, half, top, edge);
-  }
+  for (let k = 0; k < asideCount; k += 1) putAside(aside[k]!);
 }
 
 /** Keep one that goes aside, before those below it. */
-function keep(count: number, caption: Caption, x: number, y: number): void {
-  if (aside.length === count) aside.push({ caption: null, x: 0, y: 0 });
+function keep(count: number, caption: Caption): void {
+  if (aside.length === count) aside.push(new Belonging());
   const one = aside[count]!;
   one.caption = caption;
-  one.x = x;
-  one.y = y;
+  one.x = at.x;
+  one.y = at.y;
   let k = count;
-  for (; k > 0 && aside[k - 1]!.y < y; k -= 1) aside[k] = aside[k - 1]!;
+  for (; k > 0 && aside[k - 1]!.y < one.y; k -= 1) aside[k] = aside[k - 1]!;
   aside[k] = one;
 }
 
-/** A place that counts as covered from now on. */
-function nextPlace(x: number, y: number, width: number, height: number): Place {
-  if (placed.length === placedCount) placed.push({ x: 0, y: 0, width: 0, height: 0 });
+/** A place for a caption, which counts as covered from now on; where in the room is said by whoever asks. */
+function nextPlace(caption: Caption): Place {
+  if (placed.length === placedCount) placed.push(new Place());
   const place = placed[placedCount]!;
-  place.x = x;
-  place.y = y;
-  place.width = width;
-  place.height = height;
+  place.width = caption.widthPx;
+  place.height = caption.heightPx + GAP_PX;
   return place;
 }
 
-function putAside(caption: Caption, x: number, y: number, half: number, top: number, edge: number): void {
-  const { widthPx: width, heightPx } = caption;
-  const height = heightPx + GAP_PX;
-  if (caption.side === 0 || Math.abs(x) > KEEPS_SIDE * edge) caption.side = x < 0 ? -1 : 1;
+function putAside({ caption, x, y }: Belonging): void {
+  const { half, edge, top } = room;
+  const place = nextPlace(caption!);
+  const { width, height } = place;
+  if (caption!.side === 0 || Math.abs(x) > KEEPS_SIDE * edge) caption!.side = x < 0 ? -1 : 1;
   const lowest = -half + LEGEND_PX;
   const highest = top - height;
   const level = 2 * edge < NARROW_PX ? highest : Math.max(Math.min(y - height / 2, highest), lowest);
-  const place = nextPlace(caption.side * Math.max(edge - SIDE_PX - width / 2, 0), level, width, height);
+  place.x = caption!.side * Math.max(edge - SIDE_PX - width / 2, 0);
+  place.y = level;
   for (let other = covered(place); other; other = covered(place)) place.y = other.y - height;
   if (place.y < lowest) {
     place.y = level;
     for (let other = covered(place); other; other = covered(place)) place.y = other.y + other.height;
   }
   placedCount += 1;
-  caption.lift(place.y - y, place.x - x);
+  caption!.liftedPx = place.y - y;
+  caption!.rightPx = place.x - x;
+  caption!.lift();
 }
 
 // Above those before it that it would cover, or below them when the room ends above; beside its point when the
 // room ends at a side.
-function stack(caption: Caption, x: number, y: number, top: number, edge: number, seen: boolean): void {
+function stack(caption: Caption, seen: boolean): void {
+  const { x, y } = at;
+  const { top, edge } = room;
+  const place = nextPlace(caption);
   // Of a point that is out of sight, or where the room is too narrow, it stays over its point.
-  const room = seen ? Math.max(edge - caption.widthPx / 2, 0) : Number.POSITIVE_INFINITY;
-  const beside = room > 0 ? Math.min(Math.max(x, -room), room) : x;
-  const place = nextPlace(beside, y, caption.widthPx, caption.heightPx + GAP_PX);
+  const free = seen ? Math.max(edge - place.width / 2, 0) : Number.POSITIVE_INFINITY;
+  place.x = free > 0 ? Math.min(Math.max(x, -free), free) : x;
+  place.y = y;
   for (let below = covered(place); below; below = covered(place)) place.y = below.y + below.height;
   if (place.y > y && place.y + place.height > top) {
     place.y = y - place.height;
     for (let above = covered(place); above; above = covered(place)) place.y = above.y - place.height;
   }
   placedCount += 1;
-  caption.lift(place.y - y, place.x - x);
+  caption.liftedPx = place.y - y;
+  caption.rightPx = place.x - x;
+  caption.lift();
 }
 
 function covered({ x, y, width, height }: Place): Place | undefined {

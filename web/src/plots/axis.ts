@@ -51,19 +51,27 @@ export function shownRange(): TimeRange {
   if (isLive.value) {
     const first = firstTime.value;
     const span = seconds ?? Math.max(end - first, LIVE_LEAST_S);
-    const newest = Math.max(end, first + span);
-    return { start: newest - span, end: newest };
+    const last = Math.max(end, first + span);
+    return range(last - span, last);
   }
   if (seconds === null || seconds >= end - start) {
     // All of a longer run beside it is seen, too.
     const { first, last } = beside.value;
     const begin = Math.min(start, first);
     const stop = seconds === null ? last : Math.min(last, begin + seconds);
-    return { start: begin, end: Math.max(end, stop, begin + 1e-3) };
+    return range(begin, Math.max(end, stop, begin + 1e-3));
   }
   const middle = Number.isFinite(now.value) ? now.value : start;
   const left = Math.min(Math.max(middle - seconds / 2, start), end - seconds);
-  return { start: left, end: left + seconds };
+  return range(left, left + seconds);
+}
+
+let newest: TimeRange = { start: 0, end: 0 };
+
+// The same one as long as it is the same: it is asked for with every picture.
+function range(start: number, end: number): TimeRange {
+  if (newest.start !== start || newest.end !== end) newest = { start, end };
+  return newest;
 }
 
 const beside = computed(() => {

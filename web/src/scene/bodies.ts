@@ -154,6 +154,8 @@ export class Body {
   }
   /** Whether it may be elsewhere. */
   doubted = false;
+  /** Whether a variable says that it is not there. */
+  absent = false;
 
   constructor(readonly node: Node) {
     this.group.name = node.name;
@@ -277,7 +279,6 @@ export class Bodies {
   /** Where every body was put. */
   private posed = new Float32Array();
   private hidden: ReadonlySet<string> = new Set();
-  private absent: ReadonlySet<string> = new Set();
   private real = false;
   private generation = 0;
   /** Whether somebody wears a look of a variable, or is in doubt. */
@@ -453,12 +454,14 @@ export class Bodies {
   /** Looks that follow variables: colours in 0…1, null for what is not drawn. */
   wear(looks: Looks): void {
     if (!this.worn && isEmpty(looks)) return;
-    const names = Object.keys(looks);
-    this.worn = names.length > 0;
-    this.absent = new Set(names.filter((name) => looks[name] === null));
-    for (const body of this.list) {
+    this.worn = !isEmpty(looks);
+    for (let k = 0; k < this.list.length; k += 1) {
+      const body = this.list[k]!;
       const look = looks[body.node.name];
-      body.wear(look ? look.reduce((sum, part) => sum * 256 + Math.round(255 * part), 0) : undefined);
+      body.absent = look === null;
+      let color = 0;
+      if (look) for (let i = 0; i < look.length; i += 1) color = color * 256 + Math.round(255 * look[i]!);
+      body.wear(look ? color : undefined);
     }
     this.reveal();
   }
@@ -471,9 +474,9 @@ export class Bodies {
   }
 
   private reveal(): void {
-    for (const body of this.list) {
-      const { name } = body.node;
-      const visible = !this.hidden.has(name) && !this.absent.has(name);
+    for (let k = 0; k < this.list.length; k += 1) {
+      const body = this.list[k]!;
+      const visible = !this.hidden.has(body.node.name) && !body.absent;
       if (visible === body.group.visible) continue;
       body.group.visible = visible;
       body.follow();

@@ -153,6 +153,8 @@ class Companion {
 export class Companions {
   readonly root = new Group();
   private readonly of = new Map<number, Companion>();
+  /** The same, in a list: what a map is gone through with would be made anew for each picture. */
+  private all: readonly Companion[] = [];
   private at = Number.NaN;
 
   /** Show these and no others. */
@@ -172,6 +174,7 @@ export class Companions {
         this.root.add(companion.root);
       }
     }
+    this.all = [...this.of.values()];
   }
 
   take({ visitors }: Presences): void {
@@ -181,11 +184,11 @@ export class Companions {
 
   /** Once per picture; whether anybody has moved. */
   tick(time: number): boolean {
-    const share = 1 - Math.exp(-(time - this.at) / FOLLOWS_MS);
+    const since = time - this.at;
     this.at = time;
     let moved = false;
-    for (const companion of this.of.values())
-      moved = companion.follow(Number.isNaN(share) ? 1 : share) || moved;
+    const share = Number.isNaN(since) ? 1 : 1 - Math.exp(-since / FOLLOWS_MS);
+    for (let k = 0; k < this.all.length; k += 1) moved = this.all[k]!.follow(share) || moved;
     return moved;
   }
 

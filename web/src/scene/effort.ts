@@ -56,7 +56,8 @@ const GIVEN_UP_MS = 10_000;
 export class Sharpness {
   /** Now. */
   ratio: number;
-  private times: number[] = [];
+  private readonly times = new Float64Array(LOOKED_AT);
+  private count = 0;
   /** How long a picture took before pixels were made larger [ms]; null when they were not just now. */
   private before: number | null = null;
   private idleUntil = 0;
@@ -76,10 +77,11 @@ export class Sharpness {
 
   /** A picture came `took` after the one before it, at `time` [ms]: whether the ratio is another one now. */
   take(took: number, time: number): boolean {
-    this.times.push(took);
-    if (this.times.length < LOOKED_AT) return false;
-    const typical = this.times.sort((a, b) => a - b)[LOOKED_AT >> 1]!;
-    this.times = [];
+    this.times[this.count] = took;
+    this.count += 1;
+    if (this.count < LOOKED_AT) return false;
+    this.count = 0;
+    const typical = this.times.sort()[LOOKED_AT >> 1]!;
     const before = this.before;
     this.before = null;
     if (before !== null && typical > HELPS * before) {

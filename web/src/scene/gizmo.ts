@@ -13,7 +13,11 @@ import { Carried, frameOf } from "./carried";
 import type { Stage } from "./stage";
 
 export class Gizmo {
-  private readonly controls: TransformControls;
+  /**
+   * Made when something is edited first: its meshes come after all others by an infinite number, and from then on V8
+   * has that number of every mesh as an object of its own.
+   */
+  private controls: TransformControls | null = null;
   /** Stands where the entry is, along the axes of the world (z up); turned only while it is turned. */
   private readonly handle = new Object3D();
   private entry: Entry | null = null;
@@ -25,26 +29,12 @@ export class Gizmo {
   constructor(
     private readonly stage: Stage,
     private readonly bodies: Bodies,
-    free: (yes: boolean) => void,
+    private readonly free: (yes: boolean) => void,
   ) {
-    this.controls = new TransformControls(stage.camera, stage.renderer.domElement);
-    // The handle has the world's axes: its own space is z up, that of three.js is y up.
-    this.controls.setSpace("local");
-    this.controls.setSize(0.8);
     stage.world.add(this.handle);
-    this.controls.addEventListener("change", () => stage.invalidate());
-    this.controls.addEventListener("objectChange", () => this.carry());
-    this.controls.addEventListener("dragging-changed", ({ value }) => {
-      free(value !== true);
-      holding.value = value === true && this.entry ? [this.entry.name] : [];
-      if (value === true) this.take();
-      else void this.put();
-    });
     effect(() => {
-      this.controls.setMode(gizmoMode.value === "move" ? "translate" : "rotate");
-      const [length, angle] = STEPS[steps.value];
-      this.controls.setTranslationSnap(length || null);
-      this.controls.setRotationSnap(angle ? MathUtils.degToRad(angle) : null);
+      void [gizmoMode.value, steps.value];
+      if (this.controls) this.choose(this.controls);
       stage.invalidate();
     });
     effect(() => {
@@ -57,20 +47,47 @@ export class Gizmo {
 
   /** Whether the pointer is on a handle, or drags one. */
   get held(): boolean {
-    return this.controls.dragging || this.controls.axis !== null;
+    return this.controls !== null && (this.controls.dragging || this.controls.axis !== null);
+  }
+
+  private make(): TransformControls {
+    const { stage } = this;
+    const controls = new TransformControls(stage.camera, stage.renderer.domElement);
+    // The handle has the world's axes: its own space is z up, that of three.js is y up.
+    controls.setSpace("local");
+    controls.setSize(0.8);
+    controls.addEventListener("change", () => stage.invalidate());
+    controls.addEventListener("objectChange", () => this.carry());
+    controls.addEventListener("dragging-changed", ({ value }) => {
+      this.free(value !== true);
+      holding.value = value === true && this.entry ? [this.entry.name] : [];
+      if (value === true) this.take();
+      else void this.put();
+    });
+    this.choose(controls);
+    return controls;
+  }
+
+  /** Have handles do what is chosen, in the steps that are. */
+  private choose(controls: TransformControls): void {
+    controls.setMode(gizmoMode.peek() === "move" ? "translate" : "rotate");
+    const [length, angle] = STEPS[steps.peek()];
+    controls.setTranslationSnap(length || null);
+    controls.setRotationSnap(angle ? MathUtils.degToRad(angle) : null);
   }
 
   /** Stand where the entry is; none that is on something whose place is not known here. */
   place(): void {
-    if (this.controls.dragging) return;
+    if (this.controls?.dragging) return;
     const { entry } = this;
     if (!entry || !frameOf(entry, this.bodies, this.frame)) {
-      this.controls.detach();
+      this.controls?.detach();
       // Hidden handles, too, are turned to the eye in each picture.
-      this.controls.getHelper().removeFromParent();
+      this.controls?.getHelper().removeFromParent();
       this.stage.invalidate();
       return;
     }
+    this.controls ??= this.make();
     const { position } = placing(entry);
     this.handle.position.copy(position.applyMatrix4(this.frame));
     this.handle.quaternion.identity();
@@ -87,7 +104,7 @@ export class Gizmo {
   }
 
   private carry(): void {
-    if (!this.controls.dragging || !this.carried) return;
+    if (!this.controls?.dragging || !this.carried) return;
     this.handle.updateMatrix();
     this.carried.motion.multiplyMatrices(this.handle.matrix, this.start);
     this.carried.show();

@@ -93,7 +93,10 @@ export class OwnPresence {
     position.applyMatrix4(this.fromRig);
     turn.premultiply(this.rigTurn).normalize();
     const at = row * FLOATS;
-    position.toArray(this.poses, at);
+    // By hand: three.js's function for it is used with all kinds of lists, and each number is an object there.
+    this.poses[at] = position.x;
+    this.poses[at + 1] = position.y;
+    this.poses[at + 2] = position.z;
     this.poses[at + 3] = turn.w;
     this.poses[at + 4] = turn.x;
     this.poses[at + 5] = turn.y;

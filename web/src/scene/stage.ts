@@ -19,6 +19,7 @@ import {
 import { Backdrop, type Standing } from "./backdrop";
 import { drawnBySoftware, Sharpness } from "./effort";
 import { makeGrid, recolorGrid } from "./grid";
+import { keepLists } from "./render_list";
 import { roomLook } from "./room_look";
 
 /** Pictures per second below which pixels are made larger, and the largest of them, by processor and by graphics card. */
@@ -55,6 +56,7 @@ export class Stage {
     const light = drawnBySoftware();
     const kind = light ? "software" : "hardware";
     this.renderer = light ? opaque() : new WebGLRenderer({ antialias: true });
+    keepLists(this.renderer);
     this.backdrop = new Backdrop(this.renderer);
     this.sharpest = Math.min(globalThis.devicePixelRatio, light ? 1 : 2);
     const least = Math.min(LEAST_SHARPNESS[kind], this.sharpest);
@@ -66,7 +68,10 @@ export class Stage {
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     element.append(this.renderer.domElement);
-    this.renderer.domElement.addEventListener("webglcontextrestored", () => this.refresh());
+    this.renderer.domElement.addEventListener("webglcontextrestored", () => {
+      keepLists(this.renderer);
+      this.refresh();
+    });
     this.scene.background = this.ground;
     this.scene.fog = this.fog;
     this.world.rotation.x = -Math.PI / 2;

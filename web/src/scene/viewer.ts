@@ -26,7 +26,7 @@ import { manikinTints } from "../posture/coloring";
 import { angleUnit, lengthUnit } from "../units";
 import { camera, cameraShown, device } from "../view/camera";
 import { measuring, type Normal, withFace } from "../view/measure";
-import { followProbe, probeAt, probing } from "../view/probe";
+import { followProbe, probe, probeAt, probing } from "../view/probe";
 import { reaching } from "../view/reach";
 import { sectionPlanes } from "../view/section";
 import type { CameraInfo, Scene } from "../wire";
@@ -163,8 +163,9 @@ export class Viewer {
   /** Once per display frame, before drawing. */
   tick(time: number): void {
     const block = this.feed?.read();
-    if (block) this.glide.take(block, this.feed!.t, time, time - this.tickedAt);
+    this.glide.drawnEvery = time - this.tickedAt;
     this.tickedAt = time;
+    if (block) this.glide.take(block, this.feed!, time);
     if (block || this.glide.moving) {
       const shown = this.glide.at(time);
       if (shown) {
@@ -250,7 +251,8 @@ export class Viewer {
 
   // Where bodies are between two instants is drawn, not known.
   private probe(): void {
-    if (this.feed) followProbe(this.feed.t, (name) => this.bodies.byName.get(name)?.group);
+    const probed = probe.peek();
+    if (probed && this.feed) followProbe(this.feed.t, this.bodies.byName.get(probed.name)?.group);
   }
 
   /** Volumes with edges, of which one may be all that is seen. */

@@ -37,9 +37,8 @@ export function probeAt(name: string, point: Vector3, body: Object3D): void {
 }
 
 /** Follow the body to where it is shown at an instant. */
-export function followProbe(t: number, body: (name: string) => Object3D | undefined): void {
+export function followProbe(t: number, group: Object3D | undefined): void {
   const now = probe.peek();
-  const group = now && body(now.name);
   if (!now || !group) return;
   group.updateWorldMatrix(true, false);
   const place = group.localToWorld(now.local.clone());

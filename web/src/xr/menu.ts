@@ -1,6 +1,16 @@
 // A menu beside the wrist: large buttons that the other hand's beam presses, for time and for comfort.
 
-import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, type Raycaster, SRGBColorSpace } from "three";
+import {
+  CanvasTexture,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  PlaneGeometry,
+  type Ray,
+  type Raycaster,
+  SRGBColorSpace,
+  Vector3,
+} from "three";
 import { uncut } from "../scene/materials";
 import { OVER_CAPTIONS } from "./panel";
 
@@ -47,8 +57,7 @@ export class Menu {
 
   /** Whether a ray of the world meets it; notes which button. */
   point(ray: Raycaster): boolean {
-    const [hit] = ray.intersectObject(this.mesh);
-    this.pointed = hit?.uv ? this.at(hit.uv.x, hit.uv.y) : -1;
+    this.pointed = this.met(ray.ray);
     return this.pointed >= 0;
   }
 
@@ -72,7 +81,11 @@ export class Menu {
     // What stands on buttons changes seldom; where one points, at any time.
     if (this.pointed === this.drawn && Math.abs(time - this.lookedAt) < EVERY_MS) return;
     this.lookedAt = time;
-    if (!this.news()) return;
+    if (this.news()) this.paint();
+  }
+
+  // Apart, as what a function closes over is made whenever that is called.
+  private paint(): void {
     const { brush } = this;
     const [w, h] = [BUTTON.width * SHARP, BUTTON.height * SHARP];
     brush.clearRect(0, 0, brush.canvas.width, brush.canvas.height);
@@ -112,8 +125,22 @@ export class Menu {
     this.mesh.geometry.dispose();
   }
 
-  private at(u: number, v: number): number {
-    const k = Math.floor((1 - v) * this.rowCount) * COLUMNS + Math.floor(u * COLUMNS);
+  private readonly from = new Vector3();
+  private readonly along = new Vector3();
+  private readonly toOwn = new Matrix4();
+
+  /** The button that a ray of the world meets from before it; −1 for none. Lists of what is met would be made anew. */
+  private met({ origin, direction }: Ray): number {
+    const { mesh, from, along, toOwn } = this;
+    toOwn.copy(mesh.matrixWorld).invert();
+    from.copy(origin).applyMatrix4(toOwn);
+    along.copy(direction).transformDirection(toOwn);
+    if (!(from.z >= 0 && along.z < 0)) return -1;
+    const way = -from.z / along.z;
+    const column = Math.floor((from.x + way * along.x) / BUTTON.width + COLUMNS / 2);
+    const row = Math.floor(this.rowCount / 2 - (from.y + way * along.y) / BUTTON.height);
+    if (column < 0 || column >= COLUMNS || row < 0 || row >= this.rowCount) return -1;
+    const k = row * COLUMNS + column;
     return k < this.items.length ? k : -1;
   }
 }

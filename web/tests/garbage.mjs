@@ -93,7 +93,12 @@ function parted(head) {
     const to = into[own && !asked ? told : "theirs"];
     const key = `${functionName || "(anonymous)"}:${lineNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
     to.set(key, (to.get(key) ?? 0) + selfSize);
-    const mine = url.includes("/assets/") ? functionName || "(anonymous)" : url === "" ? ours : "";
+    // Nor has a script that a test puts before the page an address, and its functions have lines.
+    const mine = url.includes("/assets/")
+      ? functionName || "(anonymous)"
+      : url === "" && lineNumber < 0
+        ? ours
+        : "";
     for (const child of children) walk(child, within, mine);
   };
   walk(head, "panels", "");

@@ -112,7 +112,7 @@ async function spent(pictures) {
 }
 
 async function measure(name) {
-  await pass(page, WARM);
+  await pass(page, 2 * WARM);
   const { slots, collected } = await traced();
   await page.evaluate(() => {
     window.cost.n = 0;

@@ -14,6 +14,7 @@ from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.judging import Judge
 from seerob.description.humans.skeleton import BONES
 from seerob.distance.least import Query
+from seerob.twin import joint_torques
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
@@ -389,3 +390,40 @@ def test_noise_of_speeds_counts_with_the_heaviest_masses(tmp_path):
     off = interval("off", robot="mass_tolerance = 0.1\n", grip="mass_tolerance = 0.5")
     assert off[1] == pytest.approx(heavy[1], rel=1e-9)
     assert off[0] <= interval("light", links=(0.9, 0.9), tool=0.35)[0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("joint_torque", 'robot = "arm"\ntorques = "model"\ntorque_uncertainty = [5, 5, 5, 5, 5, 5]'),
+        ("force_polytope", 'at = "arm"\nlimit = 4900'),
+        (
+            "tool_force",
+            'at = "arm"\nlimit = 1e3\ntorques = "measured"\ntorque_uncertainty = [1, 1, 1, 1, 1, 1]',
+        ),
+    ],
+)
+def test_torques_that_a_model_needs_are_not_within_where_masses_may_be_off(tmp_path, kind, options):
+    """A load of 6 kg ± 40 %: what holds it is off by as much, and nobody follows it here."""
+    q, still = (0.3, -1.2, 1.5, -1.8, -1.57, 0.2), (0.0,) * 6
+
+    def said(name, more):
+        load = '[[tools]]\nname = "grip"\non = "arm/tool0"\nshape = { box = [0.1, 0.1, 0.1] }\nmass = 6\n'
+        robot = '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+        cell = made(tmp_path / name, robot + load + more + criterion(kind, options))
+        held = np.zeros(6)
+        for _ in range(2):  # what holds it is what is measured
+            engine = Engine(cell.model, controllers=False)
+            engine.take([heard("arm", 0.0, q, still, tau=tuple(held.tolist()))])
+            state = engine.start()
+            held = joint_torques.gravity(state, cell.model.robot("arm"))
+        engine.take([heard("arm", 0.01, q, still, tau=tuple(held.tolist()))])
+        judge = Judge(cell.bound)
+        judge(state)
+        return judge(engine.tick())[0]
+
+    sure = said("sure", "")
+    assert sure.verdict == "within", sure.reason
+    off = said("off", "mass_tolerance = 0.4\n")
+    assert off.verdict == "undecided"
+    assert "mass_tolerance of grip ± 40 % not followed in torques that the model needs" in off.reason

@@ -30,6 +30,7 @@ from seerob.kernels.polytope import largest
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
+from seerob.twin.accuracy.mass_tolerances import loose_torques
 from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, coupling_of, down_to
 from seerob.twin.state import State
 from seerob.twin.states import States
@@ -104,6 +105,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             robot.require_masses(self.name)
         offset = np.array(self.offset)
         lower, upper, unknown = self._torques(model, robot)
+        loose = self.load != "none" and bool(loose_torques(model, robot))
 
         def compute(twin: Twin) -> Figure:
             twin.require(robot.name)
@@ -114,14 +116,14 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
                 # Without the surface, which only one instant draws. Empty is nan, and undecided.
                 left = (np.broadcast_to(side - held, (len(J), len(lower))).copy() for side in (lower, upper))
                 norm, _, _ = largest(np.ascontiguousarray(J[:, :3]), *left)
-                return Figure(norm, limit)
+                return Figure(norm, limit, open=loose)
             polytope = self._polytope(J, lower - held, upper - held)
             if polytope.empty:
                 raise Undecided(
                     f"{robot.name}: the torque limits cannot hold it in this pose, with any force"
                 )
             # Unbounded is infinite: no force is too large for the structure then, so it exceeds any limit.
-            return Figure(polytope.largest, limit, beside=polytope)
+            return Figure(polytope.largest, limit, open=loose, beside=polytope)
 
         return compute
 
@@ -134,6 +136,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
     def present(self, model: Model) -> Present:
         """Return the function that names the direction of the largest force, and draws the polytope."""
         frame, offset, limit = model.frame(self.at), np.array(self.offset), self._against(model).limit
+        loose = "" if self.load == "none" else loose_torques(model, model.carrier(frame))
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             polytope: Polytope = figure.beside
@@ -153,6 +156,8 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
                 reason = f"largest along {_vector(direction)}"
                 if polytope.inscribed < 0:
                     reason += "; without any force the torque limits cannot hold the robot"
+            if loose and verdict is Verdict.UNDECIDED:
+                reason = f"{loose}; {reason}"
             inscribed = polytope.inscribed if np.isfinite(polytope.inscribed) else None
 
             def draw() -> tuple[Marker, ...]:

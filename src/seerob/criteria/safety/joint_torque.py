@@ -24,6 +24,7 @@ from seerob.criteria.figure import Compute, Figure, Parts, Present, Shown, Twin
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
+from seerob.twin.accuracy.mass_tolerances import loose_torques
 from seerob.twin.spans import Points, Span
 from seerob.twin.state import State
 
@@ -96,7 +97,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         needed = joint_torques.Needed(robot, model.workstation.engine.tick)
         unlimited, all_unlimited = bool(np.isnan(limits).any()), bool(np.isnan(limits).all())
         # Friction and rotors are not in the model.
-        inexact = self.torques == "model" and given is None
+        inexact = self.torques == "model" and (given is None or bool(loose_torques(model, robot)))
 
         def compute(twin: Twin) -> Figure:
             state, why = cast("State", twin), ""
@@ -134,6 +135,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         largest = self._per_joint(model, robot, "largest_residual")
         where = ["nobody gave its limit" if unknown else "" for unknown in np.isnan(limits).tolist()]
         ever = [f"{name}: {reason}" for name, reason in zip(names, where, strict=True) if reason]
+        loose = loose_torques(model, robot) if self.torques == "model" else ""
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             (share, residual, why), reasons, parts = figure.beside, list(ever), figure.parts
@@ -141,6 +143,8 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
             decided = worst(list(parts.verdicts))
             if decided is not Verdict.UNDECIDED and figure.value is not None:
                 reasons.append(names[int(np.nanargmax(share))])
+            if loose and decided is Verdict.WITHIN:
+                reasons.insert(0, loose)
             if self.torques == "model" and self.torque_uncertainty is None and decided is Verdict.WITHIN:
                 reasons.insert(0, "friction and rotors are not in the model: give torque_uncertainty")
             if residual is None:

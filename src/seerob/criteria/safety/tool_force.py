@@ -26,6 +26,7 @@ from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
+from seerob.twin.accuracy.mass_tolerances import loose_torques
 from seerob.twin.spans import Points, Span, coupling_of
 from seerob.twin.state import State
 
@@ -189,6 +190,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         uncertainty = self._uncertainty(model, robot)
         rows = 3 if self.contact == "zero_moment" else 6
         needed = joint_torques.Needed(robot, model.workstation.engine.tick)
+        loose = self._loose(model)
 
         def external(state: State) -> Array:
             try:
@@ -202,11 +204,18 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             state = cast("State", twin)
             tau = external(state)
             J = state.jacobian(frame, robot, offset)[:rows]
-            return self._figure(wrench_from_torques(J, tau, damped_below=self.damped_below), tau, uncertainty)
+            wrench = wrench_from_torques(J, tau, damped_below=self.damped_below)
+            return self._figure(wrench, tau, uncertainty, open_=bool(loose))
 
         return compute
 
-    def _figure(self, found: Wrench, tau: Array, uncertainty: Array | None) -> Figure:
+    def _loose(self, model: Model) -> str:
+        """Why what the model needs, which is taken off, may be another torque; empty where it may not."""
+        if self.torques == "external":
+            return ""
+        return loose_torques(model, model.carrier(model.frame(self.at)))
+
+    def _figure(self, found: Wrench, tau: Array, uncertainty: Array | None, *, open_: bool = False) -> Figure:
         size, residual = _length(found.wrench[:3]), _length(found.residual)
         error = None if uncertainty is None else float(largest_error(found.gain, uncertainty))
         interval = None if error is None else (max(size - error, 0.0), size + error)
@@ -217,11 +226,12 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         if self.largest_residual is not None and residual > self.largest_residual:
             # Where torques fit no force at this point, it may be any.
             interval = 0.0, math.inf
-        return Figure(size, self.limit, interval, beside=_Found(found, residual, _length(tau), hidden, error))
+        beside = _Found(found, residual, _length(tau), hidden, error)
+        return Figure(size, self.limit, interval, open=open_, beside=beside)
 
     def present(self, model: Model) -> Present:
         """Return the function that says what is not known of the force, and draws it."""
-        frame, offset = model.frame(self.at), np.array(self.offset)
+        frame, offset, loose = model.frame(self.at), np.array(self.offset), self._loose(model)
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             told: _Found = figure.beside
@@ -240,7 +250,10 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             share = told.residual / told.torques if told.torques > 0 else 0.0
             parts.append(Result(name="residual", value=told.residual, unit="N·m"))
             parts.append(Result(name="residual share", value=share, unit=""))
-            return Shown(self._reason(told, size), draw, tuple(parts))
+            reason = self._reason(told, size)
+            if loose and verdict is Verdict.UNDECIDED:
+                reason = "; ".join(filter(None, (loose, reason)))
+            return Shown(reason, draw, tuple(parts))
 
         return present
 

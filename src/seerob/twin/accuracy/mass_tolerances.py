@@ -184,6 +184,12 @@ class MassTolerances:
         )
 
 
+def loose_torques(model: Model, robot: Mechanism) -> str:
+    """Why torques that the model needs of a robot may be others: tolerances of masses; empty without."""
+    off = ", ".join(map(str, MassTolerances(model, robot).tolerances))
+    return f"{off} not followed in torques that the model needs" if off else ""
+
+
 class _Bounds(NamedTuple):
     """What one input makes of a mass matrix at its ends, shape (n, n) each."""
 

@@ -201,9 +201,9 @@ def listen(notes: str) -> int:
     def heard(listener, sample):
         signals = isinstance(sample, SignalSample)
         what = ("signal", listener.name) if signals else key(sample)
-        before = listener._posted.get(what)
+        before = (told := listener._told.get(what)) and told.posted
         hear(listener, sample)
-        posted = listener._posted.get(what)
+        posted = (told := listener._told.get(what)) and told.posted
         if posted is not None and posted is not before:
             noted.append((listener.name, signals, posted.seq, sample.t, sample.t_device, time.monotonic()))
 

@@ -195,7 +195,7 @@ WRONG = {
         TOOL + MESH + "density = 1000",
         {"it.stl": OPEN},
         "it.stl: tools[0] (density)",
-        "give the mass, close the mesh, or say how far beyond its holes' rims that lies: hole_depth",
+        "give the mass, or close the mesh",
     ),
     "open mesh that sweeps a volume": (
         TOOL + MESH + "mass = 1\n" + criterion("swept_volume", 'of = "arm"'),

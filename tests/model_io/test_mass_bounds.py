@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import made_cell
 from seerob.app import cli
 from seerob.app.console.terminal import Exit
 from seerob.core.errors import InputError
@@ -342,19 +343,42 @@ def test_what_a_mesh_lacks_is_within_the_bounds_as_far_as_it_is_said_where_that_
     assert outside > 3
 
 
-def test_where_nobody_says_what_a_mesh_lacks_a_density_is_refused_and_a_mass_is_anywhere_in_the_hull():
+def box_with_a_hole():
     box = trimesh.creation.box((0.1, 0.2, 0.3)).subdivide().subdivide()
-    mesh = Mesh(np.array(box.vertices), box.faces[1:].astype(np.int32))
-    with pytest.raises(InputError, match="nobody says where the surface is that it lacks") as caught:
-        from_shape([mesh], density=1000)
-    assert "hole_depth" in caught.value.problems[0].remedy
-    assert from_shape([mesh], density=1000, hole_depth=0.0)[0].mass == pytest.approx(6.0)
+    return Mesh(np.array(box.vertices), box.faces[1:].astype(np.int32))
+
+
+def test_where_nobody_says_what_a_mesh_lacks_nobody_knows_what_it_weighs_and_a_mass_is_anywhere_in_the_hull():
+    mesh = box_with_a_hole()
+    guessed, findings = from_shape([mesh], density=1000)
+    assert guessed.mass == pytest.approx(6.0)
+    assert np.isinf(guessed.spread_error)
+    assert any("nobody says that (hole_depth)" in finding.text for finding in findings)
+    assert from_shape([mesh], density=1000, hole_depth=0.0)[0].spread_error < 1e-9
     given, findings = from_shape([mesh], mass=2.0)
     assert any("the mass may be anywhere in its convex hull" in finding.text for finding in findings)
     told = moments.Moments(2.0, given.com, given.inertia)
     for corner in mesh.vertices:
         assert holds(told, moments.Moments(2.0, corner, np.zeros((3, 3))), given.spread_error)
     assert from_shape([mesh], mass=2.0, hole_depth=0.0)[0].spread_error < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("limit", "said", "verdict"),
+    [(200, "", "undecided"), (200, "hole_depth = 0\n", "within"), (1e-9, "", "exceeded")],
+)
+def test_a_tool_of_a_mesh_with_a_hole_has_a_mass_by_density_only_with_a_depth(tmp_path, limit, said, verdict):
+    mesh = box_with_a_hole()
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(tmp_path / "open.stl")
+    table = (
+        f'[[tools]]\nname = "grip"\non = "arm/tip"\nmesh = "open.stl"\nunits = "m"\ndensity = 1000\n{said}'
+        f'[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = {limit}\n'
+    )
+    cell = made_cell.made(
+        tmp_path, made_cell.FLOATING + made_cell.TWO_R + table, {"arm.urdf": made_cell.two_r()}
+    )
+    one = made_cell.results_at(cell, arm=([0.1, 0.2], [1.0, 1.0]))["energy"]
+    assert one.verdict == verdict, one.reason
 
 
 def test_edges_of_unequal_length_that_meet_are_no_hole():

@@ -58,7 +58,7 @@ def test_an_open_mesh_is_mended_and_the_truth_lies_within_the_stated_error(seed)
     first = 30 * seed
     opened = without(CYLINDER, np.arange(first, first + 10))
     truth = DENSITY * CYLINDER.volume
-    inertial, findings = from_shape([opened], density=DENSITY, hole_depth=0.0)
+    inertial, findings = from_shape([opened], density=DENSITY)
     assert abs(inertial.mass - truth) <= inertial.error * inertial.mass + 1e-9
     assert inertial.error < 0.05
     assert "holes spanned" in texts(findings)
@@ -67,7 +67,7 @@ def test_an_open_mesh_is_mended_and_the_truth_lies_within_the_stated_error(seed)
 def test_scattered_missing_triangles_cost_nothing():
     rng = np.random.default_rng(1)
     opened = without(CYLINDER, rng.choice(len(CYLINDER.faces), 10, replace=False))
-    inertial, _ = from_shape([opened], density=DENSITY, hole_depth=0.0)
+    inertial, _ = from_shape([opened], density=DENSITY)
     assert inertial.mass == pytest.approx(DENSITY * CYLINDER.volume, rel=1e-9)
 
 
@@ -133,7 +133,7 @@ def test_loose_triangles_are_welded_or_flooded_and_the_error_covers_the_truth(no
     ball = trimesh.creation.icosphere(4, 0.1)
     loose = ball.vertices[ball.faces].reshape(-1, 3) + rng.normal(0, noise, (3 * len(ball.faces), 3))
     inertial, findings = from_shape(
-        [Mesh(loose, np.arange(len(loose), dtype=np.int32).reshape(-1, 3))], density=1000, hole_depth=0.0
+        [Mesh(loose, np.arange(len(loose), dtype=np.int32).reshape(-1, 3))], density=1000
     )
     truth = 1000 * ball.volume
     assert abs(inertial.mass - truth) <= max(inertial.error, 1e-6) * inertial.mass
@@ -152,8 +152,6 @@ def test_what_is_mostly_missing_is_refused_unless_the_mass_is_known():
     assert (np.linalg.eigvalsh(inertial.inertia) > 0).all()
     assert [f.level for f in findings] == ["warning"]
     assert "convex hull" in texts(findings)
-    with pytest.raises(InputError, match="of a closed surface is missing"):
-        from_shape([trough], density=1000, hole_depth=0.0, subject="trough")
 
 
 def test_flat_empty_and_contradictory_input_is_refused():
@@ -181,7 +179,7 @@ def test_whatever_is_missing_the_result_is_physical_or_refused(seed):
     kept = rng.random(len(body.faces)) > rng.uniform(0, 0.9)
     try:
         inertial, _ = from_shape(
-            [Mesh(np.array(body.vertices), body.faces[kept].astype(np.int32))], density=1000, hole_depth=0.0
+            [Mesh(np.array(body.vertices), body.faces[kept].astype(np.int32))], density=1000
         )
     except InputError:
         return

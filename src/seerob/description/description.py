@@ -93,7 +93,8 @@ class Inertial:
     """Relative uncertainty of the mass, of an estimate; 0 when stated."""
     spread_error: float = 0.0
     """By which share all that it adds to a mass matrix may be off in any motion, with centre and moments,
-    no less than ``error``; 0 where the mass alone is uncertain."""
+    no less than ``error``; 0 where the mass alone is uncertain, infinite where nobody says where the surface
+    is that a mesh lacks: then nobody knows the mass either."""
     within: float = 0.0
     """How far from ``com`` any of the mass may lie, where nobody knows how it is spread [m]; 0 where that is
     known."""

@@ -458,6 +458,7 @@ def accepted(
             (one, np.linalg.inv(placed[child]) @ assembly.instances[i].world_from_shape)
             for i in members[child]
             if (one := weighed(assembly.shapes[assembly.instances[i].shape])) is not None
+            and np.isfinite(one.spread_error)
         ]
         inertial = rigid(known) if len(known) == len(members[child]) else None
         kind = "turn" if p.kind is JointKind.REVOLUTE else "slide"

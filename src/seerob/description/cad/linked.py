@@ -246,6 +246,9 @@ def _inertial(
                     deviation=row.get("off", 0.0) * meters,
                     subject=link,
                 )
+            if math.isinf(made.spread_error):
+                source.findings += findings
+                return None
         except InputError as error:
             source.note(f"link {link}: no inertia from its shape ({error}): unknown", level="warning")
             return None

@@ -4,8 +4,9 @@ A closed mesh is integrated exactly; an inverted one is turned; an open one is m
 its hull, and the result says so with a bound; what has no volume is refused.
 
 Where the surface is that an open mesh lacks, no mesh tells: a lid is flat, a dome, or the bottom of a bore.
-So its volume has a bound only where somebody says how far it may be from what is there (``hole_depth``), and
-a mass that is given may be anywhere in the hull else.
+So its volume has a bound only where somebody says how far it may be from what is there (``hole_depth``).
+Else the bound is that of flat holes and told as such, and no more is known of what follows: nothing of a
+mass by a density, and of a mass that is given that it is somewhere in the hull.
 
 The volume inside a heap of triangles lies between two bounds, by a flood from outside. Every voxel that a
 triangle touches, or that is so near to one, is *surface*; what a flood through faces cannot reach from
@@ -222,11 +223,12 @@ def from_shape(
     Returns:
         The mass properties, whose ``error`` bounds the relative error of the mass (0 of a given one) and
         ``spread_error`` that of all that they add to a mass matrix (0 for a closed mesh without a
-        deviation), and what was noticed.
+        deviation; infinite where nobody gives the depth of holes: then nobody knows the mass, and ``error``
+        is that of flat ones), and what was noticed.
 
     Raises:
-        InputError: neither or both are given, or not positive; there is no mesh; no volume can be had from it
-            within `WORST`; or a density is given of a mesh with holes, without ``hole_depth``.
+        InputError: neither or both are given, or not positive; there is no mesh; or no volume can be had
+            from it within `WORST`.
     """
     name = "density" if mass is None else "mass"
     given = density if mass is None else mass
@@ -253,11 +255,13 @@ def from_shape(
         inertial = moments.inertial(
             mass=given * moments.volume, origin=Origin.ESTIMATED, source=source, error=error
         )
-        inertial = replace(inertial, spread_error=max(everything, error))
+        inertial = replace(inertial, spread_error=max(everything, error) if estimate.bounded else np.inf)
     else:
         source = f"mass given; centre and inertia from uniform density over {estimate.method}"
         inertial = moments.inertial(mass=mass, origin=Origin.GIVEN, source=source)
         around = deviation + estimate.moved + (hole_depth or 0.0)
+        if not estimate.bounded:
+            error = everything = np.inf
         inertial = replace(inertial, spread_error=_of_given(mesh, around, moments, error, everything))
     notes = ((dropped,) if dropped else ()) + estimate.notes
     findings = [Finding(level="note", subject=subject, text=text) for text in notes]
@@ -268,7 +272,9 @@ def from_shape(
             text += f", as its surface lies within {deviation * 1e3:.3g} mm"
         if everything > max(error, 1e-4):
             text += f"; in a mass matrix, with centre and inertia, {_within(everything)}"
-        if not estimate.bounded:
+        if mass is None and not estimate.bounded:
+            text += "; nobody says that (hole_depth), and what rests on its mass is undecided"
+        elif not estimate.bounded:
             text = (
                 f"centre of mass and inertia from {estimate.method}; what lies beyond its holes nobody says "
                 "(hole_depth): the mass may be anywhere in its convex hull"
@@ -315,18 +321,11 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) ->
     else:
         patched = mended(single, depth or 0.0)
         missing = patched.filled
-        first = _of_mended(patched, depth or 0.0)
+        first = _of_mended(patched, depth)
     credible = _is_credible(first, hull) and missing <= PATCHED
     bounded = depth is not None or missing <= SLITS
-    if strict and not bounded:
-        raise InputError.at(
-            subject,
-            "density",
-            "the mesh is open, and nobody says where the surface is that it lacks",
-            "give the mass, close the mesh, or say how far beyond its holes' rims that lies: hole_depth",
-        )
     if credible and first.error <= WORST:
-        return first if bounded else _unbounded(first)
+        return first._replace(bounded=bounded)
     flooded = voxel_fill(mesh, beyond=depth or 0.0)
     if flooded is not None:
         error = (flooded.high - flooded.low) / (flooded.high + flooded.low)
@@ -334,11 +333,11 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) ->
             # Of the half of what is on the surface that may be there or not.
             off = mass_bounds.off_by_difference(flooded.moments, flooded.inside)
             method = "the mesh filled with voxels (open or tangled)"
-            provided = (
-                f", if no surface is missing farther than {_depth(depth)} from it" if missing > SLITS else ""
-            )
+            provided = ""
+            if missing > SLITS:
+                provided = f", if no surface is missing farther than {1e3 * (depth or 0.0):.3g} mm from it"
             found = _Estimate(flooded.moments, method, error, max(off, error), provided=provided)
-            return found if bounded else _unbounded(found)
+            return found._replace(bounded=bounded)
     if strict:
         raise InputError.at(
             subject,
@@ -352,16 +351,7 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) ->
     error = 1 - inner / hull.volume
     off = mass_bounds.off_by_difference(hull, first.moments) + first.inertia if credible else 1.0
     found = _Estimate(hull, "the convex hull of the open mesh", error, min(max(off, error), 1.0))
-    return found if bounded and not (depth and missing > SLITS) else _unbounded(found)
-
-
-def _unbounded(estimate: _Estimate) -> _Estimate:
-    """The estimate of a mesh of which nobody says where the surface is that it lacks."""
-    return estimate._replace(error=np.inf, inertia=np.inf, provided="", bounded=False)
-
-
-def _depth(depth: float | None) -> str:
-    return f"{(depth or 0.0) * 1e3:.3g} mm"
+    return found._replace(bounded=bounded and not (depth and missing > SLITS))
 
 
 def _is_sheet(mesh: Mesh, hull_volume: float) -> bool:
@@ -385,7 +375,7 @@ def _hull(mesh: Mesh) -> Moments | None:
     return moments if moments.volume > 1e-9 * size**3 else None
 
 
-def _of_mended(patched: Mended, depth: float) -> _Estimate:
+def _of_mended(patched: Mended, depth: float | None) -> _Estimate:
     if not np.isfinite(patched.slack):
         return _Estimate(_NOTHING, "a heap of triangles", np.inf)
     method = "the mended mesh (" + ", ".join(patched.steps) + ")"
@@ -394,7 +384,8 @@ def _of_mended(patched: Mended, depth: float) -> _Estimate:
     error = estimate.error + patched.slack / volume if volume > 0 else np.inf
     provided = ""
     if patched.filled:
-        provided = f", if the holes' true surface lies within {_depth(depth)} of the hulls of their rims"
+        within = f"within {1e3 * depth:.3g} mm of" if depth else "in"
+        provided = f", if the holes' true surface lies {within} the hulls of their rims"
     off = estimate.inertia
     if volume > 0 and patched.slack > 0:
         off += mass_bounds.off_by_volume(patched.within, patched.slack, estimate.moments)

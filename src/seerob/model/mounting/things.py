@@ -144,11 +144,12 @@ def load_thing(
     elif thing.mass is not None and thing.com is not None:
         # It stands still, so only what the user wrote is looked at.
         inertial = given_inertial(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)
+    findings += more
     if inertial is not None:
         inertial, noticed = _possible(
             inertial, solids, thing, thing.name, file, "", lambda: _spread(thing, whole, off)
         )
-        findings += more + noticed
+        findings += noticed
     if not needs_mass:
         inertial = None
     return LoadedThing(pieces, inertial, findings, files)
@@ -219,10 +220,12 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
 
 def _inertial(
     thing: Thing, meshes: list[Mesh], deviation: float, source: str
-) -> tuple[Inertial, tuple[Finding, ...]]:
+) -> tuple[Inertial | None, tuple[Finding, ...]]:
     if thing.mass is not None and thing.com is not None and thing.inertia is not None:
         return given_inertial(thing.mass, thing.com, thing.inertia, "workstation file"), ()
     inertial, findings = _spread(thing, meshes, deviation)
+    if np.isinf(inertial.spread_error):
+        return None, findings
     if thing.com is not None:
         inertial = replace(inertial, com=np.array(thing.com, float))
     if thing.mass is not None:

@@ -68,7 +68,7 @@ def test_a_late_reader_does_not_make_it_late(kind):
             time.sleep(LATE)
             arrived, data, _ = reception.read(100)
             assert data == text
-            # Where the processor is busy the kernel delivers, and stamps, some milliseconds after it was sent.
+            # Where the processor is busy the kernel delivers, and stamps, a moment after it was sent.
             return before - CLOCKS, arrived, after + LATE / 2
 
         def stamped():

@@ -343,6 +343,22 @@ def test_what_a_mesh_lacks_is_within_the_bounds_as_far_as_it_is_said_where_that_
     assert outside > 3
 
 
+def test_trays_without_lids_beside_a_block_are_not_taken_for_empty():
+    """Voxels are flooded through a hole unless what closes it counts as a surface."""
+    block, tray = trimesh.creation.box((0.5, 0.5, 0.5)), trimesh.creation.box((0.5, 0.5, 0.1))
+    faces = tray.faces[tray.face_normals[:, 2] < 0.9].astype(np.int32)
+    truth, meshes = [moments.of_closed_mesh(mesh_of(block))], [mesh_of(block)]
+    for k in range(4):
+        at = tray.vertices + np.array([0.7, 0, 0.15 * k])
+        truth.append(moments.of_closed_mesh(Mesh(at, tray.faces.astype(np.int32))))
+        meshes.append(Mesh(at, faces))
+    made, findings = from_shape(meshes, density=1000, hole_depth=0.0)
+    assert any("filled with voxels" in finding.text for finding in findings)
+    told = moments.Moments(made.mass / 1000, made.com, made.inertia / 1000)
+    assert holds(told, moments.combined(truth), made.spread_error)
+    assert abs(225 - made.mass) < made.error * made.mass
+
+
 def box_with_a_hole():
     box = trimesh.creation.box((0.1, 0.2, 0.3)).subdivide().subdivide()
     return Mesh(np.array(box.vertices), box.faces[1:].astype(np.int32))

@@ -67,27 +67,33 @@ class Filled(NamedTuple):
     """Of the inside voxels alone."""
 
 
-def voxel_fill(mesh: Mesh, *, cells: int = 64, beyond: float = 0.0) -> Filled | None:
+def voxel_fill(
+    mesh: Mesh, *, cells: int = 64, beyond: float = 0.0, rims: Sequence[Array] = ()
+) -> Filled | None:
     """Flood-filled moments with ``cells`` voxels along the longest side; None when nothing is inside.
 
     Args:
         mesh: A heap of triangles.
         cells: How many.
-        beyond: How far what it lacks may be from its triangles [m].
+        beyond: How far what it lacks may be from the convex hulls of its holes' rims, or from its triangles
+            where no rim is given [m].
+        rims: Corners of each [m], shape (n, 3).
     """
     low = mesh.vertices.min(axis=0)
     extent = np.ptp(mesh.vertices, axis=0)
     h = float(extent.max()) / cells
     if not h > 0:
         return None
-    more = math.ceil(beyond / h - 1e-9)
+    more = math.ceil(beyond / h - 1e-9) + bool(rims)
     if 2 * more >= cells:
         return None
     shape = np.ceil(extent / h).astype(int) + 3 + 2 * more
     # An odd offset keeps faces that lie on round coordinates off the voxels' faces.
     origin = low - (1.37 + more) * h
     surface = _touched((mesh.vertices[mesh.faces] - origin) / h, shape)
-    for axis in range(3) if more else ():
+    for rim in rims:
+        _fill_hull(surface, (rim - origin) / h, beyond / h + 1)
+    for axis in range(3) if more and not rims else ():
         window = np.pad(surface, [(more, more) if k == axis else (0, 0) for k in range(3)])
         surface = np.asarray(sliding_window_view(window, 2 * more + 1, axis).any(axis=-1))
     inside = ~surface & ~_around(~surface)
@@ -97,6 +103,24 @@ def voxel_fill(mesh: Mesh, *, cells: int = 64, beyond: float = 0.0) -> Filled | 
     high_volume = low_volume + float(surface.sum()) * h**3
     amid = _of_voxels(inside + 0.5 * surface, origin, h)
     return Filled(amid, low_volume, high_volume, _of_voxels(inside.astype(float), origin, h))
+
+
+def _fill_hull(grid: NDArray[np.bool_], corners: Array, beyond: float) -> None:
+    """Mark unit voxels that are within ``beyond`` − 1 of the convex hull of some corners, and some more."""
+    points = (corners[:, None] + beyond * np.array(list(product((-1.0, 1.0), repeat=3)))).reshape(-1, 3)
+    faces = convex_hull(points)
+    assert faces is not None  # a cube about each corner has a volume
+    first = np.maximum(np.floor(points.min(axis=0)).astype(int), 0)
+    end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 1, grid.shape)
+    box = grid[tuple(map(slice, first, end))]
+    centers = first + np.moveaxis(np.indices(box.shape), 0, -1) + 0.5
+    a, b, c = np.moveaxis(points[faces], 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals *= np.sign(np.einsum("ij,ij->i", normals, a - points.mean(axis=0)))[:, None]
+    within = np.ones(box.shape, bool)
+    for normal, at in zip(normals, a, strict=True):
+        within &= (centers - at) @ normal <= 1e-9
+    box |= within
 
 
 def _of_voxels(weight: Array, origin: Array, h: float) -> Moments:
@@ -312,7 +336,7 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) ->
         raise InputError.at(
             subject, "mass", "the mesh is flat: it encloses no volume", "give mass, com and inertia by hand"
         )
-    missing = 0.0
+    missing, rims = 0.0, tuple[Array, ...]()
     single = one_sided(mesh)
     if is_closed(mesh) and not _is_sheet(mesh, hull.volume):
         first = _of_bodies(mesh, _EXACT, ())
@@ -321,12 +345,13 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) ->
     else:
         patched = mended(single, depth or 0.0)
         missing = patched.filled
+        rims = patched.rims if depth is not None else ()
         first = _of_mended(patched, depth)
     credible = _is_credible(first, hull) and missing <= PATCHED
     bounded = depth is not None or missing <= SLITS
     if credible and first.error <= WORST:
         return first._replace(bounded=bounded)
-    flooded = voxel_fill(mesh, beyond=depth or 0.0)
+    flooded = voxel_fill(mesh, beyond=depth or 0.0, rims=rims)
     if flooded is not None:
         error = (flooded.high - flooded.low) / (flooded.high + flooded.low)
         if error <= WORST:
@@ -336,6 +361,8 @@ def _estimate(mesh: Mesh, subject: str, *, strict: bool, depth: float | None) ->
             provided = ""
             if missing > SLITS:
                 provided = f", if no surface is missing farther than {1e3 * (depth or 0.0):.3g} mm from it"
+            if rims:
+                provided = _in_hulls(depth)
             found = _Estimate(flooded.moments, method, error, max(off, error), provided=provided)
             return found._replace(bounded=bounded)
     if strict:
@@ -375,6 +402,12 @@ def _hull(mesh: Mesh) -> Moments | None:
     return moments if moments.volume > 1e-9 * size**3 else None
 
 
+def _in_hulls(depth: float | None) -> str:
+    """What a bound rests on where holes have rims."""
+    within = f"within {1e3 * depth:.3g} mm of" if depth else "in"
+    return f", if the holes' true surface lies {within} the hulls of their rims"
+
+
 def _of_mended(patched: Mended, depth: float | None) -> _Estimate:
     if not np.isfinite(patched.slack):
         return _Estimate(_NOTHING, "a heap of triangles", np.inf)
@@ -382,10 +415,7 @@ def _of_mended(patched: Mended, depth: float | None) -> _Estimate:
     estimate = _of_bodies(patched.mesh, method, ())
     volume = estimate.moments.volume
     error = estimate.error + patched.slack / volume if volume > 0 else np.inf
-    provided = ""
-    if patched.filled:
-        within = f"within {1e3 * depth:.3g} mm of" if depth else "in"
-        provided = f", if the holes' true surface lies {within} the hulls of their rims"
+    provided = _in_hulls(depth) if patched.filled else ""
     off = estimate.inertia
     if volume > 0 and patched.slack > 0:
         off += mass_bounds.off_by_volume(patched.within, patched.slack, estimate.moments)

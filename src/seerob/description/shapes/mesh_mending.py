@@ -154,6 +154,8 @@ class Mended(NamedTuple):
     """Corners of what contains those hulls [m], shape (n, 3)."""
     moved: float
     """How far corners were moved to weld them, at most [m]."""
+    rims: tuple[Array, ...] = ()
+    """Corners of each hole that was spanned [m], shape (n, 3)."""
 
 
 def mended(mesh: Mesh, depth: float) -> Mended:
@@ -183,11 +185,13 @@ def mended(mesh: Mesh, depth: float) -> Mended:
     before = _area(mesh)
     # A cube about each corner holds the ball about it.
     cube = depth * np.array(list(product((-1.0, 1.0), repeat=3))) if depth else np.zeros((1, 3))
-    around = [(mesh.vertices[loop][:, None] + cube).reshape(-1, 3) for loop in loops]
+    rims = tuple(mesh.vertices[loop] for loop in loops)
+    around = [(rim[:, None] + cube).reshape(-1, 3) for rim in rims]
     slack = sum(map(hull_volume, around))
     mesh = _spanned(mesh, loops)
     steps.append(f"{len(loops)} holes spanned")
-    return Mended(mesh, tuple(steps), slack, 1 - before / _area(mesh), np.concatenate(around), moved)
+    filled = 1 - before / _area(mesh)
+    return Mended(mesh, tuple(steps), slack, filled, np.concatenate(around), moved, rims)
 
 
 CROWD = 64

@@ -225,6 +225,7 @@ def test_a_volume_that_is_known_within_bounds_leaves_the_mass_within_them(tmp_pa
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
     stl = trimesh.Trimesh(ball.vertices, ball.faces[7:]).export(file_type="stl")
     tool = '[[tools]]\nname = "grip"\non = "arm/tip"\nmesh = "grip.stl"\nunits = "m"\ndensity = 500\n'
+    tool += "hole_depth = 0\n"
     files = {"arm.urdf": two_r(), "grip.stl": stl}
     cell = made(tmp_path, FLOATING + TWO_R + tool + CRITERIA, files)
     (body,) = (b for b in cell.model.bodies if b.name == "grip")

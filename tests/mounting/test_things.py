@@ -52,6 +52,21 @@ def test_what_is_plausible_is_not_warned_of(tmp_path, density):
     assert not [text for level, text in said if level == "warning"]
 
 
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ("com = [0.05, 0, 0]\n", True),
+        ("com = [0, 0, 0]\n", False),
+        ("", False),
+        ("com = [0.05, 0, 0]\ninertia = [0.01, 0.01, 0.01, 0, 0, 0]\n", False),
+    ],
+)
+def test_moments_of_uniform_density_about_another_centre_are_told_as_assumed(tmp_path, more, told):
+    """Who gives that centre says that density is not uniform; a point mass there has no moments at all."""
+    said = findings(tmp_path, f"{TOOL}{BOX}mass = 2\n{more}")
+    assert any(level == "assumed" and "is 50 mm from where uniform" in text for level, text in said) == told
+
+
 def test_a_mesh_in_the_wrong_unit_names_the_one_that_fits(tmp_path):
     corners = "v 0 0 0\nv 90 0 0\nv 0 90 0\nv 0 0 90\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     (tmp_path / "t.obj").write_text(corners)

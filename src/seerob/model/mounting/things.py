@@ -37,6 +37,8 @@ AREA_COLOR: Color = (0.99, 0.92, 0.57, 0.25)
 CYLINDER_SIDES = 96
 VISIBLE = 1e-4
 """How far what is shown may be off without a finding [m]."""
+OFF_CENTRE = 1e-3
+"""How far a given centre of mass may be from that of uniform density without a finding [m]: a choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +229,7 @@ def _inertial(
     if np.isinf(inertial.spread_error):
         return None, findings
     if thing.com is not None:
+        findings += _uneven(thing.name, inertial, thing.com)
         inertial = replace(inertial, com=np.array(thing.com, float))
     if thing.mass is not None:
         # The mass itself was given; only how it is spread follows from the shape.
@@ -237,6 +240,18 @@ def _inertial(
         text = f"{figure} estimated: {inertial.source}, error ±{100 * inertial.error:.2g} %"
         findings += (Finding(level="note", subject=thing.name, text=text),)
     return inertial, findings
+
+
+def _uneven(subject: str, uniform: Inertial, com: Sequence[float]) -> tuple[Finding, ...]:
+    """What a centre of mass says of moments that follow from uniform density, which has its own elsewhere."""
+    off = float(np.linalg.norm(np.asarray(com) - uniform.com))
+    if off <= OFF_CENTRE:
+        return ()
+    text = (
+        f"moments of inertia are those of uniform density, and its centre of mass is {1e3 * off:.3g} mm from "
+        "where uniform density has it: give inertia"
+    )
+    return (Finding(level="assumed", subject=subject, text=text),)
 
 
 def _spread(thing: Thing, meshes: list[Mesh], deviation: float) -> tuple[Inertial, tuple[Finding, ...]]:
@@ -424,15 +439,21 @@ def overridden_link(
         off, subject = max(s.deviation for s in link.solids), f"{robot}/{link.name}"
         return mass_properties.from_shape(meshes, mass=table.mass, deviation=off, subject=subject)
 
+    uneven: tuple[Finding, ...] = ()
     if table.com is not None and table.inertia is not None:
         inertial = given_inertial(table.mass, table.com, table.inertia, table.source)
     else:
         inertial = spread()[0]
         com = inertial.com if table.com is None else np.array(table.com, float)
+        if table.inertia is None:
+            uneven = _uneven(f"{robot}/{link.name}", inertial, com.tolist())
         inertia = inertial.inertia if table.inertia is None else symmetric(table.inertia)
         source = f"{table.source}; rest from the shape"
         inertial = replace(inertial, com=com, inertia=inertia, source=source)
-    return _possible(inertial, link.solids, table, f"{robot}/{link.name}", file, f"{key}.", spread)
+    inertial, noticed = _possible(
+        inertial, link.solids, table, f"{robot}/{link.name}", file, f"{key}.", spread
+    )
+    return inertial, uneven + noticed
 
 
 FIELD_COLOR: Color = (0.98, 0.75, 0.35, 0.20)

@@ -103,6 +103,21 @@ def test_before_much_is_told_the_largest_counts():
     assert noise.speed_error([9.0, 10.0, 11.0])[0] == pytest.approx(2 * first)
 
 
+@pytest.mark.parametrize("before", [2, 200])
+def test_noise_after_a_clock_has_begun_again_is_told(before):
+    """A controller that is switched on again, or milliseconds that are full: its clock is behind for long."""
+    rng, slope, period = np.random.default_rng(5), Differentiator(1.0), 0.004
+    for k in range(before):
+        slope.add(4e6 + period * k, (0.5,))
+    speeds, told = [], []
+    for k in range(400):
+        speed = slope.add(period * k, (float(rng.normal(0.5, 1e-4)),))
+        if speed is not None and k > 200:
+            speeds.append(speed[0])
+            told.append(slope.error()[0])
+    assert np.mean(np.abs(speeds) <= told) > 0.98
+
+
 def test_a_jump_is_no_noise():
     noise = PositionNoise()
     told(noise, np.arange(60.0), np.where(np.arange(60) < 30, 0.0, 1.0))

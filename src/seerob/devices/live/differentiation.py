@@ -85,6 +85,8 @@ class Differentiator:
             [rad/s or m/s], shape (n,).
         """
         if self._times and not 0.0 < t - self._times[-1] <= self._gap:
+            if t < self._times[-1]:
+                self._noise.restart()
             self._times.clear()
             self._values.clear()
         self._times.append(t)
@@ -105,6 +107,11 @@ class PositionNoise:
         self._found: deque[list[float]] = deque(maxlen=REMEMBERED)
         self._sorted: list[list[float]] = []
         """What was found, of each value, ascending: its median is asked for at every sample."""
+
+    def restart(self) -> None:
+        """Take up a clock that has begun again; what was found of the noise stays."""
+        self._times.clear()
+        self._values.clear()
 
     def add(self, t: float, values: tuple[float, ...]) -> None:
         """Take what came.

@@ -2,9 +2,14 @@
 //
 // Matrices and values of uniforms in typed arrays: in plain arrays V8 keeps their numbers as objects of their own once
 // kinds of elements are mixed, and each product of two matrices then allocates sixteen, each colour that is told to the
-// graphics card three: 90 kB per picture of 50 bodies.
+// graphics card three: 90 kB per picture of 50 bodies. Values of uniforms are written where they are others: a number with
+// a fraction is an object of its own each time that it is written into a field of any kind. What is drawn and by what
+// light is listed in memory that is kept, as an array gives its own back when it is emptied.
 
 import type { Plugin } from "vite";
+
+const OPACITY =
+  "if ( uniforms.opacity.value !== ( material.opacity ) ) uniforms.opacity.value = ( material.opacity );";
 
 /** What is replaced, in which of its files, how often it is there, and by what. */
 const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
@@ -13,8 +18,68 @@ const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
     /(class SingleUniform \{[\s\S]{0,200}?)this\.cache = \[\];/g,
     ["module"],
     1,
-    "$1this.cache = FLOATS[activeInfo.type] ? new Float64Array(FLOATS[activeInfo.type]).fill(NaN) : [];",
+    "$1this.cache = floats(activeInfo.type, 1);",
   ],
+  [
+    /(class PureArrayUniform \{[\s\S]{0,200}?)this\.cache = \[\];/g,
+    ["module"],
+    1,
+    "$1this.cache = floats(activeInfo.type, activeInfo.size);",
+  ],
+  // Read in one place for each class: where it is a fraction in some, and an integer in others, it is an object.
+  [
+    /(function refreshUniformsCommon\([^)]*\) \{\s+)uniforms\.opacity\.value = material\.opacity;/g,
+    ["module"],
+    1,
+    `$1if ( material.isMeshStandardMaterial ) { ${OPACITY} } else if ( material.isMeshBasicMaterial ) { ${OPACITY} } else { ${OPACITY} }`,
+  ],
+  [
+    /(?<![.\w])(uniforms\.\w+\.value) = ((?:material|fog)\.\w+(?: [*+] [\w.]+)?|height \* 0\.5);/g,
+    ["module"],
+    77,
+    "if ( $1 !== $2 ) $1 = $2;",
+  ],
+  [
+    /uniforms\.emissive\.value\.copy\( material\.emissive \)\.multiplyScalar\( (material\.emissiveIntensity) \);/g,
+    ["module"],
+    1,
+    "{ const { value } = uniforms.emissive, { r, g, b } = material.emissive; value.r = r * $1; value.g = g * $1; value.b = b * $1; }",
+  ],
+  // Each setter compares and copies by itself: one function for arrays of every kind hands on each number as an object.
+  [
+    /if \( arraysEqual\( cache, (\w+) \) \) return;/g,
+    ["module"],
+    15,
+    "let same = cache.length === $1.length; for ( let i = 0; same && i < $1.length; i ++ ) same = cache[ i ] === $1[ i ]; if ( same ) return;",
+  ],
+  [
+    /copyArray\( cache, (\w+) \);/g,
+    ["module"],
+    19,
+    "for ( let i = 0; i < $1.length; i ++ ) cache[ i ] = $1[ i ];",
+  ],
+  // What may be a number or nothing is an object, and so is each number that is handed to WebGL by itself.
+  [
+    /(function setValueV3f\([^)]*\) \{\s+const cache = this\.cache;\s+)(?=if \( v\.x !== undefined \))/g,
+    ["module"],
+    1,
+    "$1if ( v.isColor === true ) return setColor( gl, this.addr, cache, v ); if ( v.isVector3 === true ) return setVector( gl, this.addr, cache, v );",
+  ],
+  // A matrix that is compared with a number is written as a text first.
+  [
+    /if \( firstElem <= 0 \|\| firstElem > 0 \) return array;/g,
+    ["module"],
+    1,
+    "if ( typeof firstElem === 'number' ) return array;",
+  ],
+  [
+    /const (renderListStack|renderStateStack|lightsArray|shadowsArray) = \[\];/g,
+    ["module"],
+    4,
+    "const $1 = new Kept();",
+  ],
+  // A function that compares is made where there is something to compare.
+  [/(?=lightProbeGridArray\.sort\()/g, ["module"], 1, "if ( lightProbeGridArray.length > 1 ) "],
   // How deep something lies is handed to the page's own list (scene/render_list.ts) in memory, not as an object for each
   // mesh; nor are planes.
   [
@@ -31,9 +96,38 @@ const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
   ],
 ];
 
-// Floats of a number and of vectors, by WebGL's kinds of uniforms.
+// Floats of a number, of vectors and of matrices, by WebGL's kinds of uniforms; and a list that keeps its memory.
 const ADDED = `
-const FLOATS = { 0x1406: 1, 0x8b50: 2, 0x8b51: 3, 0x8b52: 4 };
+const FLOATS = { 0x1406: 1, 0x8b50: 2, 0x8b51: 3, 0x8b52: 4, 0x8b5a: 4, 0x8b5b: 9, 0x8b5c: 16 };
+function floats(type, size) { return FLOATS[type] ? new Float64Array(FLOATS[type] * size).fill(NaN) : []; }
+const floats3 = new Float32Array(3);
+function setColor(gl, addr, cache, { r, g, b }) {
+  if (cache[0] === r && cache[1] === g && cache[2] === b) return;
+  floats3[0] = cache[0] = r;
+  floats3[1] = cache[1] = g;
+  floats3[2] = cache[2] = b;
+  gl.uniform3fv(addr, floats3);
+}
+function setVector(gl, addr, cache, { x, y, z }) {
+  if (cache[0] === x && cache[1] === y && cache[2] === z) return;
+  floats3[0] = cache[0] = x;
+  floats3[1] = cache[1] = y;
+  floats3[2] = cache[2] = z;
+  gl.uniform3fv(addr, floats3);
+}
+class Kept {
+  constructor() { this.length = 0; }
+  push(one) { this[this.length] = one; this.length += 1; }
+  pop() { this.length -= 1; return this[this.length]; }
+  sort(order) {
+    for (let i = 1; i < this.length; i += 1) {
+      const one = this[i];
+      let k = i;
+      for (; k > 0 && order(this[k - 1], one) > 0; k -= 1) this[k] = this[k - 1];
+      this[k] = one;
+    }
+  }
+}
 `;
 
 // A signal that is peeked at makes a function each time, with what it closes over; a picture peeks at dozens.

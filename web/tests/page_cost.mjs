@@ -1,10 +1,10 @@
 // What a picture costs the page, on the desk and in an emulated headset, with 50 bodies at 100 Hz:
-// `node tests/page_cost.mjs [seconds] [--where]`.
+// `node tests/page_cost.mjs [seconds] [--where] [--card]`.
 // Told are the script's time per picture (processor time of the page's thread, from the browser's trace), what is
 // allocated per picture by the page, by three.js and by WebXR (garbage.mjs; by the page there is to be nothing), and how
 // old the poses are, by the clock that both ends share: when the server offers them to pages, when they are taken for a
 // picture, and when the script is done with it; and how many snapshots were sent and how many replaced before they were.
-// `--where` tells which functions allocate, and whose the script's time is; a build with
+// `--card` draws as with a graphics card, with light and shadows; `--where` tells which functions allocate, and whose the script's time is; a build with
 // `npx vite build --minify false --sourcemap` names them.
 
 import { SourceMap } from "node:module";
@@ -27,7 +27,9 @@ const browser = await openBrowser({
 });
 const { page } = browser;
 await page.addInitScript(`${HEADSET}\n${WRAPPED}\nwindow.cost.begun = ${1000 * served.begun};`);
-await page.goto(served.url);
+const address = new URL(served.url);
+if (process.argv.includes("--card")) address.searchParams.set("draw", "full");
+await page.goto(address.href);
 await page.waitForFunction(() => window.seerob?.pose("operator/head") != null);
 const cdp = await browser.context.newCDPSession(page);
 

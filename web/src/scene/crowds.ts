@@ -9,6 +9,7 @@ import {
   type Material,
   Matrix4,
   type Mesh,
+  MeshDepthMaterial,
   Sphere,
   type Vector3,
 } from "three";
@@ -23,6 +24,9 @@ const MANY_TRIANGLES = 200;
 const STILL_MS = 250;
 /** Layer of what no camera sees, and rays meet all the same. Masks of higher ones are no small integers to V8. */
 export const ALONE_LAYER = 28;
+/** Of shadows: with one for single bodies and crowds three.js looks its programs up anew at each change, in every picture. */
+const manyDepth = new MeshDepthMaterial();
+
 /** A mesh of a body that may be drawn with others. */
 export interface Dressed {
   mesh: Mesh;
@@ -151,6 +155,7 @@ export class Crowd {
   private take({ shape, off }: { shape: BufferGeometry; off: number }): void {
     const drawn = new InstancedMesh(shape, this.material, this.members.length);
     drawn.castShadow = drawn.receiveShadow = true;
+    if (this.material.alphaTest === 0) drawn.customDepthMaterial = manyDepth;
     drawn.frustumCulled = false;
     drawn.raycast = () => {};
     this.root.add(drawn);

@@ -318,7 +318,7 @@ def test_what_a_mesh_lacks_is_within_the_bounds_as_far_as_it_is_said_where_that_
     """Caps, walls and bores are missing: that they are flat would often be false."""
     rng = np.random.default_rng(3)
     bounded, outside = 0, 0
-    for _ in range(150):
+    for _ in range(24):
         body, mesh, depth = cut(rng)
         if mesh is None:
             continue
@@ -339,8 +339,8 @@ def test_what_a_mesh_lacks_is_within_the_bounds_as_far_as_it_is_said_where_that_
             scaled = moments.Moments(2.0, truth.com, truth.inertia * 2.0 / truth.volume)
             if said:
                 assert holds(moments.Moments(2.0, given.com, given.inertia), scaled, given.spread_error)
-    assert bounded > 20
-    assert outside > 3
+    assert bounded > 5
+    assert outside > 0
 
 
 def test_trays_without_lids_beside_a_block_are_not_taken_for_empty():

@@ -397,6 +397,21 @@ def test_a_tool_of_a_mesh_with_a_hole_has_a_mass_by_density_only_with_a_depth(tm
     assert one.verdict == verdict, one.reason
 
 
+@pytest.mark.parametrize("said", ["", "hole_depth = 0\n"])
+def test_a_loose_workpiece_of_a_mesh_with_a_hole_is_refused_without_a_depth(tmp_path, said):
+    """Its mass is that of what a hand holds, and a placeholder would be less than it may be."""
+    mesh = box_with_a_hole()
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(tmp_path / "open.stl")
+    text = f'[[workpieces]]\nname = "blank"\nmesh = "open.stl"\nunits = "m"\ndensity = 1000\n{said}'
+    if said:
+        model = made_cell.made(tmp_path, text).model
+        assert model.mj.body_mass.sum() == pytest.approx(6.0)
+    else:
+        with pytest.raises(InputError, match="nobody knows its mass") as caught:
+            made_cell.made(tmp_path, text)
+        assert "hole_depth" in caught.value.problems[0].remedy
+
+
 def test_edges_of_unequal_length_that_meet_are_no_hole():
     box = trimesh.creation.box((0.1, 0.2, 0.3))
     a, b, c = box.faces[0]

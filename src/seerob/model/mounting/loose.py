@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from seerob.core.errors import InputError
 from seerob.description.description import Description, Joint, JointKind, Link
 from seerob.model.mounting.things import WORKPIECE_COLOR, LoadedThing, load_thing
 from seerob.workstation.workstation import Workpiece
@@ -26,9 +27,14 @@ def loaded(piece: Workpiece, folder: Path, *, file: str) -> tuple[Description, L
         file: The workstation file, for messages.
 
     Raises:
-        InputError: Its mesh cannot be read, or no body of this shape has the given mass properties.
+        InputError: Its mesh cannot be read, no body of this shape has the given mass properties, or nobody
+            knows what it weighs: forces move it.
     """
     thing = load_thing(piece, folder, WORKPIECE_COLOR, needs_mass=True, file=file)
+    if thing.inertial is None:
+        what = f"{piece.name} is loose and moved by forces, and its mesh has holes: nobody knows its mass"
+        remedy = "give its mass, close the mesh, or say how far its holes reach: hole_depth"
+        raise InputError.at(file, f"{piece.name}.density", what, remedy)
     axes = (*np.eye(3), *np.eye(3))
     kinds = (JointKind.PRISMATIC,) * 3 + (JointKind.REVOLUTE,) * 3
     body = Link(

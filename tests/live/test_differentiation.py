@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.devices.live.differentiation import FEW, SAMPLES, Differentiator, PositionNoise, end_weights
+from seerob.devices.live.differentiation import (
+    DEVIATIONS_OF_FEW,
+    FEW,
+    SAMPLES,
+    Differentiator,
+    PositionNoise,
+    end_weights,
+)
 
 steps = st.lists(st.floats(1e-3, 0.1), min_size=2, max_size=SAMPLES - 1)
 
@@ -51,11 +58,14 @@ def test_noise_of_the_slope_is_what_the_formula_says():
 def test_a_gap_begins_anew():
     slope = Differentiator(0.1)
     ramp = [slope.add(0.01 * k, (0.02 * k, -0.01 * k)) for k in range(10)]
-    assert ramp[:2] == [None, None]
-    for speeds in ramp[2:]:
+    assert ramp[:3] == [None, None, None]
+    for speeds in ramp[3:]:
         assert speeds == pytest.approx((2.0, -1.0))
     assert slope.add(1.0, (5.0, 5.0)) is None
     assert slope.add(0.5, (5.0, 5.0)) is None
+    # What is known of the noise stays: three tell a speed then.
+    assert slope.add(0.51, (5.0, 5.0)) is None
+    assert slope.add(0.52, (5.0, 5.0)) == pytest.approx((0.0, 0.0))
 
 
 def told(noise, t, q):
@@ -98,9 +108,24 @@ def test_before_much_is_told_the_largest_counts():
     noise.add(3.0, (1.0,))
     noise.add(3.0, (9.0,))  # not later: left out
     (first,) = noise.speed_error([1.0, 2.0, 3.0])
-    assert first == pytest.approx(3 * np.sqrt(6.5) / np.sqrt(20))
+    assert first == pytest.approx(DEVIATIONS_OF_FEW[0] * np.sqrt(6.5) / np.sqrt(20))
     told(noise, np.arange(4.0, 12.0), np.ones(8))
-    assert noise.speed_error([9.0, 10.0, 11.0])[0] == pytest.approx(2 * first)
+    largest = 2 * 3 * np.sqrt(6.5) / np.sqrt(20)
+    assert noise.speed_error([9.0, 10.0, 11.0])[0] == pytest.approx(largest)
+
+
+@pytest.mark.parametrize("samples", [3, SAMPLES])
+def test_how_far_derived_speeds_may_be_off_holds_from_the_first_time_it_is_told(samples):
+    rng = np.random.default_rng(3)
+    for count in (1, 2, 3, 5, 8, 9, 12):
+        beyond = []
+        for _ in range(1000):
+            noise, q = PositionNoise(), rng.standard_normal(count + 3)
+            told(noise, np.arange(float(len(q))), q)
+            q = q[-samples:]
+            (error,) = noise.speed_error(np.arange(float(len(q))).tolist())
+            beyond.append(abs(end_slope(np.arange(float(len(q))), q)) > error)
+        assert np.mean(beyond) < 0.008, count
 
 
 @pytest.mark.parametrize("before", [2, 200])

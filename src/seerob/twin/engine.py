@@ -244,6 +244,8 @@ class Engine:
         """Who was put elsewhere during a tick."""
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
+        self._noiseless: set[str] = set()
+        """Those of whom too few positions were heard to tell that noise."""
         quickest = {robot.name: robot.acceleration_limits or QUICKEST for robot in model.workstation.robots}
         quickest |= {machine.name: math.inf for machine in model.workstation.machines}
         silent = {m.name for m in model.workstation.machines if set(gappy) & set(m.motion.variables())}
@@ -444,7 +446,7 @@ class Engine:
             torques = None if sample is None else torques_of(sample)
             off = None if sample is None else self._speed_error(name, sample)
             hearing.take(Heard(t, reason or jump, torques, off))
-            hearing.once = self._references[name].once
+            hearing.once = self._speedless(name)
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
 
     def _speed_error(self, name: str, sample: JointSample | PoseSample) -> Array | None:
@@ -452,16 +454,27 @@ class Engine:
 
         Of a live source that says none, they are slopes of the parabola through its newest three samples.
         """
-        error = sample.qd_error if isinstance(sample, JointSample) else None
+        said, error = (sample.qd, sample.qd_error) if isinstance(sample, JointSample) else (None, None)
         if name in self._unread:
-            if not isinstance(sample, JointSample) or sample.qd is None:
+            self._noiseless.discard(name)
+            if said is None or error is not None:
                 noise, times = self._noises.setdefault(name, (PositionNoise(), deque(maxlen=3)))
                 noise.add(sample.t, tuple(self._references[name].newest.tolist()))
                 times.append(sample.t)
-                error = noise.speed_error(times) if len(times) == 3 else None
+                if said is None:
+                    error = noise.speed_error(times) if len(times) == 3 else None
+                    if error is None:
+                        self._noiseless.add(name)
+            elif name in self._noises:
+                self._noises[name][0].restart()
+                self._noises[name][1].clear()
             if error is not None and not max(error, default=0.0) > QUIET:
                 return None
         return None if error is None else np.array(error)
+
+    def _speedless(self, name: str) -> bool:
+        """Whether what was heard tells no speed: one position, or too few to tell how noisy they are."""
+        return self._references[name].once or name in self._noiseless
 
     def _following(self, name: str) -> Following:
         """What captured motion of a person goes through.
@@ -599,7 +612,7 @@ class Engine:
         for name, coasts in self._coasting.items():
             reference = self._references[name]
             silent = not reference.waits and t - reference.until > coasts + kernel.SLACK
-            self._hearings[name].once = silent or reference.once
+            self._hearings[name].once = silent or self._speedless(name)
         self.state.heard()
         return self.state
 

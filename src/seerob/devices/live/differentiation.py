@@ -20,6 +20,9 @@ DEVIATIONS = 3.0
 """That are told of noise: of normal errors 99.7 % lie within."""
 REMEMBERED, FEW = 64, 16
 """Third differences that noise is told by; of fewer the largest counts, not the median."""
+DEVIATIONS_OF_FEW = 206.0, 18.0, 8.9, 6.2, 4.7, 4.0, 3.5, 3.2
+"""How many times the largest of one, two, three… third differences are told, so that 99.7 % of normal errors
+lie within from the first on; later `DEVIATIONS`. Of 400 000 series each, of slopes through all `SAMPLES`."""
 FLAT = 1e-9
 """Sum of the squares that a parabola has beside the best line, in units of the span, below which its
 curvature is not told by the instants: all but two of them fall together."""
@@ -77,6 +80,9 @@ class Differentiator:
     def add(self, t: float, values: tuple[float, ...]) -> tuple[float, ...] | None:
         """Velocities at the newest sample; None until there are three, and again after a gap.
 
+        And None as long as nothing is told of the noise of positions, which takes four once: speeds of which
+        nobody knows how far they may be off pass for measured ones.
+
         Args:
             t: [s]; what is not later than the sample before it begins anew.
             values: [rad or m], shape (n,).
@@ -92,7 +98,7 @@ class Differentiator:
         self._times.append(t)
         self._values.append(values)
         self._noise.add(t, values)
-        if len(self._times) < 3:
+        if len(self._times) < 3 or not self._noise.told:
             return None
         weights = self._weights = end_weights(self._times)
         return tuple([sum(map(mul, weights, column)) for column in zip(*self._values, strict=True)])
@@ -107,6 +113,11 @@ class PositionNoise:
         self._found: deque[list[float]] = deque(maxlen=REMEMBERED)
         self._sorted: list[list[float]] = []
         """What was found, of each value, ascending: its median is asked for at every sample."""
+
+    @property
+    def told(self) -> bool:
+        """Whether enough positions came to tell anything of it."""
+        return bool(self._found)
 
     def restart(self) -> None:
         """Take up a clock that has begun again; what was found of the noise stays."""
@@ -156,15 +167,17 @@ class PositionNoise:
         Returns:
             [rad/s or m/s], shape (n,); None as long as nothing is told of the noise.
         """
-        return self.error_by(end_weights(times)) if self._found else None
+        return self.error_by(end_weights(times)) if self.told else None
 
     def error_by(self, weights: Sequence[float]) -> tuple[float, ...] | None:
         """Say what `speed_error` does, by the weights of that slope (`end_weights`) [1/s]."""
-        if not self._found:
+        if not self.told:
             return None
-        by = DEVIATIONS * math.sqrt(sum(map(mul, weights, weights)))
-        if len(self._found) < FEW:
+        count, size = len(self._found), math.sqrt(sum(map(mul, weights, weights)))
+        few = count <= len(DEVIATIONS_OF_FEW)
+        by = size * (DEVIATIONS_OF_FEW[count - 1] if few else DEVIATIONS)
+        if count < FEW:
             return tuple([by * ordered[-1] for ordered in self._sorted])
-        half, odd = divmod(len(self._found), 2)
+        half, odd = divmod(count, 2)
         middles = [o[half] if odd else 0.5 * (o[half - 1] + o[half]) for o in self._sorted]
         return tuple([by * (1.4826 * middle) for middle in middles])

@@ -157,8 +157,9 @@ class Hearing:
     leaves_at: float = 0.0
     """Of who stands where he was last said to be: largest speed of a joint then [rad/s or m/s]."""
     once: bool = False
-    """It was heard once, or once after a silence, and that told no speed; or it is a person who was not heard
-    for longer than the twin goes on."""
+    """It was heard once, or once after a silence, and that told no speed; or not yet often enough to tell how
+    noisy the positions are that its speeds follow from; or it is a person who was not heard for longer than
+    the twin goes on."""
     grace: float = 0.0
     """How long after its newest sample it may be late all the same [s]."""
     unlike: Array | None = None

@@ -87,3 +87,27 @@ def test_places_and_directions_freeze_apart(turned):
         point = BodyPoint(name="a", bone="head", position=place, wxyz=(1.0, *axis))
         (found,) = watch((point,), k / RATE)
     assert (found.position is None, found.wxyz is None) == (not turned, turned)
+
+
+@pytest.mark.parametrize("together", [1, 5, 64])
+@pytest.mark.parametrize("live", [False, True])
+def test_what_is_frozen_is_the_same_however_many_samples_are_counted_in_one_go(together, live, monkeypatch):
+    def found():
+        random, watch, out = np.random.default_rng(3), Frozen(live=live), []
+        place = random.normal(size=(6, 3))
+        for k in range(400):
+            moves = random.random((6, 1)) > 0.3 * (k % 90 > 70)
+            place = place + moves * np.round(1e-3 * random.normal(size=(6, 3)), 4)
+            points = [
+                BodyPoint(name=b, bone=b, position=tuple(p.tolist()) if random.random() > 0.02 else None)
+                for b, p in zip(BONES, place, strict=False)
+            ]
+            watch(tuple(points), k / RATE)
+            out.append(sorted(watch.bones))
+        return out
+
+    usual = found()
+    monkeypatch.setattr("seerob.description.capture.frozen.TOGETHER", together)
+    assert found() == usual
+    assert any(usual)
+    assert not all(usual)

@@ -197,6 +197,18 @@ def wxyz_from_rows(m: Sequence[Sequence[float]]) -> tuple[float, float, float, f
     return q[0] / length, q[1] / length, q[2] / length, q[3] / length
 
 
+def left_product(wxyz: ArrayLike) -> Array:
+    """What makes ``p q`` of a quaternion q, for a quaternion p with w first, shape (4, 4)."""
+    a, b, c, d = np.asarray(wxyz, float).tolist()
+    return np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
+
+
+def right_product(wxyz: ArrayLike) -> Array:
+    """What makes ``q p`` of a quaternion q, for a quaternion p with w first, shape (4, 4)."""
+    a, b, c, d = np.asarray(wxyz, float).tolist()
+    return np.array([[a, -b, -c, -d], [b, a, d, -c], [c, -d, a, b], [d, c, -b, a]])
+
+
 def turned(rotation: ArrayLike, wxyz: ArrayLike) -> Array:
     """Quaternions of ``rotation`` times each rotation that is given.
 
@@ -207,8 +219,7 @@ def turned(rotation: ArrayLike, wxyz: ArrayLike) -> Array:
     Returns:
         Quaternions, w first, of the same lengths, shape (..., 4).
     """
-    a, b, c, d = wxyz_from_rotation(rotation)
-    left = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
+    left = left_product(wxyz_from_rotation(rotation))
     given = np.asarray(wxyz, float)
     known = (np.abs(given) < _VAST).all(axis=-1, keepdims=True)
     return np.where(known, np.where(known, given, 0.0) @ left.T, np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from seerob.core.samples import BodyPoint, Vec3, Vec4
-from seerob.core.transforms import Array, rotation_from_wxyz, wxyz_from_rows
+from seerob.core.transforms import Array, left_product, right_product, wxyz_from_rotation
 from seerob.description.capture.captured import CaptureFrame, Layout
 from seerob.description.capture.mapping import Convention, Place
 from seerob.description.description import Description
@@ -126,31 +127,26 @@ class Observer:
         seen = np.asarray(frame.positions, float)
         if self.size is not None:
             seen = self.size.fitted(seen)
-        with np.errstate(invalid="ignore", over="ignore"):
-            positions = seen @ R.T + origin
-            near = (np.abs(seen) < LARGEST).all(axis=1)  # false for NaN
-        turned, known = _turned(frame, R)
-        indices, segments = self._mounted
-        turns = dict(zip(indices, (turned[indices] @ segments).tolist(), strict=True)) if indices else {}
-        places, seen_near, seen_turn = positions.tolist(), near.tolist(), known.tolist()
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            positions = (seen @ R.T + origin).tolist()
+            near = (np.abs(seen) < LARGEST).all(axis=1).tolist()  # false for NaN
+            turns = self._turns(frame)
+        shares = None if frame.confidence is None else np.asarray(frame.confidence, float).tolist()
         sure: float | None = None
         out = []
         for row, at in zip(self.rows, self._at, strict=True):
             i = row.index
             wp, wo = row.position, row.orientation
-            if frame.confidence is not None:
-                sure = _share(float(frame.confidence[i]))
+            if shares is not None:
+                sure = _share(shares[i])
                 wp, wo = wp * sure, wo * sure
-            wxyz: Vec4 | None = None
-            if wo > 0 and seen_turn[i] and i in turns:
-                wxyz = wxyz_from_rows(turns[i])
             out.append(
                 BodyPoint(
                     name=row.name,
                     bone=row.bone,
                     at=at,
-                    position=tuple(places[i]) if wp > 0 and seen_near[i] else None,
-                    wxyz=wxyz,
+                    position=tuple(positions[i]) if wp > 0 and near[i] else None,
+                    wxyz=turns.get(i) if wo > 0 else None,
                     position_weight=wp,
                     orientation_weight=wo,
                     confidence=sure,
@@ -159,11 +155,28 @@ class Observer:
             )
         return tuple(out)
 
+    def _turns(self, frame: CaptureFrame) -> dict[int, Vec4]:
+        """World from bone, by row of the layout, of the bones of which that is known."""
+        indices, matrices = self._mounted
+        if frame.orientations is None or not indices:
+            return {}
+        given = np.asarray(frame.orientations, float)[indices]
+        length = np.sqrt(np.einsum("ij,ij->i", given, given))
+        known = (np.abs(length - 1.0) < UNIT).tolist()  # false for NaN
+        found = np.einsum("ijk,ik->ij", matrices, given / length[:, None]).tolist()
+        return {
+            i: (w, x, y, z) if w >= 0 else (-w, -x, -y, -z)
+            for i, there, (w, x, y, z) in zip(indices, known, found, strict=True)
+            if there
+        }
+
     @cached_property
     def _mounted(self) -> tuple[list[int], Array]:
-        """Rows of the layout of which it is known how their bone is turned, and how: (n, 3, 3)."""
+        """Rows whose bones' turns are known, and what makes these of quaternions of the rows, (n, 4, 4)."""
         known = {row.index: row.segment_from_bone for row in self.rows if row.segment_from_bone is not None}
-        return list(known), np.array(list(known.values()), float).reshape(-1, 3, 3)
+        world = left_product(wxyz_from_rotation(self.world_from_capture[:3, :3]))
+        found = [world @ right_product(wxyz_from_rotation(segment)) for segment in known.values()]
+        return list(known), np.array(found).reshape(-1, 4, 4)
 
     @cached_property
     def _at(self) -> tuple[Vec3, ...]:
@@ -287,19 +300,8 @@ def stature(description: Description) -> float:
     return float(positions[BONES.index("head"), 2] + max(tops))
 
 
-def _turned(frame: CaptureFrame, world_from_capture: Array) -> tuple[Array, Array]:
-    """World from segment of every row (n, 3, 3), and which of them are known (n,)."""
-    n = len(frame.positions)
-    if frame.orientations is None:
-        return np.zeros((n, 3, 3)), np.zeros(n, bool)
-    given = np.asarray(frame.orientations, float)
-    with np.errstate(invalid="ignore", over="ignore"):
-        known = np.abs(np.linalg.norm(given, axis=1) - 1.0) < UNIT  # false for NaN
-    return world_from_capture @ rotation_from_wxyz(np.where(known[:, None], given, (1.0, 0, 0, 0))), known
-
-
 def _share(value: float) -> float:
-    return min(max(value, 0.0), 1.0) if np.isfinite(value) else 0.0
+    return min(max(value, 0.0), 1.0) if math.isfinite(value) else 0.0
 
 
 def _three(v: Array) -> Vec3:

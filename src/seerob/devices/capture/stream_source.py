@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import time
 from collections.abc import AsyncGenerator
 from pathlib import Path
@@ -161,7 +162,8 @@ class _Hearing:
         self._observer: Observer | None = None
         self._subject: str | None = source.subject or None
         self._last_seen = -np.inf
-        self._last_place: np.ndarray | None = None
+        self._last_frame: CaptureFrame | None = None
+        """In which anything of them was seen."""
         self._begun: float | None = None
         self._window: list[CaptureFrame] = []
         self._calibrated = source.calibration.pose is CalibrationPose.NONE
@@ -196,7 +198,7 @@ class _Hearing:
             target=self._source.human,
             seq=0,
             t=now - late,
-            t_device=frame.t if np.isfinite(frame.t) else None,
+            t_device=frame.t if math.isfinite(frame.t) else None,
             points=points,
             subject=frame.subject,
             latency=late,
@@ -255,32 +257,29 @@ class _Hearing:
 
     def _follows(self, frame: CaptureFrame, now: float) -> tuple[bool, bool]:
         """Whether the frame is of the person who is followed, and whether that has another name now."""
-        place = _middle(frame)
         if self._subject is None or frame.subject == self._subject:
             self._subject = frame.subject
-        elif (
-            self._source.subject
-            or now - self._last_seen < self._source.timeout
-            or (
-                self._last_place is None
-                or place is None
-                or np.linalg.norm(place - self._last_place) > SAME_PERSON
-            )
-        ):
+            self._note(frame, now)
+            return True, False
+        if self._source.subject or now - self._last_seen < self._source.timeout or not self._is_there(frame):
             return False, False
-        else:
-            _log.warning(
-                "%s: %r is taken for %r, who was lost there", self._source.name, frame.subject, self._subject
-            )
-            self._subject = frame.subject
-            self._note(place, now)
-            return True, True
-        self._note(place, now)
-        return True, False
+        _log.warning(
+            "%s: %r is taken for %r, who was lost there", self._source.name, frame.subject, self._subject
+        )
+        self._subject = frame.subject
+        self._note(frame, now)
+        return True, True
 
-    def _note(self, place: np.ndarray | None, now: float) -> None:
-        if place is not None:
-            self._last_place, self._last_seen = place, now
+    def _is_there(self, frame: CaptureFrame) -> bool:
+        """Whether somebody is where the person was seen last."""
+        place, last = _middle(frame), None if self._last_frame is None else _middle(self._last_frame)
+        near = place is not None and last is not None and np.linalg.norm(place - last) <= SAME_PERSON
+        return bool(near)
+
+    def _note(self, frame: CaptureFrame, now: float) -> None:
+        # Most frames have all of a person.
+        if math.isfinite(np.add.reduce(frame.positions, axis=None)) or _middle(frame) is not None:
+            self._last_frame, self._last_seen = frame, now
 
     def _calibrate(self, layout: Layout, frame: CaptureFrame, now: float) -> SignalSample | None:
         """What a calibration found, when it has ended."""

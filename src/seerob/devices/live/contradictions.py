@@ -532,14 +532,11 @@ def _moved(before: PoseSample, sample: PoseSample, step: float) -> str:
 
 def _flew(before: BodySample, sample: BodySample, step: float) -> str:
     """Whether most points of a person are elsewhere."""
-    was = {p.name: p.position for p in before.points if p.position is not None}
+    was = {p.name: p.position for p in before.points}
     reach = BODY_SPEED * step + BODY_SLACK
-    count = far = 0
-    for p in sample.points:
-        place = was.get(p.name)
-        if place is not None and p.position is not None:
-            count += 1
-            far += math.dist(place, p.position) > reach
+    places = [(was.get(p.name), p.position) for p in sample.points]
+    ways = [math.dist(a, b) for a, b in places if a and b]
+    count, far = len(ways), sum([way > reach for way in ways])
     if count and far >= MANY * count:
         return f"{far} of {count} points went farther than {reach:.2g} m within {1e3 * step:.0f} ms"
     return ""

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from operator import add, le, sub
 
-from seerob.core.samples import NO_PLACE, BodySample, JointSample, Sample
+from seerob.core.samples import NO_PLACE, JointSample, PoseSample, Sample
 
 TOGETHER = 0.02
 """Samples that arrive within this time may be of one tick, of which the newest is taken [s]."""
@@ -171,11 +171,15 @@ def said_by(sample: Sample) -> tuple[Layout, Sequence[float]]:
         return (0, 0), ()
     found: list[float] = []
     layout: list[tuple[str, bool, bool]] = []
-    for point in sample.points if isinstance(sample, BodySample) else (sample,):
-        place, turn = point.position, point.wxyz
-        layout.append((getattr(point, "name", ""), place is not None, turn is not None))
+    points = (
+        [("", sample.position, sample.wxyz)]
+        if isinstance(sample, PoseSample)
+        else [(p.name, p.position, p.wxyz) for p in sample.points]
+    )
+    for name, place, turn in points:
+        layout.append((name, place is not None, turn is not None))
         found += place or ()
         if turn is not None:
-            side = math.copysign(1.0, turn[0])  # both signs of a quaternion are one orientation
-            found += [side * x for x in turn]
+            # Both signs of a quaternion are one orientation.
+            found += turn if math.copysign(1.0, turn[0]) > 0 else [-x for x in turn]
     return tuple(layout), found

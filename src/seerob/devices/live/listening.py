@@ -501,9 +501,9 @@ class Listener:
         device, timed = sample.t_device, sample.t_device is not None
         t: float | None
         doubt: str
-        t, doubt = host, ""
+        t, doubt, content = host, "", _content(sample)
         if device is not None:
-            t, doubt = self._clock.hear(device, host, _content(sample), forgeable=bool(self._senders))
+            t, doubt = self._clock.hear(device, host, content, forgeable=bool(self._senders))
         if t is None:
             self._arrivals.repeat()
             if doubt:
@@ -512,7 +512,7 @@ class Listener:
             return
         if isinstance(sample, BodySample):
             person = told.person = told.person or _Person()
-            stood = person.stood(sample, host)
+            stood = person.stood(sample, content, host)
             if stood is not None:
                 self._arrivals.repeat()
                 if stood > self._source.timeout:
@@ -637,16 +637,15 @@ class _Person:
         self._content: int | None = None
         self._since = 0.0
 
-    def stood(self, sample: BodySample, host: float) -> float | None:
+    def stood(self, sample: BodySample, content: int, host: float) -> float | None:
         """For how long it has said nothing but this [s]: that is silence; None where it is news.
 
         Args:
             sample: What it says.
+            content: What tells that from what others say.
             host: When [s].
         """
-        content = _content(sample)
-        seen = any(p.position is not None or p.wxyz is not None for p in sample.points)
-        if seen and content == self._content:
+        if content == self._content and any(p.position or p.wxyz for p in sample.points):
             return host - self._since
         self._content, self._since = content, host
         return None

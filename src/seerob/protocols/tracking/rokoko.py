@@ -8,11 +8,12 @@ port); here turned into a right-handed world with z up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from operator import attrgetter
+from typing import Annotated
 
 import msgspec
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import UNSET, Meta, Struct, UnsetType
 
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import Layout, Seen
@@ -25,26 +26,13 @@ UNPACKED = 1 << 20
 """An LZ4 frame may hold at most so much [byte]."""
 MOST_ACTORS = 32
 
-SEGMENTS = (
-    "hip",
-    "spine",
-    "chest",
-    "neck",
-    "head",
-    *(
-        f"{side}{part}"
-        for side in ("left", "right")
-        for part in ("Shoulder", "UpperArm", "LowerArm", "Hand", "UpLeg", "Leg", "Foot", "Toe")
-    ),
-)
-LAYOUT = Layout(seen=Seen.JOINTS, names=SEGMENTS, convention="rokoko")
 WORLD_FROM_UNITY = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """z is forward there, x right, y up: x forward, y left, z up. Its determinant is -1."""
 _LZ4 = b"\x04\x22\x4d\x18"
 _Name = Annotated[str, Meta(max_length=200)]
 
 
-class Vector(Struct):
+class Vector(Struct, frozen=True, gc=False):
     """A position or, with ``w``, a rotation."""
 
     x: float | None = None
@@ -53,25 +41,59 @@ class Vector(Struct):
     w: float | None = None
 
 
-class Segment(Struct):
+class Segment(Struct, frozen=True):
     """One bone as the datagram has it."""
 
     position: Vector
     rotation: Vector | None = None
 
 
-class ActorObject(Struct):
+_NOT_SAID = Segment(Vector())
+
+
+class Segments(Struct):
+    """Bones of one person; keys that are not known are left alone."""
+
+    hip: Segment = _NOT_SAID
+    spine: Segment = _NOT_SAID
+    chest: Segment = _NOT_SAID
+    neck: Segment = _NOT_SAID
+    head: Segment = _NOT_SAID
+    leftShoulder: Segment = _NOT_SAID
+    leftUpperArm: Segment = _NOT_SAID
+    leftLowerArm: Segment = _NOT_SAID
+    leftHand: Segment = _NOT_SAID
+    leftUpLeg: Segment = _NOT_SAID
+    leftLeg: Segment = _NOT_SAID
+    leftFoot: Segment = _NOT_SAID
+    leftToe: Segment = _NOT_SAID
+    rightShoulder: Segment = _NOT_SAID
+    rightUpperArm: Segment = _NOT_SAID
+    rightLowerArm: Segment = _NOT_SAID
+    rightHand: Segment = _NOT_SAID
+    rightUpLeg: Segment = _NOT_SAID
+    rightLeg: Segment = _NOT_SAID
+    rightFoot: Segment = _NOT_SAID
+    rightToe: Segment = _NOT_SAID
+
+
+SEGMENTS = Segments.__struct_fields__
+LAYOUT = Layout(seen=Seen.JOINTS, names=SEGMENTS, convention="rokoko")
+_in_order = attrgetter(*SEGMENTS)
+
+
+class ActorObject(Segments):
     """One person as the datagram has it; ``body`` in version 3, the segments themselves in version 2."""
 
     name: _Name = ""
-    body: dict[str, Any] | None = None
+    body: Segments | UnsetType = UNSET
 
 
 class SceneObject(Struct):
     """What version 3 puts around the persons."""
 
     timestamp: float | None = None
-    actors: Annotated[list[msgspec.Raw], Meta(max_length=MOST_ACTORS)] = []
+    actors: Annotated[list[ActorObject], Meta(max_length=MOST_ACTORS)] = []
 
 
 class Datagram(Struct):
@@ -81,7 +103,7 @@ class Datagram(Struct):
     fps: float | None = None
     scene: SceneObject | None = None
     timestamp: float | None = None
-    actors: Annotated[list[msgspec.Raw], Meta(max_length=MOST_ACTORS)] = []
+    actors: Annotated[list[ActorObject], Meta(max_length=MOST_ACTORS)] = []
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -108,9 +130,6 @@ class Scene:
 
 
 _datagrams = msgspec.json.Decoder(Datagram)
-_actors = msgspec.json.Decoder(ActorObject)
-_segments = msgspec.json.Decoder(dict[str, msgspec.Raw])
-_segment = msgspec.json.Decoder(Segment)
 
 
 def decode(data: bytes | str) -> Scene:
@@ -157,32 +176,17 @@ def _scene(text: bytes) -> Scene:
     return Scene(
         t=float("nan") if when is None else float(when),
         version=version,
-        actors=tuple(_actor(raw) for raw in actors),
+        actors=tuple([_actor(said) for said in actors]),
         fps=said.fps,
     )
 
 
-def _actor(raw: msgspec.Raw) -> Actor:
-    name = _actors.decode(raw).name
-    parts = _segments.decode(raw)
-    body = parts.get("body")
-    if body is not None:
-        parts = _segments.decode(body)
-    positions = np.full((len(SEGMENTS), 3), np.nan)
-    turns = np.full((len(SEGMENTS), 4), np.nan)
-    for row, segment in enumerate(SEGMENTS):
-        if segment not in parts:
-            continue
-        said = _segment.decode(parts[segment])
-        positions[row] = _three(said.position)
-        if said.rotation is not None:
-            r = said.rotation
-            turns[row] = np.nan if r.w is None else r.w, *_three(r)
-    return Actor(name, positions @ WORLD_FROM_UNITY.T, _mirrored(turns))
-
-
-def _three(v: Vector) -> tuple[float, float, float]:
-    return tuple(float("nan") if c is None else c for c in (v.x, v.y, v.z))  # type: ignore[return-value]
+def _actor(said: ActorObject) -> Actor:
+    segments = _in_order(said if said.body is UNSET else said.body)
+    both = [(each.position, each.rotation or _NOT_SAID.position) for each in segments]
+    # What is None becomes NaN.
+    values = np.array([(p.x, p.y, p.z, r.w, r.x, r.y, r.z) for p, r in both], float)
+    return Actor(said.name, values[:, :3] @ WORLD_FROM_UNITY.T, _mirrored(values[:, 3:]))
 
 
 def _mirrored(wxyz: Array) -> Array:

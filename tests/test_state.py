@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 from made_cell import FLOATING, TWO_R, hinge_limits, made, state_at, two_r
 from oracles import pinocchio_oracle as oracle
@@ -248,6 +249,24 @@ def test_tool_without_mass_makes_energies_unknown_only_while_it_is_mounted(tmp_p
     with pytest.raises(Undecided, match="mass of grip is unknown: nobody gave its mass or its density"):
         state.mass_matrix(station.model.robot("arm"))
     assert state.jacobian(station.model.robot("arm").tip, station.model.robot("arm")).shape == (6, 2)
+
+
+@pytest.mark.parametrize("table", ["tools", "machines"])
+def test_of_a_mesh_with_holes_whose_density_is_given_it_is_the_depth_of_holes_that_is_missing(
+    tmp_path, table
+):
+    box = trimesh.creation.box((0.1, 0.1, 0.1)).subdivide()
+    stl = trimesh.Trimesh(box.vertices, box.faces[1:]).export(file_type="stl")
+    thing = f'[[{table}]]\nname = "grip"\non = "arm/tip"\nmesh = "grip.stl"\nunits = "m"\ndensity = 800\n'
+    thing += "" if table == "tools" else "slide = { along = [1, 0, 0], lower = 0, upper = 0.1 }\n"
+    files = {"arm.urdf": two_r(), "grip.stl": stl}
+    station = made(tmp_path, TWO_R + thing, files)
+    state = state_at(station, arm=((0, 1), (1, 1)))
+    with pytest.raises(Undecided, match=r"mass of grip.* is unknown: its mesh has holes.*give hole_depth"):
+        state.mass_matrix(station.model.robot("arm"))
+    station = made(tmp_path / "deep", TWO_R + f"{thing}hole_depth = 0\n", files)
+    state = state_at(station, arm=((0, 1), (1, 1)))
+    assert state.mass_matrix(station.model.robot("arm")).shape == (2, 2)
 
 
 def test_tool_and_its_working_point_are_different_points(tmp_path):

@@ -586,13 +586,15 @@ def test_a_file_without_the_customary_ending_is_read_as_what_it_is(tmp_path, nam
 
 
 def test_by_how_much_a_mass_may_be_off_is_written_and_read_again(tmp_path):
-    inertial = Inertial(2.0, np.zeros(3), np.eye(3) * 0.01, Origin.ESTIMATED, "by density", 0.02, 0.05)
+    inertial = Inertial(
+        2.0, np.zeros(3), np.eye(3) * 0.01, Origin.ESTIMATED, "by density", 0.02, 0.05, gyration=0.1
+    )
     link = Link("one", None, np.eye(4), inertial=inertial)
-    for plain, expected in ((False, (0.02, 0.05)), (True, (0, 0))):
+    for plain, expected in ((False, (0.02, 0.05, 0.1)), (True, (0, 0, 0))):
         text, _ = written(Description("one", (link,), "one", "made here"), plain=plain)
         (tmp_path / "one.urdf").write_text(text)
         read = load_robot("one.urdf", folder=tmp_path).links[0].inertial
-        assert (read.error, read.spread_error) == expected
+        assert (read.error, read.spread_error, read.gyration) == expected
     (tmp_path / "one.urdf").write_text(text.replace('value="2.0"', 'value="2.0" error="-1"'))
     with pytest.raises(InputError, match="a share from 0 up"):
         load_robot("one.urdf", folder=tmp_path)

@@ -418,7 +418,7 @@ def test_a_machine_weighs_what_all_its_links_do_or_nobody_knows():
             entry("post", 9.0, "arm", "part"),
             entry("gun", None, role="tool"),
         ]
-        riders = Riders(chains, carriers, entries)
+        riders = Riders(chains, carriers, entries, {})
         assert riders.things("arm") == {"hand": both, "pen": 2.0, "gun": None}
         said = {row.name: (row.mass, row.origin, row.source, bool(row.note)) for row in riders.weighed("arm")}
         nobody = (None, Origin.MISSING, "", True)
@@ -427,3 +427,17 @@ def test_a_machine_weighs_what_all_its_links_do_or_nobody_knows():
             "pen": (2.0, Origin.GIVEN, "label", False),
             "gun": nobody,
         }
+
+
+def test_what_is_noticed_of_the_shape_of_a_link_whose_mass_is_given_is_told(tmp_path):
+    """A mesh with a hole: how its mass is spread has bounds alone, with where they come from."""
+    box = trimesh.creation.box((0.1, 0.1, 0.1)).subdivide()
+    meshes = {"l.stl": trimesh.Trimesh(box.vertices, box.faces[1:]).export(file_type="stl")}
+    arm = two_r().replace(
+        "</link>", '<collision><geometry><mesh filename="l.stl"/></geometry></collision></link>'
+    )
+    text = FLOATING + TWO_R + '[robots.masses.l1]\nmass = 2\nsource = "a scale"\n'
+    cell = made(tmp_path, text, {"arm.urdf": arm, **meshes})
+    told = [finding for finding in cell.model.findings if finding.subject == "arm/l1"]
+    assert any("the mass may be anywhere in its convex hull" in finding.text for finding in told)
+    assert MassTolerances(cell.model, cell.model.robot("arm")).tolerances

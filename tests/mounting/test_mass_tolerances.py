@@ -14,7 +14,7 @@ from seerob.core.snapshot import Origin
 from seerob.core.tolerances import Tolerance
 from seerob.criteria.scoring.handled import heavier
 from seerob.description.description import Inertial, rigid
-from seerob.twin.accuracy.mass_tolerances import MassTolerances
+from seerob.twin.accuracy.mass_tolerances import MassTolerances, _Part
 
 M, I_Z = 2.0, 0.05
 
@@ -315,3 +315,67 @@ def test_of_a_body_that_several_inputs_leave_open_no_less_is_left_than_nothing(t
     (result,) = judged(cell.bound, state)
     assert result.interval is not None
     assert 0 < result.interval[0] < result.value < result.interval[1]
+
+
+BLOCK = np.array([0.2, 0.12, 0.3])
+"""Edges of a tool [m]."""
+
+
+def lumps(rng, com):
+    """Masses that sum to 1 in a block about the origin, at random, whose centre is a point [m]."""
+    while True:
+        at = rng.uniform(-0.5, 0.5, (rng.integers(2, 6), 3)) * BLOCK
+        at = np.where(rng.random(at.shape) < 0.5, np.sign(at) * BLOCK / 2, at)
+        share = rng.dirichlet(np.ones(len(at)))
+        # One more, which brings the centre to where it is to be, if that lies in the block.
+        weight = rng.uniform(0.05, 0.6)
+        last = (com - (1 - weight) * share @ at) / weight
+        if (np.abs(last) <= BLOCK / 2).all():
+            return np.vstack([at, last]), np.append((1 - weight) * share, weight)
+
+
+@pytest.mark.parametrize("link", [False, True])
+@pytest.mark.parametrize("more", ["", "mass_tolerance = 0.2"])
+def test_wherever_mass_is_about_a_known_centre_figures_are_within_their_bounds(tmp_path, link, more):
+    """2 kg in a block, whose centre is given and whose moments are not: who leaves them out is not relieved.
+
+    Against point masses anywhere in it that have that centre.
+    """
+    com, rng = np.array([0.06, -0.02, 0.1]), np.random.default_rng(4)
+    said = f"mass = 2\ncom = {com.tolist()}\n{more}\n"
+    block = f"shape = {{ box = {BLOCK.tolist()} }}\n"
+    files, text = {"arm.urdf": two_r(masses=(0.3, 0.1))}, FLOATING + TWO_R
+    if link:
+        files["arm.urdf"] = one("revolute", 0.0).replace("0.1 0.1 0.1", " ".join(map(str, BLOCK)))
+        text += f'{more}\n[robots.masses.l1]\nmass = 2\ncom = {com.tolist()}\nsource = "a scale"\n'
+    else:
+        text += f'[[tools]]\nname = "grip"\non = "arm/tip"\n{block}{said}'
+    cell = made(tmp_path, text, files)
+    robot = cell.model.robot("arm")
+    n = len(robot.joints)
+    found = MassTolerances(cell.model, robot)
+    name = "arm/l1" if link else "grip"
+    assert str(found.tolerances[-1]).startswith(f"radius of gyration of {name} ± ")
+    assert found.moved == (str(found.tolerances[-1]),)
+    q, qd = rng.uniform(-1, 1, n), rng.uniform(-1, 1, n)
+    state = state_at(cell, arm=(q, qd))
+    mj, data, body = cell.model.mj, state.data, state.model.mj.body(name).id
+    plain = state.mass_matrix(robot)
+    without, parts = plain - _Part.of(state, robot, body).matrix, []
+    for _ in range(300):
+        M, rows, mass = without.copy(), np.zeros((3, mj.nv)), 2 * (rng.uniform(0.8, 1.2) if more else 1.0)
+        for at, share in zip(*lumps(rng, com), strict=True):
+            mujoco.mj_jac(mj, data, rows, None, data.xpos[body] + data.xmat[body].reshape(3, 3) @ at, body)
+            M += mass * share * rows[:, robot.v_address].T @ rows[:, robot.v_address]
+        parts.append(qd @ M @ qd)
+    at, ends = found.matrices(state).at, len(found)
+    low, high = (qd @ at((side,) * ends) @ qd for side in (-1, 1))
+    assert low <= min(parts) < max(parts) <= high
+    assert low <= qd @ plain @ qd <= high
+    assert max(parts) - min(parts) > 0.15 * (high - low), "it is no bound of nothing"
+    # Who gives them has no interval.
+    given = text.replace(
+        f"com = {com.tolist()}\n", f"com = {com.tolist()}\ninertia = [0.02, 0.02, 0.01, 0, 0, 0]\n"
+    )
+    sure = made(tmp_path / "given", given, files)
+    assert len(MassTolerances(sure.model, sure.model.robot("arm"))) == ends - 1

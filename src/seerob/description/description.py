@@ -40,6 +40,8 @@ class Quantity:
     """Relative uncertainty, of an estimate that has a bound; 0 when stated."""
     spread_error: float = 0.0
     """Of a mass: `Inertial.spread_error`."""
+    gyration: float = 0.0
+    """Of a mass: `Inertial.gyration` [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,9 @@ class Inertial:
     within: float = 0.0
     """How far from ``com`` any of the mass may lie, where nobody knows how it is spread [m]; 0 where that is
     known."""
+    gyration: float = 0.0
+    """Largest radius of gyration about any axis through ``com``, where that is known and moments are not [m]:
+    they are anything from nothing to ``mass * gyration**2``; 0 where they are known."""
 
 
 def rigid(parts: Sequence[tuple[Inertial, Array]]) -> Inertial:

@@ -82,6 +82,19 @@ def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
                 origin=Origin.MISSING,
             )
         )
+    turned = [
+        f"{mechanism.name}/{link.name}"
+        for link in mechanism.description.links
+        if link.inertial is not None and link.inertial.gyration
+    ]
+    things = (model.bodies[index] for index in mechanism.carried)
+    turned += [body.owner for body in things if body.mass is not None and body.mass.gyration]
+    found += [
+        Input(
+            name=f"moments of inertia of {name}", value="any that fit into its shape", origin=Origin.MISSING
+        )
+        for name in turned
+    ]
     found += [
         Input(name=text.removeprefix("nobody gave ").strip(), origin=Origin.MISSING)
         for text in mechanism.unknown_masses

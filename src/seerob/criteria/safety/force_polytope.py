@@ -105,7 +105,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             robot.require_masses(self.name)
         offset = np.array(self.offset)
         lower, upper, unknown = self._torques(model, robot)
-        loose = self.load != "none" and bool(loose_torques(model, robot))
+        loose = bool(self._loose(model))
 
         def compute(twin: Twin) -> Figure:
             twin.require(robot.name)
@@ -136,7 +136,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
     def present(self, model: Model) -> Present:
         """Return the function that names the direction of the largest force, and draws the polytope."""
         frame, offset, limit = model.frame(self.at), np.array(self.offset), self._against(model).limit
-        loose = "" if self.load == "none" else loose_torques(model, model.carrier(frame))
+        loose = self._loose(model)
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             polytope: Polytope = figure.beside
@@ -225,6 +225,11 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             return down_to(least, limit - largest * (1 + float((gained / left).max())) / shrinks)
 
         return falls
+
+    def _loose(self, model: Model) -> str:
+        """Why what the torques must hold may be more; empty where it may not."""
+        robot, at_rest = model.carrier(model.frame(self.at)), self.load == "gravity"
+        return "" if self.load == "none" else loose_torques(model, robot, at_rest=at_rest)
 
     def _held(self, twin: Twin, robot: Mechanism) -> Array:
         if self.load == "gravity":

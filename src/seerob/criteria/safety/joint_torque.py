@@ -97,7 +97,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         needed = joint_torques.Needed(robot, model.workstation.engine.tick)
         unlimited, all_unlimited = bool(np.isnan(limits).any()), bool(np.isnan(limits).all())
         # Friction and rotors are not in the model.
-        inexact = self.torques == "model" and (given is None or bool(loose_torques(model, robot)))
+        inexact = bool(self._loose(model, robot)) or (self.torques == "model" and given is None)
 
         def compute(twin: Twin) -> Figure:
             state, why = cast("State", twin), ""
@@ -135,7 +135,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         largest = self._per_joint(model, robot, "largest_residual")
         where = ["nobody gave its limit" if unknown else "" for unknown in np.isnan(limits).tolist()]
         ever = [f"{name}: {reason}" for name, reason in zip(names, where, strict=True) if reason]
-        loose = loose_torques(model, robot) if self.torques == "model" else ""
+        loose = self._loose(model, robot)
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             (share, residual, why), reasons, parts = figure.beside, list(ever), figure.parts
@@ -213,6 +213,11 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
             return least(tau) if (residual <= largest).all() else -math.inf
 
         return lowest
+
+    def _loose(self, model: Model, robot: Mechanism) -> str:
+        """Why what the model needs may be another torque, where that is asked; empty where it may not."""
+        asked = self.torques == "model" or self.largest_residual is not None
+        return loose_torques(model, robot) if asked else ""
 
     def _limits(self, model: Model, robot: Mechanism) -> Array:
         """Of every joint [N·m or N], NaN where nobody knows, shape (n,)."""

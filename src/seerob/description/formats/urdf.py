@@ -586,9 +586,10 @@ def _inertial(
         return None, "inertial without a mass", None
     kilograms = float(reader.numbers(mass, "value", f"{key}.mass", (0.0,))[0])
     # As an import of ours writes them, of a mass by density.
-    off = [float(reader.numbers(mass, key_, f"{key}.mass", (0.0,))[0]) for key_ in ("error", "spread_error")]
+    told = "error", "spread_error", "gyration"
+    off = [float(reader.numbers(mass, key_, f"{key}.mass", (0.0,))[0]) for key_ in told]
     if not all(0 <= share <= 1e3 for share in off):
-        reader.problem(f"{key}.mass.error", f"is {off}", "a share from 0 up")
+        reader.problem(f"{key}.mass.error", f"is {off}", "a share from 0 up, of gyration a length in m")
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
@@ -607,6 +608,7 @@ def _inertial(
         source=f"{reader.file}: link {name}",
         error=off[0],
         spread_error=off[1],
+        gyration=off[2],
     )
     kept, level, text = lint.plausible_inertial(made, body=body)
     if text:

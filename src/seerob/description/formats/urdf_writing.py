@@ -162,8 +162,12 @@ def _origin(element: Element, at: Array) -> None:
 def _inertial(link: Element, inertial: Inertial, *, plain: bool) -> None:
     element = SubElement(link, "inertial")
     SubElement(element, "origin", xyz=_text(inertial.com), rpy="0 0 0")
-    off = {"error": inertial.error, "spread_error": inertial.spread_error}
-    said = {} if plain else {key: repr(float(share)) for key, share in off.items() if share > 0}
+    off = {
+        "error": inertial.error,
+        "spread_error": inertial.spread_error,
+        "gyration": inertial.gyration,
+    }
+    said = {} if plain else {key: repr(float(one)) for key, one in off.items() if one > 0}
     SubElement(element, "mass", {"value": repr(float(inertial.mass)), **said})
     pairs = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
     moments: Mapping[str, str] = {key: repr(float(inertial.inertia[at])) for key, at in pairs.items()}

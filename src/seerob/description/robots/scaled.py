@@ -97,6 +97,7 @@ def _inertial(given: Inertial, s: float) -> Inertial:
         com=given.com * s,
         inertia=given.inertia * s**5,
         within=given.within * s,
+        gyration=given.gyration * s,
         origin=_origin(given.origin),
         source=source,
     )

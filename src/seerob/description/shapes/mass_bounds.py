@@ -58,6 +58,21 @@ def off_by(mesh: Mesh, deviation: float, moments: Moments) -> Off:
     return Off(weight / moments.volume, _share(layer, _of_body(moments)))
 
 
+def largest_gyration(com: Array, low: Array, high: Array) -> float:
+    """Radius of gyration that no body within a box exceeds, about any axis through its centre of mass [m].
+
+    Along each axis of the box the mean square distance from the centre c is no more than
+    :math:`(c - l)(h - c)`, which half of the mass at either end has in the right proportion (Bhatia and
+    Davis 2000), and no moment of inertia per mass is more than their sum.
+
+    Args:
+        com: Its centre of mass [m], shape (3,).
+        low: Lowest corner of the box [m], shape (3,).
+        high: Highest corner [m], shape (3,).
+    """
+    return float(np.sqrt(np.maximum((com - low) * (high - com), 0.0).sum()))
+
+
 def off_by_volume(points: Array, volume: float, moments: Moments) -> float:
     """Share by which mass properties may be off where a volume [m³] may be missing, or too many, anywhere.
 

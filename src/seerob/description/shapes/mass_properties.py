@@ -187,6 +187,7 @@ def _overlap(corners: Array, centers: Array) -> NDArray[np.bool_]:
 
 __all__ = [
     "Moments",
+    "about_its_centre",
     "boxes_meet",
     "combined",
     "from_shape",
@@ -204,6 +205,8 @@ PATCHED = 0.2
 """Largest share of the surface that may have been missing before mending stops being credible."""
 
 
+OFF_CENTRE = 1e-3
+"""How far a given centre of mass may be from that of uniform density without a finding [m]: a choice."""
 SLITS = 1e-9
 """Share of the surface that is none: edges of unequal length that meet leave holes without an area."""
 
@@ -305,6 +308,38 @@ def from_shape(
             )
         findings.append(Finding(level="warning" if error > 0.01 else "note", subject=subject, text=text))
     return inertial, tuple(findings)
+
+
+def about_its_centre(
+    uniform: Inertial, com: Sequence[float], box: tuple[Array, Array], *, subject: str
+) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties of what has its centre of mass elsewhere than uniform density has it.
+
+    Its moments are told as those of uniform density, and may be any that a body in that box can have.
+
+    Args:
+        uniform: At uniform density.
+        com: The centre of mass [m].
+        box: Lowest and highest corner of one that holds all of it [m].
+        subject: Full name of the body.
+    """
+    inertial = replace(uniform, com=np.array(com, float))
+    off = float(np.linalg.norm(inertial.com - uniform.com))
+    if off <= OFF_CENTRE:
+        return inertial, ()
+    gyration = max(mass_bounds.largest_gyration(inertial.com, *box), OFF_CENTRE)
+    # Those of uniform density may be more than any that has its centre there.
+    share = min(1.0, inertial.mass * gyration**2 / float(np.linalg.eigvalsh(inertial.inertia)[-1]))
+    inertial = replace(inertial, gyration=gyration, inertia=share * inertial.inertia)
+    if uniform.error == 0.0:
+        # Mass and centre are given, and the moments have a bound of their own.
+        inertial = replace(inertial, spread_error=0.0)
+    text = (
+        f"moments of inertia are those of uniform density, and its centre of mass is {1e3 * off:.3g} mm from "
+        "where uniform density has it: give inertia, or what rests on them has an interval of any that fit "
+        "into its shape"
+    )
+    return inertial, (Finding(level="assumed", subject=subject, text=text),)
 
 
 def _of_given(mesh: Mesh, around: float, moments: Moments, error: float, everything: float) -> float:

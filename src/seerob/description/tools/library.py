@@ -8,7 +8,7 @@ not say is unknown and stays so.
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -19,6 +19,7 @@ from seerob.core.errors import UnknownName
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array, rotation_from_rpy, transform
+from seerob.description import lint
 from seerob.description.description import Inertial
 from seerob.description.robots.library import NOTE, shapes_for
 from seerob.description.shapes import mass_properties
@@ -81,12 +82,12 @@ def _inertial(table: dict[str, Any], solids: tuple[Solid, ...], tool: str) -> In
     origin, source, mass = Origin(table["origin"]), table["source"], float(table["mass"])
     meshes = [solid.mesh for solid in solids if solid.mesh is not None]
     spread, _ = mass_properties.from_shape(meshes, mass=mass, subject=tool)
-    com, inertia = spread.com, spread.inertia
-    if "com" in table:
-        com = np.array(table["com"], float)
+    com = table.get("com", spread.com)
     if "inertia" in table:
         xx, yy, zz, xy, xz, yz = table["inertia"]
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float)
-    else:
-        source = f"{source}; spread over the envelope"
-    return Inertial(mass, com, inertia, origin, source)
+        return Inertial(mass, np.array(com, float), inertia, origin, source)
+    source = f"{source}; spread over the envelope"
+    # Who gives a mass instead is not told of these moments: a file says itself that its source has none.
+    inertial, _ = mass_properties.about_its_centre(spread, com, lint.box(solids), subject=tool)
+    return replace(inertial, origin=origin, source=source)

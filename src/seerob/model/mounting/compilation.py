@@ -140,6 +140,8 @@ class _Compiler:
         self.problems: list[Problem] = []
         self.chains: dict[str, MechanismDraft] = {}
         self.carriers: dict[str, str] = {}
+        self.unweighed: dict[str, str] = {}
+        """By tool and workpiece, why it has no mass though somebody gave its density."""
         self.bound = Bound({}, {}, ())
 
     def run(self) -> Model:
@@ -472,6 +474,8 @@ class _Compiler:
         if carrier:
             self.carriers[thing.name] = carrier
         mass = None
+        if loaded.refused_mass:
+            self.unweighed[thing.name] = loaded.refused_mass
         if loaded.inertial is not None:
             self.mounting.inertial(body, loaded.inertial)
             mass = _weight(loaded.inertial)
@@ -548,7 +552,7 @@ class _Compiler:
                 yield Finding(level="warning", subject=area.name, text=text, holds=(area.name,))
 
     def _riders(self) -> Riders:
-        return Riders(self.chains, self.carriers, self.mounting.entries)
+        return Riders(self.chains, self.carriers, self.mounting.entries, self.unweighed)
 
     def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
         given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")
@@ -556,7 +560,14 @@ class _Compiler:
 
 
 def _weight(inertial: Inertial) -> Quantity:
-    return Quantity(inertial.mass, inertial.origin, inertial.source, inertial.error, inertial.spread_error)
+    return Quantity(
+        inertial.mass,
+        inertial.origin,
+        inertial.source,
+        inertial.error,
+        inertial.spread_error,
+        inertial.gyration,
+    )
 
 
 def _body_id(mj: mujoco.MjModel, name: str) -> int:

@@ -40,6 +40,7 @@ def loaded(machine: Machine, folder: Path, *, file: str) -> tuple[Description, L
         np.eye(4),
         joints=joints(machine.motion),
         inertial=thing.inertial,
+        refused_mass=thing.refused_mass,
         visual=tuple(mesh for piece in thing.pieces for mesh in piece.visual),
         solids=tuple(solid for piece in thing.pieces for solid in piece.solids),
     )

@@ -54,8 +54,10 @@ class Riders:
         chains: Mapping[str, MechanismDraft],
         carriers: Mapping[str, str],
         entries: Sequence[Entry],
+        unweighed: Mapping[str, str],
     ) -> None:
         self._chains, self._carriers, self._entries = chains, carriers, entries
+        self._unweighed = unweighed
 
     def above(self, name: str) -> str:
         """Who carries a robot or machine; empty for the world."""
@@ -87,6 +89,12 @@ class Riders:
                 things[entry.owner] = known if mass is None else mass
         return things
 
+    def _refused(self, machine: str) -> str:
+        """Why what is on a robot has no mass, if it is a machine of which somebody gave a density."""
+        chain = self._chains.get(machine)
+        links = () if chain is None else chain.description.links
+        return next((link.refused_mass for link in links if link.refused_mass), "")
+
     def weighed(self, name: str) -> tuple[LinkMass, ...]:
         """What each link of a robot or machine weighs, and each thing on it."""
         chain = self._chains[name]
@@ -95,7 +103,8 @@ class Riders:
         for thing, mass in self.things(name).items():
             stated = None if mass is None else given[thing]
             if stated is None:
-                rows.append(LinkMass(name=thing, origin=Origin.MISSING, note=NOT_WEIGHED))
+                note = self._unweighed.get(thing) or self._refused(thing) or NOT_WEIGHED
+                rows.append(LinkMass(name=thing, origin=Origin.MISSING, note=note))
             else:
                 rows.append(LinkMass(name=thing, mass=mass, origin=stated.origin, source=stated.source))
         return tuple(rows)

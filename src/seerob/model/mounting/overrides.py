@@ -116,7 +116,13 @@ def overridden(description: Description, robot: Robot, file: str) -> Description
         if link.name in robot.masses:
             refused, impossible = "", None
             try:
-                inertial, more = overridden_link(robot.masses[link.name], link, robot=robot.name, file=file)
+                inertial, more = overridden_link(
+                    robot.masses[link.name],
+                    link,
+                    robot=robot.name,
+                    file=file,
+                    com_tolerance=robot.com_tolerance or 0.0,
+                )
                 findings += more
             except InputError as error:
                 problems += error.problems

@@ -25,7 +25,7 @@ from seerob.description.shapes.moments import signed_volume
 from seerob.description.tools import library
 from seerob.model.mounting.specification import Mounting, pose_matrix
 from seerob.workstation.tables.sensors import Sensor
-from seerob.workstation.workstation import Area, Shape, Thing
+from seerob.workstation.workstation import Area, Mounted, Shape, Thing
 from seerob.workstation.workstation import Body as BodyTable
 
 Color = tuple[float, float, float, float]
@@ -35,10 +35,11 @@ PART_COLOR: Color = (0.55, 0.58, 0.62, 1.0)
 AREA_COLOR: Color = (0.99, 0.92, 0.57, 0.25)
 
 CYLINDER_SIDES = 96
+NO_DEPTH = (
+    "its mesh has holes, and nobody says how far beyond their rims its surface may lie: give hole_depth"
+)
 VISIBLE = 1e-4
 """How far what is shown may be off without a finding [m]."""
-OFF_CENTRE = 1e-3
-"""How far a given centre of mass may be from that of uniform density without a finding [m]: a choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,8 @@ class LoadedThing:
     """Inertial of all pieces together, in the thing's frame; None when nobody gave a mass or a density."""
     findings: tuple[Finding, ...]
     files: dict[str, bytes]
+    refused_mass: str = ""
+    """Why it has none though somebody gave a density."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +143,7 @@ def load_thing(
     inertial: Inertial | None = None
     more: tuple[Finding, ...] = ()
     if needs_mass and (thing.mass is not None or thing.density is not None):
-        inertial, more = _inertial(thing, whole, off, source)
+        inertial, more = _inertial(thing, whole, solids, off, source)
     elif needs_mass and known is not None:
         inertial = known.inertial
     elif thing.mass is not None and thing.com is not None:
@@ -154,7 +157,8 @@ def load_thing(
         findings += noticed
     if not needs_mass:
         inertial = None
-    return LoadedThing(pieces, inertial, findings, files)
+    refused = NO_DEPTH if needs_mass and inertial is None and thing.density is not None else ""
+    return LoadedThing(pieces, inertial, findings, files, refused)
 
 
 def replace_subject(finding: Finding, subject: str) -> Finding:
@@ -221,7 +225,7 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
 
 
 def _inertial(
-    thing: Thing, meshes: list[Mesh], deviation: float, source: str
+    thing: Thing, meshes: list[Mesh], solids: Sequence[Solid], deviation: float, source: str
 ) -> tuple[Inertial | None, tuple[Finding, ...]]:
     if thing.mass is not None and thing.com is not None and thing.inertia is not None:
         return given_inertial(thing.mass, thing.com, thing.inertia, "workstation file"), ()
@@ -229,8 +233,13 @@ def _inertial(
     if np.isinf(inertial.spread_error):
         return None, findings
     if thing.com is not None:
-        findings += _uneven(thing.name, inertial, thing.com)
-        inertial = replace(inertial, com=np.array(thing.com, float))
+        beyond = thing.hole_depth or 0.0
+        if isinstance(thing, Mounted):
+            beyond += thing.com_tolerance or 0.0
+        inertial, uneven = mass_properties.about_its_centre(
+            inertial, thing.com, _box(solids, beyond), subject=thing.name
+        )
+        findings += uneven
     if thing.mass is not None:
         # The mass itself was given; only how it is spread follows from the shape.
         inertial = replace(inertial, origin=Origin.GIVEN, error=0.0, source=f"workstation file; {source}")
@@ -242,16 +251,11 @@ def _inertial(
     return inertial, findings
 
 
-def _uneven(subject: str, uniform: Inertial, com: Sequence[float]) -> tuple[Finding, ...]:
-    """What a centre of mass says of moments that follow from uniform density, which has its own elsewhere."""
-    off = float(np.linalg.norm(np.asarray(com) - uniform.com))
-    if off <= OFF_CENTRE:
-        return ()
-    text = (
-        f"moments of inertia are those of uniform density, and its centre of mass is {1e3 * off:.3g} mm from "
-        "where uniform density has it: give inertia"
-    )
-    return (Finding(level="assumed", subject=subject, text=text),)
+def _box(solids: Sequence[Solid], beyond: float) -> tuple[Array, Array]:
+    """Lowest and highest corner [m] of the box that holds all of a body, farther out by what is not known."""
+    low, high = lint.box(solids)
+    margin = beyond + max(solid.deviation for solid in solids)
+    return low - margin, high + margin
 
 
 def _spread(thing: Thing, meshes: list[Mesh], deviation: float) -> tuple[Inertial, tuple[Finding, ...]]:
@@ -411,7 +415,7 @@ def symmetric(six: tuple[float, float, float, float, float, float]) -> Array:
 
 
 def overridden_link(
-    table: BodyTable, link: Link, *, robot: str, file: str
+    table: BodyTable, link: Link, *, robot: str, file: str, com_tolerance: float
 ) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties of a link from its table; what the table leaves out follows from the shape.
 
@@ -420,6 +424,7 @@ def overridden_link(
         link: The link as read.
         robot: Name of its robot.
         file: The workstation file, for messages.
+        com_tolerance: How far its centre of mass may be from where it is said to be [m].
 
     Returns:
         The mass properties, and what is odd about them.
@@ -428,7 +433,7 @@ def overridden_link(
         InputError: Something was left out and the link has no shape to compute it from, or no body of
             this shape has the given centre of mass or inertia.
     """
-    key = f"masses.{link.name}"
+    key, subject = f"masses.{link.name}", f"{robot}/{link.name}"
 
     def spread() -> tuple[Inertial, tuple[Finding, ...]]:
         from seerob.description.shapes.glb import solid_mesh
@@ -436,24 +441,24 @@ def overridden_link(
         if not link.solids:
             raise InputError.at(file, key, "has no shape to compute com and inertia from", "give both")
         meshes = [s.mesh if s.mesh is not None else solid_mesh(s) for s in link.solids]
-        off, subject = max(s.deviation for s in link.solids), f"{robot}/{link.name}"
+        off = max(s.deviation for s in link.solids)
         return mass_properties.from_shape(meshes, mass=table.mass, deviation=off, subject=subject)
 
-    uneven: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     if table.com is not None and table.inertia is not None:
         inertial = given_inertial(table.mass, table.com, table.inertia, table.source)
     else:
-        inertial = spread()[0]
-        com = inertial.com if table.com is None else np.array(table.com, float)
-        if table.inertia is None:
-            uneven = _uneven(f"{robot}/{link.name}", inertial, com.tolist())
-        inertia = inertial.inertia if table.inertia is None else symmetric(table.inertia)
-        source = f"{table.source}; rest from the shape"
-        inertial = replace(inertial, com=com, inertia=inertia, source=source)
-    inertial, noticed = _possible(
-        inertial, link.solids, table, f"{robot}/{link.name}", file, f"{key}.", spread
-    )
-    return inertial, uneven + noticed
+        inertial, findings = spread()
+        if table.com is not None:
+            inertial, uneven = mass_properties.about_its_centre(
+                inertial, table.com, _box(link.solids, com_tolerance), subject=subject
+            )
+            findings += uneven
+        if table.inertia is not None:
+            inertial = replace(inertial, inertia=symmetric(table.inertia))
+        inertial = replace(inertial, source=f"{table.source}; rest from the shape")
+    inertial, noticed = _possible(inertial, link.solids, table, subject, file, f"{key}.", spread)
+    return inertial, findings + noticed
 
 
 FIELD_COLOR: Color = (0.98, 0.75, 0.35, 0.20)

@@ -26,6 +26,10 @@ Of a body of which only the mass is known and a ball around its centre in which 
 (`seerob.description.description.Inertial.within`), each of its parts is d away from the centre, with
 :math:`|d| \le \delta`: the inequality holds for each, and so for all of them together, without any moment of
 inertia of its own on either side.
+
+Of a body whose centre of mass is known and whose moments are not (`Inertial.gyration`, k), these are anything
+between nothing and :math:`m k^2` about every axis: between :math:`m J_c^T J_c` and
+:math:`m J_c^T J_c + m k^2 J_\omega^T J_\omega`.
 """
 
 from __future__ import annotations
@@ -157,6 +161,10 @@ class MassTolerances:
         """What leaves centres of mass open, in words."""
         return tuple(str(off.tolerance) for off in self._offs if off.ways or off.spread)
 
+    def of_torques(self, *, at_rest: bool) -> tuple[str, ...]:
+        """What leaves torques open, in words: moments of inertia do not where the robot stands."""
+        return tuple(str(off.tolerance) for off in self._offs if not (at_rest and off.turned))
+
     def matrices(self, state: State, rates: Array | None = None) -> Matrices:
         """Mass matrices of a state, to be asked at shifted masses.
 
@@ -184,9 +192,15 @@ class MassTolerances:
         )
 
 
-def loose_torques(model: Model, robot: Mechanism) -> str:
-    """Why torques that the model needs of a robot may be others: tolerances of masses; empty without."""
-    off = ", ".join(map(str, MassTolerances(model, robot).tolerances))
+def loose_torques(model: Model, robot: Mechanism, *, at_rest: bool = False) -> str:
+    """Why torques that the model needs of a robot may be others: tolerances of masses; empty without.
+
+    Args:
+        model: The compiled workstation.
+        robot: The robot.
+        at_rest: Whether it stands: moments of inertia count for nothing then.
+    """
+    off = ", ".join(MassTolerances(model, robot).of_torques(at_rest=at_rest))
     return f"{off} not followed in torques that the model needs" if off else ""
 
 
@@ -217,6 +231,8 @@ class _Off:
     """Of the centre of mass of each, or of all its parts [m]; empty where only masses are off."""
     anyhow: bool = False
     """Whether it is all their parts that may be so far from the centre, and their inertia is not known."""
+    turned: bool = False
+    """Whether it is their radii of gyration that are no more than that, and their centres are known."""
     lighter: float = 1.0
     """Least factor on the masses whose centres may be off."""
     heavier: float = 1.0
@@ -238,13 +254,15 @@ class _Off:
             share = max(self.share, self.spread)
             lost = min(share, 1.0) * part.matrix
             each = part.shifted(self, way, qd) if self.ways else (lost, lost, share * part.matrix)
+            if self.turned:
+                each = part.turned(self, way)
             found = [a + b for a, b in zip(found, each, strict=True)]
         if self.rotors:
             spun = state.model.mj.dof_armature[robot.v_address]
             matrix = self.share * robot.coupling.T @ (spun[:, None] * robot.coupling)
             found = [a + matrix for a in found]
         lost, at_most, gained = found
-        return _Bounds(lost, at_most, gained, self.anyhow or self.spread >= 1)
+        return _Bounds(lost, at_most, gained, self.anyhow or self.turned or self.spread >= 1)
 
 
 @dataclass(frozen=True)
@@ -276,6 +294,12 @@ class _Part:
     def spun(self) -> Array:
         """What its own moments of inertia make of the matrix, shape (n, n)."""
         return np.asarray(self.J_w.T @ self.inertia @ self.J_w)
+
+    def turned(self, off: _Off, gyration: float) -> tuple[Array, Array, Array]:
+        """What is lost at most where its moments are off, the same again, what is gained."""
+        lost = off.lighter * self.spun
+        most = self.m * gyration**2 * self.J_w.T @ self.J_w
+        return lost, lost, off.heavier * (most - self.spun)
 
     def shifted(self, off: _Off, way: float, qd: Array) -> tuple[Array, Array, Array]:
         """What is lost at most where its mass is off, the same in any case, what is gained."""
@@ -358,6 +382,10 @@ def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Ite
             lighter=max(1 - error - either, 0.0),
             heavier=(1 + error) * (1 + either),
         )
+    for body, of in known:
+        if of.gyration:
+            name = f"radius of gyration of {next(name for name, each in full.items() if each is of)}"
+            yield _turned(name, body, of.gyration, either, _estimated(of))
 
 
 def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
@@ -373,6 +401,31 @@ def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
             of = given.get(body.owner)
             either = 0.0 if of is None else heavier_by_tolerances(of) - 1
             yield _off_by(f"volume of {body.owner}", (mj,), body.mass.error, body.mass.spread_error, either)
+        if body.mass is not None and body.mass.gyration:
+            of = given.get(body.owner)
+            either = 0.0 if of is None else heavier_by_tolerances(of) - 1
+            name = f"radius of gyration of {body.owner}"
+            yield _turned(name, mj, body.mass.gyration, either, _estimated(body.mass))
+
+
+def _turned(name: str, body: int, gyration: float, either: float, estimated: float) -> _Off:
+    """Moments that nobody knows, of a body that may be heavier, besides.
+
+    Args:
+        name: What is told as off.
+        body: Of `mujoco`.
+        gyration: Its largest radius of gyration about its centre of mass [m].
+        either: Share by which its mass may be off.
+        estimated: Share by which it is, as it is estimated.
+    """
+    return _Off(
+        Tolerance(name, gyration, "m"),
+        (body,),
+        ways=(gyration,),
+        turned=True,
+        lighter=max(1 - either, 0.0),
+        heavier=(1 + either) * (1 + estimated),
+    )
 
 
 def heavier_by_tolerances(thing: Mounted) -> float:

@@ -20,6 +20,7 @@ from seerob.protocols.tracking import mvn_pose, natnet
 from seerob.protocols.tracking.natnet import (
     RIGID_BODY,
     SKELETON,
+    Bodies,
     Body,
     BoneModel,
     Frame,
@@ -220,12 +221,12 @@ class NatnetServer(Emulator):
         for number, person in enumerate(self.people.values(), 1):
             pose = person(t)
             bones = _as_bodies(pose.positions[_ROWS], pose.wxyz[_ROWS], (number << 16) + 1)
-            skeletons.append(Skeleton(number, bones))
+            skeletons.append(Skeleton(number, Bodies.of(bones)))
         bodies: list[Body] = []
         for index, (person, segment) in enumerate(self.worn.values()):
             pose, row = person(t), mvn_pose.SEGMENTS.index(segment)
             bodies += _as_bodies(pose.positions[row, None], pose.wxyz[row, None], 100 + index)
-        return Frame(k, t, tuple(bodies), tuple(skeletons), models_changed=False, recording=False)
+        return Frame(k, t, Bodies.of(bodies), tuple(skeletons), models_changed=False, recording=False)
 
     def _serve(self, link: socket.socket) -> None:
         begun, k = time.monotonic(), 0

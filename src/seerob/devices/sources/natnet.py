@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated
 
@@ -12,13 +13,22 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core.snapshot import Finding
-from seerob.core.transforms import Array, rotation_from_wxyz, turned, wxyz_from_rotation
+from seerob.core.transforms import Array, left_product, rotation_from_wxyz, wxyz_from_rotation
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.live.listening import Contact, contact_of
 from seerob.files.motion_capture.upright import Up, world_from_file
 from seerob.protocols.tracking import natnet
-from seerob.protocols.tracking.natnet import Body, BoneModel, Models, ReceivedFrame, SkeletonModel, frames
+from seerob.protocols.tracking.natnet import (
+    Bodies,
+    Body,
+    BoneModel,
+    Models,
+    ReceivedFrame,
+    Skeleton,
+    SkeletonModel,
+    frames,
+)
 
 LISTEN_AT_START = 0.4
 """How long frames are listened to at start [s]."""
@@ -83,42 +93,32 @@ class Natnet(CaptureStream, frozen=True, kw_only=True):
             ProtocolError: What comes cannot be understood.
         """
         known: Models | None = None
-        layouts: dict[int, tuple[Layout, SkeletonModel]] = {}
-        rigid = _rigid_layout(())
+        people: dict[int, _Known] = {}
+        rigid = _Known(_rigid_layout(()), (), ())
+        world = _World(world_from_file(self.up or Up.Y))
         last = -1.0
         async with aclosing(self._heard()) as stream:
             async for heard in stream:
                 if heard.models is not known:
                     known = heard.models
-                    layouts = {s.id: (_layout(s), s) for s in known.skeletons}
-                    rigid = _rigid_layout(known.bodies)
+                    people = {s.id: _person(s) for s in known.skeletons}
+                    numbers = tuple(body.id for body in known.bodies)
+                    rigid = _Known(_rigid_layout(known.bodies), known.bodies, numbers)
                 if heard.frame.t == last:  # a frame that came twice
                     continue
                 last = heard.frame.t
-                for layout, frame in self._people(heard, layouts, rigid):
-                    yield layout, frame
+                if self.tracked is Tracked.RIGID_BODIES:
+                    if rigid.numbers:
+                        yield rigid.layout, rigid.frame(last, heard.frame.bodies, world)
+                    continue
+                for skeleton in heard.frame.skeletons:
+                    if (who := people.get(skeleton.id)) is not None:
+                        yield who.layout, who.frame(last, self._in_world(skeleton, who), world)
 
-    def _people(
-        self, heard: ReceivedFrame, layouts: dict[int, tuple[Layout, SkeletonModel]], rigid: Layout
-    ) -> list[tuple[Layout, CaptureFrame]]:
-        world = world_from_file(self.up or Up.Y)
-        if self.tracked is Tracked.RIGID_BODIES:
-            if not rigid.names:
-                return []
-            ids = tuple(body.id for body in heard.models.bodies)
-            return [(rigid, _frame(heard.frame.t, ids, heard.frame.bodies, world, ""))]
-        found = []
-        for skeleton in heard.frame.skeletons:
-            if skeleton.id not in layouts:
-                continue
-            layout, model = layouts[skeleton.id]
-            # Frames give a bone's number with the skeleton's in the upper half.
-            bones = [bone._replace(id=bone.id & 0xFFFF) for bone in skeleton.bones]
-            if self.coordinates is Coordinates.LOCAL:
-                bones = _composed(bones, model.bones)
-            ids = tuple(bone.id & 0xFFFF for bone in model.bones)
-            found.append((layout, _frame(heard.frame.t, ids, bones, world, model.name)))
-        return found
+    def _in_world(self, skeleton: Skeleton, who: _Known) -> Bodies:
+        # Frames give a bone's number with the skeleton's in the upper half.
+        bones = replace(skeleton.bones, numbers=tuple([number & 0xFFFF for number in skeleton.bones.numbers]))
+        return Bodies.of(_composed(bones, who.models)) if self.coordinates is Coordinates.LOCAL else bones
 
     def contact(self) -> Contact:
         """The computer with Motive, which is asked and then sends."""
@@ -183,18 +183,54 @@ def _rigid_layout(bodies: Sequence[BoneModel]) -> Layout:
     return Layout(seen=Seen.TRACKERS, names=tuple(b.name for b in bodies), convention="trackers")
 
 
-def _frame(
-    t: float, ids: tuple[int, ...], bodies: Sequence[Body], world: Array, subject: str
-) -> CaptureFrame:
-    """Rows in the order of ``ids``; NaN for what was not tracked."""
-    rows = {number: row for row, number in enumerate(ids)}
-    positions, turns = np.full((len(ids), 3), np.nan), np.full((len(ids), 4), np.nan)
-    seen = [(row, b) for b in bodies if b.tracked and (row := rows.get(b.id)) is not None]
-    if seen:
-        where = [row for row, _ in seen]
-        positions[where] = np.array([body.position for _, body in seen]) @ world.T
-        turns[where] = np.array([body.xyzw for _, body in seen])[:, [3, 0, 1, 2]]
-    return CaptureFrame(t=t, positions=positions, orientations=turned(world, turns), subject=subject)
+class _World:
+    """Poses of Motive in the world.
+
+    Args:
+        rotation: World from Motive's, shape (3, 3).
+    """
+
+    def __init__(self, rotation: Array) -> None:
+        self.places = rotation.T
+        self.turns = left_product(wxyz_from_rotation(rotation))[:, [1, 2, 3, 0]].T
+        """Makes w, x, y, z of x, y, z, w there."""
+
+
+class _Known:
+    """A skeleton, or all rigid bodies, as frames tell of it.
+
+    Args:
+        layout: Its names.
+        models: In the order of its rows.
+        numbers: By which frames tell of them.
+        subject: Who it is.
+    """
+
+    def __init__(
+        self, layout: Layout, models: Sequence[BoneModel], numbers: tuple[int, ...], subject: str = ""
+    ) -> None:
+        self.layout, self.models, self.numbers, self._subject = layout, models, numbers, subject
+
+    def frame(self, t: float, bodies: Bodies, world: _World) -> CaptureFrame:
+        """Rows in the order of the models; NaN for what was not tracked."""
+        with np.errstate(invalid="ignore", over="ignore"):  # numbers that cannot be are for others
+            positions, turns = bodies.poses[:, :3] @ world.places, bodies.poses[:, 3:] @ world.turns
+        if bodies.numbers != self.numbers or not all(bodies.tracked):
+            seen = {
+                n: k
+                for k, (n, tracked) in enumerate(zip(bodies.numbers, bodies.tracked, strict=True))
+                if tracked
+            }
+            rows = [seen.get(number, -1) for number in self.numbers]
+            nothing = np.full((1, 4), np.nan)
+            positions = np.concatenate([positions, nothing[:, :3]])[rows]
+            turns = np.concatenate([turns, nothing])[rows]
+        return CaptureFrame(t=t, positions=positions, orientations=turns, subject=self._subject)
+
+
+def _person(skeleton: SkeletonModel) -> _Known:
+    numbers = tuple(bone.id & 0xFFFF for bone in skeleton.bones)
+    return _Known(_layout(skeleton), skeleton.bones, numbers, skeleton.name)
 
 
 def _composed(bones: Sequence[Body], models: Sequence[BoneModel]) -> list[Body]:

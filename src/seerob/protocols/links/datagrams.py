@@ -53,6 +53,13 @@ class Datagrams(asyncio.DatagramProtocol):
 
     After a silence it is the first from that address, whatever port it has then, as after a restart.
 
+    Args:
+        senders: Addresses whose datagrams count; None where it is whoever sends first.
+        answer: What is sent back.
+        one_port: Whether all of a sender's datagrams come from one port of it.
+        before: Who was heard at which port before a silence.
+        beside: Who reads what arrives here, too.
+
     Attributes:
         port: Of this machine.
         dropped: Datagrams that nobody read in time.
@@ -66,7 +73,9 @@ class Datagrams(asyncio.DatagramProtocol):
         *,
         one_port: bool = True,
         before: dict[int, str] | None = None,
+        beside: Datagrams | None = None,
     ) -> None:
+        self._reader = beside or self
         self._senders, self._answer, self._one_port = senders, answer, one_port
         self._before = {} if before is None else before
         self._first: tuple[str, int] | None = None
@@ -118,9 +127,10 @@ class Datagrams(asyncio.DatagramProtocol):
             heard = _shown(self._first) if self._first else self._before.get(self.port, "nobody yet")
             distrust(f"{_shown(who)} sends to port {self.port}, too; heard is {heard}")
             return
-        self.dropped += len(self._waiting) == WAITING
-        self._waiting.append(Datagram(arrived, data))
-        self._wakeup.wake()
+        reader = self._reader
+        reader.dropped += len(reader._waiting) == WAITING
+        reader._waiting.append(Datagram(arrived, data))
+        reader._wakeup.wake()
         if self._answer is not None:
             self._loop.call_soon(self._reply, data, sender)
 
@@ -143,8 +153,8 @@ class Datagrams(asyncio.DatagramProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Called by the loop."""
-        self._error = exc if isinstance(exc, OSError) else OSError("closed")
-        self._wakeup.wake()
+        self._reader._error = exc if isinstance(exc, OSError) else OSError("closed")
+        self._reader._wakeup.wake()
 
     async def receive(self, silence: float) -> AsyncGenerator[Datagram, None]:
         """What arrives, oldest first.
@@ -159,16 +169,33 @@ class Datagrams(asyncio.DatagramProtocol):
         while True:
             while self._waiting:
                 yield self._waiting.popleft()
-            if self._error is not None:
-                raise self._error
-            try:
-                await self._wakeup.wait(silence)
-            except TimeoutError as error:
-                # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
-                await asyncio.sleep(0)
-                await asyncio.sleep(0)
-                if not self._waiting:
-                    raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
+            await self._more(silence)
+
+    async def next(self, silence: float) -> Datagram:
+        """The oldest that waits, or else the next one.
+
+        Args:
+            silence: Longest pause [s].
+
+        Raises:
+            TimeoutError: Nothing for so long.
+            OSError: The socket is gone.
+        """
+        while not self._waiting:
+            await self._more(silence)
+        return self._waiting.popleft()
+
+    async def _more(self, silence: float) -> None:
+        if self._error is not None:
+            raise self._error
+        try:
+            await self._wakeup.wait(silence)
+        except TimeoutError as error:
+            # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+            if not self._waiting:
+                raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
 
 
 def _shown(who: tuple[str, int]) -> str:
@@ -189,6 +216,7 @@ async def listening(
     answer: Answer | None = None,
     group: str | None = None,
     one_port: bool = True,
+    beside: Datagrams | None = None,
 ) -> AsyncGenerator[Datagrams, None]:
     """Listen on a port of this machine.
 
@@ -199,6 +227,7 @@ async def listening(
         answer: Asked at once for each datagram that counts; must not raise.
         group: Multicast group to join, on the interface that has the address ``bind``.
         one_port: Whether all of a sender's datagrams come from one port of it.
+        beside: Who reads what arrives here, too.
 
     Raises:
         OSError: The port is taken, the address is not of this machine, or nobody knows the sender's name.
@@ -210,7 +239,7 @@ async def listening(
         senders = frozenset(plain(address[0]) for *_, address in known)
     (found, *_) = await loop.getaddrinfo(bind, port, type=socket.SOCK_DGRAM)
     link = _bound(found[0], found[4]) if group is None else _member(bind, port, group)
-    heard = Datagrams(senders, answer, one_port=one_port, before=HEARD.get(None))
+    heard = Datagrams(senders, answer, one_port=one_port, before=HEARD.get(None), beside=beside)
     try:
         loop.add_reader(link, heard.attach(link))
     except NotImplementedError:  # a loop of Windows

@@ -12,13 +12,14 @@ import asyncio
 import socket
 import struct
 import time
-from collections.abc import AsyncGenerator, Callable
-from contextlib import AsyncExitStack, aclosing
+from collections.abc import AsyncGenerator, Callable, Sequence
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.protocols import ProtocolError
@@ -77,6 +78,15 @@ class Cursor:
         self.skip(4 * count)
         # For a few numbers faster than numpy's own, and quiet about a signalling NaN.
         return np.array(struct.unpack_from(f"<{count}f", self._data, self.at - 4 * count))
+
+    def rows(self, kind: np.dtype[np.void], count: int) -> NDArray[np.void]:
+        """So many items of one size.
+
+        Raises:
+            ProtocolError: There are not so many.
+        """
+        self.skip(kind.itemsize * count)
+        return np.frombuffer(self._data, kind, count, self.at - kind.itemsize * count)
 
     def count(self, smallest: int, most: int) -> int:
         """How many items follow.
@@ -169,11 +179,43 @@ class Body(NamedTuple):
     tracked: bool
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Bodies(Sequence[Body]):
+    """Rigid bodies, or bones, as columns: of a person there are many."""
+
+    numbers: tuple[int, ...]
+    poses: Array
+    """Positions [m], then x, y, z, w of world from body, shape (n, 7)."""
+    errors: tuple[float, ...]
+    """Mean errors of their markers [m]."""
+    tracked: tuple[bool, ...]
+
+    @classmethod
+    def of(cls, bodies: Sequence[Body]) -> Bodies:
+        """Columns of bodies one by one."""
+        poses = np.array([[*body.position, *body.xyzw] for body in bodies], float).reshape(-1, 7)
+        numbers, errors = tuple(body.id for body in bodies), tuple(body.error for body in bodies)
+        return cls(numbers, poses, errors, tuple(body.tracked for body in bodies))
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> Body: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Body]: ...
+    def __getitem__(self, index: int | slice) -> Body | Sequence[Body]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        pose = self.poses[index]
+        return Body(self.numbers[index], pose[:3], pose[3:], self.errors[index], self.tracked[index])
+
+
 class Skeleton(NamedTuple):
     """One person."""
 
     id: int
-    bones: tuple[Body, ...]
+    bones: Bodies
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,7 +225,7 @@ class Frame:
     number: int
     t: float
     """Motive's time since it was started [s]."""
-    bodies: tuple[Body, ...]
+    bodies: Bodies
     skeletons: tuple[Skeleton, ...]
     models_changed: bool
     recording: bool
@@ -248,7 +290,7 @@ def frame(payload: bytes, version: Version) -> Frame:
     number = cursor.whole()
     _skip(cursor, version, 5, _marker_set)
     _skip(cursor, version, 12, lambda c: c.skip(12))
-    bodies = tuple(_body(cursor, version) for _ in range(_counted(cursor, version, 32)))
+    bodies = _bodies(cursor, version, _counted(cursor, version, 32))
     skeletons: tuple[Skeleton, ...] = ()
     if version >= (2, 1):
         skeletons = tuple(_skeleton(cursor, version) for _ in range(_counted(cursor, version, 8)))
@@ -264,7 +306,7 @@ def frame(payload: bytes, version: Version) -> Frame:
 
 
 def _ended(
-    cursor: Cursor, version: Version, number: int, bodies: tuple[Body, ...], skeletons: tuple[Skeleton, ...]
+    cursor: Cursor, version: Version, number: int, bodies: Bodies, skeletons: tuple[Skeleton, ...]
 ) -> Frame:
     cursor.skip(8)  # time code
     t = float(cursor.take(_F64 if version >= (2, 7) else _F32)[0])
@@ -316,12 +358,22 @@ def _channels(cursor: Cursor) -> None:
         cursor.skip(4 * cursor.count(4, MOST))
 
 
+def _bodies(cursor: Cursor, version: Version, count: int) -> Bodies:
+    if version < (3, 0):
+        return Bodies.of([_body(cursor, version) for _ in range(count)])
+    rows = cursor.rows(_BODY, count)
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        poses = rows["pose"].astype(float)
+    tracked = [bool(said & TRACKED) for said in rows["parameters"].tolist()]
+    return Bodies(tuple(rows["id"].tolist()), poses, tuple(rows["error"].tolist()), tuple(tracked))
+
+
 def _body(cursor: Cursor, version: Version) -> Body:
+    """Of a version before 3.0, each of a size of its own."""
     number = cursor.whole()
     values = cursor.floats(7)
-    if version < (3, 0):
-        # Position, identifier and size of each marker.
-        cursor.skip(20 * cursor.count(20, MOST))
+    # Position, identifier and size of each marker.
+    cursor.skip(20 * cursor.count(20, MOST))
     error = float(cursor.floats(1)[0])
     # Before 2.6 an unseen body keeps its last pose or has none, and nothing says so.
     tracked = bool(cursor.short() & TRACKED) if version >= (2, 6) else bool(values.any())
@@ -330,10 +382,11 @@ def _body(cursor: Cursor, version: Version) -> Body:
 
 def _skeleton(cursor: Cursor, version: Version) -> Skeleton:
     number = cursor.whole()
-    return Skeleton(number, tuple(_body(cursor, version) for _ in range(cursor.count(32, MOST_BONES))))
+    return Skeleton(number, _bodies(cursor, version, cursor.count(32, MOST_BONES)))
 
 
 _F64, _F32 = struct.Struct("<d"), struct.Struct("<f")
+_BODY = np.dtype([("id", "<i4"), ("pose", "<f4", 7), ("error", "<f4"), ("parameters", "<u2")])
 
 MARKER_SET, RIGID_BODY, SKELETON, FORCE_PLATE, DEVICE, CAMERA, ASSET = range(7)
 
@@ -527,7 +580,7 @@ class Session:
             known = {s.id for s in self.models.skeletons}, {b.id for b in self.models.bodies}
             self._stale = self._stale or heard.models_changed
             self._stale |= not all(s.id in known[0] for s in heard.skeletons)
-            self._stale |= not all(b.id in known[1] for b in heard.bodies)
+            self._stale |= not known[1].issuperset(heard.bodies.numbers)
             return ReceivedFrame(datagram.arrived, heard, self.models, self.info)
         return None
 
@@ -557,24 +610,18 @@ async def frames(
     loop = asyncio.get_running_loop()
     found = await loop.getaddrinfo(host, command_port, family=socket.AF_INET, type=socket.SOCK_DGRAM)
     address = found[0][4][0]
-    queue: asyncio.Queue[Datagram | BaseException] = asyncio.Queue(512)
     async with AsyncExitStack() as stack:
         port = await stack.enter_async_context(listening(bind, 0, sender=str(address), one_port=False))
-        ports = [port]
         if group is not None:
-            joined = listening(bind, data_port, sender=str(address), group=group, one_port=False)
-            ports.append(await stack.enter_async_context(joined))
-        tasks = [asyncio.create_task(_forward(each, queue)) for each in ports]
-        for task in tasks:
-            stack.callback(task.cancel)
+            joined = listening(bind, data_port, sender=str(address), group=group, one_port=False, beside=port)
+            await stack.enter_async_context(joined)
         session = Session(port, (str(address), command_port), unicast=group is None)
         begun = spoken = time.monotonic()
         while True:
             now = time.monotonic()
             session.tick(now)
             try:
-                async with asyncio.timeout(0.1):
-                    datagram = await queue.get()
+                datagram = await port.next(0.1)
             except TimeoutError:
                 waited = time.monotonic() - spoken
                 if session.models is None and time.monotonic() - begun > PATIENCE:
@@ -582,8 +629,6 @@ async def frames(
                 if session.models is not None and waited > SILENCE:
                     raise TimeoutError(f"no frame from {host} for {SILENCE:g} s") from None
                 continue
-            if isinstance(datagram, BaseException):
-                raise datagram
             heard = session.take(datagram)
             _check(session.info)
             if heard is not None:
@@ -591,17 +636,6 @@ async def frames(
                 yield heard
             elif session.models is not None and time.monotonic() - spoken > PATIENCE:
                 raise TimeoutError(f"{host} answers, but sends no frames: is it in Live, is it playing?")
-
-
-async def _forward(port: Datagrams, queue: asyncio.Queue[Datagram | BaseException]) -> None:
-    async with aclosing(port.receive(float("inf"))) as heard:
-        try:
-            async for datagram in heard:
-                if queue.full():
-                    queue.get_nowait()
-                queue.put_nowait(datagram)
-        except OSError as error:
-            await queue.put(error)
 
 
 def _check(info: ServerInfo | None) -> None:

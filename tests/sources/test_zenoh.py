@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import aclosing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -48,13 +48,13 @@ def source(port, **more):
 
 
 @contextmanager
-def router(port):
-    """A router of Zenoh's own library."""
+def router(port, where="listen"):
+    """A router of Zenoh's own library, or with ``connect`` another one at it, as a bridge from DDS is."""
     config = zenoh.Config()
     for path, value in (
         ("mode", "router"),
         ("scouting/multicast/enabled", False),
-        ("listen/endpoints", [f"tcp/127.0.0.1:{port}"]),
+        (f"{where}/endpoints", [f"tcp/127.0.0.1:{port}"]),
     ):
         config.insert_json5(path, json.dumps(value))
     session = zenoh.open(config)
@@ -191,6 +191,64 @@ def test_a_bridge_from_dds_publishes_under_the_topic_alone():
     with router(port) as session, again_and_again(lambda: session.put("cell/joint_states", raw)):
         sample = heard(source(port, topic="/cell/joint_states"), len)[0]
     assert sample.q == (0.5, 0.25)
+
+
+HASH = store(Edition.ROS2).hash_rihs01(Content.JOINT_STATE.message_type)
+BRIDGED, OF_DOMAIN_0 = (
+    "joint_states",
+    rmw_zenoh.key("/joint_states", Content.JOINT_STATE.message_type, 0, HASH),
+)
+
+
+@pytest.mark.parametrize(
+    ("keys", "domain", "heard_of", "doubted"),
+    [
+        ((BRIDGED, BRIDGED), None, {0.5, 0.7}, True),
+        ((OF_DOMAIN_0, BRIDGED), None, {0.5, 0.7}, True),
+        ((OF_DOMAIN_0, BRIDGED), 0, {0.5}, False),
+        ((OF_DOMAIN_0, OF_DOMAIN_0), None, {0.5, 0.7}, False),
+    ],
+    ids=["two bridges", "a node and a bridge", "a node whose domain is given", "two nodes of a domain"],
+)
+def test_what_is_heard_from_two_domains_at_once_is_not_relied_on(keys, domain, heard_of, doubted):
+    """Keys of a bridge have no domain; within one a topic may have several publishers."""
+    port = free_port()
+    first, second = (
+        encode(Content.JOINT_STATE, Joints(None, NAMES, (x, 0.25)), Edition.ROS2) for x in (0.5, 0.7)
+    )
+
+    async def listened():
+        found = []
+        async with asyncio.timeout(60), aclosing(source(port, domain=domain).listen(None)) as samples:
+            async for sample in samples:
+                found.append(sample)
+                if {x.q[0] for x in found} >= heard_of and len(found) > 30:
+                    return found
+
+    with (
+        router(port) as one,
+        router(port, "connect") as other,
+        again_and_again(lambda: one.put(keys[0], first), lambda: other.put(keys[1], second)),
+    ):
+        samples = asyncio.run(listened())
+    assert {sample.q[0] for sample in samples} == heard_of
+    both = next((k for k, sample in enumerate(samples) if sample.q != samples[0].q), len(samples))
+    assert all(("give the domain" in sample.reason) == doubted for sample in samples[both:])
+    assert not any(sample.reason for sample in samples[:both])
+
+
+def test_who_takes_the_place_of_another_is_relied_on_after_a_while():
+    origins = rmw_zenoh.Origins()
+
+    def doubt(t, origin, topic="/joint_states"):
+        return origins.take(rmw_zenoh.Put(t, topic, b"", origin))
+
+    assert not doubt(0.0, "a")
+    assert "/joint_states is heard from two, a and b" in doubt(1.0, "b")
+    assert not doubt(1.1, "a", "/tf")
+    assert doubt(1.0 + rmw_zenoh.ONE_ALONE, "b")
+    assert not doubt(1.1 + rmw_zenoh.ONE_ALONE, "b")
+    assert doubt(3.2, "a")
 
 
 def test_another_domain_is_not_heard_and_what_there_is_is_said(monkeypatch, caplog):

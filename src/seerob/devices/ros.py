@@ -407,7 +407,17 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
 
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Samples of the robot."""
-        async with aclosing(self.heard()) as messages:
+        doubt = ""
+
+        async def noted(
+            messages: AsyncGenerator[ReceivedMessage, None],
+        ) -> AsyncGenerator[ReceivedMessage, None]:
+            nonlocal doubt
+            async for heard in messages:
+                doubt = heard.doubt
+                yield heard
+
+        async with aclosing(self.heard()) as every, aclosing(noted(every)) as messages:
             match self.content:
                 case Content.JOINT_STATE:
                     samples: AsyncGenerator[Sample, None] = self._joint_samples(messages, target)
@@ -417,7 +427,7 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
                     samples = self._played(messages, target)
             async with aclosing(samples):
                 async for sample in samples:
-                    yield sample
+                    yield replace(sample, reason=doubt) if doubt else sample
 
     def _names(self, target: Target | None) -> tuple[str, ...]:
         return self.joints or (() if target is None else target.joints)

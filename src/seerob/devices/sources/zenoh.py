@@ -29,8 +29,9 @@ class Zenoh(RosSource, frozen=True, kw_only=True):
     """Name or address of the computer with the Zenoh router (``rmw_zenohd``, or the bridge from DDS)."""
     port: Annotated[int, Meta(ge=1, le=65535)] = rmw_zenoh.PORT
     """TCP port of the router."""
-    domain: Annotated[int, Meta(ge=0, le=232)] = 0
-    """``ROS_DOMAIN_ID`` of nodes with ``rmw_zenoh``."""
+    domain: Annotated[int, Meta(ge=0, le=232)] | None = None
+    """``ROS_DOMAIN_ID`` of nodes with ``rmw_zenoh``: only they are heard then. When not given those of domain
+    0 are, and what a bridge from DDS publishes, whose keys have no domain."""
 
     def where(self) -> str:
         """The router."""
@@ -42,8 +43,11 @@ class Zenoh(RosSource, frozen=True, kw_only=True):
         await asyncio.to_thread(store, Edition.ROS2)
         async with rmw_zenoh.opened(self.host, self.port) as link:
             for topic in self.topics():
-                keys = rmw_zenoh.key(topic, kind, self.domain), rmw_zenoh.bridged(topic)
+                keys = [rmw_zenoh.key(topic, kind, self.domain or 0)]
+                if self.domain is None:
+                    keys.append(rmw_zenoh.bridged(topic))
                 link.subscribe(topic, keys, kept=topic == STATIC)
+            origins = rmw_zenoh.Origins()
             nonsense, begun = 0, time.monotonic()
             last, silence = begun, self.silence()
             while True:
@@ -51,7 +55,7 @@ class Zenoh(RosSource, frozen=True, kw_only=True):
                 try:
                     put = await link.next(left)
                 except TimeoutError:
-                    reason = self._silent(await link.publishers(self.domain), heard=last > begun)
+                    reason = self._silent(await link.publishers(self.domain or 0), heard=last > begun)
                     raise TimeoutError(reason) from None
                 try:
                     said = decode(self.content, put.payload, Edition.ROS2)
@@ -60,10 +64,10 @@ class Zenoh(RosSource, frozen=True, kw_only=True):
                     if nonsense >= NONSENSE:
                         raise
                     continue
-                nonsense = 0
+                nonsense, doubt = 0, origins.take(put)
                 if put.topic == own:
                     last = put.arrived
-                yield ReceivedMessage(put.arrived, put.topic, said)
+                yield ReceivedMessage(put.arrived, put.topic, said, doubt)
 
     def _silent(self, there: dict[str, str], *, heard: bool) -> str:
         own, kind = self.topics()[0], self.content.message_type
@@ -72,4 +76,4 @@ class Zenoh(RosSource, frozen=True, kw_only=True):
         if own in there:
             return f"{own} is {there[own]}, no {kind}"
         shown = ", ".join(sorted(there)[:12]) or "nothing"
-        return f"connected, but nobody publishes {own} in domain {self.domain}; there is: {shown}"
+        return f"connected, but nobody publishes {own} in domain {self.domain or 0}; there is: {shown}"

@@ -6,13 +6,15 @@ liveliness tokens, in which ``/`` is written as ``%``:
 
     @ros2_lv/<domain>/<session>/<node>/<entity>/MP/<enclave>/<namespace>/<name>/<topic>/<type>/<hash>/<qos>
 
-The bridge from DDS publishes under the topic alone. Source: design document of rmw_zenoh.
+The bridge from DDS publishes under the topic alone, whatever the domain; what it publishes bears the time at
+which it did, and by whose clock. Source: design document of rmw_zenoh.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import math
 import socket
 import struct
 import time
@@ -41,6 +43,8 @@ MOST_KEPT = 64
 """Messages of a topic that are kept for whoever comes later."""
 LONGEST_NAME = 255
 """Of a topic or a type in ROS 2 [characters]: whoever announces a longer one is not listed."""
+ONE_ALONE = 2.0
+"""How long one has to be alone on a topic until it is relied on after another [s]."""
 NODE = "seerob"
 TOKENS = "@ros2_lv"
 PUBLISHER = "MP"
@@ -164,6 +168,31 @@ class Put(NamedTuple):
     """Host's monotonic time [s]."""
     topic: str
     payload: bytes
+    origin: str
+    """Its key, and of one without a domain by whose clock it was published: a bridge has its own."""
+
+
+class Origins:
+    """Whether topics are heard from one at a time: of two domains, or two bridges, nobody knows whose."""
+
+    def __init__(self) -> None:
+        self._newest: dict[str, str] = {}
+        self._two: dict[str, tuple[float, str]] = {}
+        """By topic, until when there is a doubt [s], and why."""
+
+    def take(self, put: Put) -> str:
+        """Take note of what was published: why it may be of another robot; empty where it may not."""
+        before = self._newest.get(put.topic, put.origin)
+        self._newest[put.topic] = put.origin
+        if put.origin != before:
+            one, other = sorted((before, put.origin))
+            text = (
+                f"{put.topic} is heard from two, {one} and {other}: give the domain, or each bridge a "
+                "namespace of its own"
+            )
+            self._two[put.topic] = put.arrived + ONE_ALONE, text
+        until, why = self._two.get(put.topic, (-math.inf, ""))
+        return why if put.arrived <= until else ""
 
 
 class Router:
@@ -190,7 +219,7 @@ class Router:
             payload = sample.payload
             raw = payload.to_bytes() if len(payload) <= MAX_MESSAGE else bytes(MAX_MESSAGE + 1)
             # Who has not come for what waits was called already: of a flood the loop hears once.
-            if self._add(Put(time.monotonic(), topic, raw)):
+            if self._add(Put(time.monotonic(), topic, raw, _origin(sample, topic))):
                 self._loop.call_soon_threadsafe(self._some.set)
 
         for one in keys:
@@ -256,6 +285,13 @@ class Router:
             if reply.ok is not None and len(found) < MOST_TOKENS:
                 found.append(str(reply.ok.key_expr))
         return offered(found)
+
+
+def _origin(sample: Any, topic: str) -> str:
+    found = str(sample.key_expr)
+    if found == bridged(topic) and sample.timestamp is not None:
+        found = f"{found} by {sample.timestamp.get_id()}"
+    return found
 
 
 @asynccontextmanager

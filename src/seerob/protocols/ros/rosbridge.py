@@ -252,6 +252,8 @@ class ReceivedMessage(NamedTuple):
     """Host's monotonic time [s]."""
     topic: str
     said: RosMessage
+    doubt: str = ""
+    """Why it may be of another robot; empty where it may not."""
 
 
 async def hear(

@@ -231,8 +231,9 @@ def core_distance(
         return d2
     if which[j, MESH]:
         _relative(world, i, j, R, t)
-        wa, wb = which[i, WIDE], which[j, WIDE]
-        d2, ka, kb = nearest_of_meshes(trees, wa, wb, limit, first[0], first[1], scratch)
+        one = which[i, WIDE], which[i, TRIANGLE], which[i, TRIANGLE_END]
+        other = which[j, WIDE], which[j, TRIANGLE], which[j, TRIANGLE_END]
+        d2, ka, kb = nearest_of_meshes(trees, one, other, limit, first[0], first[1], scratch)
         if d2 == 0.0:
             ka, kb = first_crossing(
                 mesh_of(solids, i), mesh_of(solids, j), R, t, scratch.stack, scratch.row, W

@@ -31,6 +31,7 @@ from seerob.kernels.boxes import fit_box
 from seerob.kernels.lanes import WIDTH, Lanes, asked_soon, first_lane, of_rows
 from seerob.kernels.primitives import index, on_edges, segment_triangle, triangles
 from seerob.kernels.search import Vec, cut_of, row_in
+from seerob.kernels.slab import FEW, pairs_in_slab
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
@@ -69,6 +70,8 @@ class Scratch(NamedTuple):
     t: Array
     """Position a_from_b [m], shape (3,)."""
     row: Array
+    ends: Array
+    """Of triangles along directions, for `seerob.kernels.slab`."""
     W: Array
     """Receives the points on both, shape (36,), of which 30 are scratch."""
 
@@ -78,7 +81,7 @@ SCRATCH = Layout(
     Scratch,
     [
         (_INT, 2), (_SINGLE, 1), (_SINGLE, 1), (_SINGLE, 1),
-        (_FLOAT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 1),
+        (_FLOAT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 1),
     ],
 )  # fmt: skip
 
@@ -87,7 +90,8 @@ def scratch() -> Scratch:
     """Room for one search at a time."""
     return Scratch(
         np.empty((STACK, 2), np.int32), np.empty(STACK, np.float32), np.empty(16, np.float32),
-        np.empty(2 * WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty(36),
+        np.empty(2 * WIDTH, np.float32), np.empty(9), np.empty(3), np.empty((1, 13)), np.empty((FEW, 7)),
+        np.empty(36),
     )  # fmt: skip
 
 
@@ -391,16 +395,46 @@ def _radius(boxes: Boxes, ref: int) -> float:
     return float(boxes[i, 24 + k] ** 2 + boxes[i, 32 + k] ** 2 + boxes[i, 40 + k] ** 2)
 
 
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _from_to(W: Array, best: float, coarse: float) -> Vec:
+    """Direction from one nearest point so far to the other; none where rounding would turn it."""
+    over = 1.0 / math.sqrt(best) if best > coarse else 0.0
+    return (W[3] - W[0]) * over, (W[4] - W[1]) * over, (W[5] - W[2]) * over
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _tried(
+    trees: Trees, a: int, b: int, cut: float, found: tuple[float, int, int], scratch: Scratch
+) -> tuple[float, int, int]:
+    """The nearer of what is found, squared distance and triangles, and triangles a and, in ``row``, b."""
+    T, row, W = trees.T, scratch.row, scratch.W
+    points = W[12:24]
+    best, ka, kb = found
+    g, s, v, both = triangles(T, a, row, index(0), cut, points)
+    if g <= cut and (g < best or (g == best and (a < ka or (a == ka and b < kb)))):
+        best, ka, kb = g, a, b
+        on_edges(T, a, row, index(0), s, v, both, points)
+        for c in range(6):
+            W[c] = points[c]
+    return best, ka, kb
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def nearest_of_meshes(
-    trees: Trees, root_a: int, root_b: int, limit: float, first_a: int, first_b: int, scratch: Scratch
+    trees: Trees,
+    one: tuple[int, int, int],
+    other: tuple[int, int, int],
+    limit: float,
+    first_a: int,
+    first_b: int,
+    scratch: Scratch,
 ) -> tuple[float, int, int]:
     """Nearest points of two meshes, in the frame of the first.
 
     Args:
         trees: Of both.
-        root_a: First nodes.
-        root_b: Likewise.
+        one: First node, and first and last triangle, of the first mesh.
+        other: Of the second.
         limit: Squared distance above which nothing is looked for [m²].
         first_a: Triangles to begin with, -1 for none.
         first_b: Likewise.
@@ -412,97 +446,103 @@ def nearest_of_meshes(
         first one.
     """
     boxes, kids, T = trees
-    pairs, bounds, given, low, R, t, row, W = scratch
-    points, Q, p = W[12:24], W[24:33], W[33:36]
+    pairs, bounds, given, low, R, t, row, ends, W = scratch
+    root_a, root_b = one[0], other[0]
+    size = _size(boxes, root_a) + _size(boxes, root_b) + abs(t[0]) + abs(t[1]) + abs(t[2])
+    fine = 1e-14 * size  # what rounding takes of a gap, and below what square it turns a direction
+    coarse = (1e-8 * size) ** 2
+    found = np.inf, -1, -1
+    cut = limit
+    u = 0.0, 0.0, 0.0
+    posed = -1
+    if first_a >= 0:
+        row_in(T, first_b, R, t, row)
+        posed = first_b
+        found = _tried(trees, first_a, first_b, cut, found, scratch)
+        if found[0] < np.inf:
+            cut = min(cut, cut_of(found[0]))
+            u = _from_to(W, found[0], coarse)
+        if coarse < found[0] < np.inf and one[2] - one[1] + other[2] - other[1] <= FEW:
+            many = pairs_in_slab(T, one[1:], other[1:], R, t, u, cut, fine, pairs, ends)
+            for k in range(many):
+                a, b = pairs[k, 0], pairs[k, 1]
+                if a == first_a and b == first_b:
+                    continue
+                if b != posed:
+                    row_in(T, b, R, t, row)
+                    posed = b
+                found = _tried(trees, a, b, cut, found, scratch)
+                cut = min(cut, cut_of(found[0]))
+            if many >= 0:
+                return found
+    Q, p = W[24:33], W[33:36]
     for c in range(3):
         p[c] = 0.0
         for d in range(3):
             Q[3 * c + d] = R[3 * d + c]
             p[c] -= R[3 * d + c] * t[d]
-    size = _size(boxes, root_a) + _size(boxes, root_b) + abs(t[0]) + abs(t[1]) + abs(t[2])
-    fine = 1e-14 * size  # what rounding takes of a gap, and below what square it turns a direction
-    coarse = (1e-8 * size) ** 2
     given[15] = 4e-6 * size
-    best = np.inf
-    cut = limit
-    ka = kb = -1
-    ux = uy = uz = 0.0
-    a, b = first_a, first_b
-    moved = posed = -1
+    moved, posed = posed, -1
     pairs[0, 0] = 8 * root_a
     pairs[0, 1] = 8 * root_b
     bounds[0] = 0.0
     depth = 1
-    begun = a < 0
-    while True:
-        if begun:
-            if depth == 0 or best == 0.0:
-                break
-            depth -= 1
-            if bounds[depth] > cut:
-                continue
-            ra = pairs[depth, 0]
-            rb = pairs[depth, 1]
-            na = kids[ra >> 3, ra & 7]
-            nb = kids[rb >> 3, rb & 7]
-            if na >= 0 or nb >= 0:
-                split_a = nb < 0 or (na >= 0 and _radius(boxes, ra) > _radius(boxes, rb))
-                # Where the box is in the other frame is mostly known: its partner's parts come one by one.
-                if split_a:
-                    if posed != 2 * rb:
-                        _box_in(boxes, rb, R, t, given)
-                    i, posed = na, 2 * rb
-                else:
-                    if posed != 2 * ra + 1:
-                        _box_in(boxes, ra, Q, p, given)
-                    i, posed = nb, 2 * ra + 1
-                hits = _to_box(boxes, i, given, cut, low)
-                base = depth
-                while hits:
-                    c = first_lane(hits)
-                    hits &= hits - 1
-                    if kids[i, c] == NONE:
-                        break
-                    bound = low[c]
-                    at = depth
-                    while at > base and bounds[at - 1] < bound:
-                        bounds[at] = bounds[at - 1]
-                        pairs[at, 0] = pairs[at - 1, 0]
-                        pairs[at, 1] = pairs[at - 1, 1]
-                        at -= 1
-                    bounds[at] = bound
-                    pairs[at, 0] = 8 * i + c if split_a else ra
-                    pairs[at, 1] = rb if split_a else 8 * i + c
-                    depth += 1
-                continue
-            a = ~na
-            b = ~nb
-            if a == first_a and b == first_b:
-                continue
+    while depth > 0 and found[0] > 0.0:
+        depth -= 1
+        if bounds[depth] > cut:
+            continue
+        ra = pairs[depth, 0]
+        rb = pairs[depth, 1]
+        na = kids[ra >> 3, ra & 7]
+        nb = kids[rb >> 3, rb & 7]
+        if na >= 0 or nb >= 0:
+            split_a = nb < 0 or (na >= 0 and _radius(boxes, ra) > _radius(boxes, rb))
+            # Where the box is in the other frame is mostly known: its partner's parts come one by one.
+            if split_a:
+                if posed != 2 * rb:
+                    _box_in(boxes, rb, R, t, given)
+                i, posed = na, 2 * rb
+            else:
+                if posed != 2 * ra + 1:
+                    _box_in(boxes, ra, Q, p, given)
+                i, posed = nb, 2 * ra + 1
+            hits = _to_box(boxes, i, given, cut, low)
+            base = depth
+            while hits:
+                c = first_lane(hits)
+                hits &= hits - 1
+                if kids[i, c] == NONE:
+                    break
+                bound = low[c]
+                at = depth
+                while at > base and bounds[at - 1] < bound:
+                    bounds[at] = bounds[at - 1]
+                    pairs[at, 0] = pairs[at - 1, 0]
+                    pairs[at, 1] = pairs[at - 1, 1]
+                    at -= 1
+                bounds[at] = bound
+                pairs[at, 0] = 8 * i + c if split_a else ra
+                pairs[at, 1] = rb if split_a else 8 * i + c
+                depth += 1
+            continue
+        a = ~na
+        b = ~nb
+        if a == first_a and b == first_b:
+            continue
         if b != moved:
             row_in(T, b, R, t, row)
             moved = b
-        if begun:
-            a1 = T[a, 3] * ux + T[a, 4] * uy + T[a, 5] * uz
-            a2 = T[a, 6] * ux + T[a, 7] * uy + T[a, 8] * uz
-            b1 = row[0, 3] * ux + row[0, 4] * uy + row[0, 5] * uz
-            b2 = row[0, 6] * ux + row[0, 7] * uy + row[0, 8] * uz
-            gap = (row[0, 0] - T[a, 0]) * ux + (row[0, 1] - T[a, 1]) * uy + (row[0, 2] - T[a, 2]) * uz
-            gap += min(b1, b2, 0.0) - max(a1, a2, 0.0) - fine
-            if gap > 0.0 and gap * gap > cut * (1.0 + 1e-6):
-                continue
-        begun = True
-        g, s, v, both = triangles(T, a, row, index(0), cut, points)
-        if g <= cut and (g < best or (g == best and (a < ka or (a == ka and b < kb)))):
-            best = g
-            cut = min(cut, cut_of(best))
-            ka = a
-            kb = b
-            on_edges(T, a, row, index(0), s, v, both, points)
-            for c in range(6):
-                W[c] = points[c]
-            over = 1.0 / math.sqrt(best) if best > coarse else 0.0
-            ux = (W[3] - W[0]) * over
-            uy = (W[4] - W[1]) * over
-            uz = (W[5] - W[2]) * over
-    return best, ka, kb
+        a1 = T[a, 3] * u[0] + T[a, 4] * u[1] + T[a, 5] * u[2]
+        a2 = T[a, 6] * u[0] + T[a, 7] * u[1] + T[a, 8] * u[2]
+        b1 = row[0, 3] * u[0] + row[0, 4] * u[1] + row[0, 5] * u[2]
+        b2 = row[0, 6] * u[0] + row[0, 7] * u[1] + row[0, 8] * u[2]
+        gap = (row[0, 0] - T[a, 0]) * u[0] + (row[0, 1] - T[a, 1]) * u[1] + (row[0, 2] - T[a, 2]) * u[2]
+        gap += min(b1, b2, 0.0) - max(a1, a2, 0.0) - fine
+        if gap > 0.0 and gap * gap > cut * (1.0 + 1e-6):
+            continue
+        nearer = _tried(trees, a, b, cut, found, scratch)
+        if nearer[1] != found[1] or nearer[2] != found[2]:
+            found = nearer
+            cut = min(cut, cut_of(found[0]))
+            u = _from_to(W, found[0], coarse)
+    return found

@@ -14,6 +14,8 @@ from numba import njit
 
 from seerob.core.transforms import Array
 
+BLOCK = 32
+"""Matrices of which each figure is worked out in turn, so that the compiler does several at once."""
 SWEEPS = 30
 """At most; five or six are usual."""
 ORTHOGONAL = 1e-16
@@ -88,53 +90,67 @@ def half_axes(J: Array, values: Array) -> None:
         values: Written: shape (N, 3); NaN, all three, of what is not finite.
     """
     n = J.shape[2]
-    rest, L = np.empty((3, n)), np.empty((3, 3))
-    for k in range(len(J)):
+    rest, L = np.empty((3, n, BLOCK)), np.empty((9, BLOCK))
+    per, along, turned = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.bool_)
+    for begin in range(0, len(J), BLOCK):
+        m = min(BLOCK, len(J) - begin)
+        for i in range(m):
+            for p in range(3):
+                for j in range(n):
+                    rest[p, j, i] = J[begin + i, p, j]
         for p in range(3):
-            for i in range(n):
-                rest[p, i] = J[k, p, i]
-        for p in range(3):
-            square = 0.0
-            for i in range(n):
-                square += rest[p, i] * rest[p, i]
-            L[p, p] = math.sqrt(square)
-            per = 1.0 / L[p, p] if square > 0.0 else 0.0
+            along[:] = 0.0
+            for j in range(n):
+                for i in range(m):
+                    along[i] += rest[p, j, i] * rest[p, j, i]
+            size = L[4 * p]
+            for i in range(m):
+                size[i] = math.sqrt(along[i])
+                per[i] = 1.0 / size[i] if along[i] > 0.0 else 0.0
             for q in range(p + 1, 3):
-                along = 0.0
-                for i in range(n):
-                    along += rest[p, i] * rest[q, i]
-                along *= per
-                L[q, p], L[p, q] = along, 0.0
-                for i in range(n):
-                    rest[q, i] -= along * per * rest[p, i]
+                below, above = L[3 * q + p], L[3 * p + q]
+                along[:] = 0.0
+                for j in range(n):
+                    for i in range(m):
+                        along[i] += rest[p, j, i] * rest[q, j, i]
+                for i in range(m):
+                    along[i] *= per[i]
+                    below[i], above[i] = along[i], 0.0
+                for j in range(n):
+                    for i in range(m):
+                        rest[q, j, i] -= along[i] * per[i] * rest[p, j, i]
         for _ in range(SWEEPS):
-            turned = False
+            some = False
             for p in range(2):
                 for q in range(p + 1, 3):
-                    pp = L[p, 0] * L[p, 0] + L[p, 1] * L[p, 1] + L[p, 2] * L[p, 2]
-                    qq = L[q, 0] * L[q, 0] + L[q, 1] * L[q, 1] + L[q, 2] * L[q, 2]
-                    pq = L[p, 0] * L[q, 0] + L[p, 1] * L[q, 1] + L[p, 2] * L[q, 2]
-                    if not pq * pq > LIKE_ORTHOGONAL * LIKE_ORTHOGONAL * pp * qq:
-                        continue
-                    turned = True
-                    zeta = (qq - pp) / (2.0 * pq)
-                    t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
-                    c = 1.0 / math.sqrt(1.0 + t * t)
-                    s = c * t
-                    for i in range(3):
-                        x, y = L[p, i], L[q, i]
-                        L[p, i], L[q, i] = c * x - s * y, s * x + c * y
-            if not turned:
+                    P, Q = L[3 * p : 3 * p + 3], L[3 * q : 3 * q + 3]
+                    for i in range(m):
+                        x0, x1, x2, y0, y1, y2 = P[0, i], P[1, i], P[2, i], Q[0, i], Q[1, i], Q[2, i]
+                        pp, qq = x0 * x0 + x1 * x1 + x2 * x2, y0 * y0 + y1 * y1 + y2 * y2
+                        pq = x0 * y0 + x1 * y1 + x2 * y2
+                        turn = pq * pq > LIKE_ORTHOGONAL * LIKE_ORTHOGONAL * pp * qq
+                        zeta = (qq - pp) / (2.0 * pq)
+                        t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                        c = 1.0 / math.sqrt(1.0 + t * t)
+                        s = c * t
+                        c, s, turned[i] = c if turn else 1.0, s if turn else 0.0, turn
+                        P[0, i], P[1, i], P[2, i] = c * x0 - s * y0, c * x1 - s * y1, c * x2 - s * y2
+                        Q[0, i], Q[1, i], Q[2, i] = s * x0 + c * y0, s * x1 + c * y1, s * x2 + c * y2
+                    for i in range(m):
+                        some = some or turned[i]
+            if not some:
                 break
-        a = math.sqrt(L[0, 0] * L[0, 0] + L[0, 1] * L[0, 1] + L[0, 2] * L[0, 2])
-        b = math.sqrt(L[1, 0] * L[1, 0] + L[1, 1] * L[1, 1] + L[1, 2] * L[1, 2])
-        c = math.sqrt(L[2, 0] * L[2, 0] + L[2, 1] * L[2, 1] + L[2, 2] * L[2, 2])
-        if not math.isfinite(a + b + c):
-            values[k, 0] = values[k, 1] = values[k, 2] = np.nan
-            continue
-        a, b = max(a, b), min(a, b)
-        b, c = max(b, c), min(b, c)
-        values[k, 0], values[k, 1], values[k, 2] = max(a, b), min(a, b), c
+        for i in range(m):
+            a = math.sqrt(L[0, i] * L[0, i] + L[1, i] * L[1, i] + L[2, i] * L[2, i])
+            b = math.sqrt(L[3, i] * L[3, i] + L[4, i] * L[4, i] + L[5, i] * L[5, i])
+            c = math.sqrt(L[6, i] * L[6, i] + L[7, i] * L[7, i] + L[8, i] * L[8, i])
+            k = begin + i
+            if not math.isfinite(a + b + c):
+                values[k, 0] = values[k, 1] = values[k, 2] = np.nan
+                continue
+            a, b = max(a, b), min(a, b)
+            b, c = max(b, c), min(b, c)
+            values[k, 0], values[k, 1], values[k, 2] = max(a, b), min(a, b), c
 
 
 @njit("b1(f8[:,:,::1], f8[:,:,::1], f8[:,:,::1])", cache=True, nogil=True, error_model="numpy")
@@ -149,34 +165,41 @@ def mobility(J: Array, M: Array, found: Array) -> bool:
     Returns:
         Whether every M is positive definite; where not, nothing of use is written.
     """
-    r, n = found.shape[1], J.shape[2]
-    U = np.zeros((n, n))
-    D = np.empty(n)
-    W = np.empty((r, n))
+    r, n, wide = found.shape[1], J.shape[2], min(BLOCK, len(J))
+    U, D = np.zeros((n, n, wide)), np.empty((n, wide))
+    solved, total = np.empty((r, n, wide)), np.empty(wide)
     definite = True
-    for k in range(len(J)):
+    for begin in range(0, len(J), BLOCK):
+        m = min(BLOCK, len(J) - begin)
         for j in range(n - 1, -1, -1):
             for i in range(j, -1, -1):
-                rest = M[k, i, j]
+                for k in range(m):
+                    total[k] = M[begin + k, i, j]
                 for c in range(j + 1, n):
-                    rest -= U[i, c] * D[c] * U[j, c]
-                if i == j:
-                    D[j] = rest
-                    definite = definite and rest > 0.0
-                else:
-                    U[i, j] = rest / D[j]
+                    for k in range(m):
+                        total[k] -= U[i, c, k] * D[c, k] * U[j, c, k]
+                for k in range(m):
+                    if i == j:
+                        D[j, k] = total[k]
+                        definite = definite and total[k] > 0.0
+                    else:
+                        U[i, j, k] = total[k] / D[j, k]
         for row in range(r):
+            W = solved[row]
             for i in range(n - 1, -1, -1):
-                rest = J[k, row, i]
+                for k in range(m):
+                    W[i, k] = J[begin + k, row, i]
                 for c in range(i + 1, n):
-                    rest -= U[i, c] * W[row, c]
-                W[row, i] = rest
+                    for k in range(m):
+                        W[i, k] -= U[i, c, k] * W[c, k]
         for p in range(r):
             for q in range(p + 1):
-                total = 0.0
+                total[:] = 0.0
                 for i in range(n):
-                    total += W[p, i] * W[q, i] / D[i]
-                found[k, p, q] = found[k, q, p] = total
+                    for k in range(m):
+                        total[k] += solved[p, i, k] * solved[q, i, k] / D[i, k]
+                for k in range(m):
+                    found[begin + k, p, q] = found[begin + k, q, p] = total[k]
     return definite
 
 

@@ -163,6 +163,11 @@ def held_many(
         held(subtree_com[k], anchors[k], axes[k], bodies, joints, turns, masses, gravity, found[k])
 
 
+BLOCK = 32
+"""Instants of which `followed` and `weighed` work out each figure one after the other, so that the compiler
+does several at once."""
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def followed(
     q: Array,
@@ -192,48 +197,62 @@ def followed(
         positions: Receives their origins in the world [m], shape (N, n + 1, 3).
         twists: Receives them, rotation first, shape (N, n, 6).
     """
-    turn = np.empty((3, 3))
-    for k in range(len(q)):
-        for r in range(3):
-            positions[k, 0, r] = 0.0
-            for c in range(3):
-                rotations[k, 0, r, c] = 1.0 if r == c else 0.0
-        for j in range(len(parents)):
-            P, p = rotations[k, parents[j]], positions[k, parents[j]]
-            R, x = rotations[k, j + 1], positions[k, j + 1]
-            F, a, h = fixed[j], axes[j], anchors[j]
+    n = len(parents)
+    # Of each link the rotation, row by row, and the position; then where it would be with its joint at 0.
+    links, turn, wave = np.empty((n + 1, 12, BLOCK)), np.empty((9, BLOCK)), np.empty((2, BLOCK))
+    axis, arm = np.empty((3, BLOCK)), np.empty((3, BLOCK))
+    for e in range(12):
+        links[0, e, :] = 1.0 if e in (0, 4, 8) else 0.0
+    for begin in range(0, len(q), BLOCK):
+        m = min(BLOCK, len(q) - begin)
+        for j in range(n):
+            P, L, F, a, h = links[parents[j]], links[j + 1], fixed[j], axes[j], anchors[j]
             for r in range(3):
-                x[r] = p[r] + P[r, 0] * F[0, 3] + P[r, 1] * F[1, 3] + P[r, 2] * F[2, 3]
+                p, o, x, w = P[3 * r : 3 * r + 3], P[9 + r], L[9 + r], axis[r]
+                T = turn[3 * r : 3 * r + 3]
+                for i in range(m):
+                    x[i] = o[i] + p[0, i] * F[0, 3] + p[1, i] * F[1, 3] + p[2, i] * F[2, 3]
                 for c in range(3):
-                    turn[r, c] = P[r, 0] * F[0, c] + P[r, 1] * F[1, c] + P[r, 2] * F[2, c]
-            wx = turn[0, 0] * a[0] + turn[0, 1] * a[1] + turn[0, 2] * a[2]
-            wy = turn[1, 0] * a[0] + turn[1, 1] * a[1] + turn[1, 2] * a[2]
-            wz = turn[2, 0] * a[0] + turn[2, 1] * a[1] + turn[2, 2] * a[2]
-            twist = twists[k, j]
+                    f, g, e, t = F[0, c], F[1, c], F[2, c], T[c]
+                    for i in range(m):
+                        t[i] = p[0, i] * f + p[1, i] * g + p[2, i] * e
+                for i in range(m):
+                    w[i] = T[0, i] * a[0] + T[1, i] * a[1] + T[2, i] * a[2]
             if not turns[j]:
-                for c in range(3):
-                    twist[c] = 0.0
-                twist[3], twist[4], twist[5] = wx, wy, wz
-                for r in range(3):
-                    x[r] += twist[3 + r] * q[k, j]
-                    for c in range(3):
-                        R[r, c] = turn[r, c]
+                for i in range(m):
+                    twist = twists[begin + i, j]
+                    for r in range(3):
+                        twist[r], twist[3 + r] = 0.0, axis[r, i]
+                        L[9 + r, i] += axis[r, i] * q[begin + i, j]
+                L[:9] = turn
                 continue
+            for i in range(m):
+                wave[0, i], wave[1, i] = math.sin(q[begin + i, j]), math.cos(q[begin + i, j])
             # Rodrigues' formula about the axis in the link.
-            s, v = math.sin(q[k, j]), math.cos(q[k, j])
-            u = 1.0 - v
+            a0, a1, a2, h0, h1, h2 = a[0], a[1], a[2], h[0], h[1], h[2]
             for r in range(3):
-                T = turn[r]
-                along_axis = (T[0] * a[0] + T[1] * a[1] + T[2] * a[2]) * u
-                R[r, 0] = v * T[0] + s * (T[1] * a[2] - T[2] * a[1]) + along_axis * a[0]
-                R[r, 1] = v * T[1] + s * (T[2] * a[0] - T[0] * a[2]) + along_axis * a[1]
-                R[r, 2] = v * T[2] + s * (T[0] * a[1] - T[1] * a[0]) + along_axis * a[2]
-                held_point = x[r] + T[0] * h[0] + T[1] * h[1] + T[2] * h[2]
-                x[r] = held_point - (R[r, 0] * h[0] + R[r, 1] * h[1] + R[r, 2] * h[2])
-                twist[3 + r] = reference[r] - held_point
-            bx, by, bz = twist[3], twist[4], twist[5]
-            twist[0], twist[1], twist[2] = wx, wy, wz
-            twist[3], twist[4], twist[5] = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
+                T, R, x, b, at = turn[3 * r : 3 * r + 3], L[3 * r : 3 * r + 3], L[9 + r], arm[r], reference[r]
+                for i in range(m):
+                    s, v, t0, t1, t2 = wave[0, i], wave[1, i], T[0, i], T[1, i], T[2, i]
+                    along_axis = (t0 * a0 + t1 * a1 + t2 * a2) * (1.0 - v)
+                    r0 = v * t0 + s * (t1 * a2 - t2 * a1) + along_axis * a0
+                    r1 = v * t1 + s * (t2 * a0 - t0 * a2) + along_axis * a1
+                    r2 = v * t2 + s * (t0 * a1 - t1 * a0) + along_axis * a2
+                    held_point = x[i] + t0 * h0 + t1 * h1 + t2 * h2
+                    R[0, i], R[1, i], R[2, i] = r0, r1, r2
+                    x[i] = held_point - (r0 * h0 + r1 * h1 + r2 * h2)
+                    b[i] = at - held_point
+            for i in range(m):
+                wx, wy, wz, bx, by, bz = axis[0, i], axis[1, i], axis[2, i], arm[0, i], arm[1, i], arm[2, i]
+                twist = twists[begin + i, j]
+                twist[0], twist[1], twist[2] = wx, wy, wz
+                twist[3], twist[4], twist[5] = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
+        for j in range(n + 1):
+            for i in range(m):
+                for r in range(3):
+                    positions[begin + i, j, r] = links[j, 9 + r, i]
+                    for c in range(3):
+                        rotations[begin + i, j, r, c] = links[j, 3 * r + c, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -266,53 +285,79 @@ def weighed(
         found: Receives them, shape (N, m, m).
     """
     n = len(parents)
-    sums = np.empty((n, 10))
-    A, d, f = np.empty((3, 3)), np.empty(3), np.empty(6)
-    for k in range(len(found)):
+    # Of each link, and then of all that it carries: moments about the reference, first moments, mass.
+    sums, carried = np.empty((n, 9, BLOCK)), np.empty(n)
+    link, A, d = np.empty((12, BLOCK)), np.empty((9, BLOCK)), np.empty((3, BLOCK))
+    s, f, entry = np.empty((n, 6, BLOCK)), np.empty((6, BLOCK)), np.empty(BLOCK)
+    for begin in range(0, len(found), BLOCK):
+        m = min(BLOCK, len(found) - begin)
         for j in range(n):
-            R, x, c, local, m = rotations[k, j + 1], positions[k, j + 1], centers[j], inertias[j], masses[j]
+            for i in range(m):
+                for r in range(3):
+                    link[9 + r, i] = positions[begin + i, j + 1, r]
+                    for c in range(3):
+                        link[3 * r + c, i] = rotations[begin + i, j + 1, r, c]
+                for r in range(6):
+                    s[j, r, i] = twists[begin + i, j, r]
+            center, local, mass, own = centers[j], inertias[j], masses[j], sums[j]
+            carried[j] = mass
             for r in range(3):
-                d[r] = x[r] + R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] - reference[r]
+                R, x, off, at = link[3 * r : 3 * r + 3], link[9 + r], d[r], reference[r]
+                for i in range(m):
+                    off[i] = x[i] + R[0, i] * center[0] + R[1, i] * center[1] + R[2, i] * center[2] - at
                 for e in range(3):
-                    A[r, e] = R[r, 0] * local[0, e] + R[r, 1] * local[1, e] + R[r, 2] * local[2, e]
-            own = sums[j]
-            dx, dy, dz = d[0], d[1], d[2]
-            own[0] = A[0, 0] * R[0, 0] + A[0, 1] * R[0, 1] + A[0, 2] * R[0, 2] + m * (dy * dy + dz * dz)
-            own[1] = A[1, 0] * R[1, 0] + A[1, 1] * R[1, 1] + A[1, 2] * R[1, 2] + m * (dx * dx + dz * dz)
-            own[2] = A[2, 0] * R[2, 0] + A[2, 1] * R[2, 1] + A[2, 2] * R[2, 2] + m * (dx * dx + dy * dy)
-            own[3] = A[0, 0] * R[1, 0] + A[0, 1] * R[1, 1] + A[0, 2] * R[1, 2] - m * dx * dy
-            own[4] = A[0, 0] * R[2, 0] + A[0, 1] * R[2, 1] + A[0, 2] * R[2, 2] - m * dx * dz
-            own[5] = A[1, 0] * R[2, 0] + A[1, 1] * R[2, 1] + A[1, 2] * R[2, 2] - m * dy * dz
-            own[6], own[7], own[8], own[9] = m * dx, m * dy, m * dz, m
-        found[k, :, :] = 0.0
+                    f0, f1, f2, to = local[0, e], local[1, e], local[2, e], A[3 * r + e]
+                    for i in range(m):
+                        to[i] = R[0, i] * f0 + R[1, i] * f1 + R[2, i] * f2
+            for k in range(6):
+                p, r = (k, k) if k < 3 else (0, k - 2) if k < 5 else (1, 2)
+                a, R, to = A[3 * p : 3 * p + 3], link[3 * r : 3 * r + 3], own[k]
+                for i in range(m):
+                    to[i] = a[0, i] * R[0, i] + a[1, i] * R[1, i] + a[2, i] * R[2, i]
+            for i in range(m):
+                x, y, z = d[0, i], d[1, i], d[2, i]
+                own[0, i] += mass * (y * y + z * z)
+                own[1, i] += mass * (x * x + z * z)
+                own[2, i] += mass * (x * x + y * y)
+                own[3, i] -= mass * x * y
+                own[4, i] -= mass * x * z
+                own[5, i] -= mass * y * z
+                own[6, i], own[7, i], own[8, i] = mass * x, mass * y, mass * z
+        found[begin : begin + m] = 0.0
         for j in range(n - 1, -1, -1):
-            own, s = sums[j], twists[k, j]
+            own, w, weight = sums[j], s[j], carried[j]
             if parents[j] > 0:
-                carrier = sums[parents[j] - 1]
-                for i in range(10):
-                    carrier[i] += own[i]
+                carried[parents[j] - 1] += weight
+                for e in range(9):
+                    more, to = own[e], sums[parents[j] - 1, e]
+                    for i in range(m):
+                        to[i] += more[i]
             row = places[j]
             if row < 0:
                 continue
             # What a motion along this joint has of angular and linear momentum.
-            f[0] = own[0] * s[0] + own[3] * s[1] + own[4] * s[2] - own[8] * s[4] + own[7] * s[5]
-            f[1] = own[3] * s[0] + own[1] * s[1] + own[5] * s[2] + own[8] * s[3] - own[6] * s[5]
-            f[2] = own[4] * s[0] + own[5] * s[1] + own[2] * s[2] - own[7] * s[3] + own[6] * s[4]
-            f[3] = own[8] * s[1] - own[7] * s[2] + own[9] * s[3]
-            f[4] = own[6] * s[2] - own[8] * s[0] + own[9] * s[4]
-            f[5] = own[7] * s[0] - own[6] * s[1] + own[9] * s[5]
-            found[k, row, row] = armature[j]
-            i = j
-            while i >= 0:
-                column = places[i]
+            for i in range(m):
+                w0, w1, w2, w3, w4, w5 = w[0, i], w[1, i], w[2, i], w[3, i], w[4, i], w[5, i]
+                x, y, z = own[6, i], own[7, i], own[8, i]
+                f[0, i] = own[0, i] * w0 + own[3, i] * w1 + own[4, i] * w2 - z * w4 + y * w5
+                f[1, i] = own[3, i] * w0 + own[1, i] * w1 + own[5, i] * w2 + z * w3 - x * w5
+                f[2, i] = own[4, i] * w0 + own[5, i] * w1 + own[2, i] * w2 - y * w3 + x * w4
+                f[3, i] = z * w1 - y * w2 + weight * w3
+                f[4, i] = x * w2 - z * w0 + weight * w4
+                f[5, i] = y * w0 - x * w1 + weight * w5
+            k = j
+            while k >= 0:
+                column, v = places[k], s[k]
                 if column >= 0:
-                    w = twists[k, i]
-                    total = w[0] * f[0] + w[1] * f[1] + w[2] * f[2] + w[3] * f[3] + w[4] * f[4] + w[5] * f[5]
-                    if i == j:
-                        found[k, row, row] += total
-                    else:
-                        found[k, row, column] = found[k, column, row] = total
-                i = parents[i] - 1
+                    for i in range(m):
+                        entry[i] = (
+                            v[0, i] * f[0, i] + v[1, i] * f[1, i] + v[2, i] * f[2, i]
+                            + v[3, i] * f[3, i] + v[4, i] * f[4, i] + v[5, i] * f[5, i]
+                        )  # fmt: skip
+                    for i in range(m):
+                        total = armature[j] + entry[i] if k == j else entry[i]
+                        found[begin + i, row, column] = found[begin + i, column, row] = total
+                k = parents[k] - 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -199,17 +199,17 @@ def followed(
     """
     n = len(parents)
     # Of each link the rotation, row by row, and the position; then where it would be with its joint at 0.
-    links, turn, wave = np.empty((n + 1, 12, BLOCK)), np.empty((9, BLOCK)), np.empty((2, BLOCK))
+    links, turn, wave = np.empty((n + 1, 4, 3, BLOCK)), np.empty((3, 3, BLOCK)), np.empty((2, BLOCK))
     axis, arm = np.empty((3, BLOCK)), np.empty((3, BLOCK))
-    for e in range(12):
-        links[0, e, :] = 1.0 if e in (0, 4, 8) else 0.0
+    links[0] = 0.0
+    for r in range(3):
+        links[0, r, r] = 1.0
     for begin in range(0, len(q), BLOCK):
         m = min(BLOCK, len(q) - begin)
         for j in range(n):
             P, L, F, a, h = links[parents[j]], links[j + 1], fixed[j], axes[j], anchors[j]
             for r in range(3):
-                p, o, x, w = P[3 * r : 3 * r + 3], P[9 + r], L[9 + r], axis[r]
-                T = turn[3 * r : 3 * r + 3]
+                p, o, x, w, T = P[r], P[3, r], L[3, r], axis[r], turn[r]
                 for i in range(m):
                     x[i] = o[i] + p[0, i] * F[0, 3] + p[1, i] * F[1, 3] + p[2, i] * F[2, 3]
                 for c in range(3):
@@ -223,15 +223,15 @@ def followed(
                     twist = twists[begin + i, j]
                     for r in range(3):
                         twist[r], twist[3 + r] = 0.0, axis[r, i]
-                        L[9 + r, i] += axis[r, i] * q[begin + i, j]
-                L[:9] = turn
+                        L[3, r, i] += axis[r, i] * q[begin + i, j]
+                L[:3] = turn
                 continue
             for i in range(m):
                 wave[0, i], wave[1, i] = math.sin(q[begin + i, j]), math.cos(q[begin + i, j])
             # Rodrigues' formula about the axis in the link.
             a0, a1, a2, h0, h1, h2 = a[0], a[1], a[2], h[0], h[1], h[2]
             for r in range(3):
-                T, R, x, b, at = turn[3 * r : 3 * r + 3], L[3 * r : 3 * r + 3], L[9 + r], arm[r], reference[r]
+                T, R, x, b, at = turn[r], L[r], L[3, r], arm[r], reference[r]
                 for i in range(m):
                     s, v, t0, t1, t2 = wave[0, i], wave[1, i], T[0, i], T[1, i], T[2, i]
                     along_axis = (t0 * a0 + t1 * a1 + t2 * a2) * (1.0 - v)
@@ -250,9 +250,9 @@ def followed(
         for j in range(n + 1):
             for i in range(m):
                 for r in range(3):
-                    positions[begin + i, j, r] = links[j, 9 + r, i]
+                    positions[begin + i, j, r] = links[j, 3, r, i]
                     for c in range(3):
-                        rotations[begin + i, j, r, c] = links[j, 3 * r + c, i]
+                        rotations[begin + i, j, r, c] = links[j, r, c, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -287,31 +287,31 @@ def weighed(
     n = len(parents)
     # Of each link, and then of all that it carries: moments about the reference, first moments, mass.
     sums, carried = np.empty((n, 9, BLOCK)), np.empty(n)
-    link, A, d = np.empty((12, BLOCK)), np.empty((9, BLOCK)), np.empty((3, BLOCK))
+    link, A, d = np.empty((4, 3, BLOCK)), np.empty((3, 3, BLOCK)), np.empty((3, BLOCK))
     s, f, entry = np.empty((n, 6, BLOCK)), np.empty((6, BLOCK)), np.empty(BLOCK)
     for begin in range(0, len(found), BLOCK):
         m = min(BLOCK, len(found) - begin)
         for j in range(n):
             for i in range(m):
                 for r in range(3):
-                    link[9 + r, i] = positions[begin + i, j + 1, r]
+                    link[3, r, i] = positions[begin + i, j + 1, r]
                     for c in range(3):
-                        link[3 * r + c, i] = rotations[begin + i, j + 1, r, c]
+                        link[r, c, i] = rotations[begin + i, j + 1, r, c]
                 for r in range(6):
                     s[j, r, i] = twists[begin + i, j, r]
             center, local, mass, own = centers[j], inertias[j], masses[j], sums[j]
             carried[j] = mass
             for r in range(3):
-                R, x, off, at = link[3 * r : 3 * r + 3], link[9 + r], d[r], reference[r]
+                R, x, off, at = link[r], link[3, r], d[r], reference[r]
                 for i in range(m):
                     off[i] = x[i] + R[0, i] * center[0] + R[1, i] * center[1] + R[2, i] * center[2] - at
                 for e in range(3):
-                    f0, f1, f2, to = local[0, e], local[1, e], local[2, e], A[3 * r + e]
+                    f0, f1, f2, to = local[0, e], local[1, e], local[2, e], A[r, e]
                     for i in range(m):
                         to[i] = R[0, i] * f0 + R[1, i] * f1 + R[2, i] * f2
             for k in range(6):
                 p, r = (k, k) if k < 3 else (0, k - 2) if k < 5 else (1, 2)
-                a, R, to = A[3 * p : 3 * p + 3], link[3 * r : 3 * r + 3], own[k]
+                a, R, to = A[p], link[r], own[k]
                 for i in range(m):
                     to[i] = a[0, i] * R[0, i] + a[1, i] * R[1, i] + a[2, i] * R[2, i]
             for i in range(m):

@@ -25,7 +25,7 @@ import struct
 import sys
 import time
 from collections.abc import Callable, Coroutine, Iterable
-from contextvars import Context, copy_context
+from contextvars import Context
 from typing import Any, NamedTuple, TypeVarTuple
 
 _NANOSECONDS = getattr(socket, "SO_TIMESTAMPNS", 35) if sys.platform == "linux" else None
@@ -218,7 +218,7 @@ if hasattr(select, "epoll"):
         def __init__(self) -> None:
             super().__init__()
             self._epoll = select.epoll.fromfd(os.dup(self.fileno()))
-            self.readers: dict[int, Callable[[], object]] = {}
+            self.readers: dict[int, asyncio.Handle] = {}
             """Who is called, by descriptor."""
             self.asked = False
             """Whether the loop has been asked to do something since it began to wait."""
@@ -233,15 +233,17 @@ if hasattr(select, "epoll"):
             end = None if timeout is None else time.monotonic() + timeout
             while True:
                 events = self._epoll.poll(timeout)
-                others = False
+                others = []
                 for file, what in events:
                     reader = self.readers.get(file)
-                    if reader is None or what != _READABLE:
-                        others = True
-                    else:
-                        reader()
+                    if reader is not None and what == _READABLE:
+                        reader._run()
+                    elif (key := self.get_map().get(file)) is not None:
+                        mask = selectors.EVENT_WRITE * bool(what & ~select.EPOLLIN)
+                        mask |= selectors.EVENT_READ * bool(what & ~select.EPOLLOUT)
+                        others.append((key, mask & key.events))
                 if others:
-                    return super().select(0)  # what is there is still there
+                    return others
                 if self.asked or not events:
                     return []
                 if end is not None:
@@ -255,31 +257,24 @@ if hasattr(select, "epoll"):
             super().close()
 
     class PromptLoop(asyncio.SelectorEventLoop):
-        """asyncio's loop, but for `add_reader`, whose callback is called without a turn of the loop."""
+        """asyncio's loop, but for what waits to read, which is called without a turn of the loop.
+
+        Its transports, `add_reader` and `sock_recv` alike: all of them ask by what is overridden here.
+        """
 
         def __init__(self) -> None:
             self._prompt = _PromptSelector()
             super().__init__(self._prompt)
+            self._prompt.readers.clear()  # by which other threads wake the loop, to have a turn
 
-        def add_reader(self, fd: Any, callback: Callable[[*_Ts], Any], *args: *_Ts) -> None:
-            """Call back whenever there is something to read, in the context of whoever asks for it now."""
-            super().add_reader(fd, callback, *args)
-            context = copy_context()
+        def _add_reader(self, fd: Any, callback: Callable[[*_Ts], Any], *args: *_Ts) -> asyncio.Handle:
+            handle: asyncio.Handle = super()._add_reader(fd, callback, *args)  # type: ignore[misc]
+            self._prompt.readers[_descriptor(fd)] = handle
+            return handle
 
-            def read() -> None:
-                try:
-                    context.run(callback, *args)
-                except (SystemExit, KeyboardInterrupt):
-                    raise
-                except BaseException as error:  # as asyncio does
-                    self.call_exception_handler({"message": "a reader failed", "exception": error})
-
-            self._prompt.readers[_descriptor(fd)] = read
-
-        def remove_reader(self, fd: Any) -> bool:
-            """Call back no more."""
+        def _remove_reader(self, fd: Any) -> bool:
             self._prompt.readers.pop(_descriptor(fd), None)
-            return super().remove_reader(fd)
+            return bool(super()._remove_reader(fd))  # type: ignore[misc]
 
         def call_soon(
             self, callback: Callable[[*_Ts], object], *args: *_Ts, context: Context | None = None

@@ -219,9 +219,16 @@ def turned(rotation: ArrayLike, wxyz: ArrayLike) -> Array:
     Returns:
         Quaternions, w first, of the same lengths, shape (..., 4).
     """
-    left = left_product(wxyz_from_rotation(rotation))
+    return multiplied(left_product(wxyz_from_rotation(rotation)), wxyz)
+
+
+def multiplied(left: Array, wxyz: ArrayLike) -> Array:
+    """Quaternions as `turned` gives them, by what `left_product` makes of that rotation."""
     given = np.asarray(wxyz, float)
-    known = (np.abs(given) < _VAST).all(axis=-1, keepdims=True)
+    near = np.abs(given) < _VAST
+    if near.all():
+        return np.asarray(given @ left.T)
+    known = near.all(axis=-1, keepdims=True)
     return np.where(known, np.where(known, given, 0.0) @ left.T, np.nan)
 
 

@@ -85,26 +85,32 @@ class Size:
             Positions about the middle of the hips [m], shape (n, 3); trunk and shoulders are those of who
             stands upright, as nothing shows how they bend. NaN where no direction leads there.
         """
-        ends, lengths = (
-            np.array([limb[:2] for limb in self.limbs]),
-            np.array([limb[2] for limb in self.limbs]),
+        at = positions.tolist()
+        out = [[math.nan] * 3 for _ in at]
+        ways = [[b - a for a, b in zip(at[near], at[far], strict=True)] for near, far, _ in self.limbs]
+        found = [math.hypot(*way) for way in ways]
+        scale = sum([length for *_, length in self.limbs]) / (sum(found) or math.nan)
+        ways = [
+            [x * (length / (size or math.nan)) for x in way]
+            for way, size, (*_, length) in zip(ways, found, self.limbs, strict=True)
+        ]
+        hips, shoulders = (
+            [(a + b) / 2 for a, b in zip(at[one], at[other], strict=True)]
+            for one, other in (self.hips, self.shoulders)
         )
-        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            ways = positions[ends[:, 1]] - positions[ends[:, 0]]
-            found = np.linalg.norm(ways, axis=1)
-            scale = float(lengths.sum() / found.sum())
-            ways *= (lengths / found)[:, None]
-            out = np.full(positions.shape, np.nan)
-            out[self.hips[0]], out[self.hips[1]] = -ways[0] / 2, ways[0] / 2
-            middle = positions[list(self.shoulders)].mean(axis=0)
-            trunk = middle - positions[list(self.hips)].mean(axis=0)
-            trunk *= self.trunk / float(np.linalg.norm(trunk))
-            out[self.shoulders[0]], out[self.shoulders[1]] = trunk - ways[1] / 2, trunk + ways[1] / 2
-            for (near, far, _), way in zip(self.limbs[2:], ways[2:], strict=True):
-                out[far] = out[near] + way
-            for row, joint in self.carried:
-                out[row] = out[joint] + (positions[row] - positions[joint]) * scale
-        return out
+        trunk = [b - a for a, b in zip(hips, shoulders, strict=True)]
+        size = self.trunk / (math.hypot(*trunk) or math.nan)
+        for (left, right), middle, way in (
+            (self.hips, (0.0, 0.0, 0.0), ways[0]),
+            (self.shoulders, [x * size for x in trunk], ways[1]),
+        ):
+            out[left] = [a - b / 2 for a, b in zip(middle, way, strict=True)]
+            out[right] = [a + b / 2 for a, b in zip(middle, way, strict=True)]
+        for (near, far, _), way in zip(self.limbs[2:], ways[2:], strict=True):
+            out[far] = [a + b for a, b in zip(out[near], way, strict=True)]
+        for row, joint in self.carried:
+            out[row] = [o + (a - b) * scale for o, a, b in zip(out[joint], at[row], at[joint], strict=True)]
+        return np.array(out)
 
 
 @dataclass(frozen=True, eq=False)

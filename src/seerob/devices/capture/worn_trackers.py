@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
@@ -116,10 +117,10 @@ class OriginWatch:
         pairs = [(old[d.serial], d.position) for d in instant.devices if d.tracking and d.serial in old]
         if len(pairs) < 2:
             return False
-        before, now = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
         since = max(instant.t - self._before.t, 0.0)
-        if not np.linalg.norm(now - before, axis=1).max() > LEAP + SPEED * since:
+        if not max([math.dist(a.tolist(), b.tolist()) for a, b in pairs]) > LEAP + SPEED * since:
             return False
+        before, now = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
         return bool(np.abs(_distances(now) - _distances(before)).max() < RIGID + MOST_DISTANCE * since)
 
 

@@ -109,15 +109,14 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
         )
 
     def _frame(self, pending: dict[Key, TrackerPose], rows: dict[Key, int]) -> CaptureFrame:
-        positions, turns = np.full((len(rows), 3), np.nan), np.full((len(rows), 4), np.nan)
-        world, metres = world_from_file(self.up or Up.Z), SI[self.unit][1]
+        values = np.full((len(rows), 7), np.nan)
         for key, pose in pending.items():
-            with np.errstate(all="ignore"):  # what is not finite is left out where it is used
-                positions[rows[key]] = world @ (metres * pose.position)
-                turns[rows[key]] = pose.xyzw[[3, 0, 1, 2]]
-        t = max(pose.t for pose in pending.values())
-        with np.errstate(all="ignore"):
-            return CaptureFrame(t=t, positions=positions, orientations=turned(world, turns))
+            values[rows[key], :3], values[rows[key], 3:] = pose.position, pose.xyzw
+        t = max([pose.t for pose in pending.values()])
+        world = world_from_file(self.up or Up.Z)
+        with np.errstate(all="ignore"):  # what is not finite is left out where it is used
+            positions = (SI[self.unit][1] * values[:, :3]) @ world.T
+            return CaptureFrame(t=t, positions=positions, orientations=turned(world, values[:, [6, 3, 4, 5]]))
 
     async def ask(self) -> tuple[Finding, ...]:
         """Which trackers and sensors there are."""

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from seerob.core.transforms import Array, turned
+from seerob.core.transforms import Array, left_product, multiplied, turned, wxyz_from_rotation
 from seerob.description.capture.captured import Layout, Seen
 from seerob.protocols import ProtocolError
 from seerob.protocols.links import live_messages
@@ -80,6 +80,8 @@ observed but predicted, behind something else; medium is the best that the track
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """The camera's optical axes (x right, y down, z forward) in the camera as a thing (x forward, y left, z up).
 """
+
+_TURN = left_product(wxyz_from_rotation(BODY_FROM_OPTICAL))
 
 Number = float | None
 """null is how JSON libraries write NaN."""
@@ -235,7 +237,7 @@ def camera_body(body_id: int, positions: Array, wxyz: Array | None, levels: Arra
 
 
 def _optical(wxyz: Array, *, back: bool = False) -> Array:
-    return turned(BODY_FROM_OPTICAL.T if back else BODY_FROM_OPTICAL, wxyz)
+    return turned(BODY_FROM_OPTICAL.T, wxyz) if back else multiplied(_TURN, wxyz)
 
 
 def _decoded(decoder: msgspec.json.Decoder[T], data: bytes | str) -> T:

@@ -9,14 +9,19 @@ do not hold, stands beside them as ``timestamp_ms`` or ``timestampMs``, as `dete
 
 from __future__ import annotations
 
+import math
+import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import mul
 from typing import Annotated
 
 import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.core.samples import Vec4
+from seerob.core.transforms import Array, wxyz_from_rows
 from seerob.description.capture.captured import Layout, Seen
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.kinect import BODY_FROM_OPTICAL
@@ -57,7 +62,17 @@ NOSE_TURN = np.array(
 )
 """Face (ears to tip of the nose, up, right) from head: the tip is as much below the ears as in the table of
 the Azure Kinect's names (shares of the stature; a choice)."""
-_HIPS = [LANDMARKS.index(f"{side}_hip") for side in ("left", "right")]
+_LEFT, _RIGHT = (
+    [LANDMARKS.index(f"{side}_{part}") for part in ("hip", "shoulder", "ear")] for side in ("left", "right")
+)
+"""Rows at both ends of what points right, by segment."""
+_HIPS = _LEFT[0], _RIGHT[0]
+_TRUNK = [*_LEFT[:2], *_RIGHT[:2]]
+_USED = (_TRUNK, _TRUNK, [LANDMARKS.index("nose"), _LEFT[2], _RIGHT[2]])
+"""What tells how a segment is turned."""
+_Columns = tuple[tuple[float, float], tuple[float, float]]
+_NOSE_COLUMNS: _Columns = tuple((float(c), float(s)) for c, s in NOSE_TURN[:2, :2].T)  # type: ignore[assignment]
+NOWHERE = (math.nan,) * 4
 
 
 class Landmark(Struct):
@@ -167,9 +182,10 @@ def centred(values: Array) -> bool:
     Args:
         values: Of people or instants, shape (…, 33, 4).
     """
-    middle = np.linalg.norm(values[..., _HIPS, :3].mean(axis=-2), axis=-1)
-    known = middle[np.isfinite(middle)]
-    return bool(len(known) == 0 or float(np.median(known)) <= OFF_CENTRE)
+    middles = ((values[..., _HIPS[0], :3] + values[..., _HIPS[1], :3]) / 2).reshape(-1, 3)
+    far = [math.hypot(*middle) for middle in middles.tolist()]
+    known = [way for way in far if math.isfinite(way)]
+    return not known or statistics.median(known) <= OFF_CENTRE
 
 
 def camera_points(values: Array) -> tuple[Array, Array, Array]:
@@ -189,35 +205,38 @@ def camera_points(values: Array) -> tuple[Array, Array, Array]:
     orientations = np.full((count, n + len(SEGMENTS), 4), np.nan)
     confidence = np.ones((count, n + len(SEGMENTS)))
     confidence[:, :n] = np.where(values[..., 3] >= VISIBLE, 1.0, 0.0)
-    at = {name: positions[:, row] for row, name in enumerate(LANDMARKS)}
-    hips, shoulders, ears = (
-        (at[f"left_{part}"] + at[f"right_{part}"]) / 2 for part in ("hip", "shoulder", "ear")
-    )
-    up, ahead = shoulders - hips, at["nose"] - ears
-    trunk = [f"{side}_{part}" for part in ("hip", "shoulder") for side in ("left", "right")]
-    for row, part, way, turn, used in (
-        (n, "hip", up, None, trunk),
-        (n + 1, "shoulder", up, None, trunk),
-        (n + 2, "ear", ahead, NOSE_TURN, ["nose", "left_ear", "right_ear"]),
-    ):
-        _orient(at[f"right_{part}"] - at[f"left_{part}"], way, turn, orientations[:, row])
-        confidence[:, row] = confidence[:, [LANDMARKS.index(name) for name in used]].min(axis=1)
+    middles = (positions[:, _LEFT] + positions[:, _RIGHT]) / 2
+    hips, shoulders, ears = middles.transpose(1, 0, 2)
+    up, ahead = shoulders - hips, positions[:, LANDMARKS.index("nose")] - ears
+    across = positions[:, _RIGHT] - positions[:, _LEFT]
+    for k, (way, turn) in enumerate(((up, None), (up, None), (ahead, _NOSE_COLUMNS))):
+        pairs = zip(across[:, k].tolist(), way.tolist(), strict=True)
+        orientations[:, n + k] = [_orientation(right, other, turn) for right, other in pairs]
+        confidence[:, n + k] = confidence[:, _USED[k]].min(axis=1)
     return positions, orientations, confidence
 
 
-def _orient(across: Array, way: Array, turn: Array | None, out: Array) -> None:
-    """Write world from segment where it is known, w first, shape (n, 4).
+def _orientation(across: Sequence[float], way: Sequence[float], turn: _Columns | None) -> Vec4:
+    """World from segment, w first; NaN where it is not known. In plain numbers: of one person they are few.
 
     Args:
-        across: What points right, shape (n, 3).
-        way: What points up, or forward where there is a turn, shape (n, 3).
-        turn: How the segment is turned in the frame of both.
-        out: Written to.
+        across: What points right.
+        way: What points up, or forward where there is a turn.
+        turn: How the segment is turned in the frame of both, about what points right.
     """
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        z = across / np.linalg.norm(across, axis=1, keepdims=True)
-        y = way - (way * z).sum(axis=1, keepdims=True) * z
-        y /= np.linalg.norm(y, axis=1, keepdims=True)
-        turns = np.stack([np.cross(y, z), y, z] if turn is None else [y, np.cross(z, y), z], axis=2)
-    for row in np.flatnonzero(np.isfinite(turns).all(axis=(1, 2))).tolist():
-        out[row] = wxyz_from_rotation(turns[row] if turn is None else turns[row] @ turn)
+    z = _unit(across)
+    along = sum(map(mul, way, z))
+    y = _unit([a - along * b for a, b in zip(way, z, strict=True)])
+    x = y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0]
+    first: Sequence[float] = x
+    second: Sequence[float] = y
+    if turn is not None:
+        ahead, up = y, [-a for a in x]
+        first, second = (tuple([c * a + s * b for a, b in zip(ahead, up, strict=True)]) for c, s in turn)
+    rows = list(zip(first, second, z, strict=True))
+    return wxyz_from_rows(rows) if math.isfinite(sum(map(sum, rows))) else NOWHERE
+
+
+def _unit(v: Sequence[float]) -> tuple[float, float, float]:
+    size = math.hypot(*v) or math.nan
+    return v[0] / size, v[1] / size, v[2] / size

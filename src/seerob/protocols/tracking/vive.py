@@ -9,18 +9,21 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from seerob.core.transforms import Array, turned
+from seerob.core.transforms import Array, left_product, multiplied, turned, wxyz_from_rotation
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.live_messages import MAX_MESSAGE
 
 WORLD_FROM_XR = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """x forward, y left, z up from x right, y up, z backward; a rotation."""
+
+_TURN = left_product(wxyz_from_rotation(WORLD_FROM_XR))
 
 
 def world_positions(positions: Array) -> Array:
@@ -30,7 +33,7 @@ def world_positions(positions: Array) -> Array:
 
 def world_turns(wxyz: Array) -> Array:
     """World (z up) from device, w first, shape (..., 4), of a headset's rotations w first."""
-    return turned(WORLD_FROM_XR, wxyz)
+    return multiplied(_TURN, wxyz)
 
 
 def xr_positions(positions: Array) -> Array:
@@ -112,10 +115,12 @@ class Devices:
     epoch: int = 0
 
 
+_UNKNOWN: tuple[_Number, ...] = (None,) * 4
 _messages = msgspec.json.Decoder(MessageObject)
 _encode = msgspec.json.Encoder().encode
 
 
+@lru_cache(256)
 def plain_role(role: str) -> str:
     """``waist`` of ``vive_tracker_waist`` or ``/user/vive_tracker_htcx/role/waist``."""
     name = _ROLE.sub("", role.strip().lower())
@@ -141,17 +146,25 @@ def decode(data: bytes | str) -> Devices:
     serials = [d.serial for d in said.devices]
     if len(set(serials)) != len(serials):
         raise ProtocolError("the same serial number twice in a message of trackers")
-    return Devices(said.t, tuple(_device(d) for d in said.devices), said.epoch)
+    return Devices(said.t, _devices(said.devices), said.epoch)
 
 
-def _device(said: DeviceObject) -> Device:
-    return device(
-        said.serial,
-        said.role,
-        tracking=said.tracking,
-        result=said.result,
-        position=said.position,
-        wxyz=said.rotation,
+def _devices(said: Sequence[DeviceObject]) -> tuple[Device, ...]:
+    """All of one instant; their numbers are made of as one array."""
+    given = [(*(d.position or _UNKNOWN[:3]), *(d.rotation or _UNKNOWN)) for d in said]
+    values = np.array(given, float).reshape(-1, 7)  # what is None becomes NaN
+    finite = np.isfinite(values[:, :3]).all(axis=1).tolist()
+    with np.errstate(invalid="ignore", over="ignore"):  # of what is not finite nothing is used
+        places, turns = world_positions(values[:, :3]), world_turns(values[:, 3:])
+    sees = [d.tracking and d.result == RUNNING_OK and known for d, known in zip(said, finite, strict=True)]
+    if not all(sees):
+        blind = np.logical_not(sees)
+        places[blind], turns[blind] = np.nan, np.nan
+    return tuple(
+        [
+            Device(d.serial, plain_role(d.role), seen, place, turn, d.result)
+            for d, seen, place, turn in zip(said, sees, places, turns, strict=True)
+        ]
     )
 
 
@@ -174,17 +187,11 @@ def device(
         position: y up [m]; None when it is not known.
         wxyz: Rotation, w first, y up; None when it is not known.
     """
-    place = np.array((None,) * 3 if position is None else position, float)
-    turn = np.array((None,) * 4 if wxyz is None else wxyz, float)
-    sees = tracking and result == RUNNING_OK and bool(np.isfinite(place).all())
-    return Device(
-        serial=serial,
-        role=plain_role(role),
-        tracking=sees,
-        position=world_positions(place) if sees else np.full(3, np.nan),
-        wxyz=world_turns(turn) if sees else np.full(4, np.nan),
-        result=result,
-    )
+    said = DeviceObject(serial=serial, role=role, tracking=tracking, result=result)
+    said.position = None if position is None else (position[0], position[1], position[2])
+    said.rotation = None if wxyz is None else (wxyz[0], wxyz[1], wxyz[2], wxyz[3])
+    (found,) = _devices([said])
+    return found
 
 
 def encode(devices: Devices) -> bytes:

@@ -23,6 +23,7 @@ from seerob.devices.live.listening import say_once
 from seerob.files.motion_capture.upright import Up, world_from_file
 from seerob.files.tables.mapping import SI, LengthUnit
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.connection import connected
 from seerob.protocols.tracking import vrpn
 from seerob.protocols.tracking.vrpn import TrackerPose
 
@@ -141,23 +142,19 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
         return tuple(Finding(level=level, subject=self.human, text=f"vrpn: {text}") for level, text in said)
 
     async def _poses(self) -> AsyncGenerator[tuple[float, TrackerPose], None]:
-        async with asyncio.timeout(CONNECT_WITHIN):
-            reader, writer = await asyncio.open_connection(self.host, self.port)
-        try:
-            writer.write(vrpn.COOKIE)
+        async with connected(self.host, self.port, CONNECT_WITHIN) as connection:
+            await connection.write(vrpn.COOKIE)
+            data = b""
             async with asyncio.timeout(CONNECT_WITHIN):
-                vrpn.check_cookie(await reader.readexactly(len(vrpn.COOKIE)))
+                while len(data) < len(vrpn.COOKIE):
+                    if not (more := (await connection.read(CONNECT_WITHIN)).data):
+                        raise ProtocolError("no VRPN answers there: the connection was closed")
+                    data += more
+            vrpn.check_cookie(data[: len(vrpn.COOKIE)])
+            data = data[len(vrpn.COOKIE) :]
             splitter, names = vrpn.Splitter(), vrpn.Reader()
-            heard = time.monotonic()
+            heard = arrived = time.monotonic()
             while True:
-                try:
-                    async with asyncio.timeout(SILENCE):
-                        data = await reader.read(1 << 16)
-                except TimeoutError as error:
-                    raise TimeoutError(f"connected, but silent for {SILENCE:g} s") from error
-                if not data:
-                    raise ProtocolError("the server closed the connection")
-                arrived = time.monotonic()
                 for message in splitter.feed(data):
                     pose = names.take(message)
                     if pose is not None:
@@ -166,10 +163,9 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
                 if arrived - heard > 2 * SILENCE:  # it only says that it lives
                     shown = ", ".join(list(names.senders.values())[:8]) or "none"
                     raise TimeoutError(f"connected, but no pose of a tracker comes (senders: {shown})")
-        except asyncio.IncompleteReadError as error:
-            raise ProtocolError("no VRPN answers there: the connection was closed") from error
-        finally:
-            writer.transport.abort()
+                arrived, data, _ = await connection.read(SILENCE)
+                if not data:
+                    raise ProtocolError("the server closed the connection")
 
 
 def names_of(keys: Iterable[Key]) -> dict[Key, str]:

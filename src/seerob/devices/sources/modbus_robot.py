@@ -29,6 +29,7 @@ from seerob.protocols.plc.modbus import (
     Block,
     Device,
     Joints,
+    Place,
     Refused,
     RegisterMap,
     blocks,
@@ -131,13 +132,13 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
         clock = asyncio.get_running_loop()
         async with connect(self.host, self.port, self.device) as device:
             answers = await _understood(device, found)
-            questions = tuple(block for block, said in answers if not isinstance(said, Refused))
+            questions = [(b, _wanted(found, b)) for b, said in answers if not isinstance(said, Refused)]
             due, before = clock.time(), None
             while True:
                 asked = time.monotonic()
                 values: dict[str, int | float | bool] = {}
-                for block in questions:
-                    values |= await _read(device, found, block)
+                for block, wanted in questions:
+                    values |= take(block, await device.patient_block(block), wanted)
                 states, doubts = signals(found, values)
                 # As old as the question: when in between it was so, nobody says.
                 sample = joint_sample(found, values, states, target=self.robot, arrived=asked)
@@ -162,19 +163,19 @@ async def _understood(
     while waiting:
         block = waiting.pop(0)
         try:
-            answers.append((block, await _read(device, found, block)))
+            said = take(block, await device.patient_block(block), _wanted(found, block))
+            answers.append((block, said))
         except Refused as error:
-            alone = blocks(place for place in found.places().values() if block.covers(place))
+            alone = blocks(_wanted(found, block).values())
             if alone == (block,):
                 answers.append((block, error))
             waiting[:0] = () if alone == (block,) else alone
     return answers
 
 
-async def _read(device: Device, found: RegisterMap, block: Block) -> dict[str, int | float | bool]:
-    """Values of one block, by name."""
-    wanted = {name: place for name, place in found.places().items() if block.covers(place)}
-    return take(block, await device.patient_block(block), wanted)
+def _wanted(found: RegisterMap, block: Block) -> dict[str, Place]:
+    """What lies in one block, by name."""
+    return {name: place for name, place in found.places().items() if block.covers(place)}
 
 
 def standing(before: JointSample | None, sample: JointSample) -> JointSample:

@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import gc
 import importlib
+import importlib.util
 import logging
 import os
 import pickle
@@ -108,6 +109,9 @@ def _listener(order: Order) -> Listener:
     for module in source.loads:
         with contextlib.suppress(ImportError):  # the source itself will say so
             importlib.import_module(module)
+    if importlib.util.find_spec("sniffio") is None:
+        # httpcore, where it is loaded, looks for it in every folder of modules, several times a request.
+        sys.modules["sniffio"] = None  # type: ignore[assignment]
     # All of this stays: it need not be looked through while somebody listens.
     gc.collect()
     gc.freeze()

@@ -23,7 +23,7 @@ from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import NotLetIn, ProtocolError
 from seerob.protocols.links.credentials import Server, secret, server_of, trusting
-from seerob.protocols.links.http_answer import answer
+from seerob.protocols.links.http_answer import Question
 from seerob.protocols.plc import s7_web
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables import Variable
@@ -111,12 +111,13 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
         clock = asyncio.get_running_loop()
         async with self._session(folder) as session:
             due = clock.time()
+            parts = [addresses[k : k + s7_web.MOST] for k in range(0, len(addresses), s7_web.MOST)]
+            questions = [(session.question(s7_web.reading(part)), len(part)) for part in parts]
             while True:
                 asked = time.monotonic()
                 said: list[tuple[object, str]] = []
-                for k in range(0, len(addresses), s7_web.MOST):
-                    some = addresses[k : k + s7_web.MOST]
-                    said += s7_web.results(await session.post(s7_web.reading(some)), len(some))
+                for question, count in questions:
+                    said += s7_web.results(await question.answer(), count)
                 age = time.monotonic() - asked
                 yield tuple(
                     Change(n, raw, invalid_reason, age)
@@ -204,5 +205,9 @@ class _Session:
             OSError: There is none.
             ProtocolError: It is too large, or no success.
         """
+        return await self.question(data).answer()
+
+    def question(self, data: bytes) -> Question:
+        """A request that may be sent again and again, while it is logged in."""
         headers = {"Content-Type": "application/json"} | ({s7_web.TOKEN: self.token} if self.token else {})
-        return await answer(self._client, "POST", self.url, who="the PLC", headers=headers, content=data)
+        return Question(self._client, "POST", self.url, who="the PLC", headers=headers, content=data)

@@ -24,7 +24,7 @@ from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.credentials import Server, secret, server_of, trusting
-from seerob.protocols.links.http_answer import LARGEST, answer
+from seerob.protocols.links.http_answer import LARGEST, Question
 from seerob.protocols.links.json_pointer import document, parts
 from seerob.protocols.links.websocket_link import linked_to
 from seerob.workstation.source import Opened, Target
@@ -239,12 +239,16 @@ class Web(VariablesSource, frozen=True, kw_only=True):
         verify = self._context(folder)
         async with httpx.AsyncClient(verify=verify, timeout=PATIENCE, trust_env=False) as client:
             due = clock.time()
+            headers = {"Accept": "application/json"} | self._headers()
+            questions = [
+                (path, Question(client, "GET", self._place(path), who="the server", headers=headers))
+                for path in paths
+            ]
             while True:
-                for path in paths:
+                for path, question in questions:
                     try:
-                        headers = {"Accept": "application/json"} | self._headers()
-                        where, asked = self._place(path), time.monotonic()
-                        said = await answer(client, "GET", where, who="the server", headers=headers)
+                        asked = time.monotonic()
+                        said = await question.answer()
                         yield path, said, time.monotonic() - asked
                     except ProtocolError as error:
                         if len(paths) == 1:

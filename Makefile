@@ -86,7 +86,7 @@ web/node_modules/.installed: web/package-lock.json $(NODE)
 	cd web && ../scripts/npm ci --no-audit --no-fund
 	touch $@
 
-$(PAGE): web/node_modules/.installed $(shell find web/src web/public web/index.html web/vite.config.ts web/pack.mjs -type f 2>/dev/null)
+$(PAGE): web/node_modules/.installed $(shell find web/src web/public web/index.html web/vite.config.ts web/three_garbage.ts web/pack.mjs -type f 2>/dev/null)
 	cd web && ../scripts/npm run build
 	touch $@
 

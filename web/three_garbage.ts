@@ -2,14 +2,12 @@
 //
 // Matrices and values of uniforms in typed arrays: in plain arrays V8 keeps their numbers as objects of their own once
 // kinds of elements are mixed, and each product of two matrices then allocates sixteen, each colour that is told to the
-// graphics card three: 90 kB per picture of 50 bodies. Values of uniforms are written where they are others: a number with
-// a fraction is an object of its own each time that it is written into a field of any kind. What is drawn and by what
-// light is listed in memory that is kept, as an array gives its own back when it is emptied.
+// graphics card three: 90 kB per picture of 50 bodies. A number with a fraction is kept inside of a field that has had
+// numbers alone, and is an object anew for whoever hands it on; in a field that began as nothing it is one from when it was
+// set, which is handed on. What is drawn and by what light is listed in memory that is kept, as an array gives its own back
+// when it is emptied.
 
 import type { Plugin } from "vite";
-
-const OPACITY =
-  "if ( uniforms.opacity.value !== ( material.opacity ) ) uniforms.opacity.value = ( material.opacity );";
 
 /** What is replaced, in which of its files, how often it is there, and by what. */
 const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
@@ -26,24 +24,19 @@ const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
     1,
     "$1this.cache = floats(activeInfo.type, activeInfo.size);",
   ],
-  // Read in one place for each class: where it is a fraction in some, and an integer in others, it is an object.
+  // What materials, lights and cameras hand on to uniforms and to cameras of a headset.
   [
-    /(function refreshUniformsCommon\([^)]*\) \{\s+)uniforms\.opacity\.value = material\.opacity;/g,
-    ["module"],
-    1,
-    `$1if ( material.isMeshStandardMaterial ) { ${OPACITY} } else if ( material.isMeshBasicMaterial ) { ${OPACITY} } else { ${OPACITY} }`,
+    /this\.(opacity|roughness|metalness|emissiveIntensity|intensity|normalBias|near) = (\d\.?\d*|intensity|near);/g,
+    ["core"],
+    14,
+    "this.$1 = null; this.$1 = $2;",
   ],
+  // What is computed for points is written where it is another number.
   [
-    /(?<![.\w])(uniforms\.\w+\.value) = ((?:material|fog)\.\w+(?: [*+] [\w.]+)?|height \* 0\.5);/g,
+    /(uniforms\.(?:size|scale)\.value) = (material\.size \* pixelRatio|height \* 0\.5);/g,
     ["module"],
-    77,
+    2,
     "if ( $1 !== $2 ) $1 = $2;",
-  ],
-  [
-    /uniforms\.emissive\.value\.copy\( material\.emissive \)\.multiplyScalar\( (material\.emissiveIntensity) \);/g,
-    ["module"],
-    1,
-    "{ const { value } = uniforms.emissive, { r, g, b } = material.emissive; value.r = r * $1; value.g = g * $1; value.b = b * $1; }",
   ],
   // Each setter compares and copies by itself: one function for arrays of every kind hands on each number as an object.
   [
@@ -77,6 +70,13 @@ const CHANGES: readonly [RegExp, readonly string[], number, string][] = [
     ["module"],
     4,
     "const $1 = new Kept();",
+  ],
+  // What is told of planes is made where somebody listens.
+  [
+    /if \( frame\.detectedPlanes \)/g,
+    ["module"],
+    1,
+    "if ( frame.detectedPlanes && scope._listeners?.planesdetected )",
   ],
   // A function that compares is made where there is something to compare.
   [/(?=lightProbeGridArray\.sort\()/g, ["module"], 1, "if ( lightProbeGridArray.length > 1 ) "],

@@ -15,10 +15,10 @@ import {
   isLive,
   link,
   lookingAt,
-  now,
   otherRuns,
   reach,
   registered,
+  shownAt,
   soFar,
   stale,
   traces,
@@ -38,6 +38,8 @@ import { type History, SCHEMA, type Scene } from "./wire";
 const NUMBERS_IN_ROOM_MS = 240;
 /** A frame of a live run that is older is not trusted any more, whatever holds up page or worker. */
 const OLD_MS = 1000;
+/** When the page began [ms since 1970]. */
+const BEGUN = performance.timeOrigin;
 /** Points per trace of a live run; a recording comes thinned already. */
 const LIVE_POINTS = 40_000;
 
@@ -118,8 +120,8 @@ export class Connection {
     this.numbersAt = time;
     this.pending = null;
     this.asked = false;
+    if (ownDevice.peek() !== "desk") shownAt[0] = heard.t;
     frame.value = heard;
-    if (ownDevice.peek() !== "desk") now.value = heard.t;
   }
 
   private due(time: number): boolean {
@@ -247,8 +249,8 @@ export class Connection {
     // Whatever got worse is not waited for: no text says within beside what is drawn as exceeded.
     const before = (this.pending ?? frame.peek())?.results;
     if (before && worse(form, numbers, before)) this.numbersAt = Number.NEGATIVE_INFINITY;
-    // Panels that follow it cost more than a picture, and in the room nobody sees them.
-    if (ownDevice.peek() === "desk") now.value = this.shownT;
+    // In the room the cursor is of the figures on the panels there.
+    if (ownDevice.peek() === "desk") shownAt[0] = this.shownT;
     this.watch();
     this.events.drawn(form, numbers);
   }
@@ -257,7 +259,7 @@ export class Connection {
   private watch(): void {
     if (link.value.state !== "open") stale.value = true;
     else if (isLive.value && lookingAt.value === null)
-      stale.value = this.silent || performance.timeOrigin + performance.now() - this.heard > OLD_MS;
+      stale.value = this.silent || BEGUN + performance.now() - this.heard > OLD_MS;
     else stale.value = frame.value === null && this.pending === null;
   }
 }

@@ -19,6 +19,8 @@ export class Glide {
   private arrived = Number.NEGATIVE_INFINITY;
   private lasts = 0;
   private fromT = Number.NaN;
+  /** Of the way to the newest frame, so far. */
+  share = 0;
   /** Run time of what `at` returned last [s]. */
   shownT = Number.NaN;
   /** Time between two pictures [ms]: where frames come as often as pictures are drawn, gliding would only add delay. */
@@ -76,13 +78,13 @@ export class Glide {
     if (!this.from || !this.to) return null;
     this.shownT = this.t;
     if (this.lasts === 0) return this.shown;
-    const share = (now - this.arrived) / this.lasts;
-    if (share >= 1) {
+    this.share = Math.max((now - this.arrived) / this.lasts, 0);
+    if (this.share >= 1) {
       this.lasts = 0;
       this.shown.set(this.to); // exactly what was heard
     } else {
-      this.shownT = this.fromT + Math.max(share, 0) * (this.t - this.fromT);
-      blend(this.from, this.to, Math.max(share, 0), this.shown);
+      this.shownT = this.fromT + this.share * (this.t - this.fromT);
+      blend(this.from, this.to, this, this.shown);
     }
     return this.shown;
   }
@@ -99,8 +101,18 @@ function leaps(from: Float32Array, to: Float32Array, step: number): boolean {
   return false;
 }
 
-/** Positions along the line, orientations along the shorter arc (normalised chord: frames are close). */
-export function blend(from: Float32Array, to: Float32Array, share: number, out: Float32Array): void {
+/**
+ * Positions along the line, orientations along the shorter arc (normalised chord: frames are close).
+ *
+ * @param of Who has the share of the way: as a number that is handed over it would be an object each time.
+ */
+export function blend(
+  from: Float32Array,
+  to: Float32Array,
+  of: { readonly share: number },
+  out: Float32Array,
+): void {
+  const { share } = of;
   for (let k = 0; k < to.length; k += FLOATS_PER_NODE) {
     let cosine = 0;
     for (let i = 0; i < 3; i += 1) out[k + i] = from[k + i]! + share * (to[k + i]! - from[k + i]!);

@@ -10,7 +10,8 @@ import { Connection } from "./connection";
 import { connectDoing } from "./doing";
 import { connectDraft } from "./editing/draft";
 import { listenToKeys } from "./keyboard";
-import { now, selectedNodes } from "./page_state";
+import type { ToWorker } from "./messages";
+import { selectedNodes, shownAt } from "./page_state";
 import { App } from "./panels/App";
 import { type Actions, ActionsContext } from "./panels/app_context";
 import { placeIn, whereIs } from "./scene/carried";
@@ -90,15 +91,17 @@ function begin(element: HTMLElement): void {
     (name, face) => viewer.turned(name, face),
   );
   connectCompany((said) => connection.send({ kind: "company", said }));
-  const presence = new OwnPresence(viewer.stage, (said) => connection.send({ kind: "company", said }));
+  const presence = new OwnPresence(viewer.stage, (message) => connection.send(message));
   let visit: Visit | null = null;
   actions.enter = async (mode, human) => {
-    const offer = (message: Tracking | Register) =>
-      connection.send(
-        message.type === "tracking"
-          ? { kind: "tracking", tracking: message }
-          : { kind: "register", asked: message },
-      );
+    // Told with each picture: made once, as what is told is.
+    let tracking: Extract<ToWorker, { kind: "tracking" }> | null = null;
+    const offer = (message: Tracking | Register) => {
+      if (message.type !== "tracking") return connection.send({ kind: "register", asked: message });
+      tracking ??= { kind: "tracking", tracking: message };
+      tracking.tracking = message;
+      connection.send(tracking);
+    };
     cameraShown.value = null;
     visit = await Visit.begin(viewer, mode, human, offer, actions.time);
     ownDevice.value = mode === "immersive-ar" ? "ar" : "vr";
@@ -131,7 +134,7 @@ function begin(element: HTMLElement): void {
   });
   window.seerob = {
     get t() {
-      return ownDevice.peek() === "desk" ? now.value : connection.shownT;
+      return ownDevice.peek() === "desk" ? shownAt[0]! : connection.shownT;
     },
     get posed() {
       return viewer.posedT;

@@ -48,8 +48,16 @@ export const soFar = signal<SoFar | null>(null);
 
 /** Shown results and joints; replaced at most ten times a second. */
 export const frame = signal<Frame | null>(null);
-/** The time cursor: run time of what is shown [s]. */
-export const now = signal(Number.NaN);
+/** Run time of what is shown [s], in memory: a picture changes it, and a signal would keep each value as an object. */
+export const shownAt = new Float64Array([Number.NaN]);
+/** The time cursor: run time of what is shown [s]; whoever follows it hears of it with each frame. */
+export const now = {
+  get value() {
+    void frame.value;
+    return shownAt[0]!;
+  },
+  peek: () => shownAt[0]!,
+};
 /** Run time that the numbers on the screen are of [s]; the cursor is ahead of it by less than one can read. */
 export const clock = computed(() => frame.value?.t ?? Number.NaN);
 /** Whether numbers on screen are older than they should be: no connection, or nothing heard. */
@@ -179,8 +187,8 @@ export function beginScene(next: Scene): void {
     }
     scene.value = next;
     soFar.value = null;
+    shownAt[0] = Number.NaN;
     frame.value = null;
-    now.value = Number.NaN;
     lookingAt.value = null;
     traces.clear();
     besideTraces.clear();

@@ -48,6 +48,12 @@ export const WRAPPED = `
   if (session?.requestAnimationFrame) session.requestAnimationFrame = wrapped(session.requestAnimationFrame);
   const sources = session && Object.getOwnPropertyDescriptor(session, "inputSources");
   if (sources?.get) Object.defineProperty(session, "inputSources", { ...sources, get: apart(sources.get) });
+  // Numbers of a point, which the browser makes anew each time.
+  const point = DOMPointReadOnly.prototype;
+  for (const key of ["x", "y", "z", "w"]) {
+    const { get, ...rest } = Object.getOwnPropertyDescriptor(point, key);
+    Object.defineProperty(point, key, { ...rest, get: apart(function toldByWebXR() { return get.call(this); }) });
+  }
   const frame = window.XRFrame?.prototype;
   if (frame) for (const key of ["getPose", "getViewerPose"]) frame[key] = apart(frame[key]);
   const heard = Object.getOwnPropertyDescriptor(Worker.prototype, "onmessage");
@@ -59,12 +65,12 @@ export const WRAPPED = `
   Object.defineProperty(Worker.prototype, "onmessage", { ...heard, set });
 })();`;
 
-/** Functions that ask WebXR for poses: what it tells is made anew by the browser, each number of a point an object. */
-const POSES = ["hold"];
+/** Who hands on numbers of WebXR's poses: the browser makes each of them anew, as an object. */
+const TOLD = "toldByWebXR";
 /** What this measurement asks the page. */
 const ASKED = ["get t", "get posed"];
-/** Functions that write figures, in the page or in the room: four times a second, not once per picture. */
-const FIGURES = ["publish", "paint"];
+/** Functions that write figures, or draw what is something else now: a few times a second, not once per picture. */
+const FIGURES = ["publish", "paint", "renew"];
 
 /**
  * Bytes by function, of what is done for a picture, of poses that WebXR tells for it, of three.js's own drawing in it, of
@@ -82,16 +88,17 @@ function parted(head) {
     panels: new Map(),
     theirs: new Map(),
   };
-  const walk = ({ callFrame: { url, functionName, lineNumber }, selfSize, children }, part, ours) => {
+  const walk = ({ callFrame, selfSize, children }, part, ours) => {
+    const { url, functionName, lineNumber, columnNumber } = callFrame;
     let within = functionName === "timed" ? "picture" : functionName.endsWith("onmessage") ? "heard" : part;
     if (within === "picture" && functionName.endsWith(".render")) within = "drawing";
     if (within === "picture" && FIGURES.includes(functionName)) within = "figures";
     // Functions of the browser's own have no line.
     const own = url.includes("/assets/") || (url === "" && lineNumber < 0 && (ours || within === "heard"));
     const asked = within === "picture" && ASKED.includes(functionName);
-    const told = within === "picture" && POSES.includes(functionName) ? "poses" : within;
-    const to = into[own && !asked ? told : "theirs"];
-    const key = `${functionName || "(anonymous)"}:${lineNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
+    const told = within === "picture" && functionName === TOLD;
+    const to = into[told ? "poses" : own && !asked ? within : "theirs"];
+    const key = `${functionName || "(anonymous)"}:${lineNumber}:${columnNumber}${url === "" && ours ? ` of ${ours}` : ""}`;
     to.set(key, (to.get(key) ?? 0) + selfSize);
     // Nor has a script that a test puts before the page an address, and its functions have lines.
     const mine = url.includes("/assets/")

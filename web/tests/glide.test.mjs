@@ -81,7 +81,7 @@ test("orientations stay unit quaternions on the shorter arc, whatever their sign
     blend(
       from,
       to.map((x, i) => (i < 3 ? x : sign * x)),
-      0.5,
+      { share: 0.5 },
       out,
     );
     assert.ok(Math.abs(Math.hypot(...out.slice(3)) - 1) < 1e-6);

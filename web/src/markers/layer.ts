@@ -53,10 +53,12 @@ export class MarkerLayer {
    */
   update(results: readonly ShownResult[], muted: ReadonlySet<string>, written: Written): void {
     this.drawn = results;
-    if (!this.news(results, muted, written)) {
-      this.move(results, muted);
-      return;
-    }
+    if (this.news(results, muted, written)) this.renew(results, muted, written);
+    else this.move(results, muted);
+  }
+
+  /** Draw and write what is something else than before, which it is a few times a second. */
+  private renew(results: readonly ShownResult[], muted: ReadonlySet<string>, written: Written): void {
     const { told, selected, most } = written;
     this.painted.clear();
     const captioned = worst(told, muted, most);

@@ -1,8 +1,7 @@
 // A few criteria over time, side by side, under one time cursor.
 
-import { effect, untracked } from "@preact/signals";
+import { untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { ownDevice } from "../company";
 import { against, steady, withUnit } from "../figures";
 import { formatTime } from "../format";
 import {
@@ -25,8 +24,8 @@ import {
 import { setWidth, shownRange, WIDTHS, width } from "../plots/axis";
 import { Chart } from "../plots/chart";
 import { ranked } from "../plots/ranking";
+import { redrawn } from "../plots/redrawn";
 import { VERDICT_OF } from "../points";
-import { redrawEveryMs } from "../scene/effort";
 import { theme } from "../theme";
 import { spoken } from "../units";
 import { stateOf } from "../verdicts";
@@ -107,20 +106,14 @@ function Plot({ name }: { name: string }) {
   const place = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const chart = new Chart(place.current!, (t) => time.seek(t));
-    let timer: ReturnType<typeof setTimeout> | null = null;
     const draw = (): void => {
-      timer = null;
       const trace = traces.get(name);
       if (trace)
         chart.show(trace, { ...untracked(shownRange), now: now.peek() }, besideTraces.get(name) ?? null);
     };
-    const stop = effect(() => {
-      void [tracesRevision.value, now.value, shownRange(), theme.value];
-      timer ??= setTimeout(draw, redrawEveryMs(ownDevice.peek() !== "desk"));
-    });
+    const stop = redrawn(() => [tracesRevision.value, now.value, shownRange(), theme.value], draw);
     return () => {
       stop();
-      if (timer !== null) clearTimeout(timer);
       chart.dispose();
     };
   }, [name, time]);

@@ -1,14 +1,13 @@
 // Time as a strip: a lane per criterion with a limit, coloured where it is exceeded or undecided.
 
-import { effect, untracked } from "@preact/signals";
+import { untracked } from "@preact/signals";
 import { useLayoutEffect, useRef } from "preact/hooks";
-import { ownDevice } from "../company";
 import { formatTime } from "../format";
 import { clock, now, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { held, shownRange, timeAt } from "../plots/axis";
 import { drawLanes, lanePx } from "../plots/lanes";
 import { isJudged, ranked } from "../plots/ranking";
-import { redrawEveryMs } from "../scene/effort";
+import { redrawn } from "../plots/redrawn";
 import { theme } from "../theme";
 import { said } from "../words";
 import { useActions } from "./app_context";
@@ -28,24 +27,15 @@ export function Timeline() {
     if (!target) return;
     const draw = (): void =>
       drawLanes(target, key === "" ? [] : key.split("\n"), untracked(shownRange), now.peek(), stale.peek());
-    draw();
+    const stop = redrawn(
+      () => [tracesRevision.value, now.value, shownRange(), stale.value, theme.value],
+      draw,
+    );
     const resized = new ResizeObserver(draw);
     resized.observe(target);
-    let waiting: ReturnType<typeof setTimeout> | null = null;
-    const stop = effect(() => {
-      void [tracesRevision.value, now.value, shownRange(), stale.value, theme.value];
-      waiting ??= setTimeout(
-        () => {
-          waiting = null;
-          draw();
-        },
-        redrawEveryMs(ownDevice.peek() !== "desk"),
-      );
-    });
     return () => {
       stop();
       resized.disconnect();
-      if (waiting !== null) clearTimeout(waiting);
     };
   }, [key, tall]);
 

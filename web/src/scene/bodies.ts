@@ -10,12 +10,12 @@ import {
   Matrix4,
   Mesh,
   type Object3D,
-  type PerspectiveCamera,
   Quaternion,
   Vector3,
 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Doubts, doubtOf } from "../doubts";
+import type { View } from "../markers/view";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
 import { coarsening } from "./coarser";
@@ -386,14 +386,15 @@ export class Bodies {
    *
    * While one moves they are coarser by up to `MOVING_PX` pixels, and by less than one as soon as one stands.
    *
-   * @param camera Its matrices up to date.
-   * @param pixel Size of a pixel of the screen one metre away [m]; 0 where all are drawn as they are.
+   * @param view Matrices of its camera up to date.
+   * @param plain Whether the screen's pixels count; else all are drawn as they are.
    * @param time Of the picture [ms].
    * @returns Whether it is time for a picture, as one has come to stand.
    */
-  arrange(camera: PerspectiveCamera, pixel: number, time: number): boolean {
+  arrange({ camera, pixel: ofScreen }: View, plain: boolean, time: number): boolean {
     if (this.crowds.length === 0) return false;
     const { sight, toScreen, seenFrom } = this;
+    const pixel = plain ? ofScreen : 0;
     const close = pixel > 0 && drawnBySoftware();
     if (close) {
       toScreen.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);

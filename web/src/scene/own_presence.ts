@@ -2,6 +2,7 @@
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { ownPlace } from "../company";
+import type { ToWorker } from "../messages";
 import type { Presence } from "../wire";
 import type { Stage } from "./stage";
 
@@ -33,18 +34,19 @@ export class OwnPresence {
   private readonly fromRig = new Matrix4();
   private readonly upright = new Quaternion();
   private readonly beamBytes = new Uint8Array(this.beam.buffer);
-  private readonly message: Presence = {
+  private readonly presence: Presence = {
     type: "presence",
     poses: new Uint8Array(this.poses.buffer),
     points: NOTHING,
     laser: NOTHING,
   };
+  private readonly message: ToWorker = { kind: "company", said: this.presence };
   private at = Number.NEGATIVE_INFINITY;
   private pointed = false;
 
   constructor(
     private readonly stage: Stage,
-    private readonly send: (presence: Presence) => void,
+    private readonly send: (message: ToWorker) => void,
   ) {}
 
   /** Once per picture; `visit` is null on the desk. */
@@ -82,11 +84,11 @@ export class OwnPresence {
     }
     this.place();
     // The worker gets copies, by message.
-    const { message } = this;
-    if (message.points!.byteLength !== 12 * points)
-      message.points = new Uint8Array(this.points.buffer, 0, 12 * points);
-    message.laser = points_at ? this.beamBytes : NOTHING;
-    this.send(message);
+    const { presence } = this;
+    if (presence.points!.byteLength !== 12 * points)
+      presence.points = new Uint8Array(this.points.buffer, 0, 12 * points);
+    presence.laser = points_at ? this.beamBytes : NOTHING;
+    this.send(this.message);
   }
 
   private put(row: number, position: Vector3, turn: Quaternion): void {

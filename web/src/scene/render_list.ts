@@ -40,7 +40,7 @@ export class RenderList {
     this.used = this.opaqueCount = this.transmissiveCount = this.transparentCount = 0;
   }
 
-  /** Add what is drawn; how deep it lies is in `depth`. */
+  /** Add what is drawn; how deep it lies is in `depth`. The depth buffer is never reversed here. */
   push(
     object: Object3D,
     geometry: BufferGeometry,

@@ -202,7 +202,7 @@ export class Viewer {
     if (!alike(told, this.told)) this.draw();
     // Through a real camera and in a headset pixels have another size.
     const plain = this.view.margins && this.through === null;
-    if (this.bodies.arrange(camera, plain ? this.view.pixel : 0, time)) this.stage.invalidate();
+    if (this.bodies.arrange(this.view, plain, time)) this.stage.invalidate();
     this.stage.standing = this.bodies.standing;
     this.fillVolumes();
     this.markers.face(this.view, this.doubts.captions);
@@ -327,11 +327,15 @@ export class Viewer {
     this.paint();
     this.findVolumes();
     this.bodies.wear(this.frame?.looks ?? NO_LOOKS);
-    // Who is in doubt, and why, is of the form.
-    if (this.frame !== this.doubted) this.bodies.doubt(doubtsIn(this.frame));
-    this.doubted = this.frame;
+    if (this.frame !== this.doubted) this.renew();
     this.doubts.update(run.peek(), doubts.peek(), showCaptions.peek() ? this.labels + 1 : 0);
     this.stage.invalidate();
+  }
+
+  /** Who is in doubt, and why, is of the form. */
+  private renew(): void {
+    this.doubted = this.frame;
+    this.bodies.doubt(doubtsIn(this.frame));
   }
 
   // What may be out of date has no colour of a verdict.

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import time
+from collections import deque
 from collections.abc import AsyncGenerator
 from contextlib import aclosing, asynccontextmanager
 from enum import StrEnum
@@ -22,6 +24,7 @@ from seerob.devices.live.listening import Contact, contact_of
 from seerob.devices.ros import RosSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.connection import Connection, connected
+from seerob.protocols.links.reception import Wakeup
 from seerob.protocols.links.tcp_server import tcp_server
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import Edition, decode, ros1_name, same_type, store
@@ -171,7 +174,8 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
     @asynccontextmanager
     async def _served(self) -> AsyncGenerator[AsyncGenerator[tuple[float, Frame], None], None]:
         """Wait for Unity; the newest connection counts, as with an endpoint."""
-        waiting: asyncio.Queue[tuple[float, Frame] | ProtocolError] = asyncio.Queue(64)
+        waiting: deque[tuple[float, Frame] | ProtocolError] = deque(maxlen=64)
+        wakeup = Wakeup()
         newest: list[asyncio.StreamWriter] = []
 
         async def welcome(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -183,16 +187,13 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
                 writer.write(ros_tcp.handshake(self.edition))
                 while data := await reader.read(CHUNK):
                     arrived = time.monotonic()
-                    for frame in splitter.feed(data):
-                        if waiting.full():
-                            waiting.get_nowait()
-                        waiting.put_nowait((arrived, frame))
+                    waiting.extend([(arrived, frame) for frame in splitter.feed(data)])
+                    wakeup.wake()
             except OSError:
                 pass
             except ProtocolError as error:
-                if waiting.full():
-                    waiting.get_nowait()
-                waiting.put_nowait(error)
+                waiting.append(error)
+                wakeup.wake()
             except asyncio.CancelledError:
                 pass  # the source stops; asyncio would log what is no mistake
             finally:
@@ -200,18 +201,17 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
 
         async def frames() -> AsyncGenerator[tuple[float, Frame], None]:
             while True:
-                try:
-                    async with asyncio.timeout(self.silence()):
-                        item = await waiting.get()
-                except TimeoutError:
-                    what = (
-                        "connected, but silent"
-                        if newest and not newest[0].is_closing()
-                        else "nobody connects"
-                    )
-                    raise TimeoutError(
-                        f"{what} at {self.bind}:{self.port} for {self.silence() or 0:g} s"
-                    ) from None
+                while not waiting:
+                    try:
+                        await wakeup.wait(self.silence() or math.inf)
+                    except TimeoutError:
+                        if waiting:
+                            break
+                        there = newest and not newest[0].is_closing()
+                        what = "connected, but silent" if there else "nobody connects"
+                        where, silence = f"{self.bind}:{self.port}", self.silence() or 0
+                        raise TimeoutError(f"{what} at {where} for {silence:g} s") from None
+                item = waiting.popleft()
                 if isinstance(item, ProtocolError):
                     raise item
                 yield item

@@ -169,7 +169,11 @@ class Datagrams(asyncio.DatagramProtocol):
         while True:
             while self._waiting:
                 yield self._waiting.popleft()
-            await self._more(silence)
+            self._check()
+            try:
+                await self._wakeup.wait(silence)
+            except TimeoutError as error:
+                await self._look_again(silence, error)
 
     async def next(self, silence: float) -> Datagram:
         """The oldest that waits, or else the next one.
@@ -182,20 +186,23 @@ class Datagrams(asyncio.DatagramProtocol):
             OSError: The socket is gone.
         """
         while not self._waiting:
-            await self._more(silence)
+            self._check()
+            try:
+                await self._wakeup.wait(silence)
+            except TimeoutError as error:
+                await self._look_again(silence, error)
         return self._waiting.popleft()
 
-    async def _more(self, silence: float) -> None:
+    def _check(self) -> None:
         if self._error is not None:
             raise self._error
-        try:
-            await self._wakeup.wait(silence)
-        except TimeoutError as error:
-            # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
-            if not self._waiting:
-                raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
+
+    async def _look_again(self, silence: float, error: TimeoutError) -> None:
+        # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        if not self._waiting:
+            raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
 
 
 def _shown(who: tuple[str, int]) -> str:

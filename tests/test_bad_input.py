@@ -349,6 +349,7 @@ def test_what_cannot_be_evaluated_is_refused_before_the_run(tmp_path, what):
     [
         ("", {"arm.urdf": two_r(masses=(0, 1))}, "warning", "mass is 0 kg, expected more than 0"),
         (PART + MESH, {"it.stl": OPEN}, "note", "mesh is open"),
+        (PART + MESH + "density = 7900\n", {"it.stl": OPEN}, "assumed", "as if nothing closed its holes"),
     ],
 )
 def test_what_only_some_figures_need_is_told_before_the_run(tmp_path, text, more, level, words):

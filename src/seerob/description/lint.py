@@ -63,7 +63,10 @@ TIPS = (
 """Endings of names that point out the link a tool is mounted on, the best first."""
 FLANGES = ("flange", "tool0", "attachment_site", "ee_link", "link_ee")
 """Of those the ones beyond which a file has no robot any more, but what is mounted on it."""
-OPEN = "mesh is open: distances are to its surface, and what counts as inside goes by the winding number"
+OPEN = (
+    "mesh is open: distances are to its surface alone, as if nothing closed its holes, and what counts as "
+    "inside goes by the winding number"
+)
 ROTOR = (
     "rotor inertia unknown, nobody published it: mass matrix and effective mass are those of the links alone"
 )

@@ -308,7 +308,9 @@ def _hole(thing: Thing, path: Path) -> Finding:
             "the mesh is open: nothing can be said to be inside of it",
             "close it, or give a shape",
         )
-    return Finding(level="note", subject=thing.name, text=lint.OPEN)
+    # Of what is weighed as a body some surface is missing; a sheet is all there is.
+    body = thing.density is not None or thing.hole_depth is not None
+    return Finding(level="assumed" if body else "note", subject=thing.name, text=lint.OPEN)
 
 
 def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:

@@ -6,7 +6,14 @@ from hypothesis import strategies as st
 from seerob.core.errors import InputError
 from seerob.core.motion_origin import MotionOrigin, origin_finding
 from seerob.core.samples import Quality
-from seerob.files.trajectories.trajectory import Trajectory, TrajectorySamples, derive_velocities
+from seerob.files.trajectories.trajectory import (
+    QUIET,
+    Trajectory,
+    TrajectorySamples,
+    derive_velocities,
+    derived_noise,
+    handed_on,
+)
 
 
 def made(**changes):
@@ -98,3 +105,30 @@ def test_beside_a_gap_velocities_are_as_good_as_at_the_ends():
     bound = np.full(len(t), 1 / 6)
     bound[[0, 10, 11, -1]] = 1 / 3
     assert (np.abs(found - omega * np.cos(omega * t)) <= 1.1 * bound * h**2 * omega**3).all()
+
+
+@pytest.mark.parametrize("lost", ["none", "one row", "an invalid row", "every fifth", "even instants"])
+def test_noise_of_a_log_is_told_whatever_it_lacks(lost):
+    """Of a swing: no less than of the whole log, and errors are within it."""
+    rng = np.random.default_rng(3)
+
+    def told(lost):
+        t, known = 0.008 * np.arange(600), np.ones(600, bool)
+        if lost == "even instants":
+            t = t + rng.uniform(-2e-3, 2e-3, len(t))
+        t = t[(np.arange(len(t)) != 300) | (lost != "one row")]
+        t = t[rng.random(len(t)) < 0.8] if lost == "every fifth" else t
+        known = np.arange(len(t)) != (300 if lost == "an invalid row" else -1)
+        q = 0.3 * np.sin(1.5 * t) + 1e-4 * rng.standard_normal(len(t))
+        error = derived_noise(t, q[:, None], known) * handed_on(t, known)
+        off = np.abs(derive_velocities(t, q[:, None], known=known).qd[:, 0] - 0.45 * np.cos(1.5 * t))
+        assert np.mean((off <= error)[known]) > 0.99
+        return float(np.median(error))
+
+    assert told(lost) > 0.9 * told("none")
+
+
+def test_uneven_instants_of_a_smooth_motion_are_no_noise():
+    t = np.cumsum(np.random.default_rng(1).uniform(0.004, 0.012, 400))
+    q = 0.3 * np.sin(1.5 * t)[:, None]
+    assert (derived_noise(t, q) * handed_on(t)).max() < QUIET

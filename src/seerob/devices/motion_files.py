@@ -122,8 +122,8 @@ class TrajectoryFile(Source, frozen=True, kw_only=True):
         qd, about_velocities = self._velocities(trajectory, target)
         error = None
         if trajectory.qd is None or self.velocities is not Velocities.GIVEN:
-            valid = slice(None) if trajectory.invalid is None else ~trajectory.invalid
-            error = derived_noise(trajectory.t[valid], trajectory.q[valid])
+            known = None if trajectory.invalid is None else ~trajectory.invalid
+            error = derived_noise(trajectory.t, trajectory.q, known)
         if error is not None and not (error > QUIET).any():
             error = None
         sampling = sampling_findings(trajectory, target.name, self.timeout)

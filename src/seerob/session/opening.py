@@ -425,7 +425,7 @@ POSTURES = 50
 def noise_of_speeds(motion: Trajectory, description: Description, name: str) -> Finding | None:
     """How fast a robot seems to move that stands, when its speeds are derived from its positions."""
     valid = np.ones(len(motion.t), bool) if motion.invalid is None else ~motion.invalid
-    q, error = motion.q[valid], derived_noise(motion.t[valid], motion.q[valid])
+    q, error = motion.q[valid], derived_noise(motion.t, motion.q, valid)
     if error is None:
         return None
     try:

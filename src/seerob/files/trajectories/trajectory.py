@@ -21,7 +21,9 @@ from seerob.core.transforms import Array
 THREE = 3.0
 """Standard deviations that are told: 99.7 % lie within."""
 UNEVEN = 0.05
-"""Share of the step that steps may differ by where noise is looked for."""
+"""Share of the step that steps of even samples may differ by."""
+MOST_DIFFERENCES = 100_000
+"""Third differences that the noise of uneven samples is told by; of more, evenly."""
 LEAST = 50
 """Samples that tell noise."""
 BETWEEN = 2.77
@@ -265,20 +267,66 @@ def position_noise(q: Array) -> Array:
     return np.asarray(np.median(np.abs(np.diff(q, n=3, axis=0)), axis=0) * 1.4826 / np.sqrt(20))
 
 
-def derived_noise(t: Array, q: Array) -> Array | None:
+def derived_noise(t: Array, q: Array, known: NDArray[np.bool_] | None = None) -> Array | None:
     """How far speeds that were derived from noisy positions may be off [rad/s or m/s], shape (n,).
 
-    Three standard deviations of a central difference; None of few samples, or of uneven ones, which look
-    noisy where they are not.
+    Three standard deviations of a central difference, of uneven samples as it is for half of them; None of
+    few samples.
 
     Args:
         t: [s], shape (N,).
         q: [rad or m], shape (N, n).
+        known: Whether each row says where it is, shape (N,); all do when not given.
     """
-    step = np.diff(t)
-    if len(t) < LEAST or np.ptp(step) > UNEVEN * float(np.median(step)):
+    known = np.ones(len(t), bool) if known is None else known
+    t, q, step = t[known], q[known], np.diff(t[known])
+    if len(t) < LEAST:
         return None
-    return np.asarray(THREE * position_noise(q) / (np.sqrt(2) * float(np.median(step))))
+    if is_even(t):
+        return np.asarray(THREE * position_noise(q) / (np.sqrt(2) * float(np.median(step))))
+    return np.asarray(THREE * _uneven_noise(t, q) * float(np.median(_weights(t, np.ones(len(t), bool)))))
+
+
+def is_even(t: Array) -> bool:
+    """Whether samples are evenly apart, but for what a clock jitters."""
+    step = np.diff(t)
+    return bool(np.ptp(step) <= UNEVEN * float(np.median(step)))
+
+
+def _uneven_noise(t: Array, q: Array) -> Array:
+    """What `position_noise` says of even samples, by divided differences; t (N,), q (N, n)."""
+    some = slice(None, None, -(-len(t) // MOST_DIFFERENCES))
+    quadruples = np.lib.stride_tricks.sliding_window_view(t, 4)[some]
+    apart = quadruples[:, :, None] - quadruples[:, None, :] + np.eye(4)
+    with np.errstate(all="ignore"):  # two instants may be as near as numbers can be
+        weights = 1 / apart.prod(axis=2)
+        weights /= np.linalg.norm(weights, axis=1)[:, None]
+    found = np.einsum("ki,kni->kn", weights, np.lib.stride_tricks.sliding_window_view(q, 4, axis=0)[some])
+    return np.asarray(1.4826 * np.median(np.nan_to_num(np.abs(found), nan=np.inf), axis=0))
+
+
+def _weights(t: Array, known: NDArray[np.bool_]) -> Array:
+    """Noise of each derived speed per noise of a position [1/s], shape (N,)."""
+    # Three rows in a row make each: of every third one that is 1 a speed has the weight of its own.
+    probes = (np.arange(len(t))[:, None] % 3 == np.arange(3)).astype(float)
+    return np.asarray(np.linalg.norm(derive_velocities(t, probes, known=known).qd, axis=1))
+
+
+def handed_on(t: Array, known: NDArray[np.bool_] | None = None) -> Array:
+    """Noise of speeds at samples and about them, as a multiple of `derived_noise`, shape (N,).
+
+    Half way between two samples the cubic through them has one and a half times the slope of its chord, less
+    a quarter of both speeds; of uneven samples all three are added up as if they were off together.
+    """
+    known = np.ones(len(t), bool) if known is None else known
+    if is_even(t[known]):
+        found = np.full(len(t), BETWEEN)
+        found[[0, -1]] = AT_END
+        return found
+    at = _weights(t, known)
+    halfway = np.where(known[1:] & known[:-1], 1.5 * np.sqrt(2) / np.diff(t) + 0.25 * (at[1:] + at[:-1]), 0.0)
+    most = np.maximum(at, np.maximum(np.append(halfway, 0.0), np.insert(halfway, 0, 0.0)))
+    return np.asarray(most / float(np.median(_weights(t[known], np.ones(int(known.sum()), bool)))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,9 +349,9 @@ class TrajectorySamples:
         start = float(motion.t[0])
         tcp = motion.tcp_position if motion.tcp_in_base else None
         said = np.ones(len(motion.t), bool) if motion.tcp_said is None else motion.tcp_said
-        off = self.qd_error
-        error, ends = (None if off is None else tuple((k * off).tolist()) for k in (BETWEEN, AT_END))
-        last = len(motion.t) - 1
+        off, about = self.qd_error, np.zeros(0)
+        if off is not None:
+            about = handed_on(motion.t, None if motion.invalid is None else ~motion.invalid)
         for i, t in enumerate(motion.t.tolist()):
             yield JointSample(
                 source=self.source,
@@ -314,7 +362,7 @@ class TrajectorySamples:
                 quality=Quality.GOOD if motion.invalid is None or not motion.invalid[i] else Quality.INVALID,
                 q=tuple(motion.q[i].tolist()),
                 qd=None if self.qd is None else tuple(self.qd[i].tolist()),
-                qd_error=error if 0 < i < last else ends,
+                qd_error=None if off is None else tuple((about[i] * off).tolist()),
                 tau=None if motion.tau is None else tuple(motion.tau[i].tolist()),
                 tcp=None if tcp is None or not said[i] else tuple(tcp[i].tolist()),
                 tcp_speed=None if motion.tcp_speed is None else float(motion.tcp_speed[i]),

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import aclosing, contextmanager
+from contextlib import aclosing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -334,7 +334,11 @@ def test_who_publishes_faster_than_is_read_fills_no_memory():
         with router(port) as session:
             async with rmw_zenoh.opened("127.0.0.1", port) as link:
                 link.subscribe("/x", ["x"], kept=False)
-                await asyncio.sleep(0.2)
+                first = None
+                while first is None:  # until the router knows of it
+                    session.put("x", b"there")
+                    with suppress(TimeoutError):
+                        first = await link.next(0.2)
                 raw = bytes(rmw_zenoh.MAX_MESSAGE)
                 for k in range(40):
                     session.put("x", raw[: -k - 1])

@@ -19,7 +19,7 @@ from seerob.core.errors import SeerobError
 from seerob.criteria.contact import collision
 from seerob.criteria.contact.limits import robot_masses
 from seerob.criteria.ergonomics import eaws_posture, niosh, owas, reba, rula
-from seerob.criteria.ergonomics.eaws_posture import PostureTime
+from seerob.criteria.ergonomics.eaws_posture import HeldTimes
 from seerob.criteria.safety.separation import separation_bound
 from seerob.criteria.scoring import held_work, spans
 from seerob.criteria.stopping import terms
@@ -144,7 +144,7 @@ def test_instants_increase_and_are_numbers():
         with pytest.raises(ValueError, match="instant"):
             held_work.static(t, [1, 1], 1.0)
     with pytest.raises(ValueError, match="instant"):
-        PostureTime(1.0).add(math.nan, "x")
+        HeldTimes([1.0]).add(np.array([math.nan]), np.array([[True]]))
 
 
 def test_editions_are_not_guessed():
@@ -298,6 +298,7 @@ CALLS = {
     "core.transforms.transform": {"rotation": POSE[:3, :3], "position": np.ones(3)},
     "core.transforms.turned": {"rotation": POSE[:3, :3], "wxyz": POSE[0]},
     "core.transforms.wxyz_from_rotation": {"rotation": POSE[:3, :3]},
+    "criteria.ergonomics.eaws_posture.asymmetry_points": {"at_least": np.array([0.5, 0.2, 0.1])},
     "criteria.ergonomics.niosh.asymmetry_multiplier": {"A": HALF},
     "criteria.ergonomics.niosh.distance_multiplier": {"D": HALF},
     "criteria.ergonomics.niosh.horizontal_multiplier": {"H": HALF},

@@ -10,10 +10,11 @@ from made_cell import judged, made, state_at
 from seerob.core.snapshot import Snapshot, Verdict
 from seerob.criteria.ergonomics.eaws_posture import (
     EawsThresholds,
+    HeldTimes,
     Interpolation,
-    PostureTime,
     Screening,
     asymmetry_points,
+    lightest_first,
     line_points,
     lines,
     most_points,
@@ -29,13 +30,14 @@ STILL = np.zeros(len(JOINTS))
 
 
 def line(legs="standing", supported=False, accuracy=0.0, **angles):
-    return possible_lines(
+    found = possible_lines(
         made_angles(**angles),
         legs=legs,
         supported=supported,
         thresholds=USUAL,
         accuracy=np.radians(accuracy),
     )
+    return lightest_first(found)
 
 
 @pytest.mark.parametrize(
@@ -127,14 +129,15 @@ def test_asymmetry_reaches_every_factor(shares, expected):
 
 
 def test_a_posture_counts_from_its_begin_once_it_is_held():
-    times = PostureTime(4.0)
-    for k in range(201):
-        t = k / 10
-        times.add(t, "a" if t < 5 else "b" if t < 8 else "a")
-    assert times.heard == pytest.approx(20)
-    assert times.seconds == {"a": pytest.approx(5 + 12)}
-    times.add(30.0, "a")
-    assert (times.silent, times.heard) == (pytest.approx(10), pytest.approx(20))
+    t = np.arange(201) / 10
+    b = (t >= 5) & (t < 8)
+    times = HeldTimes([4.0, 4.0])
+    at_once = times.add(t, np.column_stack([~b, b]))
+    assert at_once.heard[-1] == pytest.approx(20)
+    assert at_once.seconds[-1].tolist() == [pytest.approx(5 + 12), 0]
+    assert at_once.seconds[[30, 40], 0].tolist() == [0, pytest.approx(4)]
+    later = times.add(np.array([30.0]), np.array([[True, False]]))
+    assert (later.silent[-1], later.heard[-1]) == (pytest.approx(10), pytest.approx(20))
 
 
 def station(folder, more="", cycle=20):
@@ -259,12 +262,11 @@ def test_a_posture_that_may_have_been_held_between_two_others_counts():
     """
     screening = Screening(30.0, 4.0, Interpolation.LINEAR)
     for k in range(301):
-        posture = made_angles(trunk_flexion=15 if k // 30 % 2 else 65)
+        posture = made_angles(trunk_flexion=15 if k // 30 % 2 else 65)[None]
         found = possible_lines(
             posture, legs="standing", supported=False, thresholds=USUAL, accuracy=np.radians(10)
         )
-        screening.add(k / 10, found, posture, np.radians(10))
-    low, high = screening.points()
+        _, low, high = screening.add(np.array([k / 10]), found, posture, np.radians(10))
     assert low.total == 0
     assert high.total >= line_points("3a", 1.0)
 

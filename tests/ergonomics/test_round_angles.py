@@ -88,7 +88,7 @@ def test_no_line_and_no_zone_changes_with_the_way_a_person_faces():
                 tuple(ZoneMonitor(rows, from_rest=True).add(0.0, own, 0.0, {}).items())
                 for rows in ZONES.values()
             ]
-            said.add((lines, *zones))
+            said.add((tuple(lines.tolist()), *zones))
         assert len(said) == 1, k
 
 

@@ -22,6 +22,10 @@ ENTERED = (
     'load = 3, load_use = "intermittent", muscle_arms = false, muscle_body = false, '
     'supported_arms = "none", back_supported = false, legs = "posture"'
 )
+SECTIONS = (
+    "entered = { moving_objects = 0, accessibility = 0, impulses = 0, joint_position = 0, special = 0, "
+    "far_reach = 0, forces = 10, loads = 5, upper_limbs = 0 }\n"
+)
 RULES = {
     "rula": f'kind = "rula"\naction_level = 3\nphases = [{{ {ENTERED} }}]',
     "rula, not entered": 'kind = "rula"\naction_level = 3',
@@ -39,6 +43,17 @@ RULES = {
     "per_minute = 2, origin = { horizontal = 0.3, vertical = 0.7, asymmetry = 0 }, "
     "destination = { horizontal = 0.3, vertical = 1.1, asymmetry = 0 } }]\nwork = 3000\nrecovery = 3000\n"
     "exclusions = []",
+    "eaws": 'kind = "eaws_posture"\ncycle = 2\nminimum_hold = 0.1\nlimit = 45\n' + SECTIONS,
+    "eaws, not entered": 'kind = "eaws_posture"\ncycle = 2\nminimum_hold = 0.1\nlimit = 45',
+    "eaws, off": 'kind = "eaws_posture"\ncycle = 9\nminimum_hold = 0.1\naccuracy_deg = 3\nlimit = 20\n'
+    'interpolation = "step"\nphases = [{ legs = "posture", back_supported = false }, { start = 1.0 }]\n'
+    + SECTIONS,
+    "eaws, informs": 'kind = "eaws_posture"\ncycle = 2\nminimum_hold = 0.1\naccuracy_deg = 3',
+    "eaws, seen": 'kind = "eaws_posture"\ncycle = 2\nminimum_hold = 0.1\naccuracy_deg = 3\nlimit = 50\n'
+    'phases = [{ legs = "posture", back_supported = false }]\n' + SECTIONS,
+    "eaws, in turns": 'kind = "eaws_posture"\ncycle = 2\nminimum_hold = 0.1\nlimit = 50\n'
+    'phases = [{ legs = "posture", back_supported = true }, { start = 2.02, legs = "sitting" }, '
+    "{ start = 2.03, back_supported = true }]\n" + SECTIONS,
 }
 OWN = """
 from seerob.api import Basis, Criterion, Figure, bind_posture
@@ -91,7 +106,8 @@ def test_rules_say_of_many_postures_what_they_say_of_each(asked):
     told = set()
     for name in RULES:
         one, other = many[name], each[name]
-        assert (one.note, other.note[:15]) == ("", "asked instant b")
+        alone = "asked instant by instant: what is entered changes twice between two instants"
+        assert (one.note, other.note[:15]) == (alone * (name == "eaws, in turns"), "asked instant b")
         told |= set(one.answers.verdict.tolist())
         np.testing.assert_array_equal(one.answers.verdict, other.answers.verdict, name)
         np.testing.assert_array_equal(one.value, other.value, name)
@@ -99,6 +115,39 @@ def test_rules_say_of_many_postures_what_they_say_of_each(asked):
         if other.answers.interval is not None:
             np.testing.assert_array_equal(one.answers.interval, other.answers.interval, name)
     assert told >= set(map(CODES.__getitem__, Verdict))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_counted_as_time_goes_on_is_counted_in_arrays_too(tmp_path, monkeypatch, seed, threads):
+    """Postures that are held and left, silences, and instants at which nobody knows where the person is."""
+    rules = {name: rule for name, rule in RULES.items() if name.startswith("eaws") and "turns" not in name}
+    station = made(
+        tmp_path,
+        STANDS
+        + "".join(f'[[ergonomics]]\nname = "{name}"\nhuman = "op"\n{rule}\n' for name, rule in rules.items()),
+    )
+    rng = np.random.default_rng(seed)
+    q = random_q(70, seed, 0.5)[np.repeat(rng.permutation(70), rng.integers(1, 20, 70))]
+    q[:260] = 0.0  # exact in all of a stretch, and not in the next one
+    q[rng.random(len(q)) < 0.02 * seed] = np.nan
+    steps = np.where(rng.random(len(q)) < 0.01 * seed, 1.5, rng.choice([0.01, 0.03, 0.05], len(q)))
+    given = ({"op": q}, {"op": np.zeros_like(q)}), {"t": np.cumsum(steps), "threads": threads}
+    many = station.batch(*given[0], **given[1])
+    monkeypatch.setattr(Criterion, "batch", lambda *_: None)
+    each = station.batch(*given[0], **given[1])
+    told = {code for name in rules for code in each[name].answers.verdict.tolist()}
+    silent = (steps[1:] > 1.0).any()  # after which nothing is judged
+    assert told >= {CODES[verdict] for verdict in ((None, Verdict.UNDECIDED) if silent else (None, *Verdict))}
+    for name in rules:
+        one, other = many[name], each[name]
+        assert (one.note, other.note[:15]) == ("", "asked instant b")
+        for key in ("value", "limit", "verdict", "nothing"):
+            np.testing.assert_array_equal(getattr(one.answers, key), getattr(other.answers, key), name)
+        ends = (one.value, one.value) if other.answers.interval is None else other.answers.interval
+        np.testing.assert_array_equal(one.answers.interval or (one.value, one.value), ends)
+        unheard = np.isnan(q).any(axis=1)
+        np.testing.assert_array_equal(one.reasons[unheard], other.reasons[unheard])
 
 
 def test_a_phase_between_two_instants_is_passed_over_in_arrays_too(asked):

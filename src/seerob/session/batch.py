@@ -2,8 +2,8 @@
 
 The road judges one instant after the other; here a stretch of instants is placed, and each criterion that
 can (`Criterion.batch`) judges it in a few array operations, on all cores. Its figures are those of the
-road for the same states to rounding, and its verdicts are by the same rules. What cannot, or has a
-memory of earlier instants, is asked instant by instant as on the road, in the order of time.
+road for the same states to rounding, and its verdicts are by the same rules. What has a memory of earlier
+instants is asked stretch by stretch in the order of time; what cannot, instant by instant as on the road.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -212,13 +213,19 @@ def judged(
         # Learns what distances are asked, so that every stretch asks for all of them together.
         bench = Bench(model, Questions(model))
         _stretch(bench, asked, parts[0].part(0, 1))
-        shares = [parts[k::threads] for k in range(max(1, threads))]
-        benches = [bench, *(bench.another() for _ in shares[1:])]
-        with ThreadPoolExecutor(len(shares), "seerob batch") if shares[1:] else nullcontext() as pool:
+        shares = [range(k, len(parts), max(1, threads)) for k in range(max(1, threads))]
+        # What remembers is asked by one thread.
+        lasting = {name for name, one in asked.items() if shares[1:] and one.criterion.remembers(model)}
+        free = {name: one for name, one in asked.items() if name not in lasting}
+        work = [(free, share) for share in shares]
+        if lasting:
+            work.append(({name: asked[name] for name in lasting}, range(len(parts))))
+        benches = [bench, *(bench.another() for _ in work[1:])]
+        with ThreadPoolExecutor(len(work), "seerob batch") if work[1:] else nullcontext() as pool:
             at_once = map if pool is None else pool.map
-            made = list(at_once(lambda at, share: _share(at, asked, share), benches, shares))
-        for k in range(len(parts)):
-            stretch, fast, rested = made[k % len(shares)][k // len(shares)]
+            made = at_once(lambda at, one: _share(at, one[0], one[1], parts), benches, work)
+            stretches = [stretch for share in made for stretch in share]
+        for k, (stretch, fast, rested) in sorted(stretches, key=itemgetter(0)):
             if fast is not None:
                 speeds.append((k * length, fast))
             alone |= rested
@@ -377,6 +384,8 @@ def _able(
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
             notes[criterion.name] = "asked instant by instant: masses are not known"
+        elif one.own and criterion.remembers(model):
+            notes[criterion.name] = "asked instant by instant: it remembers"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
@@ -411,10 +420,10 @@ Part = dict[str, tuple[Answers, Reasons, Flags]]
 
 
 def _share(
-    bench: Bench, asked: dict[str, _Able], parts: Sequence[Motion]
-) -> list[tuple[Part, Array | None, dict[str, str]]]:
-    """The work of one thread."""
-    return [_stretch(bench, asked, part) for part in parts]
+    bench: Bench, asked: dict[str, _Able], which: Iterable[int], parts: Sequence[Motion]
+) -> list[tuple[int, tuple[Part, Array | None, dict[str, str]]]]:
+    """The work of one thread: of some parts, which it is and what is said of it."""
+    return [(k, _stretch(bench, asked, parts[k])) for k in which]
 
 
 def _stretch(
@@ -445,6 +454,8 @@ def _stretch(
         else:
             states.alone |= noisy
         asked_of = states.asked | {above for who in states.asked for above in bench.model.carriers_of(who)}
+        if states.alone.any() and one.criterion.remembers(bench.model):
+            alone.setdefault(name, "what is entered changes twice between two instants")
         if some := sorted(motion.seen.keys() & asked_of):
             alone[name] = f"more is known of {some[0]} than where it is"
         for who in sorted(states.asked & doubted):
@@ -459,7 +470,8 @@ def _stretch(
                 answers = answers.open(there)
         found[name] = answers, reasons, states.alone
     # Only what is within, and so has a limit, is to stay so on the way.
-    kept = any((answers.verdict == WITHIN).any() for answers, _, _ in found.values())
+    watched = [name for name, one in asked.items() if one.question.bound.watch is not None]
+    kept = any((found[name][0].verdict == WITHIN).any() for name in watched)
     if motion.ways is not None and kept:
         return found, states.largest_speeds(), alone
     return found, None, alone
@@ -523,11 +535,13 @@ def _undecided_where(answers: Answers, criterion: Criterion, reasons: Reasons) -
     """Make answers undecided, without a figure, at the instants that are in doubt."""
     invalid = reasons != ""
     nothing = _nothing(criterion, len(reasons))
-    return Answers(
-        np.where(invalid, nothing.value, answers.value),
-        np.where(invalid, nothing.limit, answers.limit),
-        np.where(invalid, nothing.verdict, answers.verdict).astype(np.uint8),
-        None if answers.interval is None else _blanked(answers.interval, invalid),
+    return replace(
+        answers,
+        value=np.where(invalid, nothing.value, answers.value),
+        limit=np.where(invalid, nothing.limit, answers.limit),
+        verdict=np.where(invalid, nothing.verdict, answers.verdict).astype(np.uint8),
+        interval=None if answers.interval is None else _blanked(answers.interval, invalid),
+        nothing=None if answers.nothing is None else answers.nothing & ~invalid,
     )
 
 
@@ -550,9 +564,10 @@ def _idle(answers: Answers) -> Flags:
 
 def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]:
     said = [answers for answers, _ in parts]
-    ends = [answers.interval for answers in said if answers.interval is not None]
     interval = None
-    if ends and len(ends) == len(said):
+    if any(answers.interval is not None for answers in said):
+        # Where all of a stretch is exact, it is not in another one.
+        ends = [answers.interval or (answers.value, answers.value) for answers in said]
         interval = np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
     joined = Answers(
         np.concatenate([np.zeros(0), *(answers.value for answers in said)]),

@@ -1,8 +1,8 @@
 """Posture screening in the style of the EAWS form: sections 0 and 1, over the time of a cycle.
 
 This is not the EAWS: its figures come from one public code and from memory, sections 2 to 4 are not public.
-First lines and points of a posture, then the screening over time (seconds per posture line and of an
-asymmetric trunk, the points of both), then the rule.
+First lines and points of postures, then the screening over time (seconds per posture line and of an
+asymmetric trunk, the points of both), then the rule. All of it is of n instants, of which a tick has one.
 """
 
 from __future__ import annotations
@@ -11,30 +11,32 @@ import math
 from collections.abc import Mapping
 from enum import StrEnum
 from functools import cache
-from itertools import pairwise
-from typing import Annotated, NamedTuple, cast
+from itertools import pairwise, product
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
+from numpy.typing import ArrayLike, NDArray
 
 from seerob.core import figures
 from seerob.core.domains import number
 from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
-from seerob.core.verdict import keeps
+from seerob.core.transforms import Array
+from seerob.core.verdict import admitted
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.scoring.basis import chosen, entered, posture_quality
 from seerob.criteria.scoring.held_work import GAP
 from seerob.criteria.scoring.measured import Accuracy, Measured
-from seerob.criteria.scoring.phases import Period, Phase, Seconds, phase_at, shared_phases
+from seerob.criteria.scoring.phases import Period, Phase, Seconds, phases_of, shared_phases
 from seerob.criteria.scoring.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.score_rows import total_row
-from seerob.criteria.scoring.spans import ROUNDING, Angle, Span, published, reached
+from seerob.criteria.scoring.spans import ROUNDING, Angle, published, reached
 from seerob.description.humans.angles import Angles
 from seerob.model import provenance
 from seerob.model.model import Model
-from seerob.twin.state import State
+from seerob.recording.answers import Flags
 from seerob.workstation.tables.task_phase import Stance
 
 
@@ -93,48 +95,55 @@ POSITIONS: Mapping[Stance, str] = {
 """How the legs are used → group of lines."""
 
 
-def line_points(line: str, share: float, interpolation: Interpolation = Interpolation.LINEAR) -> float:
-    """Points of a posture that lasts for a share of the time, 0 to 1."""
+def line_points(line: str, share: ArrayLike, interpolation: Interpolation = Interpolation.LINEAR) -> Array:
+    """Points of a posture that lasts for a share of the time, 0 to 1, shape (...)."""
     if line not in lines():
         raise UnknownName("line of the form", line, lines())
-    number("share", share, 0, 1 + _ROUNDING)
-    points = lines()[line].points
-    shares = published("eaws_posture")["shares"][: len(points)]
+    x = number("share", share, 0, 1 + _ROUNDING)
+    shares, points = _columns(line)
     if Interpolation(interpolation) is Interpolation.STEP:
-        reached = int(np.searchsorted(shares, share + _ROUNDING, side="right"))
-        return points[reached - 1] if reached else 0.0
-    return float(np.interp(share, [0.0, *shares], [0.0, *points]))
+        return np.asarray(points[np.searchsorted(shares, x + _ROUNDING, side="right") - 1])
+    return np.asarray(np.interp(x, shares, points))
 
 
-def most_points(shares: Mapping[str, float], whole: float) -> float:
+@cache
+def _columns(line: str) -> tuple[Array, Array]:
+    """Shares and points of a line, none of both first."""
+    points = np.array([0.0, *lines()[line].points])
+    return np.array([0.0, *published("eaws_posture")["shares"]])[: len(points)], points
+
+
+def most_points(shares: Mapping[str, ArrayLike], whole: ArrayLike) -> Array:
     """At most so many points of postures together, of which each may last for no more than its share.
 
     Args:
-        shares: Of the time that each line may have at most, 0 to 1; together they may be more than the whole.
-        whole: Share of the time that all of them have together.
+        shares: Of the time that each line may have at most, 0 to 1; together they may be more than the
+            whole. Shape (...) each.
+        whole: Share of the time that all of them have together, shape (...).
 
     Returns:
-        The smaller of two bounds: all shares at once, and the whole time given to where it costs most, by
-        the least concave curves above the points of the form.
+        The smaller of two bounds, shape (...): all shares at once, and the whole time given to where it
+        costs most, by the least concave curves above the points of the form.
     """
-    number("whole", whole, 0, 1 + _ROUNDING)
-    at_once = sum(line_points(line, share) for line, share in shares.items())
-    pieces = sorted(
-        (
-            ((end[1] - begin[1]) / (end[0] - begin[0]), min(end[0], shares[line]) - begin[0])
-            for line in shares
-            for begin, end in pairwise(_above(line))
-            if shares[line] > begin[0]
-        ),
-        reverse=True,
-    )
-    given, left = 0.0, whole
-    for slope, width in pieces:
-        given += slope * min(width, left)
-        left -= min(width, left)
-    return min(at_once, given)
+    left = number("whole", whole, 0, 1 + _ROUNDING)[..., None]
+    at_once = np.stack([line_points(line, share) for line, share in shares.items()], axis=-1)
+    pieces = [(line, *piece) for line in shares for piece in pairwise(_above(line))]
+    begin, end = (np.array([piece[k] for piece in pieces]).T for k in (1, 2))
+    own = np.stack([np.asarray(shares[line], float) for line, *_ in pieces], axis=-1)
+    width = np.maximum(np.minimum(end[0], own) - begin[0], 0.0)
+    slope = np.broadcast_to((end[1] - begin[1]) / (end[0] - begin[0]), width.shape)
+    steepest = np.lexsort((width, slope))[..., ::-1]
+    slope, width = (np.take_along_axis(each, steepest, -1) for each in (slope, width))
+    left = np.subtract.accumulate(np.concatenate([left, width], axis=-1), axis=-1)[..., :-1]
+    return np.minimum(_summed(at_once), _summed(slope * np.minimum(width, np.maximum(left, 0.0))))
 
 
+def _summed(terms: Array) -> Array:
+    """Sums of the last axis, in its order: of many instants to the last bit those of one."""
+    return np.asarray(np.cumsum(terms, axis=-1)[..., -1])
+
+
+@cache
 def _above(line: str) -> list[tuple[float, float]]:
     """Corners of the least concave curve above the points of a line: share and points."""
     points = lines()[line].points
@@ -148,20 +157,17 @@ def _above(line: str) -> list[tuple[float, float]]:
     return hull
 
 
-def asymmetry_points(at_least: tuple[float, ...]) -> float:
-    """Points of a trunk that is turned, or bent sideways.
+def asymmetry_points(at_least: ArrayLike) -> Array:
+    """Points of a trunk that is turned, or bent sideways, shape (...).
 
     Args:
-        at_least: Share of the time at or beyond each of the form's three angles.
+        at_least: Share of the time at or beyond each of the form's three angles, shape (..., 3).
     """
     table = published("eaws_posture")
-    number("share", at_least, 0, 1 + _ROUNDING)
-    best = 0.0
-    for share, points in zip(at_least, table["asymmetry_points"], strict=True):
-        reached = int(np.searchsorted(table["asymmetry_shares"], share + _ROUNDING, side="right"))
-        factor = table["asymmetry_factors"][reached - 1] if reached else 0.0
-        best = max(best, points * factor)
-    return float(min(best, table["asymmetry_most"]))
+    shares = number("share", at_least, 0, 1 + _ROUNDING)
+    reached = np.searchsorted(table["asymmetry_shares"], shares + _ROUNDING, side="right")
+    points = np.array([0.0, *table["asymmetry_factors"]])[reached] * table["asymmetry_points"]
+    return np.asarray(np.minimum(points.max(axis=-1), table["asymmetry_most"]), float)
 
 
 def possible_lines(
@@ -171,13 +177,13 @@ def possible_lines(
     supported: bool | None,
     thresholds: EawsThresholds,
     accuracy: Accuracy = 0.0,
-) -> tuple[str, ...]:
-    """Lines that a posture may belong to; one when it is known.
+) -> Flags:
+    """Lines that postures may belong to, of each one when it is known, shape (..., 18) as `lines` are.
 
     Of several that fit, a posture belongs to the one with the most points: bent or arms raised.
 
     Args:
-        angles: Of one posture.
+        angles: Of the postures.
         legs: How they are used; ``posture`` tells standing, crouching and kneeling apart.
         supported: Whether the trunk is well supported; None when nobody said.
         thresholds: Of the lines.
@@ -190,39 +196,71 @@ def possible_lines(
         within=(0, 2),
         neutral=-math.inf,
     )
-    arms = _highest(
-        m.graded(
-            "arm_rise",
-            lambda x: (x >= -ROUNDING).astype(np.int64) + reached(x, t.overhead),
-            within=(0, 2),
-            neutral=-math.inf,
-        )
+    arms = m.graded(
+        "arm_rise",
+        lambda x: (x >= -ROUNDING).astype(np.int64) + reached(x, t.overhead),
+        within=(0, 2),
+        neutral=-math.inf,
     )
-    positions = _positions(m, legs, t)
-    held = [supported] if supported is not None else [True, False]
-    found: dict[str, None] = {}
-    for position in positions:
-        for b in range(int(bent.low), int(bent.high) + 1):
-            for a in range(int(arms.low), int(arms.high) + 1):
-                for support in held:
-                    found[_line(position, b, a, support)] = None
-    return tuple(sorted(found, key=_weight))
+    grades = np.arange(3)
+    bends, rises = (
+        (low[..., None] <= grades) & (grades <= high[..., None])
+        for low, high in ((bent.low, bent.high), (arms.low.max(axis=-1), arms.high.max(axis=-1)))
+    )
+    held = np.array([supported is not False, supported is not True])
+    fits = _positions(m, legs, t)[..., None, None, None] & bends[..., None, :, None, None]
+    fits = fits & rises[..., None, None, :, None] & held
+    return np.asarray(fits.reshape(*bends.shape[:-1], -1) @ _belongs())
 
 
-def _highest(span: Span) -> Span:
-    return Span(span.low.max(axis=-1), span.high.max(axis=-1))
+def lightest_first(possible: Flags) -> tuple[str, ...]:
+    """Lines that one posture may belong to, shape (18,), by name."""
+    return tuple(_names()[k] for k in _lightest() if possible[k])
 
 
-def _positions(measured: Measured, legs: Stance | None, t: EawsThresholds) -> tuple[str, ...]:
+_STANCES = tuple(dict.fromkeys(POSITIONS.values()))
+
+
+def _positions(measured: Measured, legs: Stance | None, t: EawsThresholds) -> Flags:
+    """Which of `_STANCES` are possible, shape (..., 6)."""
+    found = np.zeros((*measured.angles.trunk_flexion.shape, len(_STANCES)), bool)
     if legs is None:
-        return tuple(dict.fromkeys(POSITIONS.values()))
-    if legs != "posture":
-        return (POSITIONS[legs],)
-    folded = measured.beyond("knee_flexion", t.crouching)
-    flat = measured.beyond("shank_tilt", t.kneeling)
-    low = folded.low.min() == 1 or flat.low.max() == 1
-    high = folded.high.min() == 1 or flat.high.max() == 1
-    return ("kneeling",) if low else ("standing", "kneeling") if high else ("standing",)
+        found[:] = True
+    elif legs != "posture":
+        found[..., _STANCES.index(POSITIONS[legs])] = True
+    else:
+        folded = measured.beyond("knee_flexion", t.crouching)
+        flat = measured.beyond("shank_tilt", t.kneeling)
+        low, high = (
+            (f.min(axis=-1) == 1) | (s.max(axis=-1) == 1)
+            for f, s in ((folded.low, flat.low), (folded.high, flat.high))
+        )
+        found[..., _STANCES.index("standing")] = ~low
+        found[..., _STANCES.index("kneeling")] = high
+    return found
+
+
+@cache
+def _names() -> tuple[str, ...]:
+    return tuple(lines())
+
+
+@cache
+def _every() -> tuple[str, ...]:
+    """Line of every position, bend of the trunk, rise of the arms and support, in this order."""
+    return tuple(_line(*each) for each in product(_STANCES, range(3), range(3), (True, False)))
+
+
+@cache
+def _belongs() -> Flags:
+    """Which line each of these belongs to, shape (108, 18)."""
+    return np.asarray(np.array(_every())[:, None] == np.array(_names()))
+
+
+@cache
+def _lightest() -> NDArray[np.int64]:
+    """Lines by weight, the lightest first."""
+    return np.array([_names().index(name) for name in sorted(dict.fromkeys(_every()), key=_weight)])
 
 
 def _line(position: str, bent: int, arms: int, supported: bool) -> str:
@@ -240,83 +278,101 @@ def _line(position: str, bent: int, arms: int, supported: bool) -> str:
 
 
 def _weight(line: str) -> float:
-    return line_points(line, 0.66)
+    return float(line_points(line, 0.66))
 
 
 _ROUNDING = 1e-9
 
 
-class PostureTime:
-    """Seconds by posture; a posture counts, from its begin, once it was held long enough.
+class Held(NamedTuple):
+    """What has lasted until each of n instants."""
+
+    heard: Array
+    """Time that was heard [s], shape (n,)."""
+    silent: Array
+    """Time in which nothing was heard [s], shape (n,)."""
+    seconds: Array
+    """For how long each of k things was so, where that was long enough to count [s], shape (n, k)."""
+    first: Array
+    """When each first counted [s], shape (k,); infinity where it has not."""
+
+
+class HeldTimes:
+    """Seconds for which each of k things is so; they count, from its begin, once it was long enough.
 
     Args:
-        hold: How long a posture is held to count [s].
+        hold: How long each must last to count [s], shape (k,).
     """
 
-    def __init__(self, hold: float) -> None:
-        self._hold = hold
-        self._posture: str | None = None
-        self._since = self._t = math.nan
-        self.seconds: dict[str, float] = {}
-        """Posture → time for which it was held [s], where it was held long enough to count."""
-        self.heard = 0.0
-        """All time that was heard [s]."""
-        self.silent = 0.0
-        """Time in which nothing was heard [s]."""
+    def __init__(self, hold: ArrayLike) -> None:
+        self._hold = np.asarray(hold, float) - _ROUNDING
+        nothing = np.zeros_like(self._hold)
+        self.t = math.nan
+        """The last instant [s]."""
+        self.on = nothing != 0.0
+        """What is so from then on, shape (k,)."""
+        self._since = nothing - np.inf
+        self._so_far = Held(np.zeros(1), np.zeros(1), nothing[None], nothing + np.inf)
 
-    def add(self, t: float, posture: str) -> None:
-        """The posture from the instant before up to this one [s]."""
-        number("the instant", t, unit="s")
-        step = t - self._t
-        if math.isnan(step):
-            self._posture, self._since = posture, t
-        elif step > GAP + _ROUNDING:
-            self.silent += step
-            self._posture, self._since = posture, t
-        else:
-            self.heard += step
-            before = 0.0 if self._posture is None else self._credit(self._t)
-            after = 0.0 if self._posture is None else self._credit(t)
-            if self._posture is not None and after > before:
-                self.seconds[self._posture] = self.seconds.get(self._posture, 0.0) + after - before
-            if posture != self._posture:
-                self._posture, self._since = posture, t
-        self._t = t
+    def add(self, t: Array, on: Flags) -> Held:
+        """What is so from each of some instants that follow on, in their order.
 
-    def _credit(self, t: float) -> float:
-        held = t - self._since
-        return held if held >= self._hold - _ROUNDING else 0.0
+        Args:
+            t: [s], shape (n,).
+            on: Shape (n, k).
+        """
+        instants, so_far = np.append(self.t, number("the instant", t, unit="s")), self._so_far
+        was, step = np.concatenate([self.on[None], on]), instants[1:] - instants[:-1]
+        joined, silent = step <= GAP + _ROUNDING, step > GAP + _ROUNDING  # neither is the first one
+        lasts = was[:-1] & joined[:, None]
+        begins = np.where(on & ~lasts, t[:, None], -np.inf)
+        since = np.maximum.accumulate(np.concatenate([self._since[None], begins]))
+        after, before = (self._counts(each[:, None] - since[:-1]) for each in (t, instants[:-1]))
+        grown = lasts & (after > before)
+        terms = np.where(grown[:, None], np.stack([after, -before], axis=1), 0.0).reshape(-1, len(self.on))
+        heard, quiet = (
+            np.cumsum(np.append(begun[-1], np.where(where, step, 0.0)))
+            for begun, where in ((so_far.heard, joined), (so_far.silent, silent))
+        )
+        seconds = np.cumsum(np.concatenate([so_far.seconds[-1:], terms]), axis=0)[::2]
+        first = np.where(grown, t[:, None], np.inf).min(axis=0, initial=np.inf)
+        self.t, self.on, self._since = float(instants[-1]), was[-1], since[-1]
+        self._so_far = found = Held(heard, quiet, seconds, np.minimum(so_far.first, first))
+        return Held(found.heard[1:], found.silent[1:], found.seconds[1:], found.first)
+
+    def _counts(self, held: Array) -> Array:
+        return np.where(held >= self._hold, held, 0.0)
 
 
 _TURNS = ("trunk_twist", "trunk_side_bend")
 
 
 class Points(NamedTuple):
-    """Points so far."""
+    """Points so far, of n instants."""
 
-    lines: dict[str, float]
-    rotation: float
-    bending: float
-    together: float
-    """Of all lines."""
+    counted: Flags
+    """Lines that have counted, shape (n, 18)."""
+    lines: Array
+    """Of each, shape (n, 18)."""
+    turns: Array
+    """Of trunk rotation and lateral bending, shape (n, 2)."""
+    together: Array
+    """Of all lines, shape (n,)."""
 
     @property
-    def total(self) -> float:
-        """Points of section 1, far reach apart."""
+    def total(self) -> Array:
+        """Points of section 1, far reach apart, shape (n,)."""
         most = float(published("eaws_posture")["asymmetry_sum_most"])
-        return self.together + min(self.rotation + self.bending, most)
+        return self.together + np.minimum(self.turns[:, 0] + self.turns[:, 1], most)
 
-
-class _Ledger:
-    """Time by line and by size of the asymmetry, at one end of what is possible."""
-
-    def __init__(self, hold: float) -> None:
-        self.lines = PostureTime(hold)
-        self.turns = {name: [PostureTime(0.0) for _ in range(3)] for name in _TURNS}
+    def at(self, k: int) -> dict[str, float]:
+        """By line that has counted, its points at one of the instants."""
+        every = zip(lines(), self.counted[k].tolist(), self.lines[k].tolist(), strict=True)
+        return {name: points for name, counted, points in every if counted}
 
 
 class Screening:
-    """Points of a posture as time goes on, least and greatest.
+    """Points of postures as time goes on, least and greatest.
 
     Args:
         cycle: Length of the cycle [s]; shares are of this, or of all that was heard when that is longer.
@@ -325,73 +381,79 @@ class Screening:
     """
 
     def __init__(self, cycle: float, hold: float, interpolation: Interpolation) -> None:
-        self._cycle, self._hold, self._interpolation = cycle, hold, interpolation
-        self._t = -math.inf
+        self._cycle, self._interpolation = cycle, interpolation
+        self._hold = np.repeat([hold, 0.0], [2 * len(lines()), 2 * 3 * len(_TURNS)])
+        """Of the lightest line, of every possible one, of turns at least and at most, column by column."""
         self._begin()
 
     def _begin(self) -> None:
-        self._ends = (_Ledger(self._hold), _Ledger(self._hold))
-        self._may = {name: PostureTime(self._hold) for name in lines()}
+        self._times = HeldTimes(self._hold)
         self._open = False
         """Whether some posture may have belonged to several lines."""
 
-    def add(self, t: float, possible: tuple[str, ...], angles: Angles, accuracy: Accuracy) -> None:
-        """What a posture may be at an instant [s], lightest line first; an earlier instant begins anew."""
-        if t < self._t:
+    def add(
+        self, t: Array, possible: Flags, angles: Angles, accuracy: Accuracy
+    ) -> tuple[Held, Points, Points]:
+        """What was heard until each of n instants that follow [s], and the points of that.
+
+        An earlier instant than before begins anew, the same adds nothing.
+
+        Args:
+            t: Shape (n,).
+            possible: Lines of the postures, shape (n, 18).
+            angles: Of the postures, shape (n,).
+            accuracy: Of each angle [rad].
+        """
+        order, n = _lightest(), len(lines())
+        least = order[possible[:, order].argmax(axis=1)][:, None] == np.arange(n)
+        on = np.concatenate([least, possible, *_turned(Measured(angles, accuracy))], axis=1)
+        if len(t) and t[0] < self._times.t:
             self._begin()
-        if t == self._t:
-            return
-        self._t = t
-        measured = Measured(angles, accuracy)
-        self._open = self._open or len(possible) > 1
-        for name, timer in self._may.items():
-            timer.add(t, name if name in possible else "")
-        for end, ledger in enumerate(self._ends):
-            ledger.lines.add(t, possible[-end])
-            for name, timers in ledger.turns.items():
-                for edge, timer in zip(published("eaws_posture")["asymmetry_from_deg"], timers, strict=True):
-                    turned = measured.beyond(name, math.radians(edge))
-                    timer.add(t, "turned" if int(turned[end]) else "")
-
-    @property
-    def heard(self) -> float:
-        """Time that was heard [s]."""
-        return self._ends[0].lines.heard
-
-    @property
-    def silent(self) -> float:
-        """Time in which nothing was heard [s]."""
-        return self._ends[0].lines.silent
-
-    @property
-    def coverage(self) -> float:
-        """Share of the time that was heard."""
-        return self.heard / (self.heard + self.silent) if self.heard > 0 else 0.0
-
-    @property
-    def complete(self) -> bool:
-        """Whether a whole cycle was heard."""
-        return self.heard >= self._cycle - 1e-6
-
-    def points(self) -> tuple[Points, Points]:
-        """Least and greatest."""
-        whole = max(self._cycle, self.heard)
-        found = []
-        for ledger in self._ends:
-            seconds = {name: s for name, s in ledger.lines.seconds.items() if name}
-            turns = [
-                asymmetry_points(tuple(timer.seconds.get("turned", 0.0) / whole for timer in timers))
-                for timers in ledger.turns.values()
-            ]
-            points = {name: line_points(name, s / whole, self._interpolation) for name, s in seconds.items()}
-            found.append(Points(points, turns[0], turns[1], sum(points.values())))
+        if len(t) and t[0] == self._times.t:
+            on[0] = self._times.on
+        held = self._times.add(t, on)
+        several = np.count_nonzero(on[:, n : 2 * n], axis=1) > 1
+        several[:1] |= self._open
+        open_ = np.logical_or.accumulate(several)
+        self._open = self._open or bool(several.any())
+        whole = np.maximum(self._cycle, held.heard)
+        share = held.seconds / whole[:, None]
+        turns = asymmetry_points(share[:, 2 * n :].reshape(-1, 2, len(_TURNS), 3))
+        own = self._of_lines(share[:, :n])
+        together = _summed(own[:, np.argsort(held.first[:n], kind="stable")])
+        low = Points(share[:, :n] > 0.0, own, turns[:, 0], together)
+        high = low._replace(turns=turns[:, 1])
         if self._open:
             # Which line a posture had may have changed, or stayed and been held, as no single guess of it is.
-            shares = {name: timer.seconds.get(name, 0.0) / whole for name, timer in self._may.items()}
-            most = {name: line_points(name, x, self._interpolation) for name, x in shares.items() if x > 0}
-            together = max(found[0].together, most_points(shares, self.heard / whole))
-            found[1] = found[1]._replace(lines=most, together=together)
-        return found[0], found[1]
+            may = share[:, n : 2 * n]
+            shares = {_names()[k]: may[:, k] for k in np.flatnonzero(may.any(axis=0)).tolist()}
+            most = most_points(shares, held.heard / whole) if shares else together
+            together = np.where(open_, np.maximum(together, most), together)
+            high = Points(may > 0.0, self._of_lines(may), turns[:, 1], together)
+        return held, low, high
+
+    def _of_lines(self, share: Array) -> Array:
+        """Points of each line at its share of the time, shape (n, 18)."""
+        points = np.zeros_like(share)
+        for k in np.flatnonzero(share.any(axis=0)).tolist():
+            points[:, k] = line_points(_names()[k], share[:, k], self._interpolation)
+        return points
+
+
+def _turned(measured: Measured) -> tuple[Flags, Flags]:
+    """Angles of the form that rotation and bending of the trunk reach, at least and at most, shape (n, 6)."""
+    edges = [math.radians(edge) for edge in published("eaws_posture")["asymmetry_from_deg"]]
+
+    def passed(x: Array) -> NDArray[np.int64]:
+        size = np.abs(x)
+        return np.asarray(sum(reached(size, edge).astype(np.int64) for edge in edges))
+
+    found = [measured.graded(name, passed, within=(0, len(edges))) for name in _TURNS]
+    low, high = (
+        np.concatenate([end[:, None] > np.arange(len(edges)) for end in ends], axis=1)
+        for ends in zip(*found, strict=True)
+    )
+    return low, high
 
 
 WHAT = "EAWS-style posture screening (sections 0-1 only)"
@@ -439,8 +501,10 @@ class Screened(NamedTuple):
 
     now: tuple[str, ...]
     """Lines that the posture of this instant may have, the lightest first."""
-    low: Points
-    high: Points
+    pairs: tuple[tuple[str, float, float], ...]
+    """Points of lines and turns by name, at least and at most."""
+    counted: bool
+    """Whether any line has."""
     ends: tuple[float, float]
     """Points with those that were entered, at least and at most."""
     missing: tuple[str, ...]
@@ -451,7 +515,6 @@ class Screened(NamedTuple):
     """[s]"""
     silent: float
     """[s]"""
-    coverage: float
 
 
 class EawsPosture(PostureRule, frozen=True, kw_only=True):
@@ -477,6 +540,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, EawsPhase.from_task)
         error = self.error(model)
+        off: Accuracy = 0.0 if error is None else error
         screening = Screening(self.cycle, self.minimum_hold, self.interpolation)
         given = asdict(self.entered)
         missing = tuple(name.replace("_", " ") for name, value in given.items() if value is None)
@@ -484,39 +548,48 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         limbs = given["upper_limbs"] or 0.0
 
         def compute(twin: Twin) -> Figure:
-            assert isinstance(twin, State)
-            angles, phase = read(twin), phase_at(phases, twin.t, EawsPhase())
-            now = possible_lines(
-                angles,
-                legs=phase.legs,
-                supported=phase.back_supported,
-                thresholds=self.thresholds,
-                accuracy=0.0 if error is None else error,
-            )
-            screening.add(twin.t, now, angles, 0.0 if error is None else error)
-            low, high = screening.points()
-            ends = (max(low.total + whole, limbs), max(high.total + whole, limbs))
-            known = ends[1] - ends[0] < 1e-9
-            rests = self.limit is not None and (bool(missing) or screening.silent > 0)
+            every = read(twin)
+            # Of many instants those count at which the person is heard; at one, nothing else is read.
+            heard = np.atleast_1d(twin.invalid_source_reason(self.human) == "")
+            angles, t = (every[heard, 0] if twin.many else every[None]), np.atleast_1d(twin.t)[heard]
+            possible = np.empty((len(t), len(lines())), bool)
+            for phase, where in phases_of(phases, t, EawsPhase()):
+                possible[where] = possible_lines(
+                    angles if where.all() else angles[where],
+                    legs=phase.legs,
+                    supported=phase.back_supported,
+                    thresholds=self.thresholds,
+                    accuracy=off,
+                )
+            held, least, most = screening.add(t, possible, angles, off)
+            low, high = (np.maximum(points.total + whole, limbs) for points in (least, most))
+            known = high - low < 1e-9
+            rests = (bool(missing) | (held.silent > 0)) & (self.limit is not None)
             # Points of a cycle only grow until it is whole: what is too much already stays so.
-            counting = not screening.complete
-            exceeds = self.limit is not None and not keeps(ends[0], self.limit)
+            counting = held.heard < self.cycle - 1e-6
+            exceeds = low > (math.inf if self.limit is None else admitted(self.limit))
+            value, nothing = np.where(known, low, np.nan), counting & ~exceeds & ~rests
+            if twin.many:
+                high = np.where(known, low, high)
+                value, low, high = (_spread(x, heard, np.nan) for x in (value, low, high))
+                nothing, rests = (_spread(x, heard, False) for x in (nothing, rests))
+                return Figure(value, self.limit, interval=(low, high), nothing=nothing, undecided=rests)
+            ends = float(low[0]), float(high[0])
             return Figure(
-                ends[0] if known else None,
+                ends[0] if known[0] else None,
                 self.limit,
-                interval=None if known else ends,
-                nothing=counting and not exceeds and not rests,
-                undecided=rests,
+                interval=None if known[0] else ends,
+                nothing=bool(nothing[0]),
+                undecided=bool(rests[0]),
                 beside=Screened(
-                    now,
-                    low,
-                    high,
+                    lightest_first(possible[0]),
+                    tuple(_pairs(least, most)),
+                    bool(least.counted[0].any()),
                     ends,
                     missing,
-                    counting,
-                    screening.heard,
-                    screening.silent,
-                    screening.coverage,
+                    bool(counting[0]),
+                    float(held.heard[0]),
+                    float(held.silent[0]),
                 ),
             )
 
@@ -527,18 +600,23 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         return lambda state, figure, verdict: self._shown(figure, verdict)
 
     def one_by_one(self, model: Model) -> str:
-        """Say so: shares of time are counted as it goes."""
-        return "shares of the cycle are counted as it goes"
+        """Nothing: shares of time are counted of many instants as of one, in their order."""
+        return ""
+
+    def remembers(self, model: Model) -> bool:
+        """Say that what was held before counts."""
+        return True
 
     def _shown(self, figure: Figure, verdict: Verdict | None) -> Shown:
         found = cast("Screened", figure.beside)
-        low, high, ends, missing = found.low, found.high, found.ends, found.missing
+        ends, missing = found.ends, found.missing
         known = figure.value is not None
         reasons = [f"{WHAT}, no rating: lower bound" if missing else "with entered sections 2-4"]
         if missing:
             reasons.append(f"not entered: {', '.join(missing)}")
         if found.silent > 0:
-            reasons.append(f"coverage {100 * found.coverage:.1f} %: {found.silent:.1f} s not heard")
+            coverage = found.heard / (found.heard + found.silent)
+            reasons.append(f"coverage {100 * coverage:.1f} %: {found.silent:.1f} s not heard")
         if not known:
             between = figures.ends(*ends)
             reasons.append(f"the points lie between {between[0]} and {between[1]}")
@@ -555,16 +633,16 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
             "; ".join(reasons),
             lambda: (
                 tuple(Highlight(body=f"{self.human}/{bone}", verdict=verdict) for bone in _BONES)
-                if low.lines
+                if found.counted
                 else ()
             ),
             parts=tuple(
                 Result(name=name, value=a if abs(a - b) < 1e-9 else None, interval=None if a == b else (a, b))
-                for name, a, b in _pairs(low, high)
+                for name, a, b in found.pairs
             ),
             rows=(
                 total_row("", ends, None, (0.0, 100.0), self.limit, verdict),
-                *(self._row(name, a, b) for name, a, b in _pairs(low, high)),
+                *(self._row(name, a, b) for name, a, b in found.pairs),
             ),
         )
 
@@ -644,13 +722,22 @@ def published_most() -> float:
 
 
 def _pairs(low: Points, high: Points) -> list[tuple[str, float, float]]:
-    names = sorted({*low.lines, *high.lines}, key=list(lines()).index)
-    found = [(f"line {name}", low.lines.get(name, 0.0), high.lines.get(name, 0.0)) for name in names]
+    """Points of the first instant by name, at least and at most."""
+    least, most = low.at(0), high.at(0)
+    names = [name for name in lines() if name in least or name in most]
     return [
-        *found,
-        ("trunk rotation", low.rotation, high.rotation),
-        ("lateral bending", low.bending, high.bending),
+        *((f"line {name}", least.get(name, 0.0), most.get(name, 0.0)) for name in names),
+        *zip(
+            ("trunk rotation", "lateral bending"), low.turns[0].tolist(), high.turns[0].tolist(), strict=True
+        ),
     ]
+
+
+def _spread(values: NDArray[Any], heard: Flags, otherwise: float | bool) -> NDArray[Any]:
+    """Values of the instants at which somebody is heard, among all, shape (N,)."""
+    found = np.full(len(heard), otherwise)
+    found[heard] = values
+    return found
 
 
 def _rating(points: float) -> str:

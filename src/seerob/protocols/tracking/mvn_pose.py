@@ -125,6 +125,8 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _SPINE = [SEGMENTS.index(name) for name in ("Pelvis", "L5", "L3", "T12", "T8", "Neck", "Head")]
 _UNITY_ROWS = [SEGMENTS.index(name) for name in UNITY]
 _BODY = len(SEGMENTS)
+_WHOLE = np.arange(1, _BODY + 1)
+"""Numbers of a body's items that are all there, in order."""
 Row = list[float]
 
 
@@ -154,7 +156,8 @@ def pose(items: Items, *, up: Up = Up.Z, lengths: float) -> tuple[tuple[str, ...
     kind = items.header.kind
     if kind not in POSES:
         raise ProtocolError("this MVN datagram holds no pose")
-    table = _table(items)
+    body = items.ids.shape == _WHOLE.shape and bool((items.ids == _WHOLE).all())  # as nearly always
+    table = items.numbers() if body else _table(items)
     positions, turns = table[:, :3], table[:, 3:]
     if kind is Kind.EULER:
         positions, turns = _z_up(positions), _z_up_turn(_euler(turns))
@@ -167,7 +170,8 @@ def pose(items: Items, *, up: Up = Up.Z, lengths: float) -> tuple[tuple[str, ...
         bad = ~(np.abs(norms - 1) <= NOT_UNIT)
         far = ~(np.abs(positions).max(axis=1) <= FARTHEST)
     turns = turns / np.where(bad, np.nan, norms)[:, None]
-    return _names(items), np.where(far[:, None], np.nan, lengths * positions), turns
+    said = SEGMENTS if body else _names(items)
+    return said, np.where(far[:, None], np.nan, lengths * positions), turns
 
 
 def unit_of(positions: Array) -> str | None:
@@ -212,8 +216,6 @@ def _names(items: Items) -> tuple[str, ...]:
 
 def _table(items: Items) -> Array:
     rows = _rows(items)
-    if len(rows) == _BODY and rows[0] == 0 and (np.diff(rows) == 1).all():
-        return items.numbers()
     table = np.full((_BODY + np.count_nonzero(rows >= _BODY), items.values.shape[1]), np.nan)
     table[rows] = items.numbers()
     return table

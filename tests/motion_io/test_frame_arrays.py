@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError
-from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz, transform, turned
+from seerob.core.transforms import (
+    left_product,
+    right_product,
+    rotation_from_rpy,
+    rotation_from_wxyz,
+    transform,
+    turned,
+)
 from seerob.files.motion_capture.frame_arrays import FrameArrays, check_size, checked
 
 
@@ -16,6 +23,10 @@ def test_quaternions_are_turned_as_their_rotations():
     found = rotation_from_wxyz(turned(turn, wxyz))
     np.testing.assert_allclose(found, turn @ rotation_from_wxyz(wxyz), atol=1e-12)
     assert np.isnan(turned(turn, [np.nan] * 4)).all()
+    one, other = wxyz[:2]
+    np.testing.assert_allclose(left_product(one) @ other, right_product(other) @ one, atol=1e-12)
+    both = rotation_from_wxyz(one) @ rotation_from_wxyz(other)
+    np.testing.assert_allclose(rotation_from_wxyz(left_product(one) @ other), both, atol=1e-12)
 
 
 def test_frames_that_do_not_advance_and_values_that_cannot_be_are_left_out():

@@ -7,6 +7,7 @@ import itertools
 import socket
 import sys
 import time
+from threading import Timer
 
 import pytest
 from hypothesis import given
@@ -171,6 +172,31 @@ def test_who_reads_late_gets_everything_and_little_waits_meanwhile(loop):
                     await sending
                 assert found == whole
                 assert [(await connection.read(10)).data for _ in range(3)] == [b""] * 3
+
+    run(loop, talk())
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_another_thread_and_streams_of_asyncio_wake_a_loop_that_waits(loop):
+    async def echo(reader, writer):
+        while data := await reader.read(100):
+            writer.write(data)
+        writer.close()
+
+    async def talk():
+        here, woken = asyncio.get_running_loop(), asyncio.Event()
+        Timer(0.05, here.call_soon_threadsafe, (woken.set,)).start()
+        await woken.wait()
+        server = await asyncio.start_server(echo, "127.0.0.1", 0)
+        reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+        for k in range(5):
+            writer.write(b"%d" % k)
+            assert await reader.read(100) == b"%d" % k
+        writer.write_eof()
+        assert await reader.read() == b""
+        writer.close()
+        server.close()
+        await server.wait_closed()
 
     run(loop, talk())
 

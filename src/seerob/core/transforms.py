@@ -227,7 +227,7 @@ def multiplied(left: Array, wxyz: ArrayLike) -> Array:
     given = np.asarray(wxyz, float)
     near = np.abs(given) < _VAST
     if near.all():
-        return np.asarray(given @ left.T)
+        return np.asarray(np.matmul(given, left.T, out=np.empty_like(given)))
     known = near.all(axis=-1, keepdims=True)
     return np.where(known, np.where(known, given, 0.0) @ left.T, np.nan)
 

@@ -21,6 +21,8 @@ export class Glide {
   private fromT = Number.NaN;
   /** Of the way to the newest frame, so far. */
   share = 0;
+  /** How far a body that has not leapt can have come from one frame to the next [m]. */
+  farthest = 0;
   /** Run time of what `at` returned last [s]. */
   shownT = Number.NaN;
   /** Time between two pictures [ms]: where frames come as often as pictures are drawn, gliding would only add delay. */
@@ -50,13 +52,11 @@ export class Glide {
     const { t } = of;
     const since = now - this.arrived;
     const step = t - this.t;
+    this.farthest = FASTEST * step;
+    // Looked at each time: what is asked now and then is never compiled, and makes an object of each number.
+    const near = this.to?.length === block.length && !leaps(this.to, block, this);
     const glides =
-      this.to?.length === block.length &&
-      since < LONGEST_MS &&
-      since > 1.5 * this.drawnEvery &&
-      step > 0 &&
-      step < JUMP_S &&
-      !leaps(this.to, block, step);
+      near && since < LONGEST_MS && since > 1.5 * this.drawnEvery && step > 0 && step < JUMP_S;
     if (!this.to || this.to.length !== block.length) {
       this.from = block.slice();
       this.to = block.slice();
@@ -90,8 +90,8 @@ export class Glide {
   }
 }
 
-function leaps(from: Float32Array, to: Float32Array, step: number): boolean {
-  const most = FASTEST * step;
+function leaps(from: Float32Array, to: Float32Array, of: { readonly farthest: number }): boolean {
+  const most = of.farthest;
   for (let k = 0; k < to.length; k += FLOATS_PER_NODE) {
     const x = to[k]! - from[k]!;
     const y = to[k + 1]! - from[k + 1]!;

@@ -345,7 +345,10 @@ def test_who_publishes_faster_than_is_read_fills_no_memory():
                 session.put("x", b"last")
                 sizes = []
                 while not sizes or sizes[-1] != 4:
-                    sizes.append(len((await link.next(60.0)).payload))
+                    try:
+                        sizes.append(len((await link.next(5.0)).payload))
+                    except TimeoutError:  # Zenoh drops what a flooded network does not take
+                        session.put("x", b"last")
                 return sizes
 
     sizes = asyncio.run(flooded())

@@ -55,8 +55,7 @@ export class Glide {
     this.farthest = FASTEST * step;
     // Looked at each time: what is asked now and then is never compiled, and makes an object of each number.
     const near = this.to?.length === block.length && !leaps(this.to, block, this);
-    const glides =
-      near && since < LONGEST_MS && since > 1.5 * this.drawnEvery && step > 0 && step < JUMP_S;
+    const glides = near && since < LONGEST_MS && since > 1.5 * this.drawnEvery && step > 0 && step < JUMP_S;
     if (!this.to || this.to.length !== block.length) {
       this.from = block.slice();
       this.to = block.slice();

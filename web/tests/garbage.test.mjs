@@ -9,8 +9,8 @@ import { enterRoom, HEADSET, pictures, put } from "./emulated_headset.mjs";
 import { allocated, COMPILED, hold, most, pass, WRAPPED } from "./garbage.mjs";
 import { serve } from "./served.mjs";
 
-/** More than three numbers with a fraction, each an object of twelve; what the measurement finds by chance is less [B]. */
-const FEW = 36;
+/** Ten numbers with a fraction, each an object of twelve; beside busy processes the measurement finds some by chance [B]. */
+const FEW = 120;
 const FURTHER = 28;
 // What is drawn does not matter here, and takes the longest.
 const UNDRAWN = `

@@ -364,3 +364,26 @@ def test_who_turns_back_while_nothing_is_heard_is_no_farther_from_the_twin_than_
     # It stands, and nobody says that the person does.
     assert np.abs(state.qd(station.model.mechanisms["operator"])[:3]).max() < 0.05
     assert not state.moved("operator")
+
+
+def test_who_moved_while_run_time_stood_still_is_not_flung_on():
+    """The way between both samples seems made in a moment; at that speed the twin would go on meanwhile."""
+    station = Station(workstation(source(captured(frames_of(*walking(0.4))))))
+    seen = points(("head", "left_hand", "right_hand"), walking(0.1)[1][0])
+    moved = tuple(replace(p, position=(p.position[0], p.position[1], p.position[2] + 0.06)) for p in seen)
+
+    def sample(t, what, quality=Quality.GOOD):
+        return BodySample(source="room", seq=0, target="operator", t=t, points=what, quality=quality)
+
+    heard = [sample(0.02 * k, seen) for k in range(16)]
+    heard += [sample(0.3 + 1e-6, seen, Quality.LATE), sample(0.308, moved, Quality.LATE)]
+    engine = Engine(station.model, driven={"operator": 1.0}, live=["operator"])
+    hand = next(b.index for b in station.model.bodies if b.name == "operator/right_hand")
+    places = []
+    for tick in range(60):
+        engine.take([s for s in heard if (tick - 1) * 0.01 < s.t - 0.02 <= tick * 0.01])
+        state = engine.tick() if tick else engine.start()
+        places.append(state.positions[hand].copy())
+    way = np.linalg.norm(places[-1] - places[25])
+    assert 0.02 < way < 0.08
+    assert max(np.linalg.norm(place - places[-1]) for place in places[25:]) < way + 0.02

@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError
-from seerob.core.samples import GrabSample, JointSample, Mailbox, SignalSample
+from seerob.core.samples import GrabSample, JointSample, Mailbox, Quality, SignalSample
 from seerob.devices.live.receivers import Clock, hear, require_recorded
 from seerob.devices.sources.rtde import Rtde
 from seerob.workstation.source import Source
@@ -70,6 +70,20 @@ def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled(said):
     assert [s.quality for s in before] == ["good"] * 2
     assert [s.quality for s in after] == ["late"] * 4 + ["good"] * 6
     assert after[4].t - before[-1].t == pytest.approx(0.6)
+
+
+def test_what_is_doubted_already_is_late_too_where_the_clock_slipped():
+    """Whoever draws it must know that its speed is false."""
+    clock = Clock()
+    start = time.monotonic()
+    doubted = replace(joint(start), quality=Quality.DEGRADED, reason="its clock leads")
+    ticks = [[replace(doubted, t=start + 0.01 * k)] for k in range(4)]
+    feed = hear(iter(lambda: (), None), Said(*ticks), clock)
+    heard = [*next(feed), *next(feed)]
+    clock.slipped += 0.3
+    heard += next(feed)
+    assert [s.quality for s in heard] == ["degraded"] * 3 + ["late"]
+    assert {s.reason for s in heard} == {"its clock leads"}
 
 
 @pytest.mark.parametrize("when", ["asleep", "while it computes", "after it has waited"])

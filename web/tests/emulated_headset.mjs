@@ -71,6 +71,29 @@ export function put(page, head, hand = null, direction = [0, 0, -1]) {
   );
 }
 
+/**
+ * Lead the right controller to a point of the room as a hand goes, 1 cm from picture to picture [m]. Put there it would
+ * be metres per second fast, and where the next picture is late the person goes on at that speed.
+ */
+export function lead(page, to) {
+  return page.evaluate(
+    (goal) =>
+      new Promise((done) => {
+        const at = window.headset.controllers.right.position.vec3.slice();
+        const each = () => {
+          const left = Math.hypot(...goal.map((v, i) => v - at[i]));
+          const part = Math.min(1, 0.01 / left);
+          for (let i = 0; i < 3; i++) at[i] += part * (goal[i] - at[i]);
+          window.put(2, part < 1 ? [...at] : goal);
+          if (part < 1) window.headset.activeSession.requestAnimationFrame(each);
+          else done();
+        };
+        each();
+      }),
+    to,
+  );
+}
+
 /** Press or let go of the right controller's trigger, and wait until a picture of the session knows it. */
 export async function trigger(page, value) {
   await page.evaluate((v) => window.headset.controllers.right.updateButtonValue("trigger", v), value);

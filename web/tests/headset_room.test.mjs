@@ -6,7 +6,7 @@ import path from "node:path";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { openBrowser } from "./browser.mjs";
-import { HEADSET, pictures, pressInRoom, put } from "./emulated_headset.mjs";
+import { HEADSET, lead, pictures, pressInRoom, put } from "./emulated_headset.mjs";
 import { askPython, python } from "./python.mjs";
 
 const CELL = `
@@ -150,7 +150,7 @@ const happened = (what) =>
 /** The right hand at a point of the world (y up); a palm's length short of what it is to take. */
 async function reach(point, short = 0.1) {
   const [x, y, z] = await page.evaluate((p) => window.seerob.inRoom(p), point);
-  await put(page, [0, 1.64, 0], [x, y + 0.02, z + short], [0, -0.1, -1]);
+  await lead(page, [x, y + 0.02, z + short]);
 }
 
 /** Wait until a body is there [m] and rests: less than 5 mm in a quarter of a second of run time. */
@@ -181,6 +181,7 @@ test("a workpiece is taken, carried, put into a box; a lever is pulled", { timeo
   // What happened is on the panel of plots.
   await pressInRoom(page, "plot", [0, 1.64, 0]);
   const [x, y, z] = await at("blank/body");
+  await put(page, [0, 1.64, 0], [0.2, 1.4, -0.2], [0, -0.1, -1]);
   await reach([x, y, z]);
   // Where a grip is, a hand is about: the person is another than the visitor. What is taken keeps its place in the
   // hand, so the hand has come to rest.

@@ -357,7 +357,7 @@ class Engine:
                     "its source sends values that are not finite, or beyond 10⁶",
                 )
             elif isinstance(sample, JointSample):
-                qd = None if sample.qd is None else np.array(sample.qd, float)
+                qd = _still(sample, len(sample.q)) if sample.qd is None else np.array(sample.qd, float)
                 if mechanism.name in self._unread:
                     contradicted = self._contradicted(sample)
                     reason = reason or beyond_limits(sample, mechanism) or contradicted
@@ -381,7 +381,8 @@ class Engine:
             hearing = self._hearings[name]
             hearing.driven = self.controllers
             for found in following.until(self._next()):
-                self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
+                qd = np.zeros_like(found.q) if found.late else None
+                self._references[name].take(found.t, found.q, qd, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
                 hearing.leaves_at = self._references[name].leaves_at if name in self.ahead else 0.0
                 hearing.once = self._references[name].once
@@ -521,7 +522,9 @@ class Engine:
             start=reference.newest,
         )
         missed = f"{sample.target} cannot reach the pose that was heard: the nearest that was found is {miss}"
-        return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
+        return reference.take(
+            sample.t, q, _still(sample, len(q))
+        ), "" if miss.larger <= POSE_TOLERANCE else missed
 
     def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
         """Tell what a robot or human will do (`seerob.twin.motion.Foresee`): by its file, or it stands."""
@@ -847,6 +850,19 @@ class Engine:
                     "lower engine.bandwidth or check masses and samples"
                 )
         return SimulationDiverged(f"a velocity is not finite after {self._now:.3f} s")
+
+
+def _still(sample: Sample, n: int) -> Array | None:
+    """Speeds of a sample that says none: 0 where run time stood still before it, else None, to be derived.
+
+    Run time that stood still makes the way from the sample before it too fast, and where nothing more is
+    heard the twin goes on at that speed.
+
+    Args:
+        sample: Of whoever moves.
+        n: How many joints that are.
+    """
+    return np.zeros(n) if sample.quality is Quality.LATE else None
 
 
 def _joints(m: Mechanism, rows: int) -> kernel.Joints:

@@ -102,6 +102,8 @@ class Followed:
     """Why single bones may not be, and which, when the others may."""
     anew: bool
     """Nobody knows how the person came here: it is to be put there."""
+    late: bool
+    """Run time stood still before it (`Quality.LATE`): nobody knows how fast the person is."""
     seen: Pulls
     """What it was made of, in the root's frame."""
     observed: frozenset[str] = frozenset()
@@ -135,6 +137,8 @@ class _DeviceReading:
     part: InvalidPart | None = None
     jumped: bool = False
     """Something was left out because it jumped."""
+    late: bool = False
+    """Its sample is `Quality.LATE`."""
     placing: Placing | None = None
     """Of its sample."""
 
@@ -273,6 +277,7 @@ class Following:
         readings = [self._device_at(device, name, t) for name, device in self._devices.items()]
         points = [each.points for each in readings]
         reasons = [each.reason for each in readings if each.reason]
+        late = any(each.late for each in readings)
         parts = [each.part for each in readings if each.part is not None]
         chosen, last = self._handover.choose(points, t), self._last
         if not chosen:
@@ -280,7 +285,10 @@ class Following:
                 return None
             self._waits = True
             reasons += [why for why, _ in parts]
-            return Followed(t, last.q, "; ".join(reasons[:4]), (), False, pulls((), self._root_from_world))
+            late = any(each.late for each in readings)
+            return Followed(
+                t, last.q, "; ".join(reasons[:4]), (), False, late, pulls((), self._root_from_world)
+            )
         parts += self._lost(t)
         here = {point.bone for point in chosen}
         parts = [(why, _with_others(bones, here)) for why, bones in parts]
@@ -331,7 +339,7 @@ class Following:
         # Wherever the twin waited, nobody knows how a person who is seen for the first time came.
         anew = last is None or elsewhere
         return Followed(
-            t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed,
+            t, q, reason, tuple(parts), anew, late, found, frozenset(observed), bones, unaimed,
             undetermined(turns, leaning=leaning),
             unplaced, displaced, slack,
             tuple(each.placing for each in readings if each.points and each.placing is not None),
@@ -363,7 +371,7 @@ class Following:
         if sample.quality is Quality.INVALID:
             return _DeviceReading([], reason)
         reading = self._believed(device, points, instant, reason, placed=sample.placed)
-        reading = replace(reading, placing=sample.placing)
+        reading = replace(reading, placing=sample.placing, late=sample.quality is Quality.LATE)
         if not sample.upright:
             device.leaning |= {point.bone: instant for point in reading.points}
         return reading

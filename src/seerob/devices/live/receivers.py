@@ -208,7 +208,7 @@ def hear(
                 continue
             quality = sample.quality
             swings = what in invalid or t < settled.get(what, t)
-            if swings and quality is Quality.GOOD:
+            if swings and quality in (Quality.GOOD, Quality.DEGRADED):
                 # Run time stood still while the robot went on: the speed between both samples is false.
                 quality = Quality.LATE
             invalid.discard(what)

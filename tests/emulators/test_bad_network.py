@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import socket
@@ -160,6 +161,26 @@ while len(seen) < 20 and time.monotonic() < end:
 print(len(seen))
 robot.disconnect()
 """
+
+
+@pytest.mark.parametrize("first", ["client", "device"])
+def test_who_breaks_off_is_gone_for_the_other_end_too(first):
+    with socket.create_server((HERE, 0)) as listening:
+        listening.settimeout(30)
+        to = listening.getsockname()
+        with FaultyWire(Faults(jitter=0.001), at=(HERE, 0), to=to, device_listens=True) as wire:
+            client = socket.create_connection((HERE, wire.port), 30)
+            ends = {"client": client, "device": listening.accept()[0]}
+            for other in ends.values():
+                other.settimeout(30)
+            ends["device"].sendall(b"there")
+            assert ends["client"].recv(5) == b"there"
+            leaves = ends.pop(first)
+            leaves.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            leaves.close()  # with a reset, as of a process that left something unread
+            (stays,) = ends.values()
+            with stays, contextlib.suppress(ConnectionResetError):
+                assert stays.recv(1) == b""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has a whole network of loopback addresses")

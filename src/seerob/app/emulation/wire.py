@@ -138,13 +138,14 @@ class FaultyWire(LoopEmulator):
 
         async def read() -> None:
             last = 0.0
-            while data := await reader.read(LARGEST):
-                due = loop.time()
-                if said:
-                    lost, late = self.late()
-                    due = last = max(last, due + late + AGAIN * lost)
-                    data = self.damaged(data)
-                waiting.put_nowait((due, data))
+            with suppress(OSError):  # who breaks off has ended, too
+                while data := await reader.read(LARGEST):
+                    due = loop.time()
+                    if said:
+                        lost, late = self.late()
+                        due = last = max(last, due + late + AGAIN * lost)
+                        data = self.damaged(data)
+                    waiting.put_nowait((due, data))
             waiting.put_nowait((last, b""))
 
         task = asyncio.ensure_future(read())

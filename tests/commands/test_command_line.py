@@ -285,13 +285,46 @@ def test_whoever_stops_while_loops_are_compiled_leaves_no_process(monkeypatch, t
 
     started = []
     begin = progress._worker
-    monkeypatch.setattr(progress, "_worker", lambda: started.append(begin()) or started[-1])
+    monkeypatch.setattr(progress, "_worker", lambda errors: started.append(begin(errors)) or started[-1])
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(progress.Queue, "get", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         progress.compile_loops()
     assert started
     assert all(worker.returncode is not None for worker in started)
+
+
+def test_loops_of_a_process_that_ended_are_compiled_again(monkeypatch, tmp_path, nothing_brought, capsys):
+    from seerob.app.console import progress
+
+    begin, started = progress._worker, []
+
+    def worker(errors):
+        started.append(begin(errors))
+        if len(started) == 1:
+            started[0].kill()
+        return started[-1]
+
+    monkeypatch.setattr(progress, "_worker", worker)
+    monkeypatch.setattr(progress, "MOST", 1)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    names = ["paint averaged", "paint darken"]
+    progress.compile_loops(names)
+    assert len(started) == 2
+    assert progress.missing_loops(names) == []
+    assert capsys.readouterr().err == f"{progress.COMPILING}: 0 of 2\n"
+
+
+def test_why_a_loop_is_not_compiled_is_told(monkeypatch, tmp_path, nothing_brought, capsys):
+    from seerob.app.console import progress
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    names = ["paint averaged", "paint there_is_none"]
+    progress.compile_loops(names)
+    assert progress.missing_loops(names) == ["paint there_is_none"]
+    said = capsys.readouterr().err
+    assert "compiled when they are called, as that failed now: paint there_is_none\n" in said
+    assert "AttributeError: module 'seerob.kernels.paint' has no attribute 'there_is_none'" in said
 
 
 def test_where_no_process_can_be_started_loops_are_compiled_when_they_are_called(

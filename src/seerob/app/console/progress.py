@@ -9,14 +9,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from queue import Queue
 from shutil import rmtree
 from threading import Thread
 from types import TracebackType
-from typing import Any, Self
+from typing import IO, Any, Self
 
 from seerob.app.console.terminal import STATUS
 from seerob.core.errors import SeerobError
@@ -210,6 +210,10 @@ def spinner(*, quiet: bool = False) -> Iterator[Callable[[str], None]]:
 COMPILING = "compiling the inner loops, once"
 MOST = 4
 """Processes at once, of about 300 MB each; one loop takes a third of all the time."""
+ATTEMPTS = 2
+"""To compile a loop: what ends a process, or lets it fail beside others, seldom comes twice."""
+LAST_LINES = 6
+"""Of what a process said that failed."""
 
 
 def compile_loops(wanted: Collection[str] | None = None) -> None:
@@ -217,15 +221,26 @@ def compile_loops(wanted: Collection[str] | None = None) -> None:
 
     Those of `LOOPS` there unless others are named.
 
-    What cannot be compiled here, whatever the reason, is compiled when it is called.
+    What cannot be compiled here, whatever the reason, is told, and compiled when it is called.
     """
     missing = missing_loops(wanted)
     if not missing or not sys.executable or getattr(sys, "frozen", False):
         return
     STATUS.print(f"{COMPILING}: 0 of {len(missing)}", markup=False)
-    with spinner() as say, closing(_compiled(missing)) as compiled:
-        for done, _ in enumerate(compiled, 1):
-            say(f"{COMPILING}: {done} of {len(missing)}")
+    left, why = list(missing), ""
+    with spinner() as say:
+        for _ in range(ATTEMPTS):
+            with closing(_compiled(tuple(left))) as compiled:
+                for name, failure in compiled:
+                    if failure:
+                        why = failure
+                        continue
+                    left.remove(name)
+                    say(f"{COMPILING}: {len(missing) - len(left)} of {len(missing)}")
+            if not left:
+                return
+    text = f"compiled when they are called, as that failed now: {', '.join(left)}"
+    STATUS.print(printable(f"{text}\n{why}" if why else text), markup=False)
 
 
 def missing_loops(wanted: Collection[str] | None = None) -> list[str]:
@@ -251,56 +266,73 @@ def missing_loops(wanted: Collection[str] | None = None) -> list[str]:
     return [name for name in (LOOPS if wanted is None else wanted) if not is_there(name)]
 
 
-def _compiled(names: Sequence[str]) -> Generator[str]:
-    """Compile loops in processes side by side; yields the name of each when it is done."""
-    waiting, answers = iter(names), Queue[str | None]()
+def _compiled(names: Sequence[str]) -> Generator[tuple[str, str]]:
+    """Compile loops in processes side by side.
+
+    Yields:
+        The name of each when it is done, and why it is not; it is then left, and its process gone.
+    """
+    waiting, answers = iter(names), Queue[tuple[str, str] | None]()
     workers: list[subprocess.Popen[str]] = []
 
-    def share(worker: subprocess.Popen[str]) -> None:
+    def share(worker: subprocess.Popen[str], errors: IO[str]) -> None:
         assert worker.stdin is not None
         assert worker.stdout is not None
-        with suppress(OSError):  # it has ended
-            for name in waiting:
+        for name in waiting:
+            answer = ""
+            with suppress(OSError):  # it has ended
                 worker.stdin.write(f"{name}\n")
                 worker.stdin.flush()
-                if not worker.stdout.readline():
-                    break
-                answers.put(name)
+                answer = worker.stdout.readline()
+            answers.put((name, "" if answer else _last_words(worker, errors)))
+            if not answer:
+                break
         answers.put(None)
 
     threads: list[Thread] = []
-    try:
-        for _ in range(min(MOST, os.cpu_count() or 1, len(names))):
-            try:
-                workers.append(_worker())
-            except OSError:  # no process can be started
-                break
-            threads.append(Thread(target=share, args=workers[-1:], daemon=True))
-            threads[-1].start()
-        for _ in workers:
-            while (name := answers.get()) is not None:
-                yield name
-    finally:
-        for worker in workers:
-            worker.kill()
-        for thread in threads:
-            thread.join()
-        for worker in workers:
-            with worker:
-                pass  # closes its pipes and waits for its end
+    with ExitStack() as files:
+        try:
+            for _ in range(min(MOST, os.cpu_count() or 1, len(names))):
+                try:
+                    errors = files.enter_context(tempfile.TemporaryFile("w+", errors="replace"))
+                    workers.append(_worker(errors))
+                except OSError:  # no process can be started
+                    break
+                threads.append(Thread(target=share, args=(workers[-1], errors), daemon=True))
+                threads[-1].start()
+            for _ in workers:
+                while (answer := answers.get()) is not None:
+                    yield answer
+        finally:
+            for worker in workers:
+                worker.kill()
+            for thread in threads:
+                thread.join()
+            for worker in workers:
+                with worker:
+                    pass  # closes its pipes and waits for its end
 
 
-def _worker() -> subprocess.Popen[str]:
+def _worker(errors: IO[str]) -> subprocess.Popen[str]:
     path = os.pathsep.join(entry for entry in sys.path if entry)
     return subprocess.Popen(
         (sys.executable, "-P", "-m", "seerob.kernels._beforehand"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=errors,
         env={**os.environ, "PYTHONPATH": path},
         text=True,
         process_group=0,  # Ctrl-C is for the command, which ends it
     )
+
+
+def _last_words(worker: subprocess.Popen[str], errors: IO[str]) -> str:
+    """Why a process has ended that should not."""
+    with suppress(subprocess.TimeoutExpired):
+        worker.wait(5)
+    errors.seek(0)
+    said = [line for line in errors.read().splitlines() if line.strip()]
+    return "\n".join(said[-LAST_LINES:]) or f"the process ended with {worker.returncode}"
 
 
 def cache_folders() -> list[Path]:

@@ -245,10 +245,49 @@ def test_who_takes_the_place_of_another_is_relied_on_after_a_while():
 
     assert not doubt(0.0, "a")
     assert "/joint_states is heard from two, a and b" in doubt(1.0, "b")
-    assert not doubt(1.1, "a", "/tf")
+    assert doubt(1.1, "a", "/tf")  # what is known of the robot is of both topics
     assert doubt(1.0 + rmw_zenoh.ONE_ALONE, "b")
     assert not doubt(1.1 + rmw_zenoh.ONE_ALONE, "b")
     assert doubt(3.2, "a")
+
+
+def test_a_frame_that_stays_is_not_relied_on_once_two_bridges_have_said_it(monkeypatch):
+    """Also of a robot that stands switched off: its frames are there all the same."""
+    monkeypatch.setattr(rmw_zenoh, "ONE_ALONE", 0.05)
+    port, straight = free_port(), (1.0, 0.0, 0.0, 0.0)
+    moves, own, foreign = (
+        encode(Content.TF, (Transform(stamp, parent, child, (x, 0.0, 0.0), straight),), Edition.ROS2)
+        for stamp, parent, child, x in (
+            (1.0, "base_link", "link", 0.5), (None, "link", "tool0", 0.1), (None, "link", "tool0", 0.2),
+        )
+    )  # fmt: skip
+
+    async def listened(send):
+        found, sent = [], False
+        tracked = source(port, content=Content.TF)
+        async with asyncio.timeout(60), aclosing(tracked.listen(None)) as samples:
+            async for sample in samples:
+                found.append(sample)
+                if len(found) > 10 and not sent:
+                    sent = True
+                    send()
+                after = [x for x in found if math.isclose(x.position[0], 0.7)]
+                if after and sample.t - after[0].t > 1.0:
+                    return found, after
+
+    with router(port) as one, router(port, "connect") as other:
+        one.put("tf_static", own)
+        with again_and_again(lambda: one.put("tf", moves), lambda: found or one.put("tf_static", own)):
+            found = []
+
+            def send():
+                found.append("no more of it")
+                time.sleep(0.1)
+                other.put("tf_static", foreign)
+
+            every, after = asyncio.run(listened(send))
+    assert not every[0].reason
+    assert all("/tf_static is heard from two" in sample.reason for sample in after)
 
 
 def test_another_domain_is_not_heard_and_what_there_is_is_said(monkeypatch, caplog):

@@ -64,7 +64,7 @@ class Zenoh(RosSource, frozen=True, kw_only=True):
                     if nonsense >= NONSENSE:
                         raise
                     continue
-                nonsense, doubt = 0, origins.take(put)
+                nonsense, doubt = 0, origins.take(put, stays=put.topic == STATIC)
                 if put.topic == own:
                     last = put.arrived
                 yield ReceivedMessage(put.arrived, put.topic, said, doubt)

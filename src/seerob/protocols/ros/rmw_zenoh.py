@@ -180,8 +180,13 @@ class Origins:
         self._two: dict[str, tuple[float, str]] = {}
         """By topic, until when there is a doubt [s], and why."""
 
-    def take(self, put: Put) -> str:
-        """Take note of what was published: why it may be of another robot; empty where it may not."""
+    def take(self, put: Put, *, stays: bool = False) -> str:
+        """Take note of what was published: why what is known now may be of another robot; empty where not.
+
+        Args:
+            put: What was published, to any of the topics.
+            stays: Whether it is relied on from now on, as frames that never change are.
+        """
         before = self._newest.get(put.topic, put.origin)
         self._newest[put.topic] = put.origin
         if put.origin != before:
@@ -190,9 +195,8 @@ class Origins:
                 f"{put.topic} is heard from two, {one} and {other}: give the domain, or each bridge a "
                 "namespace of its own"
             )
-            self._two[put.topic] = put.arrived + ONE_ALONE, text
-        until, why = self._two.get(put.topic, (-math.inf, ""))
-        return why if put.arrived <= until else ""
+            self._two[put.topic] = math.inf if stays else put.arrived + ONE_ALONE, text
+        return next((why for until, why in self._two.values() if put.arrived <= until), "")
 
 
 class Router:

@@ -2,6 +2,7 @@
 
 import asyncio
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from seerob.devices.sources.natnet import Coordinates, Natnet, Tracked, Transmis
 from seerob.files.motion_capture.upright import world_from_file
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking import natnet
-from seerob.protocols.tracking.natnet import Message, models
+from seerob.protocols.tracking.natnet import Bodies, Message, models
 from sources.listening import by_name, heard
 
 VERSIONS = [(2, 0), (2, 1), (2, 3), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2)]
@@ -95,6 +96,28 @@ def test_rigid_bodies_are_trackers():
     (point,) = samples[-1].points
     assert (point.name, point.bone) == ("waist", "pelvis")
     np.testing.assert_allclose(point.position, PERSON(samples[-1].t_device).positions[0], atol=1e-6)
+
+
+class AlikeServer(NatnetServer):
+    """Rigid bodies of one number, of which the first is hidden."""
+
+    def models(self):
+        found = super().models()
+        return found._replace(bodies=tuple(body._replace(id=7) for body in found.bodies))
+
+    def frame(self, k):
+        found = super().frame(k)
+        bodies = [body._replace(id=7, tracked=n > 0) for n, body in enumerate(found.bodies)]
+        return replace(found, bodies=Bodies.of(bodies))
+
+
+def test_of_two_rigid_bodies_with_one_number_none_is_known():
+    worn = {"waist": (PERSON, "Pelvis"), "chest": (PERSON, "T8")}
+    with AlikeServer({"Anna": PERSON}, worn=worn, version=(4, 1), port=0) as made:
+        samples = heard(source(made, tracked=Tracked.RIGID_BODIES), lambda s: len(s) >= 2)
+    assert {point.bone for point in samples[-1].points} == {"pelvis", "thorax"}
+    assert all(point.position is None and point.wxyz is None for point in samples[-1].points)
+    assert samples[-1].quality is Quality.INVALID
 
 
 def test_a_multicast_group_is_heard():

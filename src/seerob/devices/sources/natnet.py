@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from dataclasses import replace
@@ -209,18 +210,19 @@ class _Known:
     def __init__(
         self, layout: Layout, models: Sequence[BoneModel], numbers: tuple[int, ...], subject: str = ""
     ) -> None:
-        self.layout, self.models, self.numbers, self._subject = layout, models, numbers, subject
+        self.layout, self.models, self._subject = layout, models, subject
+        # Of two with one number nobody knows which is which.
+        count = Counter(numbers)
+        self.numbers = tuple([n if count[n] == 1 else None for n in numbers])
 
     def frame(self, t: float, bodies: Bodies, world: _World) -> CaptureFrame:
         """Rows in the order of the models; NaN for what was not tracked."""
         with np.errstate(invalid="ignore", over="ignore"):  # numbers that cannot be are for others
             positions, turns = bodies.poses[:, :3] @ world.places, bodies.poses[:, 3:] @ world.turns
         if bodies.numbers != self.numbers or not all(bodies.tracked):
-            seen = {
-                n: k
-                for k, (n, tracked) in enumerate(zip(bodies.numbers, bodies.tracked, strict=True))
-                if tracked
-            }
+            seen: dict[int | None, int] = {}
+            for k, (number, tracked) in enumerate(zip(bodies.numbers, bodies.tracked, strict=True)):
+                seen[number] = k if tracked and number not in seen else -1
             rows = [seen.get(number, -1) for number in self.numbers]
             nothing = np.full((1, 4), np.nan)
             positions = np.concatenate([positions, nothing[:, :3]])[rows]

@@ -246,6 +246,33 @@ def test_frames_of_nothing_are_invalid_and_frames_of_another_size_are_left_out()
     assert [s.quality for s in samples] == [Quality.GOOD, Quality.INVALID, Quality.GOOD]
 
 
+def test_somebody_else_with_other_bones_leaves_a_calibration_as_it_is():
+    pose = {"both_elbow_pronation_deg": 90.0}
+    frames = turned([frame(k / 60, pose, subject="1") for k in range(400)], "left_hand", np.pi / 2)
+    fewer = Layout(Seen.SEGMENTS, BONES[:-1], "seerob")
+    whole = frame(0.0, shift=np.array([2.0, 0, 0]), subject="2")
+    other = CaptureFrame(0.0, whole.positions[:-1], whole.orientations[:-1], subject="2")
+
+    class Crowded(Heard, frozen=True, kw_only=True):
+        async def frames(self):
+            for each in self.said:
+                await asyncio.sleep(0.001)
+                yield self.layout, each
+                yield fewer, other
+
+    async def all_of():
+        calibration = Calibration(pose="npose", duration=0.1)
+        source = Crowded(human="operator", said=tuple(frames), calibration=calibration, timeout=60.0)
+        return [sample async for sample in source.listen(TARGET)]
+
+    _, *samples = asyncio.run(all_of())
+    assert {sample.subject for sample in samples} == {"1"}
+    R, _ = bone_poses(PERSON, posture(PERSON, pose))
+    for sample in samples:
+        hand = next(p for p in sample.points if p.bone == "left_hand")
+        assert rotation_from_wxyz(hand.wxyz) == pytest.approx(R[BONES.index("left_hand")], abs=1e-9)
+
+
 def test_a_stream_is_silent_while_it_is_calibrated_and_says_what_it_found(caplog):
     pose = {"both_elbow_pronation_deg": 90.0}
     frames = turned([frame(k / 60, pose) for k in range(400)], "left_hand", np.pi / 2)

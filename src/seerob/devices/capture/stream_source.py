@@ -175,12 +175,12 @@ class _Hearing:
 
     def take(self, layout: Layout, frame: CaptureFrame, now: float) -> BodySample | SignalSample | None:
         """The sample of a frame that arrived at ``now`` [s]; None while there is nothing to say."""
-        bound = self._bind(layout)
         if len(frame.positions) != len(layout.names):
             return None
         followed, changed = self._follows(frame, now)
         if not followed:
             return None
+        bound = self._bind(layout)
         if frame.wearer != self._wearer:
             if self._wearer is not None and self._calibrated:
                 bound = self._begin(layout)

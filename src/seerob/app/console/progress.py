@@ -214,6 +214,8 @@ ATTEMPTS = 2
 """To compile a loop: what ends a process, or lets it fail beside others, seldom comes twice."""
 LAST_LINES = 6
 """Of what a process said that failed."""
+ENDED = "the process ended with"
+"""And its code, where it said nothing."""
 
 
 def compile_loops(wanted: Collection[str] | None = None) -> None:
@@ -332,7 +334,7 @@ def _last_words(worker: subprocess.Popen[str], errors: IO[str]) -> str:
         worker.wait(5)
     errors.seek(0)
     said = [line for line in errors.read().splitlines() if line.strip()]
-    return "\n".join(said[-LAST_LINES:]) or f"the process ended with {worker.returncode}"
+    return "\n".join(said[-LAST_LINES:]) or f"{ENDED} {worker.returncode}"
 
 
 def cache_folders() -> list[Path]:

@@ -117,7 +117,7 @@ def test_before_much_is_told_the_largest_counts():
 @pytest.mark.parametrize("samples", [3, SAMPLES])
 def test_how_far_derived_speeds_may_be_off_holds_from_the_first_time_it_is_told(samples):
     rng = np.random.default_rng(3)
-    for count in (1, 2, 3, 5, 8, 9, 12):
+    for count in (1, 2, 3, 5, 8, 9, 12, 16, 20, 32):
         beyond = []
         for _ in range(1000):
             noise, q = PositionNoise(), rng.standard_normal(count + 3)
@@ -126,6 +126,15 @@ def test_how_far_derived_speeds_may_be_off_holds_from_the_first_time_it_is_told(
             (error,) = noise.speed_error(np.arange(float(len(q))).tolist())
             beyond.append(abs(end_slope(np.arange(float(len(q))), q)) > error)
         assert np.mean(beyond) < 0.008, count
+
+
+@pytest.mark.parametrize("step", [1e-160, 1e150])
+def test_instants_that_are_too_near_or_too_far_apart_tell_nothing(step):
+    slope = Differentiator(np.inf)
+    for k in range(SAMPLES):
+        slope.add(step * k, (0.1 * (k % 2),))
+        error = slope.error()
+        assert error is None or not np.isfinite(error[0])
 
 
 @pytest.mark.parametrize("before", [2, 200])

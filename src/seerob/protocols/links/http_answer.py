@@ -62,8 +62,8 @@ class Question:
             raise ConnectionError(str(error) or type(error).__name__) from error
 
     def _asked(self) -> httpx.Request:
-        # Made once, but for a server that gives cookies.
-        if self._request is None or self._client.cookies:
+        # Made once, but for a server that gives cookies, or has taken them back.
+        if self._request is None or self._client.cookies or "Cookie" in self._request.headers:
             self._request = self._client.build_request(
                 self._method, self._url, headers=self._headers, content=self._content
             )

@@ -1,14 +1,17 @@
 // Units in which the page writes what the engine says in metres and radians.
 
+import { computed } from "@preact/signals";
 import { lengthUnit } from "./editing/handles";
 import { remembered } from "./remembered";
-import { told, word } from "./words";
+import { language, told, word } from "./words";
 
 export { lengthUnit };
 
 /** Angles: joints in degrees and figures as their criteria have them, or all of them in one. */
 export const ANGLES = [word("as given"), "°", "rad"] as const;
 export const angleUnit = remembered("seerob.angle", ANGLES, "as given");
+/** Another object whenever `spoken` says the same otherwise. */
+export const manner = computed(() => [language.value, lengthUnit.value, angleUnit.value]);
 
 const DEGREES = 180 / Math.PI;
 

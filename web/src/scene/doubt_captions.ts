@@ -3,7 +3,7 @@
 import { Box3, Group } from "three";
 import type { Doubts } from "../doubts";
 import { Caption } from "../markers/caption";
-import { spoken } from "../units";
+import { manner, spoken } from "../units";
 import type { Scene } from "../wire";
 import type { Bodies } from "./bodies";
 
@@ -11,6 +11,10 @@ export class DoubtCaptions {
   readonly root = new Group();
   /** Those that are written now are visible. */
   readonly captions: Caption[] = [];
+  /** What each of them says of whom, and how it is said. */
+  private readonly names: string[] = [];
+  private readonly reasons: string[] = [];
+  private manner = manner.peek();
   private readonly box = new Box3();
   private readonly part = new Box3();
 
@@ -23,6 +27,8 @@ export class DoubtCaptions {
    */
   update(scene: Scene | null, doubts: Doubts, most: number): void {
     let used = 0;
+    const same = this.manner === manner.peek();
+    this.manner = manner.peek();
     if (doubts.size > 0)
       for (const { name } of scene?.mechanisms ?? []) {
         const reason = used < most ? doubts.get(name) : undefined;
@@ -30,7 +36,12 @@ export class DoubtCaptions {
         const caption = this.captionAt(used);
         this.box.getCenter(caption.object.position).z = this.box.max.z;
         caption.object.visible = true;
-        caption.say(shortened(name, spoken(reason)), "undecided");
+        // To put it into words at each picture would leave words to be thrown away.
+        if (!same || this.names[used] !== name || this.reasons[used] !== reason) {
+          caption.say(shortened(name, spoken(reason)), "undecided");
+          this.names[used] = name;
+          this.reasons[used] = reason;
+        }
         used += 1;
       }
     for (let k = used; k < this.captions.length; k += 1) this.captions[k]!.object.visible = false;

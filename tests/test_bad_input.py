@@ -348,8 +348,10 @@ def test_what_cannot_be_evaluated_is_refused_before_the_run(tmp_path, what):
     ("text", "more", "level", "words"),
     [
         ("", {"arm.urdf": two_r(masses=(0, 1))}, "warning", "mass is 0 kg, expected more than 0"),
-        (PART + MESH, {"it.stl": OPEN}, "note", "mesh is open"),
-        (PART + MESH + "density = 7900\n", {"it.stl": OPEN}, "assumed", "as if nothing closed its holes"),
+        (PART + MESH, {"it.stl": OPEN}, "warning", "nobody says whether its openings are closed"),
+        (PART + MESH + 'openings = "open"\n', {"it.stl": OPEN}, "note", "as if nothing closed its holes"),
+        (PART + MESH + 'openings = "closed"\n', {"it.stl": OPEN}, "note", "each opening counts as closed"),
+        (PART + MESH + "hole_depth = 0.1\n", {"it.stl": OPEN}, "note", "of its rim, and 0.1 m beyond"),
     ],
 )
 def test_what_only_some_figures_need_is_told_before_the_run(tmp_path, text, more, level, words):

@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple, Self
 
@@ -70,6 +70,9 @@ class Solid:
     deviation: float = 0.0
     """How far the real surface may lie outside this shape, as far as known [m] (a display mesh that
     sticks out of a collision mesh); part of the uncertainty of every distance."""
+    lids: tuple[Mesh, ...] = ()
+    """Closed meshes that may be surface, too: what closes its openings, where nobody says that they are open
+    in reality. No distance is to them (`seerob.model.model.Model.closed`)."""
 
     def __post_init__(self) -> None:
         if (self.mesh is None) == (self.points is None):
@@ -82,6 +85,11 @@ class Solid:
     def __repr__(self) -> str:
         core = repr(self.mesh) if self.points is None else ("segment", "rectangle")[len(self.points) - 2]
         return f"<Solid {self.name!r}: {core}, radius {self.radius:g} m>"
+
+    @property
+    def closings(self) -> tuple[Solid, ...]:
+        """Its lids, as far off as it is."""
+        return tuple(replace(self, mesh=lid, lids=()) for lid in self.lids)
 
 
 def capsule(start: Array, end: Array, radius: float, *, name: str = "") -> Solid:

@@ -154,6 +154,35 @@ def undecided(result: Result, reason: str) -> Result:
     )
 
 
+def openings_decide(model: Model, criterion: Criterion) -> str:
+    """Why what is within by a mesh as it is may not be: nobody says whether its openings are closed."""
+    judged = {model.bodies[i].owner for i in criterion.judged(model)}
+    names = [name for name in model.possibly_closed if name in judged] or model.possibly_closed
+    return (
+        f"it rests on openings of {', '.join(names)}, and nobody says whether they are closed in reality: "
+        'give openings = "open" or "closed" there'
+    )
+
+
+def closed_too(result: Result, closed: Result, criterion: Criterion, model: Model) -> Result:
+    """What is said of meshes as they are, as far as it is said of them with their openings closed, too.
+
+    Args:
+        result: Of the meshes as they are, whose value it keeps.
+        closed: Of the same criterion with all openings closed of which nobody says whether they are.
+        criterion: Of both.
+        model: The compiled workstation.
+    """
+    same = result.limit == closed.limit and result.t == closed.t
+    if same and result.value is not None and closed.value is not None:
+        ends = [end for each in (result, closed) for end in (each.value, *(each.interval or ()))]
+        least, most = min(ends), max(ends)
+        result = replace(result, interval=(least, most)) if least < most else result
+    if closed.verdict is _WITHIN or closed.nothing or closed.muted or closed.verdict is result.verdict:
+        return result
+    return undecided(result, openings_decide(model, criterion))
+
+
 def _open_marker(marker: Marker) -> Marker:
     return replace(marker, verdict=_UNDECIDED) if marker.verdict is _WITHIN else marker
 
@@ -162,28 +191,28 @@ def _open(part: Result, reason: str) -> Result:
     return part if part.verdict is None and part.value is None else undecided(part, reason)
 
 
-def plan_of(questions: Sequence[Question], model: Model) -> Plan:
+def plan_of(questions: Sequence[Question]) -> Plan:
     """What of a tick can be computed together: of shipped kinds, what is asked at every tick.
 
     Whoever was not asked in a clear tick yet, or asked for more than they declare, is asked alone.
     """
-    kinds = dict[Callable[..., Together | Whole], list[int]]()
+    kinds = dict[tuple[Callable[..., Together | Whole], int], list[int]]()
     for i, question in enumerate(questions):
         bound, rests = question.bound, question.rests
         if question.own or not question.always or question.relied_on or bound.evaluate is not bound.given:
             continue
         if rests is None or question.undeclared or not rests <= question.declared:
             continue
-        if (kind := question.criterion.planned(model)) is not None:
-            kinds.setdefault(kind, []).append(i)
+        if (kind := question.criterion.planned(question.model)) is not None:
+            kinds.setdefault((kind, id(question.model)), []).append(i)
     every = []
-    for kind, indices in kinds.items():
+    for (kind, _), indices in kinds.items():
         criteria = [questions[i].criterion for i in indices]
         same = [
             Result(name=each.name, unit=each.unit, limit=getattr(each, "limit", None), at_most=each.at_most)
             for each in criteria
         ]
-        every.append((kind(criteria, model), indices, same))
+        every.append((kind(criteria, questions[indices[0]].model), indices, same))
     return Plan(every, len(questions))
 
 
@@ -206,7 +235,9 @@ class Judge:
     def __init__(
         self, bound: Sequence[Bound], findings: Iterable[Finding] = (), unmoved: Collection[str] | None = None
     ) -> None:
-        self._bound, self._unmoved = bound, unmoved
+        self._given, self._unmoved = bound, unmoved
+        self._bound = (*bound, *(one.closed for one in bound if one.closed is not None))
+        """And each that may be closed, after all as they are."""
         self._first = True
         self._questions: list[Question] = []
         """Of every criterion, once the model is known."""
@@ -229,13 +260,14 @@ class Judge:
         """Results at this state, in the order of the file."""
         if self._plausible_places is None:
             model = state.model
-            self._questions = [question_of(one, model) for one in self._bound]
+            models = (model,) * len(self._given) + (model.closed or model,) * len(self._bound)
+            self._questions = [question_of(*each) for each in zip(self._bound, models, strict=False)]
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
             self._hold(model, findings)
             self._plausible_places = PlausiblePlaces(model)
-            self._in_hand = InHand(model, self._bound)
+            self._in_hand = InHand(model, self._given)
             known = {finding.holds for finding in findings}
-            claims = (claim for one in self._bound for claim in one.criterion.claims(model))
+            claims = (claim for one in self._given for claim in one.criterion.claims(model))
             self._claims = [claim for claim in claims if claim.holds not in known]
         worded = self._plausible_places.at(state)
         refuted = [(claim, what) for claim in self._claims if (what := claim(state)) is not None]
@@ -261,6 +293,8 @@ class Judge:
         # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
         found = self._between(state, results, Asking(ask, look, undecided))
         found, self._passed = self._untold(found, state), [result.muted for result in found]
+        if len(found) > len(self._given):
+            found = self._closed_too(found)
         if not self._in_hand.never:
             for i, why in self._in_hand.reasons(state, found).items():
                 if not found[i].muted:
@@ -269,8 +303,16 @@ class Judge:
             return found
         return tuple(
             undecided(result, question.why) if question.why and not result.muted else result
-            for result, question in zip(found, self._questions, strict=True)
+            for result, question in zip(found, self._questions, strict=False)
         )
+
+    def _closed_too(self, results: tuple[Result, ...]) -> tuple[Result, ...]:
+        """What is said of everything as its meshes are, as far as it is said with openings closed, too."""
+        found, closed = list(results[: len(self._given)]), iter(results[len(self._given) :])
+        for i, one in enumerate(self._given):
+            if one.closed is not None:
+                found[i] = closed_too(found[i], next(closed), one.criterion, self._questions[i].model)
+        return tuple(found)
 
     def _untold(self, results: tuple[Result, ...], state: State) -> tuple[Result, ...]:
         """Results without what rests on a variable of which samples turn out to be missing."""
@@ -300,7 +342,7 @@ class Judge:
         """Resolve what is held by findings, and by shapes that are missing."""
         names = held_names(findings, model)
         for question in self._questions:
-            holds = question.hold(model, findings, names)
+            holds = question.hold(findings, names)
             self._holds = self._holds or holds  # and stays so for what was said meanwhile
 
     def _asked_together(self, state: State) -> list[Result]:
@@ -312,7 +354,7 @@ class Judge:
         if plan is None or not (plan.some and state.clear):
             results = [self._one(question, state) for question in questions]
             if plan is None and not self._first and state.clear:
-                self._plan = plan_of(questions, state.model)
+                self._plan = plan_of(questions)
             return results
         planned = plan(state)
         results = []
@@ -360,7 +402,7 @@ class Judge:
         How long something is held is a figure of methods that judge work: none at the first instant, and
         how long a motion of somebody else lasts says nothing of it.
         """
-        criterion, model = question.criterion, state.model
+        criterion, model = question.criterion, question.model
         by_instant = not (question.own or question.bound.group == "ergonomics" or criterion.remembers(model))
         if by_instant or result.verdict is not _WITHIN:
             return result
@@ -369,7 +411,7 @@ class Judge:
             unmoved = [name for name, said in state.hearings.items() if not said.driven and not said.heard]
         if not question.declared <= {*unmoved, question.muted_by}:  # nor does a variable change
             return result
-        later = State(model, copy(state.data), state.hearings, state.signals)
+        later = State(state.model, copy(state.data), state.hearings, state.signals)
         later.attachments = state.attachments
         edges = question.turns(state.t, state.t + SHIFT) if question.turns is not None else ()
         later.refresh((state.t + edges[0]) / 2 if edges else state.t + SHIFT)
@@ -495,7 +537,9 @@ class Judge:
         """A result with the noise of speeds that it asked for in its interval; undecided across a limit."""
         criterion = question.criterion
         if question.again is None:
-            question.again = (None if criterion.remembers(state.model) else criterion.bind(state.model),)
+            question.again = (
+                None if criterion.remembers(question.model) else criterion.bind(question.model),
+            )
         (again,) = question.again
         if again is not None and question.bound.own:
             again = partial(_asked_alone, question.bound, again)

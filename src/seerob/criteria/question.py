@@ -37,6 +37,9 @@ class Bound:
     """How it is judged between two ticks; None where nothing bounds it."""
     given: Evaluate | None = None
     """What its kind's `bind` gave: a plan stands for that alone."""
+    closed: Bound | None = None
+    """Its criterion bound to the workstation with all openings closed of which nobody says whether they are
+    (`Model.closed`): nothing is within that is not so by both. None where that changes nothing."""
 
     def __repr__(self) -> str:
         return f"<Bound {self.criterion.name!r}: {type(self.criterion).__name__} of {self.group}>"
@@ -98,7 +101,9 @@ def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
         if not right:
             wanted = "a function of State" if what == "bind" else "a seerob.api.Basis"
             raise PluginError(f"{what} of {kind.__module__} returns {type(returned).__name__}, not {wanted}")
-    return Bound(criterion, group, evaluate, basis, given=evaluate)
+    shaped = group == "safety" and criterion.by_shape
+    closed = bound_to(model.closed, criterion, group) if shaped and model.closed is not None else None
+    return Bound(criterion, group, evaluate, basis, given=evaluate, closed=closed)
 
 
 def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[int, ...]]:
@@ -251,6 +256,8 @@ class Question:
 
     bound: Bound
     criterion: Criterion
+    model: Model
+    """To which it is bound."""
     names: tuple[str, ...]
     """Robots, people and machines that must be where the twin shows them before it is asked."""
     bodies: tuple[int, ...]
@@ -294,15 +301,14 @@ class Question:
         self.own, self.shaken = self.bound.own, not self.criterion.by_speed
         self.always = self.criterion.active is None and self.criterion.every is None and self.turns is None
 
-    def hold(self, model: Model, findings: Iterable[Finding], names: Mapping[str, str]) -> bool:
+    def hold(self, findings: Iterable[Finding], names: Mapping[str, str]) -> bool:
         """Take note of what is held by findings, and by shapes that are missing; whether anything is.
 
         Args:
-            model: The compiled workstation.
             findings: See `held`.
             names: What they hold, by name (`held_names`).
         """
-        self.held, self.held_names = held(self.criterion, model, findings), names
+        self.held, self.held_names = held(self.criterion, self.model, findings), names
         return bool(self.held or self.unmentioned or names)
 
     def held_for(self, asked: Collection[str]) -> str:
@@ -375,4 +381,6 @@ def question_of(bound: Bound, model: Model) -> Question:
     phases = entered_for(model, bound.criterion)
     changes = turns(phases) if phases else None
     moves = bool(bound.criterion.depends(model))
-    return Question(bound, bound.criterion, names, bodies, declared, shapeless, moves, rests, turns=changes)
+    return Question(
+        bound, bound.criterion, model, names, bodies, declared, shapeless, moves, rests, turns=changes
+    )

@@ -67,9 +67,28 @@ OPEN = (
     "mesh is open: distances are to its surface alone, as if nothing closed its holes, and what counts as "
     "inside goes by the winding number"
 )
+INSIDE = "mesh is open, and what counts as inside goes by the winding number"
+CLOSED = "mesh is open: each opening counts as closed in the convex hull of its rim"
+PERHAPS_OPEN = (
+    "mesh is open, and nobody says whether its openings are closed in reality: nothing is within that would "
+    "not be with a surface anywhere in the convex hull of their rims, and one that bulges beyond is not "
+    'looked for; give openings = "open" or "closed"'
+)
 ROTOR = (
     "rotor inertia unknown, nobody published it: mass matrix and effective mass are those of the links alone"
 )
+
+
+def openings(said: str | None, solids: Iterable[Solid]) -> tuple[str, str]:
+    """Level and text of a finding about an open mesh.
+
+    Args:
+        said: What the user says of its openings.
+        solids: With what may close them where nobody says that; of slits that rounding left, nothing.
+    """
+    if any(solid.lids for solid in solids):
+        return "warning", PERHAPS_OPEN
+    return "note", CLOSED if said == "closed" else OPEN
 
 
 def plausible_limit(which: str, value: float | None) -> tuple[float | None, str]:
@@ -339,13 +358,17 @@ def massless(description: Description) -> Iterator[tuple[str, str, str]]:
 
 def open_meshes(description: Description) -> Iterator[tuple[str, str, str]]:
     """A finding with the links whose surface has a hole, so that what is inside of them is a convention."""
-    found = [
+    if found := open_links(description):
+        yield "note", "", f"{', '.join(found)}: {INSIDE}"
+
+
+def open_links(description: Description) -> list[str]:
+    """Names of links whose surface has a hole."""
+    return [
         link.name
         for link in description.links
         if any(solid.mesh is not None and not is_closed(solid.mesh) for solid in link.solids)
     ]
-    if found:
-        yield "note", "", f"{', '.join(found)}: {OPEN}"
 
 
 def misplaced_mass(link: Link) -> Iterator[tuple[str, str, str]]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import add
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -44,6 +45,8 @@ class Shapes:
     kids: NDArray[np.int32]
     """Of all meshes, in numbers of all; see `seerob.kernels.wide`."""
     probes: Array
+    lids: tuple[tuple[int, ...], ...]
+    """Columns of what may close openings of each body (`Solid.lids`), which no question is about."""
 
     @classmethod
     def build(cls, bodies: Sequence[tuple[str, Sequence[Solid]]], *, cache: Path | None = None) -> Shapes:
@@ -63,12 +66,18 @@ class Shapes:
         known: dict[int, tuple[_Made, list[int], int]] = {}
         stored: list[_Made] = []
         owned: list[tuple[int, ...]] = []
+        lids: list[tuple[int, ...]] = []
+        radii: list[float] = []
         which: list[list[int]] = []
         ends = np.zeros(3, int)
         wide = 0
         for body, (_, solids) in enumerate(bodies):
-            owned.append(tuple(range(len(made), len(made) + len(solids))))
-            for solid in solids:
+            closings = [lid for solid in solids for lid in solid.closings]
+            columns = tuple(range(len(made), len(made) + len(solids) + len(closings)))
+            owned.append(columns[: len(solids)])
+            lids.append(columns[len(solids) :])
+            for solid in (*solids, *closings):
+                radii.append(solid.radius)
                 found = None if solid.mesh is None else known.get(id(solid.mesh))
                 if found is None:
                     core = _made(solid, cache)
@@ -94,15 +103,21 @@ class Shapes:
             local=_rows([m.local for m in made], (12,)),
             ball=_rows([m.ball for m in made], (4,)),
             corners=_rows([m.corners for m in made], (8, 3)),
-            radius=np.array([s.radius for _, solids in bodies for s in solids], float),
+            radius=np.array(radii, float),
             nodes=np.concatenate([np.zeros((0, 20)), *(t.nodes for t in trees)]),
             links=np.concatenate([np.zeros((0, 2), np.int32), *(t.links for t in trees)]),
             triangles=np.concatenate([np.zeros((0, 13)), *(t.triangles for t in trees)]),
             boxes=np.concatenate([np.zeros((0, 120), np.float32), *(t.boxes for t in trees)]),
             kids=_joined(trees),
             probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in stored)]),
+            lids=tuple(lids),
         )
         return shapes
+
+    def closed(self) -> Shapes:
+        """Return these arrays with what may close openings as solids of its body, after the others."""
+        every = tuple(map(add, self.solids, self.lids))
+        return replace(self, solids=every, lids=((),) * len(every))
 
     def copied(self) -> Shapes:
         """Shapes in arrays of their own."""

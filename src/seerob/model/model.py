@@ -72,6 +72,17 @@ class Body:
         """How far the real surface may lie outside the shape used for distances [m]."""
         return max((solid.deviation for solid in self.solids), default=0.0)
 
+    @property
+    def may_be_closed(self) -> bool:
+        """Whether its mesh has openings of which nobody says whether they are closed in reality."""
+        return any(solid.lids for solid in self.solids)
+
+    @property
+    def closed(self) -> Body:
+        """This body with these closed, solids in the order of `Shapes.closed`."""
+        lids = (lid for solid in self.solids for lid in solid.closings)
+        return replace(self, solids=(*(replace(solid, lids=()) for solid in self.solids), *lids))
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -264,6 +275,22 @@ class Model:
             self, mj=mj, bodies=bodies, frames=frames, mechanisms=mechanisms, dictionary=dictionary,
             shapes=shapes, _gaps=gaps,
         )  # fmt: skip
+
+    @cached_property
+    def closed(self) -> Model | None:
+        """This model with all openings closed of which nobody says whether they are; None without any.
+
+        Only what distances are asked of is another one, in the arrays of this one's.
+        """
+        if not any(self.shapes.lids):
+            return None
+        bodies = tuple(body.closed if body.may_be_closed else body for body in self.bodies)
+        return replace(self, bodies=bodies, shapes=self.shapes.closed(), _gaps={}, _owned={})
+
+    @cached_property
+    def possibly_closed(self) -> tuple[str, ...]:
+        """Table entries whose meshes have openings of which nobody says whether they are closed."""
+        return tuple(dict.fromkeys(body.owner for body in self.bodies if body.may_be_closed))
 
     @property
     def estimate_uncertainty(self) -> dict[str, float]:

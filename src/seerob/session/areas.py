@@ -31,7 +31,7 @@ from seerob.session.run import Bound
 from seerob.twin.machines.gripping import before
 from seerob.workstation.workstation import Area, SweptArea, Workstation
 
-VERSION = "seerob swept area 3"
+VERSION = "seerob swept area 4"
 """Changes whenever what is made does."""
 MOST = 6_000
 """Triangles of an area, about; it still contains every voxel."""

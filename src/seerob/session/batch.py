@@ -26,7 +26,7 @@ from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, EvaluateMany
-from seerob.criteria.judging import Judge
+from seerob.criteria.judging import Judge, openings_decide
 from seerob.criteria.question import Question, held_names, question_of, worded
 from seerob.model.model import Model
 from seerob.outputs.notebook import batch_html, plotted
@@ -184,7 +184,7 @@ def judged(
     motion: Motion,
     *,
     threads: int,
-    findings: Iterable[Finding] = (),
+    findings: Sequence[Finding] = (),
 ) -> Batch:
     """Judge a motion.
 
@@ -195,6 +195,42 @@ def judged(
         threads: How many work at once.
         findings: Of sources, besides those of the model (`Finding.holds`).
     """
+    found = _as_it_is(model, bound, motion, threads=threads, findings=findings)
+    openings = [one.closed for one in bound if one.closed is not None]
+    if model.closed is None or not openings:
+        return found
+    closed = _as_it_is(model.closed, openings, motion, threads=threads, findings=findings)
+    columns = dict(found.columns)
+    for one in openings:
+        name = one.criterion.name
+        columns[name] = _closed_too(columns[name], closed[name], openings_decide(model, one.criterion))
+    return replace(found, columns=columns)
+
+
+def _closed_too(column: Column, closed: Column, why: str) -> Column:
+    """What is said of meshes as they are, as far as it is with openings closed (`closed_too`).
+
+    Args:
+        column: Of the meshes as they are, whose values it keeps.
+        closed: Of the same criterion with all openings closed of which nobody says whether they are.
+        why: What is not within by the meshes alone rests on.
+    """
+    said, other = column.answers, closed.answers
+    same = (said.limit == other.limit) | (np.isnan(said.limit) & np.isnan(other.limit))
+    ends = [each for one in (said, other) for each in (one.value, *(one.interval or ()))]
+    low, high = (np.where(same, end, said.value) for end in (np.min(ends, axis=0), np.max(ends, axis=0)))
+    taken_back = ((said.verdict == WITHIN) | _idle(said)) & ~((other.verdict == WITHIN) | _idle(other))
+    verdict = np.where(taken_back, UNDECIDED, said.verdict).astype(np.uint8)
+    interval = said.interval if (low == high).all() else (low, high)
+    answers = replace(said, verdict=verdict, interval=interval, nothing=_idle(said) & ~taken_back)
+    reasons = np.where(taken_back, why, column.reasons)
+    return replace(column, answers=answers, reasons=reasons)
+
+
+def _as_it_is(
+    model: Model, bound: Sequence[Bound], motion: Motion, *, threads: int, findings: Sequence[Finding]
+) -> Batch:
+    """What all criteria say of a motion, of meshes as they are."""
     n = len(motion.t)
     findings = tuple(dict.fromkeys((*model.findings, *findings)))
     if motion.ways is not None:
@@ -376,7 +412,7 @@ def _able(
     for one in bound:
         criterion, question = one.criterion, question_of(one, model)
         many = criterion.batch(model)
-        question.hold(model, findings, names)
+        question.hold(findings, names)
         if many is None:
             why = criterion.one_by_one(model) or "its bind says more than its figure"
             notes[criterion.name] = f"asked instant by instant: {why}"

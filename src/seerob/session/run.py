@@ -81,8 +81,11 @@ def bind(model: Model) -> tuple[Bound, ...]:
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:
-                one = bound_to(model, criterion, group)
-                bound.append(replace(one, watch=watched(criterion, model, points)))
+                one = replace(bound_to(model, criterion, group), watch=watched(criterion, model, points))
+                if one.closed is not None and model.closed is not None:
+                    closed = replace(one.closed, watch=watched(criterion, model.closed, points))
+                    one = replace(one, closed=closed)
+                bound.append(one)
             except SeerobError as error:
                 # Many messages begin with the name of the criterion, which the key already says.
                 text = str(error).removeprefix(f"{criterion.name}: ")

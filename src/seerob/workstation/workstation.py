@@ -127,6 +127,10 @@ class Robot(_Table, frozen=True, kw_only=True):
     visuals: Literal["read", "ignore"] = "read"
     """``ignore``: what a description shows besides its collision shapes is not read, and distances take it
     that nothing stands out of those; where a link has no other shape, it is read all the same."""
+    openings: Literal["open", "closed"] | None = None
+    """Whether holes in meshes of its links are ``open`` in reality or ``closed``, each by a surface in the
+    convex hull of its rim. When not given, nothing is within that would not be with a surface anywhere in the
+    convex hull of all rims of a mesh."""
     scale: Annotated[float, Meta(ge=0.01, le=100)] = 1.0
     """How many times as large it is as the one that exists; masses, speeds and torques follow by similarity,
     and a finding says that there is no such robot."""
@@ -219,7 +223,12 @@ class Thing(_Table, frozen=True, kw_only=True):
     hole_depth: Annotated[float, unit("m", ge=0, le=1)] | None = None
     """How far the surface that a mesh lacks at its holes may lie beyond the convex hull of each hole's rim,
     of a heap of triangles from these [m]: 0 where all holes are flat. A mass by `density` needs it of a mesh
-    with holes; without it, a given mass may be anywhere in the hull of the mesh."""
+    with holes; without it, a given mass may be anywhere in the hull of the mesh. It says `openings` to be
+    closed, as they are of a body."""
+    openings: Literal["open", "closed"] | None = None
+    """Of a mesh with holes, whether they are ``open`` in reality, as of sheet metal, a fence or a tray, or
+    ``closed``, each by a surface in the convex hull of its rim or `hole_depth` beyond. With neither, nothing
+    is within that would not be with a surface anywhere in the convex hull of all rims."""
     triangles: Annotated[int, Meta(ge=100, le=20_000_000)] | None = None
     """Most triangles of each of its meshes on the screen, 20 000 when not given; how far what is shown is off
     then is a finding. Distances use all."""
@@ -251,6 +260,10 @@ class Thing(_Table, frozen=True, kw_only=True):
             raise ValueError("deviation is of a mesh: leave it out beside a shape")
         if self.hole_depth is not None and self.mesh is None:
             raise ValueError("hole_depth is of a mesh: leave it out beside a shape")
+        if self.openings is not None and self.mesh is None:
+            raise ValueError("openings are of a mesh: leave them out beside a shape")
+        if self.openings == "open" and self.hole_depth is not None:
+            raise ValueError("hole_depth is of openings that are closed: leave it out, or openings")
         if self.triangles is not None and self.mesh is None:
             raise ValueError("triangles are of a mesh: leave it out beside a shape")
         if self.mass is not None and self.density is not None:

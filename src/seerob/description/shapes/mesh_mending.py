@@ -1,6 +1,7 @@
 """Open meshes closed, with a bound on what a missing surface can change that lies near the rims of its holes.
 
-Only mass properties use what is mended: distances never see a triangle that the file does not have.
+Mass properties use what is mended, and distances where an opening is, or may be, closed in reality
+(`seerob.description.shapes.openings`).
 
 Which side of a surface is out, where a file contradicts itself: no triangle is added, moved or left out.
 

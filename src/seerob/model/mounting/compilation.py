@@ -19,11 +19,13 @@ import numpy as np
 from seerob.core.errors import InputError, Problem, SeerobError, UnknownName
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.description.description import Inertial, Link, Quantity
+from seerob.description import lint
+from seerob.description.description import Description, Inertial, Link, Quantity
 from seerob.description.humans import posture
 from seerob.description.loader import load_robot
 from seerob.description.robots.calibration import calibrated_by
 from seerob.description.robots.scaled import scaled
+from seerob.description.shapes import openings
 from seerob.description.tools import library
 from seerob.distance.least import Shapes
 from seerob.model.model import Body, Frame, Mechanism, Model
@@ -253,6 +255,7 @@ class _Compiler:
         description = overridden(description, robot, self.file)
         if robot.calibration is not None:
             description = calibrated_by(description, robot.calibration, self.folder)
+        description = self._closing(robot, description)
         q = home(description, robot, self.file)
         on = self._above(robot.on, "on", ("machine",))
         chain = MechanismDraft(description, "robot", q, robot.q is not None, on=on)
@@ -266,6 +269,21 @@ class _Compiler:
         )
         if robot.tool is not None:
             self.chains[robot.name].tip = self._tip_frame(robot)
+
+    def _closing(self, robot: Robot, description: Description) -> Description:
+        """What closes openings of its links in reality, or may."""
+        found = lint.open_links(description)
+        if not found:
+            if robot.openings is not None:
+                what = f"no mesh of a link of {robot.name} has openings"
+                raise InputError.at(self.file, f"{robot.name}.openings", what, "leave openings out")
+            return description
+        links = tuple(
+            replace(link, solids=openings.told(link.solids, robot.openings)) for link in description.links
+        )
+        level, text = lint.openings(robot.openings, (solid for link in links for solid in link.solids))
+        finding = Finding(level=level, subject=robot.name, text=f"{', '.join(found)}: {text}")
+        return replace(description, links=links, findings=(*description.findings, finding))
 
     def _tip_frame(self, robot: Robot) -> Frame | None:
         assert robot.tool is not None

@@ -16,7 +16,7 @@ from seerob.core.transforms import Array
 from seerob.description import lint
 from seerob.description.description import Inertial, Link
 from seerob.description.prepared import PreparedFile, PreparedMesh, prepared
-from seerob.description.shapes import detail, mass_properties, shapes
+from seerob.description.shapes import detail, mass_properties, openings, shapes
 from seerob.description.shapes.detail import display_mesh
 from seerob.description.shapes.hull import hull_volume
 from seerob.description.shapes.mesh_bodies import is_closed, joined
@@ -102,6 +102,7 @@ def load_thing(
         color = (*thing.color, 1.0)
     findings: tuple[Finding, ...] = ()
     files: dict[str, bytes] = {}
+    has_openings = False
     known = None if thing.library is None else library.load(thing.library)
     if thing.mesh is not None:
         path = folder / thing.mesh
@@ -122,7 +123,8 @@ def load_thing(
         if not all(m.closed for m in loaded.meshes):
             around = enclosing(whole)
             if around is None:
-                findings += (_hole(thing, path),)
+                _refuse_open(thing, path)
+                has_openings = True
             else:
                 # Split by colour or by name, none of the pieces has an inside; all of them together do.
                 inside = Solid(mesh=detail.physics_mesh(around), deviation=deviation)
@@ -137,6 +139,9 @@ def load_thing(
         assert thing.shape is not None
         piece, whole = _simple(thing.shape, color)
         pieces, source = (piece,), "shape in the workstation file"
+    if thing.openings is not None and not has_openings:
+        what, remedy = f"the mesh of {thing.name} is closed, and has no openings", "leave openings out"
+        raise InputError.at(file, f"{thing.name}.openings", what, remedy)
     solids = tuple(solid for piece in pieces for solid in piece.solids)
     off = 0.0 if thing.mesh is None else max((solid.deviation for solid in solids), default=0.0)
     findings += _odd(thing, solids, whole)
@@ -157,6 +162,10 @@ def load_thing(
         findings += noticed
     if not needs_mass:
         inertial = None
+    if has_openings:
+        said, depth = _openings(thing), thing.hole_depth or 0.0
+        pieces = tuple(replace(piece, solids=openings.told(piece.solids, said, depth)) for piece in pieces)
+        findings += (_about_openings(thing, pieces),)
     refused = NO_DEPTH if needs_mass and inertial is None and thing.density is not None else ""
     return LoadedThing(pieces, inertial, findings, files, refused)
 
@@ -295,11 +304,16 @@ def _closed_form(shape: Shape | None) -> tuple[mass_properties.Moments, str] | N
     return None
 
 
-def _hole(thing: Thing, path: Path) -> Finding:
-    """What an open surface means for distances.
+def _openings(thing: Thing) -> openings.Said:
+    """What a table says of openings: a hole has a depth where it is closed."""
+    return "closed" if thing.hole_depth is not None else thing.openings
+
+
+def _refuse_open(thing: Thing, path: Path) -> None:
+    """Refuse an open mesh where only the inside matters.
 
     Raises:
-        InputError: An area, of which only the inside matters.
+        InputError: It is an area.
     """
     if isinstance(thing, Area):
         raise InputError.at(
@@ -308,9 +322,15 @@ def _hole(thing: Thing, path: Path) -> Finding:
             "the mesh is open: nothing can be said to be inside of it",
             "close it, or give a shape",
         )
-    # Of what is weighed as a body some surface is missing; a sheet is all there is.
-    body = thing.density is not None or thing.hole_depth is not None
-    return Finding(level="assumed" if body else "note", subject=thing.name, text=lint.OPEN)
+
+
+def _about_openings(thing: Thing, pieces: Sequence[Piece]) -> Finding:
+    """What openings mean for distances."""
+    solids = [solid for piece in pieces for solid in piece.solids]
+    level, text = lint.openings(_openings(thing), solids)
+    if thing.hole_depth:
+        text = f"{text}, and {thing.hole_depth:g} m beyond"
+    return Finding(level=level, subject=thing.name, text=text)
 
 
 def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:

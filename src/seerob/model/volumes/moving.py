@@ -146,7 +146,10 @@ class Moving:
         """Of a compiled workstation, and indices in `Model.bodies`."""
         self.model, self.bodies, self.mj = model, tuple(bodies), model.mj
         _refuse_open(model, self.bodies)
-        self.cores = tuple(core_of(i, solid) for i in self.bodies for solid in model.bodies[i].solids)
+        shaped = (
+            model.closed or model
+        ).bodies  # openings of links, of which nobody says whether they are closed
+        self.cores = tuple(core_of(i, solid) for i in self.bodies for solid in shaped[i].solids)
         self.joints = Joints.of(model.mj)
         chains = {i: chain_of(model, i) for i in self.bodies}
         self.chains = tuple(chains[core.body] for core in self.cores)

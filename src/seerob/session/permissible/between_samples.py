@@ -128,7 +128,8 @@ class BetweenSamples:
         self.end = min(float(m.t[-1]) for m in motions.values())
         if not self.start < self.end:
             raise InputError.at("bounds", "motion", "the motions have no time in common", "give ones that do")
-        self._model, self._progress = model, progress
+        # The least distance is that with openings closed of which nobody says whether they are.
+        self._model, self._progress = model.closed or model, progress
         self._joints = MovingJoints(model, motions)
         self._slid = self._joints.slid()
         hearings = {name: Hearing(given=True, driven=False) for name in model.mechanisms}

@@ -69,7 +69,9 @@ class Survey:
         """
         require(by, criteria, model, robot.name)
         self._robot, self._motion, self._path, self._limits = robot, motion, path, limits
-        self._by, self._asks = by, _asks(model, robot.name, criteria, by)
+        self._by = by
+        # What may be closed takes what it would were it so.
+        self._asks = _asks(model.closed or model, robot.name, criteria, by)
         self._witness, self._state = witness, Posed(model, robot, witness)
         self._tip = model.frame(robot.name)
 

@@ -271,7 +271,8 @@ class Clearance:
         return Bound(solids, arm, apart, rotations, positions)
 
     def _against(self, others: tuple[int, ...]) -> _Pairs:
-        query = Query(self._model.shapes, others, self._mine)
+        model = self._model.closed or self._model  # what may be closed, nobody may reach into
+        query = Query(model.shapes, others, self._mine)
         weight = np.array([self._weight(self._chains[i], frozenset()) for i in self._mine])
         return _Pairs(query, weight, self._deviation(others, self._mine) + self._off, own=False)
 

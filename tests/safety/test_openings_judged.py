@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
+from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, person, results_at, two_r
 from made_ticks import SOURCE, rows
 from seerob.core.errors import InputError
+from seerob.core.snapshot import Result, Verdict
+from seerob.criteria.judging import closed_too
 from seerob.model.volumes.moving import Moving
 from seerob.session.planning.clearance import Clearance
 from seerob.testing import never_within
@@ -167,3 +170,16 @@ def test_the_harness_finds_nothing_within_that_is_in_doubt(tmp_path):
     mesh = trimesh.Trimesh(box.vertices, box.faces[2:]).export(file_type="obj")
     made(tmp_path, text, {"arm.urdf": LINK, "bowl.obj": mesh})
     never_within(tmp_path)
+
+
+def test_a_part_of_what_is_exceeded_is_within_with_openings_closed_too():
+    near, far = (
+        Result(name=name, value=1.0, limit=0.5, at_most=False, verdict=Verdict.WITHIN) for name in "ab"
+    )
+    hit, beyond = (replace(far, value=0.1, verdict=Verdict.EXCEEDED), replace(far, value=0.7))
+    whole = Result(name="c", value=0.2, limit=0.5, at_most=False, verdict=Verdict.EXCEEDED, parts=(near, far))
+    found = closed_too(whole, replace(whole, value=0.1, parts=(near, hit)), "why")
+    assert found.verdict == "exceeded"
+    assert found.interval == (0.1, 0.2)
+    assert [part.verdict for part in found.parts] == ["undecided"] * 2
+    assert closed_too(whole, replace(whole, parts=(near, beyond)), "why") is whole

@@ -164,23 +164,26 @@ def openings_decide(model: Model, criterion: Criterion) -> str:
     )
 
 
-def closed_too(result: Result, closed: Result, criterion: Criterion, model: Model) -> Result:
+def closed_too(result: Result, closed: Result, why: str) -> Result:
     """What is said of meshes as they are, as far as it is said of them with their openings closed, too.
 
     Args:
         result: Of the meshes as they are, whose value it keeps.
         closed: Of the same criterion with all openings closed of which nobody says whether they are.
-        criterion: Of both.
-        model: The compiled workstation.
+        why: What is within by the meshes alone rests on.
     """
     same = result.limit == closed.limit and result.t == closed.t
     if same and result.value is not None and closed.value is not None:
         ends = [end for each in (result, closed) for end in (each.value, *(each.interval or ()))]
         least, most = min(ends), max(ends)
         result = replace(result, interval=(least, most)) if least < most else result
-    if closed.verdict is _WITHIN or closed.nothing or closed.muted or closed.verdict is result.verdict:
-        return result
-    return undecided(result, openings_decide(model, criterion))
+    kept = closed.verdict is _WITHIN or closed.nothing or closed.muted
+    return result if kept or _verdicts(closed) == _verdicts(result) else undecided(result, why)
+
+
+def _verdicts(result: Result) -> tuple[object, ...]:
+    """What a result says of all that it is made of."""
+    return result.verdict, *(row.verdict for row in result.rows), *map(_verdicts, result.parts)
 
 
 def _open_marker(marker: Marker) -> Marker:
@@ -238,6 +241,8 @@ class Judge:
         self._given, self._unmoved = bound, unmoved
         self._bound = (*bound, *(one.closed for one in bound if one.closed is not None))
         """And each that may be closed, after all as they are."""
+        self._openings: dict[int, str] = {}
+        """By place of each that may be closed, why it is not within where that decides."""
         self._first = True
         self._questions: list[Question] = []
         """Of every criterion, once the model is known."""
@@ -311,7 +316,9 @@ class Judge:
         found, closed = list(results[: len(self._given)]), iter(results[len(self._given) :])
         for i, one in enumerate(self._given):
             if one.closed is not None:
-                found[i] = closed_too(found[i], next(closed), one.criterion, self._questions[i].model)
+                if i not in self._openings:
+                    self._openings[i] = openings_decide(self._questions[i].model, one.criterion)
+                found[i] = closed_too(found[i], next(closed), self._openings[i])
         return tuple(found)
 
     def _untold(self, results: tuple[Result, ...], state: State) -> tuple[Result, ...]:

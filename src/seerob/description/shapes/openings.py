@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from seerob.core.remembered import remembered
 from seerob.core.shapes import Faces, Mesh, Solid
 from seerob.core.transforms import Array
 from seerob.description.shapes.hull import convex_hull
@@ -60,6 +61,7 @@ def closed(mesh: Mesh, depth: float = 0.0) -> tuple[Mesh, ...]:
     return made.mesh, *(lid for rim in made.rims for lid in _hull(rim, depth + made.moved))
 
 
+@remembered
 def possibly_closed(mesh: Mesh) -> tuple[Mesh, ...]:
     """All that may be a surface besides, where nobody says whether openings are closed, nor which rims meet.
 

@@ -213,7 +213,7 @@ MOST = 4
 ATTEMPTS = 2
 """To compile a loop: what ends a process, or lets it fail beside others, seldom comes twice."""
 LAST_LINES = 6
-"""Of what a process said that failed."""
+"""How many of the last lines of a process that failed are told."""
 ENDED = "the process ended with"
 """And its code, where it said nothing."""
 

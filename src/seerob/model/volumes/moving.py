@@ -146,9 +146,8 @@ class Moving:
         """Of a compiled workstation, and indices in `Model.bodies`."""
         self.model, self.bodies, self.mj = model, tuple(bodies), model.mj
         _refuse_open(model, self.bodies)
-        shaped = (
-            model.closed or model
-        ).bodies  # openings of links, of which nobody says whether they are closed
+        # With openings closed of which nobody says whether they are.
+        shaped = (model.closed or model).bodies
         self.cores = tuple(core_of(i, solid) for i in self.bodies for solid in shaped[i].solids)
         self.joints = Joints.of(model.mj)
         chains = {i: chain_of(model, i) for i in self.bodies}

@@ -312,7 +312,10 @@ def test_loops_of_a_process_that_ended_are_compiled_again(monkeypatch, tmp_path,
     progress.compile_loops(names)
     assert len(started) == 2
     assert progress.missing_loops(names) == []
-    assert capsys.readouterr().err == f"{progress.COMPILING}: 0 of 2\n"
+    # How far it is, and no failure; a machine that takes long says it more than once.
+    first, *others = capsys.readouterr().err.splitlines()
+    assert first == f"{progress.COMPILING}: 0 of 2"
+    assert {*others} <= {f"{progress.COMPILING}: {done} of 2" for done in (1, 2)}
 
 
 def test_why_a_loop_is_not_compiled_is_told(monkeypatch, tmp_path, nothing_brought, capsys):

@@ -311,7 +311,7 @@ def _compiled(names: Sequence[str]) -> Generator[tuple[str, str]]:
             for thread in threads:
                 thread.join()
             for worker in workers:
-                with worker:
+                with suppress(OSError), worker:  # what it was still to be told is lost with it
                     pass  # closes its pipes and waits for its end
 
 

@@ -11,6 +11,8 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Result, Verdict
 from seerob.criteria.judging import closed_too
 from seerob.model.volumes.moving import Moving
+from seerob.recording.answers import Answers
+from seerob.session.batch import Column, _closed_too
 from seerob.session.planning.clearance import Clearance
 from seerob.testing import never_within
 
@@ -76,6 +78,11 @@ def test_nothing_is_within_that_is_not_so_with_and_without_a_lid(tmp_path, where
             else:
                 assert unsaid.verdict == as_open.verdict, (name, unsaid, as_open, closed)
             assert unsaid.value == as_open.value
+            answers = many[""][name].answers
+            if unsaid.value is not None and name != "safety_area":  # of which a tick bounds the depth
+                ends = unsaid.interval or (unsaid.value, unsaid.value)
+                of_many = answers.interval or (answers.value, answers.value)
+                assert [end[k] for end in of_many] == pytest.approx(ends, abs=1e-6), name
             if as_open.verdict is not None:
                 assert (many[""][name].answers.verdict[k] == many["open"][name].answers.verdict[k]) == (
                     unsaid.verdict == as_open.verdict
@@ -183,3 +190,16 @@ def test_a_part_of_what_is_exceeded_is_within_with_openings_closed_too():
     assert found.interval == (0.1, 0.2)
     assert [part.verdict for part in found.parts] == ["undecided"] * 2
     assert closed_too(whole, replace(whole, parts=(near, beyond)), "why") is whole
+
+
+def test_an_interval_over_arrays_stays_where_the_other_has_another_limit_or_no_value():
+    def column(value, limit, off):
+        made = Answers.against(np.array(value), np.array(limit), at_most=False)
+        answers = made.between(np.array(value) - off, np.array(value) + off, at_most=False)
+        return Column("d", "m", False, answers, np.full(len(value), "", object))
+
+    said = column([1.0, 1.0, 1.0], [0.5, 0.5, 0.5], 0.1)
+    other = column([0.7, 0.7, np.nan], [0.5, 0.6, 0.5], 0.05)
+    low, high = _closed_too(said, other, "why").answers.interval
+    assert low.tolist() == pytest.approx([0.65, 0.9, 0.9])
+    assert high.tolist() == pytest.approx([1.1, 1.1, 1.1])

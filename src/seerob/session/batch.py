@@ -216,12 +216,14 @@ def _closed_too(column: Column, closed: Column, why: str) -> Column:
         why: What is not within by the meshes alone rests on.
     """
     said, other = column.answers, closed.answers
-    same = (said.limit == other.limit) | (np.isnan(said.limit) & np.isnan(other.limit))
-    ends = [each for one in (said, other) for each in (one.value, *(one.interval or ()))]
-    low, high = (np.where(same, end, said.value) for end in (np.min(ends, axis=0), np.max(ends, axis=0)))
+    limits = (said.limit == other.limit) | (np.isnan(said.limit) & np.isnan(other.limit))
+    both = limits & ~np.isnan(said.value) & ~np.isnan(other.value)
+    own, closed_ends = (one.interval or (one.value, one.value) for one in (said, other))
+    low = np.where(both, np.minimum(own[0], closed_ends[0]), own[0])
+    high = np.where(both, np.maximum(own[1], closed_ends[1]), own[1])
     taken_back = ((said.verdict == WITHIN) | _idle(said)) & ~((other.verdict == WITHIN) | _idle(other))
     verdict = np.where(taken_back, UNDECIDED, said.verdict).astype(np.uint8)
-    interval = said.interval if (low == high).all() else (low, high)
+    interval = (low, high) if (low < high).any() else said.interval
     answers = replace(said, verdict=verdict, interval=interval, nothing=_idle(said) & ~taken_back)
     reasons = np.where(taken_back, why, column.reasons)
     return replace(column, answers=answers, reasons=reasons)

@@ -357,7 +357,8 @@ class Engine:
                     "its source sends values that are not finite, or beyond 10⁶",
                 )
             elif isinstance(sample, JointSample):
-                qd = _still(sample, len(sample.q)) if sample.qd is None else np.array(sample.qd, float)
+                still = _still(len(sample.q), late=sample.quality is Quality.LATE)
+                qd = still if sample.qd is None else np.array(sample.qd, float)
                 if mechanism.name in self._unread:
                     contradicted = self._contradicted(sample)
                     reason = reason or beyond_limits(sample, mechanism) or contradicted
@@ -381,7 +382,7 @@ class Engine:
             hearing = self._hearings[name]
             hearing.driven = self.controllers
             for found in following.until(self._next()):
-                qd = np.zeros_like(found.q) if found.late else None
+                qd = _still(len(found.q), late=found.late)
                 self._references[name].take(found.t, found.q, qd, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
                 hearing.leaves_at = self._references[name].leaves_at if name in self.ahead else 0.0
@@ -522,9 +523,8 @@ class Engine:
             start=reference.newest,
         )
         missed = f"{sample.target} cannot reach the pose that was heard: the nearest that was found is {miss}"
-        return reference.take(
-            sample.t, q, _still(sample, len(q))
-        ), "" if miss.larger <= POSE_TOLERANCE else missed
+        taken = reference.take(sample.t, q, _still(len(q), late=sample.quality is Quality.LATE))
+        return taken, "" if miss.larger <= POSE_TOLERANCE else missed
 
     def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
         """Tell what a robot or human will do (`seerob.twin.motion.Foresee`): by its file, or it stands."""
@@ -852,17 +852,13 @@ class Engine:
         return SimulationDiverged(f"a velocity is not finite after {self._now:.3f} s")
 
 
-def _still(sample: Sample, n: int) -> Array | None:
-    """Speeds of a sample that says none: 0 where run time stood still before it, else None, to be derived.
+def _still(n: int, *, late: bool) -> Array | None:
+    """Speeds of n joints of which nobody says any: None, to be derived, or 0 where run time stood still.
 
-    Run time that stood still makes the way from the sample before it too fast, and where nothing more is
-    heard the twin goes on at that speed.
-
-    Args:
-        sample: Of whoever moves.
-        n: How many joints that are.
+    That makes the way from the sample before it too fast, and where nothing more is heard the twin goes on at
+    that speed.
     """
-    return np.zeros(n) if sample.quality is Quality.LATE else None
+    return np.zeros(n) if late else None
 
 
 def _joints(m: Mechanism, rows: int) -> kernel.Joints:

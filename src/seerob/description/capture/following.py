@@ -285,7 +285,6 @@ class Following:
                 return None
             self._waits = True
             reasons += [why for why, _ in parts]
-            late = any(each.late for each in readings)
             return Followed(
                 t, last.q, "; ".join(reasons[:4]), (), False, late, pulls((), self._root_from_world)
             )

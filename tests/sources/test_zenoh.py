@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 from contextlib import aclosing, contextmanager, suppress
 from pathlib import Path
 
@@ -378,18 +379,18 @@ def test_who_publishes_faster_than_is_read_fills_no_memory():
                     session.put("x", b"there")
                     with suppress(TimeoutError):
                         first = await link.next(0.2)
-                raw = bytes(rmw_zenoh.MAX_MESSAGE)
-                for k in range(40):
-                    session.put("x", raw[: -k - 1])
-                session.put("x", b"last")
-                sizes = []
-                while not sizes or sizes[-1] != 4:
-                    try:
-                        sizes.append(len((await link.next(5.0)).payload))
-                    except TimeoutError:  # Zenoh drops what a flooded network does not take
-                        session.put("x", b"last")
-                return sizes
+                raw, kept = bytes(rmw_zenoh.MAX_MESSAGE), zenoh.CongestionControl.BLOCK
+                tracemalloc.start()
+                try:
+                    for k in range(40):
+                        session.put("x", raw[: -k - 1], congestion_control=kept)
+                    session.put("x", b"last", congestion_control=kept)
+                    await asyncio.sleep(0.5)  # what is on its way comes, and nobody reads
+                    while len((await link.next(5.0)).payload) != 4:
+                        pass
+                    return tracemalloc.get_traced_memory()[1]
+                finally:
+                    tracemalloc.stop()
 
-    sizes = asyncio.run(flooded())
-    assert sizes[-1] == 4
-    assert sum(sizes) <= rmw_zenoh.MOST_BYTES + rmw_zenoh.MAX_MESSAGE
+    most = asyncio.run(flooded())
+    assert rmw_zenoh.MOST_BYTES / 2 < most <= rmw_zenoh.MOST_BYTES + 4 * rmw_zenoh.MAX_MESSAGE

@@ -45,7 +45,7 @@ def test_the_falls_of_all_in_one_call_are_those_of_each_by_itself():
     ]
     for _ in range(20):
         bounds, joints, mj = rng.uniform(0, 3, (3, 9)), np.zeros((4, 2)), SimpleNamespace(nv=2)
-        span = Span(0.2, 0.2 + rng.random(), *bounds, joints, None, mj)
+        span = Span(0.2, 0.2 + rng.random(), bounds, joints, None, mj)
         found = AllFalls([every[0], None, *every[1:]]).of(span)
         assert found == {each: each(span, 0.0) for each in every}
         for each, (first, second) in ((every[0], (rows[0], rows[1])), (every[2], (rows[2], rows[5]))):

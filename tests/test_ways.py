@@ -171,15 +171,15 @@ def test_points_are_as_fast_as_all_joints_before_them_with_the_segments_between(
         most, varies = points.at_constant_speeds(span)
         assert most[k] == pytest.approx(reference(v[joints], c[joints], c[joints], segments)[1])
         assert varies[k] == pytest.approx(expected[2])
-    chains = points.chains(rows_of([3, 5, 4]), ids_of(model), model.mj)
-    assert chains.dofs.tolist() == [0, 1, 2, 3]
+    dofs, chains = points.chains(rows_of([3, 5, 4]), ids_of(model), model.mj)
+    assert dofs.tolist() == [0, 1, 2, 3]
     assert chains.start.tolist() == [0, 2, 4, 4]
-    assert chains.dofs[chains.joints].tolist() == [2, 3, 0, 1]
+    assert dofs[chains.joints].tolist() == [2, 3, 0, 1]
     assert chains.lengths == pytest.approx([*lengths[3], *lengths[5]])
-    empty = points.chains(rows_of([4]), ids_of(model), model.mj)
-    assert [len(part) for part in empty] == [0, 2, 0, 0, 0]
-    nobody = Points(model).chains(rows_of([]), ids_of(model), model.mj)
-    assert [len(part) for part in nobody] == [0, 1, 0, 0, 0]
+    dofs, chain = points.chains(rows_of([4]), ids_of(model), model.mj)
+    assert [len(part) for part in (dofs, *chain)] == [0, 2, 0, 0, 0]
+    dofs, chain = Points(model).chains(rows_of([]), ids_of(model), model.mj)
+    assert [len(part) for part in (dofs, *chain)] == [0, 1, 0, 0, 0]
     assert span.way(rows_of([0, 1, 4])) == span.fast[1] * span.T + ROUNDING
     assert span.way(rows_of([4])) == ROUNDING
 

@@ -142,7 +142,7 @@ def a_span(station: Station, state: State, robot: float, person: float, noise: f
     fast = np.zeros(len(model.bodies))
     fast[list(model.robot("arm").moving)], fast[list(model.human("op").bodies)] = robot, person
     zeros = np.zeros_like(fast)
-    span = Span(0.0, 0.1, fast, zeros, zeros, np.zeros((4, model.mj.nv)), None, model.mj)
+    span = Span(0.0, 0.1, np.array([fast, zeros, zeros]), np.zeros((4, model.mj.nv)), None, model.mj)
     span.noise = np.where(fast == person, noise, 0.0)
     return span
 
@@ -227,7 +227,9 @@ def test_a_part_reaches_a_region_from_its_skin_to_the_horizon_above_and_below(tm
     robot, bands = station.model.robot("arm"), heights(("standing",), (1.6, 1.9))
     zeros = np.zeros(len(station.model.bodies))
     fast = zeros + 2.0
-    span = Span(0.0, 0.1, fast, zeros, zeros, np.zeros((4, station.model.mj.nv)), None, station.model.mj)
+    span = Span(
+        0.0, 0.1, np.array([fast, zeros, zeros]), np.zeros((4, station.model.mj.nv)), None, station.model.mj
+    )
     bodies = [
         replace(body, solids=tuple(replace(solid, deviation=0.02) for solid in body.solids))
         for body in station.model.bodies

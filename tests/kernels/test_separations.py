@@ -1,12 +1,11 @@
 """Compiled separation distances are those of the norm's own formulas."""
 
-import math
-
 import numpy as np
 import pytest
 
+from seerob.criteria.stopping.planned import assumed_speed
 from seerob.criteria.stopping.terms import Course, separation_distance
-from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING, least_distance
+from seerob.description.norms.iso_13855 import WALKING, least_distance
 from seerob.kernels.separation import separations
 
 T_R, T_S, K = 0.1, 0.3, 0.055
@@ -26,9 +25,8 @@ def test_separations_are_those_of_the_norm_to_the_last_bit(given, seen):
         wanted = np.maximum(least_distance(at_speed), at_speed(seen) if seen > WALKING else 0.0)
     else:
         wanted = at_speed(max(given, seen))
-    found, v_h = np.empty((1, 50)), math.nan if given is None else given
-    args = T_R + T_S, K, v_h, np.array([seen]), REACHING, WALKING, ARM_REACH
-    separations(S_r[None], S_s[None], *args, found)
+    found = np.empty((1, 50))
+    separations(S_r[None], S_s[None], T_R + T_S, K, assumed_speed(given), np.array([seen]), found)
     assert found[0].tobytes() == wanted.tobytes()
 
 
@@ -38,5 +36,5 @@ def test_what_is_not_a_number_gives_no_separation(bad):
     values[bad] = np.full_like(values[bad], np.nan)
     found = np.empty((1, 1))
     S_r, S_s, seen = values
-    separations(S_r, S_s, T_R + T_S, K, math.nan, seen, REACHING, WALKING, ARM_REACH, found)
+    separations(S_r, S_s, T_R + T_S, K, assumed_speed(None), seen, found)
     assert np.isnan(found).all()

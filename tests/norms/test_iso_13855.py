@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError, Undecided
+from seerob.criteria.stopping.planned import assumed_speed
 from seerob.description.norms.iso_13855 import (
-    ARM_REACH,
-    REACHING,
-    WALKING,
     Approach,
     Edition,
     intrusion,
@@ -124,9 +122,9 @@ def test_one_way_around_counts_while_the_other_is_not_known():
 def test_a_distance_that_depends_on_the_speed_has_the_same_edges():
     ways = np.array([0.1, 0.25, 0.26, 0.3125, 0.32])
     assert least_distance(lambda K: K * ways) == pytest.approx([0.2, 0.5, 0.5, 0.5, 0.512])
-    for given, seen, speeds in ((np.nan, 0.0, [2.0, 1.6]), (np.nan, 1.8, [2.0, 1.8]), (0.5, 0.4, [0.5, 0.5])):
+    for given, seen, speeds in ((None, 0.0, [2.0, 1.6]), (None, 1.8, [2.0, 1.8]), (0.5, 0.4, [0.5, 0.5])):
         found = np.empty(2)
-        approach_speeds(np.array([0.49, 0.5]), given, seen, REACHING, WALKING, ARM_REACH, found)
+        approach_speeds(np.array([0.49, 0.5]), assumed_speed(given), seen, found)
         assert found.tolist() == speeds
 
 

@@ -25,8 +25,9 @@ from seerob.criteria.safety.effective_mass import inverse_effective_mass, princi
 from seerob.criteria.safety.manipulability import Manipulability, singular_values
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation
+from seerob.criteria.stopping.planned import assumed_speed
 from seerob.description.norms.body_limits import SHIPPED, parse, shipped
-from seerob.description.norms.iso_13855 import ARM_REACH, Approach, Edition, intrusion, minimum_distance
+from seerob.description.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance
 from seerob.kernels.separation import approach_speeds
 from seerob.recording.answers import judge_many
 from seerob.recording.series import CODES
@@ -367,7 +368,7 @@ def test_a_time_that_is_none_is_refused(T):
 
 def test_people_walk_from_half_a_metre_on():
     found = np.empty(4)
-    approach_speeds(np.array([0.0, np.nextafter(0.5, 0), 0.5, 9.0]), np.nan, 0.0, 2.0, 1.6, ARM_REACH, found)
+    approach_speeds(np.array([0.0, np.nextafter(0.5, 0), 0.5, 9.0]), assumed_speed(None), 0.0, found)
     assert found.tolist() == [2.0, 2.0, 1.6, 1.6]
 
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError, Undecided
+from seerob.criteria.stopping.planned import assumed_speed
 from seerob.criteria.stopping.terms import (
     BOUND,
     CONSTANT,
@@ -22,9 +23,6 @@ from seerob.criteria.stopping.terms import (
     worst_case,
 )
 from seerob.description.norms.iso_13855 import (
-    ARM_REACH,
-    REACHING,
-    WALKING,
     Approach,
     Edition,
     intrusion,
@@ -285,7 +283,7 @@ def test_what_is_from_memory_says_so():
 
 def approach_speed(distance):
     found = np.empty(1)
-    approach_speeds(np.array([distance]), np.nan, 0.0, REACHING, WALKING, ARM_REACH, found)
+    approach_speeds(np.array([distance]), assumed_speed(None), 0.0, found)
     return float(found[0])
 
 

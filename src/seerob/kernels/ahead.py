@@ -5,21 +5,41 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.bound import Layout
+from seerob.kernels.bound import Layout, tuple_type
 from seerob.kernels.mujoco_calls import updated
 from seerob.kernels.pull import size_of, ticks_ahead
-from seerob.kernels.spans import joint_bounds, point_bounds
+from seerob.kernels.spans import CHAINS, Chains, joint_bounds, point_bounds
 from seerob.kernels.speed import fastest_of
 
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 _ROW, _ROWS, _PAIR = "f8[::1]", "f8[:,::1]", "f8[:,:,::1]"
+_ONE, _TWO, _THREE = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_WHOLES, _TABLE = types.int64[::1], types.int64[:, ::1]
 UNKNOWN = -(1 << 62)
 """Instead of the number of a tick: it is that of none, nor is the next one."""
+
+
+class Reaction(NamedTuple):
+    """From now until a robot brakes."""
+
+    begin: float
+    """Now [s]."""
+    end: float
+    """From now, after which nothing counts [s]: ``T_r + lead`` at most."""
+    T_r: float
+    """Reaction time [s]."""
+    lead: float
+    """A reaction begins until then [s]."""
+    slack: float
+    """Instants nearer than this are one [s]."""
+
+
+REACTION = tuple_type(Reaction, [types.float64] * 5)
 
 
 class Window(NamedTuple):
@@ -131,23 +151,13 @@ def window(ticks: int, instants: int, parts: int, joints: int) -> Window:
 
 
 @njit(
-    f"void({_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, i8[::1], i8[::1], b1[::1], {_ROW}, f8, {_PAIR})",
+    types.void(_ONE, _TWO, _TWO, _TWO, _ONE, CHAINS, types.float64, _THREE),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
 def part_speeds(
-    t: Array,
-    q: Array,
-    v: Array,
-    speeds: Array,
-    home: Array,
-    start: Indices,
-    joints: Indices,
-    turns: Flags,
-    lengths: Array,
-    rounding: float,
-    bounds: Array,
+    t: Array, q: Array, v: Array, speeds: Array, home: Array, chains: Chains, rounding: float, bounds: Array
 ) -> None:
     """Bound the speeds of parts on cubics from instant to instant; writes into the last argument.
 
@@ -157,26 +167,20 @@ def part_speeds(
         v: Velocities there, shape (k, d).
         speeds: Of the fastest point of each part at the instants [m/s], shape (k, n).
         home: Positions of the joints in the model as compiled, shape (d,).
-        start: As `seerob.kernels.spans.point_bounds` takes it of the parts, with the next three.
-        joints: Likewise.
-        turns: Likewise.
-        lengths: Likewise.
+        chains: The joints that move each part.
         rounding: Added to each bound [m/s].
         bounds: Largest from instant to instant, and the larger of both instants [m/s], shape (k - 1, 2, n).
     """
     d, n = q.shape[1], speeds.shape[1]
-    speed, change, varies, away = np.empty(d), np.empty(d), np.empty(d), np.empty(d)
-    fast, quick, bend = np.empty(n), np.empty(n), np.empty(n)
+    joints, parts = np.empty((4, d)), np.empty((3, n))
     for i in range(len(t) - 1):
         a, b = t[i], t[i + 1]
-        joint_bounds(t[i : i + 2], q[i : i + 2], v[i : i + 2], a, b, home, speed, change, varies, away)
-        point_bounds(
-            speed, change, varies, away, b - a, start, joints, turns, lengths, fast, quick, bend
-        )  # fmt: skip
+        joint_bounds(t[i : i + 2], q[i : i + 2], v[i : i + 2], a, b, home, joints)
+        point_bounds(joints, b - a, chains, parts)
         for c in range(n):
             ends = np.maximum(speeds[i, c], speeds[i + 1, c])
             # Along the straight line between two velocities no speed is larger than at both ends.
-            most = np.minimum(fast[c], ends + bend[c]) + rounding
+            most = np.minimum(parts[0, c], ends + parts[2, c]) + rounding
             bounds[i, 0, c], bounds[i, 1, c] = np.maximum(most, ends), ends
 
 
@@ -203,37 +207,23 @@ def joint_speeds(t: Array, q: Array, qd: Array, bounds: Array) -> None:
 
 
 @njit(
-    f"void({_ROW}, f8, f8, f8[:,:], {_ROW}, f8, f8, f8, {_ROW}, {_ROW})",
+    types.void(_ONE, REACTION, types.float64[:, :], _ONE, _ONE, _ONE),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def farthest(
-    t: Array,
-    begin: float,
-    end: float,
-    most: Array,
-    now: Array,
-    T_r: float,
-    lead: float,
-    slack: float,
-    way: Array,
-    top: Array,
-) -> None:
+def farthest(t: Array, reaction: Reaction, most: Array, now: Array, way: Array, top: Array) -> None:
     """Bound how far and fast parts or joints get until they brake; writes into the last two arguments.
 
     Args:
         t: Instants, increasing [s], shape (k,).
-        begin: Now [s].
-        end: After which nothing counts [s], ``T_r + lead`` from now at most.
+        reaction: When it is.
         most: Largest speeds from instant to instant, shape (k - 1, n).
         now: Speeds now, which may be larger, shape (n,).
-        T_r: Reaction time [s].
-        lead: A reaction begins until then [s].
-        slack: Instants nearer than this are one [s].
-        way: In any stretch of T_r that begins within ``lead`` [m or rad], shape (n,).
+        way: In any stretch of the reaction time that begins within its lead [m or rad], shape (n,).
         top: Largest speed until then, shape (n,).
     """
+    begin, end, T_r, lead, slack = reaction
     for c in range(len(now)):
         outside, far, fastest = np.inf, 0.0, 0.0
         a = np.minimum(t[0] - begin, end)
@@ -251,7 +241,7 @@ def farthest(
 
 
 @njit(
-    f"void({_ROW}, {_PAIR}, i8[::1], i8[::1], {_ROWS}, f8, f8, f8, {_ROWS}, {_ROWS})",
+    types.void(_ONE, _THREE, _WHOLES, _WHOLES, _TWO, REACTION, _TWO, _TWO),
     cache=True,
     nogil=True,
     error_model="numpy",
@@ -262,9 +252,7 @@ def reactions(
     first: Indices,
     last: Indices,
     now: Array,
-    T_r: float,
-    lead: float,
-    slack: float,
+    reaction: Reaction,
     ways: Array,
     tops: Array,
 ) -> None:
@@ -276,17 +264,14 @@ def reactions(
         first: At which of them each reaction begins, shape (N,).
         last: At which it ends, ``T_r + lead`` later, shape (N,).
         now: Speeds when it begins, which may be larger [m/s], shape (N, n).
-        T_r: Reaction time [s].
-        lead: A reaction begins until then [s].
-        slack: Instants nearer than this are one [s].
+        reaction: The reaction, from whenever it begins.
         ways: Receives them [m], shape (N, n).
         tops: Receives the largest speeds [m/s], shape (N, n).
     """
     for k in range(len(first)):
         a, b = first[k], last[k]
-        farthest(
-            t[a : b + 1], t[a], T_r + lead, bounds[a:b, 0], now[k], T_r, lead, slack, ways[k], tops[k]
-        )  # fmt: skip
+        one = Reaction(t[a], reaction.end, reaction.T_r, reaction.lead, reaction.slack)
+        farthest(t[a : b + 1], one, bounds[a:b, 0], now[k], ways[k], tops[k])
 
 
 @njit(cache=True, nogil=True)
@@ -398,10 +383,8 @@ def _bound_tick(of: Parts, now: Window, tick: int, t: Array, rounding: float, of
             now.speeds[row],
         )  # fmt: skip
     begin, end = slot * r, slot * r + len(t) - 1
-    part_speeds(
-        t, every_q, every_v, now.speeds[: len(t)], of.home,
-        of.chain, of.joints, of.turns, of.lengths, rounding, now.parts[begin:end],
-    )  # fmt: skip
+    chains = Chains(of.chain, of.joints, of.turns, of.lengths)
+    part_speeds(t, every_q, every_v, now.speeds[: len(t)], of.home, chains, rounding, now.parts[begin:end])
     if of_joints:
         joint_speeds(t, q, qd, now.joints[begin:end])
     for c in range(now.last.shape[1]):
@@ -411,23 +394,22 @@ def _bound_tick(of: Parts, now: Window, tick: int, t: Array, rounding: float, of
 
 @njit(cache=True, nogil=True)
 def _until_braking(
-    now: Window, bounds: Array, first: int, count: int, side: int, t: Array, begin: float, end: float,
-    T_r: float, lead: float, slack: float, found: Array,
-) -> None:  # fmt: skip
+    now: Window, bounds: Array, ticks: tuple[int, int], side: int, t: Array, reaction: Reaction, found: Array
+) -> None:
     s, k = len(now.number), 0
     r = len(now.q) // s
     most = np.empty((len(t) - 1, found.shape[1]))
-    for i in range(count):
-        slot = (first + i) % s
+    for tick in range(ticks[0], ticks[1]):
+        slot = tick % s
         for row in range(slot * r, slot * r + now.instants[slot] - 1):
             for c in range(most.shape[1]):
                 most[k, c] = bounds[row, side, c]
             k += 1
-    farthest(t, begin, end, most, found[0], T_r, lead, slack, found[1], found[2])
+    farthest(t, reaction, most, found[0], found[1], found[2])
 
 
 @njit(
-    f"void(i8[:,::1], i8[:,::1], i8, i8[::1], {_ROW}, i8, f8, f8, f8, f8, f8, f8, {_ROWS}, {_ROWS})",
+    types.void(_TABLE, _TABLE, types.int64, _WHOLES, _ONE, types.int64, REACTION, types.float64, _TWO, _TWO),
     cache=True,
     nogil=True,
 )
@@ -438,11 +420,7 @@ def until_braking(
     rows: Indices,
     t: Array,
     side: int,
-    begin: float,
-    end: float,
-    T_r: float,
-    lead: float,
-    slack: float,
+    reaction: Reaction,
     rounding: float,
     points: Array,
     joints: Array,
@@ -456,11 +434,7 @@ def until_braking(
         rows: Likewise.
         t: Ticks, and the knots between them [s], shape (m,).
         side: 0 for the largest speeds from instant to instant, 1 for the larger one of both instants.
-        begin: As `farthest` takes it, with the next [s].
-        end: Likewise.
-        T_r: As `farthest` takes it, with the next two [s].
-        lead: Likewise.
-        slack: Likewise.
+        reaction: When they brake.
         rounding: As `part_speeds` takes it [m/s].
         points: Speeds of the parts now [m/s], which are given, ways [m] and largest speeds, shape (3, n).
         joints: Those of joints [rad/s or m/s, rad or m], shape (3, j); of none where they are not asked for.
@@ -470,16 +444,20 @@ def until_braking(
     for i in range(count):
         if now.number[(first + i) % len(now.number)] != first + i:
             _bound_tick(of, now, first + i, t[rows[i] : rows[i + 1] + 1], rounding, of_joints)
-    _until_braking(now, now.parts, first, count, side, t, begin, end, T_r, lead, slack, points)
+    ticks = first, first + count
+    _until_braking(now, now.parts, ticks, side, t, reaction, points)
     if of_joints:
-        _until_braking(now, now.joints, first, count, side, t, begin, end, T_r, lead, slack, joints)
+        _until_braking(now, now.joints, ticks, side, t, reaction, joints)
 
 
 @njit(
-    f"i8(i8[:,::1], i8[:,::1], i8[:,::1], b1, i8, i8, i8, f8, f8, f8, f8, f8, f8, {_ROW}, {_ROWS})",
+    types.int64(
+        _TABLE, _TABLE, _TABLE, types.boolean, types.int64, types.int64, types.int64, REACTION, types.float64,
+        _ONE, _TWO,
+    ),
     cache=True,
     nogil=True,
-)
+)  # fmt: skip
 def braking_along(
     parts: Indices,
     window: Indices,
@@ -488,11 +466,7 @@ def braking_along(
     first: int,
     last: int,
     side: int,
-    begin: float,
-    T_r: float,
-    ahead: float,
-    period: float,
-    slack: float,
+    reaction: Reaction,
     rounding: float,
     now: Array,
     points: Array,
@@ -507,12 +481,8 @@ def braking_along(
         first: Number of the first tick.
         last: Number of the last one.
         side: As of `until_braking`.
-        begin: Now [s].
-        T_r: Reaction time [s].
-        ahead: How much of it is looked at [s].
-        period: Of a tick [s].
-        slack: As of `until_braking`, with the next [s].
-        rounding: Likewise [m/s].
+        reaction: When they brake; its lead is the period of a tick.
+        rounding: As `part_speeds` takes it [m/s].
         now: Speeds of the parts now [m/s], shape (n,).
         points: As of `until_braking`, shape (3, n).
 
@@ -527,14 +497,11 @@ def braking_along(
         np.empty((room, joints)),
         np.empty((room, joints)),
     )
-    count = ticks_ahead(samples, begin, first, period, t, rows, q, qd, qdd)
+    count = ticks_ahead(samples, reaction.begin, first, reaction.lead, t, rows, q, qd, qdd)
     missing = moved_on(window, again, first, rows, q[:count], qd[:count])
     if missing < 0:
         return missing
     for c in range(len(now)):
         points[0, c] = now[c]
-    until_braking(
-        parts, window, first, rows, t[:count], side, begin, ahead + period, T_r, period, slack, rounding,
-        points, np.empty((3, 0)),
-    )  # fmt: skip
+    until_braking(parts, window, first, rows, t[:count], side, reaction, rounding, points, np.empty((3, 0)))
     return missing

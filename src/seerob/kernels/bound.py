@@ -4,6 +4,8 @@ To take one array out of its Python object costs a call as much as measuring a d
 kernel takes so it counts references of. So they are bound: a `Layout` writes addresses and lengths of a named
 tuple of arrays to a table, and inside of a kernel its `read` gives the named tuple again, for nothing.
 Who made the table keeps the arrays as long as it is used: nothing else does.
+
+Named tuples that are given at every call are as they are in Python: `tuple_type` is their type.
 """
 
 from __future__ import annotations
@@ -20,6 +22,11 @@ from numpy.typing import DTypeLike, NDArray
 
 COLUMNS = 4
 """Of a table: address, and up to three lengths."""
+
+
+def tuple_type(kind: type, fields: Sequence[Any]) -> Any:
+    """Numba's type of a named tuple, by the types of its fields."""
+    return types.BaseTuple.from_types(fields, kind)  # type: ignore[no-untyped-call]
 
 
 class Layout:
@@ -55,7 +62,7 @@ class Layout:
 
 def _reader(kind: type, arrays: list[tuple[np.dtype[Any], int]]) -> Any:
     kinds = [types.Array(from_dtype(number), ndim, "C") for number, ndim in arrays]
-    result = types.BaseTuple.from_types(kinds, kind)  # type: ignore[no-untyped-call]
+    result = tuple_type(kind, kinds)
 
     @intrinsic
     def read(_typing: Any, table: Any, row: Any) -> Any:

@@ -7,6 +7,7 @@ centre of mass of its whole tree.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.axes import principal_axes, quaternion
+from seerob.kernels.bound import Layout
 
 Indices = NDArray[np.int64]
 
@@ -419,24 +421,39 @@ def carried_by(jacobian: Array, qd: Array, found: Array) -> None:
             found[k, r] = total
 
 
+class Kinematics(NamedTuple):
+    """MuJoCo's, of one instant: m bodies."""
+
+    xmat: Array
+    """World from body, row by row, shape (m, 9)."""
+    xpos: Array
+    """[m], shape (m, 3)."""
+    cdof: Array
+    """Axes of the joints, at the centre of mass of the whole tree, shape (nv, 6)."""
+    subtree_com: Array
+    """Centre of mass of the tree below each body [m], shape (m, 3)."""
+    qvel: Array
+    """Velocities of all joints [rad/s or m/s], shape (nv,)."""
+
+
+_F = np.float64
+KINEMATICS = Layout(Kinematics, [(_F, 2), (_F, 2), (_F, 2), (_F, 2), (_F, 1)])
+_kinematics_in = KINEMATICS.read
+
+
 @njit(
-    "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, i8, i8[::1], b1[::1], f8[::1], f8[::1],"
-    " f8[:,::1], f8[::1], f8[:,::1], f8[::1])",
+    "void(i8[:,::1], i8, i8, i8[::1], b1[::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1])",
     cache=True,
     nogil=True,
     error_model="numpy",
 )
 def at_point(
-    xmat: Array,
-    xpos: Array,
-    cdof: Array,
-    subtree_com: Array,
+    kinematics: Indices,
     body: int,
     root: int,
     dofs: Indices,
     moves: NDArray[np.bool_],
     local: Array,
-    qvel: Array,
     jacobian: Array,
     velocity: Array,
     axes: Array,
@@ -445,21 +462,18 @@ def at_point(
     """What joints do to one point now: its Jacobian, velocity and ellipsoid of velocity, in one call.
 
     Args:
-        xmat: MuJoCo's, world from body, row by row, shape (m, 9).
-        xpos: MuJoCo's [m], shape (m, 3).
-        cdof: MuJoCo's, shape (nv, 6).
-        subtree_com: MuJoCo's [m], shape (m, 3).
+        kinematics: Table that begins with rows of `KINEMATICS`.
         body: MuJoCo's, of the point.
         root: First body of its tree.
         dofs: Degrees of freedom that are columns, shape (n,).
         moves: Which of them move the point, shape (n,).
         local: The point in the body [m], shape (3,).
-        qvel: MuJoCo's [rad/s or m/s], shape (nv,).
         jacobian: Written: linear rows first, world axes, shape (6, n).
         velocity: Written: that of the point, linear before angular [m/s, rad/s], shape (6,).
         axes: Written: directions of the singular values of the linear rows, shape (3, 3).
         figures: Written: singular values, and the quaternion of the axes, shape (7,).
     """
+    xmat, xpos, cdof, subtree_com, qvel = _kinematics_in(kinematics, 0)
     R, n = xmat[body], len(dofs)
     velocity[:] = 0.0
     x = xpos[body, 0] + (R[0] * local[0] + R[1] * local[1] + R[2] * local[2]) - subtree_com[root, 0]

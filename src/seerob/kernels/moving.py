@@ -11,25 +11,15 @@ from numpy.typing import NDArray
 from seerob.core.transforms import Array
 from seerob.kernels.axes import felt
 from seerob.kernels.bound import Layout
-from seerob.kernels.chain import at_point
+from seerob.kernels.chain import KINEMATICS, at_point
 
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
 class MovingPoints(NamedTuple):
-    """Points of MuJoCo's m bodies, p of them, with c columns of joints in all."""
+    """Points of MuJoCo's bodies, p of them, with c columns of joints in all."""
 
-    xmat: Array
-    """World from body, row by row, shape (m, 9)."""
-    xpos: Array
-    """[m], shape (m, 3)."""
-    cdof: Array
-    """MuJoCo's, shape (nv, 6)."""
-    subtree_com: Array
-    """Centre of mass of the tree below each body [m], shape (m, 3)."""
-    qvel: Array
-    """Velocities of all joints [rad/s or m/s], shape (nv,)."""
     M: Array
     """MuJoCo's mass matrix, of which there are only entries that are not 0, shape (nM,)."""
     bodies: Indices
@@ -62,11 +52,11 @@ _F, _I, _B = np.float64, np.int64, np.bool_
 MOVING_POINTS = Layout(
     MovingPoints,
     [
-        (_F, 2), (_F, 2), (_F, 2), (_F, 2), (_F, 1), (_F, 1), (_I, 1), (_I, 1), (_F, 2), (_I, 1), (_I, 1),
-        (_B, 1), (_I, 1), (_I, 1), (_F, 2), (_F, 2), (_F, 3), (_F, 2),
+        (_F, 1), (_I, 1), (_I, 1), (_F, 2), (_I, 1), (_I, 1), (_B, 1), (_I, 1), (_I, 1), (_F, 2), (_F, 2),
+        (_F, 3), (_F, 2),
     ],
 )  # fmt: skip
-_points_in = MOVING_POINTS.read
+_points_in, _BEHIND = MOVING_POINTS.read, len(KINEMATICS.arrays)
 
 
 @njit("i8(i8[:,::1])", cache=True, nogil=True, error_model="numpy")
@@ -74,19 +64,18 @@ def move_points(table: Indices) -> int:
     """Work out what joints do to points now, and their effective masses.
 
     Args:
-        table: Of `MOVING_POINTS`.
+        table: Of `KINEMATICS` and, behind it, `MOVING_POINTS`.
 
     Returns:
         Of which point the mass matrix is not positive definite; -1 of none.
     """
-    all_ = _points_in(table, 0)
+    all_ = _points_in(table, _BEHIND)
     axes, wrong = np.empty((3, 3)), -1
     for p in range(len(all_.bodies)):
         a, b = all_.start[p], all_.start[p + 1]
         J = np.empty((6, b - a))
         at_point(
-            all_.xmat, all_.xpos, all_.cdof, all_.subtree_com, all_.bodies[p], all_.roots[p],
-            all_.dofs[a:b], all_.moves[a:b], all_.local[p], all_.qvel,
+            table, all_.bodies[p], all_.roots[p], all_.dofs[a:b], all_.moves[a:b], all_.local[p],
             J, all_.velocity[p], axes, all_.sigma[p],
         )  # fmt: skip
         first, n = all_.first[p], b - a

@@ -3,35 +3,60 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import tuple_type
 from seerob.kernels.pull import greatest
 from seerob.kernels.spans import Indices
 from seerob.kernels.spans import greatest as greatest_of
 from seerob.kernels.verdicts import Codes, judged
 
 _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+_ONE, _TWO, _FLOAT = types.float64[::1], types.float64[:, ::1], types.float64
+
+
+class HumanSpeed(NamedTuple):
+    """How fast a person is assumed to come."""
+
+    v_h: float
+    """Speed that is given [m/s]; NaN for that of ISO 13855, by the next three."""
+    reaching: float
+    """Speed up to ``arm`` [m/s]."""
+    walking: float
+    """Speed beyond [m/s]."""
+    arm: float
+    """Distance up to which the former counts, and below which the latter leads to none [m]."""
+
+
+class TimedStop(NamedTuple):
+    """A stop that takes a known time."""
+
+    T_r: float
+    """Reaction time [s]."""
+    T_s: float
+    """Stopping time [s]."""
+    share: float
+    """Of speed times stopping time that is travelled."""
+
+
+HUMAN_SPEED, TIMED_STOP = tuple_type(HumanSpeed, [_FLOAT] * 4), tuple_type(TimedStop, [_FLOAT] * 3)
 
 
 @njit(
-    f"void({_ROW}, {_ROW}, f8, f8, f8, f8, f8, f8, f8, {_ROW})", cache=True, nogil=True, error_model="numpy"
+    types.void(_ONE, _ONE, _FLOAT, _FLOAT, HUMAN_SPEED, _FLOAT, _ONE),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
 )
 def separation(
-    S_r: Array,
-    S_s: Array,
-    time: float,
-    K: float,
-    v_h: float,
-    seen: float,
-    reaching: float,
-    walking: float,
-    arm: float,
-    found: Array,
+    S_r: Array, S_s: Array, time: float, K: float, human_speed: HumanSpeed, seen: float, found: Array
 ) -> None:
     """Find S_p of each part at one instant, shape (n,); arguments as of `separations`."""
+    v_h, reaching, walking, arm = human_speed
     given = not math.isnan(v_h)
     own = np.maximum(np.maximum(v_h, seen), 0.0) * time
     near, far = np.maximum(reaching, 0.0) * time, np.maximum(walking, 0.0) * time
@@ -78,43 +103,30 @@ def rise(
         found[i] = ((S_h_then + S_r_then[i] + S_s_then[i]) - (S_h + S_r[i] + S_s[i])) + more
 
 
-@njit(f"void({_ROW}, f8, f8, f8, f8, f8, {_ROW})", cache=True, nogil=True, error_model="numpy")
-def approach_speeds(
-    distance: Array, v_h: float, seen: float, reaching: float, walking: float, arm: float, found: Array
-) -> None:
+@njit(types.void(_ONE, HUMAN_SPEED, _FLOAT, _ONE), cache=True, nogil=True, error_model="numpy")
+def approach_speeds(distance: Array, human_speed: HumanSpeed, seen: float, found: Array) -> None:
     """Find the speed of the person that counts for each part at its distance; writes the last argument.
 
     Args:
         distance: Of each part [m], shape (n,).
-        v_h: As of `separations`, with the next four.
-        seen: Likewise, of one instant.
-        reaching: Likewise.
-        walking: Likewise.
-        arm: Likewise.
+        human_speed: How fast the person is assumed to come.
+        seen: As of `separations`, of one instant.
         found: [m/s], shape (n,).
     """
+    v_h, reaching, walking, arm = human_speed
     for i in range(len(distance)):
         assumed = v_h if not math.isnan(v_h) else walking if distance[i] >= arm else reaching
         found[i] = np.maximum(assumed, seen)
 
 
 @njit(
-    f"void({_ROWS}, {_ROWS}, f8, f8, f8, {_ROW}, f8, f8, f8, {_ROWS})",
+    types.void(_TWO, _TWO, _FLOAT, _FLOAT, HUMAN_SPEED, _ONE, _TWO),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
 def separations(
-    S_r: Array,
-    S_s: Array,
-    time: float,
-    K: float,
-    v_h: float,
-    seen: Array,
-    reaching: float,
-    walking: float,
-    arm: float,
-    found: Array,
+    S_r: Array, S_s: Array, time: float, K: float, human_speed: HumanSpeed, seen: Array, found: Array
 ) -> None:
     r"""Find S_p of each part at many instants; writes into the last argument.
 
@@ -125,15 +137,12 @@ def separations(
         S_s: Ways while it brakes [m], shape (N, n).
         time: T_r + T_s [s].
         K: C + Z_d + Z_r [m].
-        v_h: Speed of the person that is given [m/s]; NaN for that of ISO 13855, by the next three.
+        human_speed: How fast the person is assumed to come.
         seen: Speed that the person is seen to have, which counts where it is larger [m/s], shape (N,).
-        reaching: Speed up to ``arm`` [m/s].
-        walking: Speed beyond [m/s].
-        arm: Distance up to which the former counts, and below which the latter leads to none [m].
         found: S_p [m], shape (N, n).
     """
     for k in range(S_r.shape[0]):
-        separation(S_r[k], S_s[k], time, K, v_h, seen[k], reaching, walking, arm, found[k])
+        separation(S_r[k], S_s[k], time, K, human_speed, seen[k], found[k])
 
 
 @njit(f"f8({_ROW}, {_ROW}, {_ROW})", cache=True, nogil=True, error_model="numpy")
@@ -165,7 +174,12 @@ def largest_factor(c: Array, b: Array, a: Array) -> float:
     return least
 
 
-@njit(f"f8({', '.join([_ROW] * 6)}, f8, f8, f8, f8)", cache=True, nogil=True, error_model="numpy")
+@njit(
+    types.float64(*[_ONE] * 6, TIMED_STOP, _FLOAT),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
 def largest_factor_in_time(
     distance: Array,
     v_h: Array,
@@ -173,10 +187,8 @@ def largest_factor_in_time(
     S_now: Array,
     v_rest: Array,
     v_now: Array,
-    T_r: float,
-    T_s: float,
+    stop: TimedStop,
     K: float,
-    share: float,
 ) -> float:
     """Find the largest factor of all speeds with no part nearer than its S_p, for a stop of known time.
 
@@ -187,14 +199,13 @@ def largest_factor_in_time(
         S_now: Ways at the present speeds, likewise.
         v_rest: Speeds at which it begins to brake, at rest now [m/s], shape (n,).
         v_now: At the present speeds, likewise.
-        T_r: Reaction time [s].
-        T_s: Stopping time [s].
+        stop: The stop.
         K: C + Z_d + Z_r [m].
-        share: Of speed times stopping time that is travelled.
 
     Returns:
         As `largest_factor`.
     """
+    T_r, T_s, share = stop
     n = len(distance)
     c, b = np.empty(n), np.empty(n)
     for i in range(n):
@@ -204,7 +215,7 @@ def largest_factor_in_time(
 
 
 @njit(
-    f"i8({', '.join([_ROW] * 4)}, {', '.join(['f8'] * 11)}, {_ROWS}, u1[::1], {_ROW})",
+    types.int64(*[_ONE] * 4, TIMED_STOP, _FLOAT, HUMAN_SPEED, *[_FLOAT] * 3, _TWO, types.uint8[::1], _ONE),
     cache=True,
     nogil=True,
     error_model="numpy",
@@ -214,15 +225,10 @@ def stops_in_time(
     S_r: Array,
     v_s: Array,
     distance: Array,
-    T_r: float,
-    T_s: float,
-    share: float,
+    stop: TimedStop,
     K: float,
-    v_h: float,
+    human_speed: HumanSpeed,
     seen: float,
-    reaching: float,
-    walking: float,
-    arm: float,
     moving: float,
     rounding: float,
     found: Array,
@@ -236,15 +242,10 @@ def stops_in_time(
         S_r: Way until braking begins [m], shape (n,).
         v_s: Largest speed until then [m/s], shape (n,).
         distance: Of each part [m], shape (n,).
-        T_r: Reaction time [s].
-        T_s: Stopping time [s].
-        share: Of speed times stopping time that is travelled.
+        stop: The stop.
         K: C + Z_d + Z_r [m].
-        v_h: As of `separations`, with the next four; ``seen`` is that of the instant.
-        seen: Likewise.
-        reaching: Likewise.
-        walking: Likewise.
-        arm: Likewise.
+        human_speed: How fast the person is assumed to come.
+        seen: As of `separations`, of the instant [m/s].
         moving: Speed above which the robot moves [m/s].
         rounding: As of `seerob.kernels.verdicts.judged`.
         found: Ways while it brakes and S_p [m], shape (2, n).
@@ -255,16 +256,16 @@ def stops_in_time(
     Returns:
         Which part governs; -1 where a distance, or S_p, is not finite.
     """
-    n = len(distance)
-    S_s, S_p, approach, rest = found[0], found[1], np.empty(n), np.empty((2, n))
+    n, (T_r, T_s, share) = len(distance), stop
+    S_s, S_p, v_h, rest = found[0], found[1], np.empty(n), np.empty((2, n))
     for i in range(n):
         S_s[i] = (v_s[i] if share == 1.0 else share * v_s[i]) * T_s
         rest[0, i], rest[1, i] = 0.0 * S_r[i], 0.0 * v_s[i]
-    separation(S_r, S_s, T_r + T_s, K, v_h, seen, reaching, walking, arm, S_p)
+    separation(S_r, S_s, T_r + T_s, K, human_speed, seen, S_p)
     for i in range(n):
         if not (math.isfinite(distance[i]) and math.isfinite(S_p[i])):
             return -1
-    approach_speeds(distance, v_h, seen, reaching, walking, arm, approach)
+    approach_speeds(distance, human_speed, seen, v_h)
     top = greatest(v_r)
     if top < moving:
         # At rest nobody knows which part will be fastest: each may be.
@@ -272,19 +273,17 @@ def stops_in_time(
         for i in range(n):
             more, faster = S_r[i] - v_r[i] * T_r, v_s[i] - v_r[i]
             left = distance[i] - more - share * faster * T_s
-            left = left - K - approach[i] * (T_r + T_s)
+            left = left - K - v_h[i] * (T_r + T_s)
             least = min(least, np.maximum(left, 0.0) / (T_r + share * T_s))
         permitted[0], permitted[1] = least, math.nan
     else:
-        factor = largest_factor_in_time(
-            distance, approach, rest[0], S_r, rest[1], v_s, T_r, T_s, K, share
-        )  # fmt: skip
+        factor = largest_factor_in_time(distance, v_h, rest[0], S_r, rest[1], v_s, stop, K)
         permitted[0], permitted[1] = factor * top, factor
     return judged(distance, distance, distance, S_p, rounding, False, False, verdicts)
 
 
 @njit(
-    f"void({_ROW}, {_ROW}, i8[::1], i8[::1], {', '.join(['f8'] * 7)}, {_ROW})",
+    types.void(_ONE, _ONE, types.int64[::1], types.int64[::1], _FLOAT, TIMED_STOP, *[_FLOAT] * 3, _ONE),
     cache=True,
     nogil=True,
     error_model="numpy",
@@ -295,9 +294,7 @@ def lost_in_time(
     people: Indices,
     parts: Indices,
     T: float,
-    T_r: float,
-    T_s: float,
-    share: float,
+    stop: TimedStop,
     least: float,
     most: float,
     rounding: float,
@@ -311,15 +308,14 @@ def lost_in_time(
         people: Points of people, shape (k,).
         parts: Of the robot, shape (n,).
         T: Length of the span [s].
-        T_r: Reaction time [s].
-        T_s: Stopping time [s].
-        share: Of speed times stopping time that is travelled.
+        stop: The stop.
         least: Speed of the person that S_p assumes at least [m/s].
         most: Speed up to which it assumes so at most [m/s].
         rounding: Added to the way of people [m].
         lost: By how much each may be less above its S_p, then how much nearer each may be [m], shape (2 n,).
     """
-    n, time = len(parts), T_r + T_s
+    n, (T_r, T_s, share) = len(parts), stop
+    time = T_r + T_s
     slowest, fastest = greatest_of(slow, people), greatest_of(fast, people)
     way, v_h = greatest_of(fast, people) * T + rounding, max(least, fastest)
     more = max(fastest - max(most, slowest), 0.0) * time

@@ -15,37 +15,41 @@ latter of which varies over the span by at most :math:`(\Omega'' + T (3 \Omega \
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout, tuple_type
 
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+_ONE, _TWO, _WHOLE = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 
 
-@njit(
-    f"void({_ROW}, {_ROWS}, {_ROWS}, f8, f8, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW})",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def joint_bounds(
-    t: Array,
-    q: Array,
-    v: Array,
-    begin: float,
-    end: float,
-    home: Array,
-    speed: Array,
-    change: Array,
-    varies: Array,
-    away: Array,
-) -> None:
-    """Bounds on the motion of joints within a span; writes into the last four arguments.
+class Chains(NamedTuple):
+    """Joints that move p points, k in all: of one point after the other, each from base to tip."""
+
+    start: Indices
+    """Where the joints of each point begin, shape (p + 1,)."""
+    joints: Indices
+    """Which they are, shape (k,)."""
+    turns: Flags
+    """Whether each turns; otherwise it slides, shape (k,)."""
+    lengths: Array
+    """Of the segment behind each [m], shape (k,)."""
+
+
+CHAINS = tuple_type(Chains, (_WHOLE, _WHOLE, types.boolean[::1], _ONE))
+
+
+@njit(f"void({_ROW}, {_ROWS}, {_ROWS}, f8, f8, {_ROW}, {_ROWS})", cache=True, nogil=True, error_model="numpy")
+def joint_bounds(t: Array, q: Array, v: Array, begin: float, end: float, home: Array, found: Array) -> None:
+    """Bounds on the motion of joints within a span; writes into the last argument.
 
     Args:
         t: Knots, increasing [s], shape (k,), k >= 2.
@@ -54,16 +58,12 @@ def joint_bounds(
         begin: Of the span [s].
         end: Likewise.
         home: Positions in the model as compiled, shape (n,).
-        speed: Largest absolute speed, shape (n,).
-        change: Largest absolute acceleration, shape (n,).
-        varies: Total variation of the acceleration, shape (n,).
-        away: Farthest from ``home``, shape (n,).
+        found: Largest absolute speed and acceleration, total variation of the latter, and farthest from
+            ``home``, shape (4, n).
     """
     n = q.shape[1]
-    speed[:] = 0.0
-    change[:] = 0.0
-    varies[:] = 0.0
-    away[:] = 0.0
+    speed, change, varies, away = found[0], found[1], found[2], found[3]
+    found[:] = 0.0
     before = np.zeros(n)
     some = False
     for k in range(len(t) - 1):
@@ -94,42 +94,20 @@ def joint_bounds(
         some = True
 
 
-@njit(
-    f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, f8, i8[::1], i8[::1], b1[::1], {_ROW}, {_ROW}, {_ROW}, {_ROW})",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def point_bounds(
-    speed: Array,
-    change: Array,
-    varies: Array,
-    away: Array,
-    T: float,
-    start: Indices,
-    joints: Indices,
-    turns: Flags,
-    lengths: Array,
-    fast: Array,
-    quick: Array,
-    bend: Array,
-) -> None:
-    """Bound the motion of points at the ends of chains within a span; writes into the last three arguments.
+@njit(types.void(_TWO, types.float64, CHAINS, _TWO), cache=True, nogil=True, error_model="numpy")
+def point_bounds(bounds: Array, T: float, chains: Chains, found: Array) -> None:
+    """Bound the motion of points at the ends of chains within a span; writes into the last argument.
 
     Args:
-        speed: From `joint_bounds`, as the next three, shape (nv,).
-        change: See there.
-        varies: See there.
-        away: See there; only that of joints that slide counts.
+        bounds: Of the joints, from `joint_bounds`, shape (4, nv); how far only those get counts that slide.
         T: Length of the span [s].
-        start: Where the joints of each point begin, shape (p + 1,).
-        joints: All chains one after the other, each from base to tip, shape (k,).
-        turns: Whether each turns; otherwise it slides.
-        lengths: Of the segment behind each [m].
-        fast: Largest speed [m/s], shape (p,).
-        quick: Largest acceleration [m/s²], shape (p,).
-        bend: How far the velocity gets from the straight line between those at both ends [m/s], shape (p,).
+        chains: The joints that move each point.
+        found: Largest speed [m/s] and acceleration [m/s²], and how far the velocity gets from the straight
+            line between those at both ends [m/s], shape (3, p).
     """
+    speed, change, varies, away = bounds[0], bounds[1], bounds[2], bounds[3]
+    fast, quick, bend = found[0], found[1], found[2]
+    start, joints, turns, lengths = chains
     for p in range(len(fast)):
         W, W1, W2 = 0.0, 0.0, 0.0
         V, A, J = 0.0, 0.0, 0.0
@@ -322,72 +300,68 @@ def column_changes(
                 found[c] += change * shares[joints[i], c]
 
 
+class Figures(NamedTuple):
+    """Figures that can fall: n distances and speeds of sets of points, and singular values of m Jacobians."""
+
+    start: Indices
+    """Where the points of each set begin, shape (2 n + 1,): two sets for each distance or speed, of which the
+    second is that of whom a distance is to."""
+    rows: Indices
+    """The points of all sets."""
+    nears: Flags
+    """Whether each is a distance; otherwise a speed, shape (n,)."""
+    points: Indices
+    """Of which Jacobians are, shape (m,)."""
+    moves: Flags
+    """As of `column_changes`, shape (m, nv)."""
+    shares: Array
+    """Likewise, 0 in columns that there are not, shape (m, nv, c)."""
+
+
+FIGURES = Layout(
+    Figures,
+    [(np.int64, 1), (np.int64, 1), (np.bool_, 1), (np.int64, 1), (np.bool_, 2), (np.float64, 3)],
+)
+_figures_in = FIGURES.read
+
+
 @njit(
-    f"void({', '.join([_ROW] * 5)}, f8, f8, i8[::1], i8[::1], b1[::1], "
-    f"i8[::1], i8[::1], i8[::1], b1[::1], {_ROW}, b1[:,::1], f8[:,:,::1], {_ROWS})",
+    types.void(types.int64[:, ::1], CHAINS, _TWO, _TWO, types.float64, types.float64, _TWO),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
 def all_falls(
-    fast: Array,
-    quick: Array,
-    bend: Array,
-    qd: Array,
-    away: Array,
-    T: float,
-    rounding: float,
-    start: Indices,
-    rows: Indices,
-    nears: Flags,
-    points: Indices,
-    chains: Indices,
-    joints: Indices,
-    turns: Flags,
-    lengths: Array,
-    moves: Flags,
-    shares: Array,
-    falls: Array,
+    table: Indices, chains: Chains, joints: Array, moved: Array, T: float, rounding: float, falls: Array
 ) -> None:
     """How far figures can fall within a span; writes the last argument.
 
-    Those are distances and speeds of sets of points, and after them singular values of Jacobians.
-
     Args:
-        fast: Of points, from `point_bounds`, as the next two, shape (p,).
-        quick: Likewise.
-        bend: Likewise.
-        qd: Largest speeds of all joints [rad/s or m/s], shape (nv,).
-        away: Their largest ways from the model's pose, shape (nv,).
+        table: Of `FIGURES`.
+        chains: The joints that move each point.
+        joints: From `joint_bounds`, of largest speeds, shape (4, nv).
+        moved: Of the points, from `point_bounds`, shape (3, p).
         T: Length of the span [s].
         rounding: Added to each bound.
-        start: Where the points of each set begin, shape (2 n + 1,): two sets for each distance or speed, of
-            which the second is that of whom a distance is to.
-        rows: The points of all sets.
-        nears: Whether each is a distance; otherwise a speed, shape (n,).
-        points: Of which m Jacobians are, shape (m,).
-        chains: Where the joints of each point begin, see `point_bounds`, as the next three, shape (p + 1,).
-        joints: Likewise.
-        turns: Likewise.
-        lengths: Likewise [m].
-        moves: As of `column_changes`, shape (m, nv).
-        shares: Likewise, 0 in columns that there are not, shape (m, nv, c).
         falls: From any instant to any other [m, m/s or m/rad], and below the lesser of both ends, infinite
             where no more is known, shape (2, n + m).
     """
+    of, (starts, every, turns, lengths) = _figures_in(table, 0), chains
+    fast, quick, bend, qd, away = moved[0], moved[1], moved[2], joints[0], joints[3]
     fall, below = falls[0], falls[1]
-    n, found = len(nears), np.empty(shares.shape[2])
+    n, found = len(of.nears), np.empty(of.shares.shape[2])
     for i in range(n):
-        first, second = rows[start[2 * i] : start[2 * i + 1]], rows[start[2 * i + 1] : start[2 * i + 2]]
-        if nears[i]:
+        begin, middle, end = of.start[2 * i], of.start[2 * i + 1], of.start[2 * i + 2]
+        first, second = of.rows[begin:middle], of.rows[middle:end]
+        if of.nears[i]:
             one, other = greatest(fast, first) * T + rounding, greatest(fast, second) * T + rounding
             fall[i], below[i] = one + other, np.inf
         else:
             fall[i], below[i] = greatest(quick, first) * T + rounding, greatest(bend, first) + rounding
-    for i in range(len(moves)):
+    for i in range(len(of.moves)):
         # Singular values change by no more than the norm of how much the matrix does.
-        a, b = chains[points[i]], chains[points[i] + 1]
-        column_changes(joints[a:b], turns[a:b], lengths[a:b], qd, away, moves[i], shares[i], found)
+        a, b = starts[of.points[i]], starts[of.points[i] + 1]
+        column_changes(every[a:b], turns[a:b], lengths[a:b], qd, away, of.moves[i], of.shares[i], found)
         square = 0.0
         for change in found:
             square += change * change

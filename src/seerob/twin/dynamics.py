@@ -17,7 +17,7 @@ from seerob.kernels.chain import along, at_point
 from seerob.model.model import Frame, Mechanism, Model
 from seerob.twin.attachments import moving_dofs
 from seerob.twin.motion import StateOfMotion
-from seerob.twin.moving_points import Moved, Point, PointSurvey, place_of
+from seerob.twin.moving_points import Moved, Point, PointSurvey, kinematics_table, place_of
 from seerob.twin.places import MOST_PLACES, Indices
 from seerob.twin.signals import Signals
 from seerob.twin.validity.hearing import SLACK, Hearing
@@ -57,7 +57,7 @@ class Dynamics(StateOfMotion):
         self._sparse_mass_matrix = data.M
         self._points: dict[tuple[Hashable, ...], tuple[Frame, int, Indices, NDArray[np.bool_], Array]] = {}
         """Points of which Jacobians are asked: what of them is the same at all ticks."""
-        self._moving = PointSurvey(model.mj, data, self.columns)
+        self._moving, self._kinematics = PointSurvey(model.mj, data, self.columns), kinematics_table(data)
 
     def refresh(self, t: float) -> None:
         """Take the engine's new positions and velocities, and forget what followed from the last ones."""
@@ -274,8 +274,7 @@ class Dynamics(StateOfMotion):
         _, root, dofs, moves, local = bound
         J, v, axes, figures = np.empty((6, len(dofs))), np.empty(6), np.empty((3, 3)), np.empty(7)
         at_point(
-            self._xmat, self._xpos, self._cdof, self._com, frame.mj, root, dofs, moves, local, self._qvel,
-            J, v, axes, figures,
+            self._kinematics, frame.mj, root, dofs, moves, local, J, v, axes, figures,
         )  # fmt: skip
         if columns.coupling is not None:
             # Joints that others follow: the ellipsoid is that of the commanded ones.

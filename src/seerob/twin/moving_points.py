@@ -10,8 +10,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.chain import KINEMATICS, Kinematics
 from seerob.kernels.moving import MOVING_POINTS, MovingPoints, move_points
 from seerob.model.model import Frame, Mechanism
 from seerob.twin.attachments import Columns, moving_dofs
@@ -95,7 +97,7 @@ class PointSurvey:
         bound = self._bound
         if bound is None:
             bound = self._bound = self._bind()
-            self._table = MOVING_POINTS.rows(bound)
+            self._table = np.concatenate([kinematics_table(self._data), MOVING_POINTS.rows(bound)])
         if move_points(self._table) >= 0:
             raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
         return Moved(bound.velocity.copy(), bound.sigma.tolist(), bound.inverse, bound.masses.tolist())
@@ -112,13 +114,17 @@ class PointSurvey:
             for each, point in zip(columns, self._points, strict=True)
         ]
         return MovingPoints(
-            data.xmat, data.xpos, data.cdof, data.subtree_com, data.qvel, data.M,
-            np.array(bodies, np.int64), mj.body_rootid[bodies].astype(np.int64),
+            data.M, np.array(bodies, np.int64), mj.body_rootid[bodies].astype(np.int64),
             np.array([place_of(point.frame, np.array(point.offset)) for point in self._points]),
             np.cumsum([0, *map(len, dofs)]), np.concatenate(dofs), np.concatenate(moves),
             np.cumsum([0, *map(len, entries)]), np.concatenate(entries),
             np.zeros((p, 6)), np.zeros((p, 7)), np.zeros((p, 3, 3)), np.zeros((p, 7)),
         )  # fmt: skip
+
+
+def kinematics_table(data: mujoco.MjData) -> NDArray[np.int64]:
+    """Table of `seerob.kernels.chain.KINEMATICS`; good as long as the data are."""
+    return KINEMATICS.rows(Kinematics(data.xmat, data.xpos, data.cdof, data.subtree_com, data.qvel))
 
 
 def commanded(mechanism: Mechanism) -> bool:

@@ -25,6 +25,9 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.spans import (
+    FIGURES,
+    Chains,
+    Figures,
     all_falls,
     column_changes,
     greatest,
@@ -237,21 +240,6 @@ UNBOUNDED = Fall(np.inf)
 """The fall within a span of which nothing is known."""
 
 
-class Chains(NamedTuple):
-    """Joints that move some points and no others, as `seerob.kernels.spans.point_bounds` takes them."""
-
-    dofs: Indices
-    """In ``MjData.qvel``, increasing, shape (d,)."""
-    start: Indices
-    """Where the joints of each point begin, shape (p + 1,)."""
-    joints: Indices
-    """Of one point after the other, from base to tip, among ``dofs``."""
-    turns: NDArray[np.bool_]
-    """Whether each turns."""
-    lengths: Array
-    """Of the segment behind each [m]."""
-
-
 class Points:
     """Points of which the motion is bounded: of every body its outermost, and what criteria add.
 
@@ -269,6 +257,7 @@ class Points:
         """Which of MuJoCo's bodies moved each body when chains were resolved."""
         self._bounds = np.zeros((4, model.mj.nv))
         self._speed, self._change, self._varies, self._away = self._bounds
+        self._every = NO_CHAINS
         self._movers = {name: np.asarray(m.v_address) for name, m in model.mechanisms.items()}
 
     @property
@@ -304,21 +293,19 @@ class Points:
         if self._ids != ids.tobytes():
             self._chains(mj, ids)
         n = self.count
-        fast, quick, bend = np.empty((3, n))
-        captured: Array | None = None
+        moved, captured = np.empty((3, n)), None
         if path.captured is not None:
             # Who is held back may be where the twin is, or where the capture is: the larger motion of both.
-            self._bound(path, *path.captured, begin, end, mj, fast, quick, bend)
-            captured, joints, others = fast.copy(), self._bounds.copy(), (quick.copy(), bend.copy())
-        self._bound(path, path.q, path.v, begin, end, mj, fast, quick, bend)
+            self._bound(path, *path.captured, begin, end, mj, moved)
+            captured, joints = moved.copy(), self._bounds.copy()
+        self._bound(path, path.q, path.v, begin, end, mj, moved)
         if captured is not None:
             np.maximum(self._bounds, joints, out=self._bounds)
-            for most, other in zip((fast, quick, bend), (captured, *others), strict=True):
-                np.maximum(most, other, out=most)
+            np.maximum(moved, captured, out=moved)
         if path.broken:
-            lost = ~np.isfinite(fast)
-            fast[lost], quick[lost], bend[lost] = np.inf, np.inf, np.inf
-        return Span(begin, end, fast, quick, bend, self._bounds.copy(), path, mj, captured)
+            moved[:, ~np.isfinite(moved[0])] = np.inf
+        fast = None if captured is None else captured[0]
+        return Span(begin, end, moved, self._bounds.copy(), path, mj, fast)
 
     def _bound(
         self,
@@ -328,21 +315,16 @@ class Points:
         begin: float,
         end: float,
         mj: mujoco.MjModel,
-        fast: Array,
-        quick: Array,
-        bend: Array,
+        moved: Array,
     ) -> None:
         """Bound all joints, and with them all points, on cubics through the knots of a path."""
-        joint_bounds(path.t, q, v, begin, end, mj.qpos0, self._speed, self._change, self._varies, self._away)
+        joint_bounds(path.t, q, v, begin, end, mj.qpos0, self._bounds)
         for gap in path.loose:
             self._loosen(gap, end - begin)
         for name in path.broken:
             rows = self._movers[name]
             self._speed[rows] = self._change[rows] = self._varies[rows] = np.inf
-        point_bounds(
-            self._speed, self._change, self._varies, self._away, end - begin,
-            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
-        )  # fmt: skip
+        point_bounds(self._bounds, end - begin, self._every, moved)
 
     def _loosen(self, gap: Gap, T: float) -> None:
         """Let a robot go any way within a span of length T [s] that its accelerations allow."""
@@ -364,18 +346,23 @@ class Points:
         self._change[rows] = np.maximum(self._change[rows], most)
 
     @property
-    def every_chain(self) -> tuple[Indices, Indices, NDArray[np.bool_], Array]:
-        """Where the joints of each point begin, and `chain` of one after the other."""
-        return self._start, self._joints, self._turns, self._lengths
+    def every_chain(self) -> Chains:
+        """Joints that move the points."""
+        return self._every
 
     def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
         """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
         assert self._ids
-        part = slice(int(self._start[point]), int(self._start[point + 1]))
-        return self._joints[part], self._turns[part], self._lengths[part]
+        start, joints, turns, lengths = self._every
+        part = slice(int(start[point]), int(start[point + 1]))
+        return joints[part], turns[part], lengths[part]
 
-    def chains(self, points: Indices, ids: Indices, mj: mujoco.MjModel) -> Chains:
-        """Joints that move some points; ids and model as `span` takes them."""
+    def chains(self, points: Indices, ids: Indices, mj: mujoco.MjModel) -> tuple[Indices, Chains]:
+        """Joints that move some points; ids and model as `span` takes them.
+
+        Returns:
+            Which these are in ``MjData.qvel``, increasing, shape (d,), and the chains, by rows of that.
+        """
         if self._ids != ids.tobytes():
             self._chains(mj, ids)
         every = [self.chain(point) for point in points.tolist()]
@@ -385,7 +372,7 @@ class Points:
         )
         dofs = np.unique(joints)
         start = np.cumsum([0, *(len(each[0]) for each in every)])
-        return Chains(dofs, start, np.searchsorted(dofs, joints), turns, lengths)
+        return dofs, Chains(start, np.searchsorted(dofs, joints), turns, lengths)
 
     def column_changes(self, point: int, span: Span, coupling: Coupling) -> Array:
         r"""How quickly columns of a point's linear Jacobian change at most, per second, shape (n,).
@@ -408,12 +395,9 @@ class Points:
         """
         none, (most, varies) = np.zeros(len(span.qd)), np.empty((2, self.count))
         for change, found in ((none, most), (span.qdd, varies)):
-            fast, quick, bend = np.empty((3, self.count))
-            point_bounds(
-                span.qd, change, none, span.away, span.T,
-                self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
-            )  # fmt: skip
-            found[:] = quick if change is none else 4 * bend / span.T
+            moved = np.empty((3, self.count))
+            point_bounds(np.array([span.qd, change, none, span.away]), span.T, self._every, moved)
+            found[:] = moved[1] if change is none else 4 * moved[2] / span.T
         return most, varies
 
     def _chains(self, mj: mujoco.MjModel, ids: Indices) -> None:
@@ -433,9 +417,20 @@ class Points:
             joints += [int(mj.jnt_dofadr[j]) for j in chain]
             turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in chain]
             start.append(len(joints))
-        self._start, self._joints = np.array(start, np.int64), np.array(joints, np.int64)
-        self._turns, self._lengths = np.array(turns, np.bool_), np.array(lengths, float)
+        self._every = chains_by(start, joints, turns, lengths)
         self._ids = ids.tobytes()
+
+
+def chains_by(
+    start: Sequence[int], joints: Sequence[int], turns: Sequence[bool], lengths: Sequence[float]
+) -> Chains:
+    """Chains by their fields."""
+    where, which = np.array(start, np.int64), np.array(joints, np.int64)
+    return Chains(where, which, np.array(turns, np.bool_), np.array(lengths, float))
+
+
+NO_CHAINS = chains_by([0], [], [], [])
+"""Of no points."""
 
 
 def joints_of(mj: mujoco.MjModel, body: int) -> list[int]:
@@ -455,9 +450,7 @@ class Span:
         self,
         begin: float,
         end: float,
-        fast: Array,
-        quick: Array,
-        bend: Array,
+        moved: Array,
         joints: Array,
         path: Path,
         mj: mujoco.MjModel,
@@ -473,11 +466,13 @@ class Span:
         self.T = end - begin
         """Its length [s]."""
         self._captured = captured
-        self.fast = fast
+        self.moved = moved
+        """The next three, shape (3, p)."""
+        self.fast = fast = moved[0]
         """Largest speed [m/s], shape (p,)."""
-        self.quick = quick
+        self.quick = moved[1]
         """Largest acceleration [m/s²], shape (p,)."""
-        self.bend = bend
+        self.bend = moved[2]
         """How far a velocity gets from the straight line between those at both ends [m/s], shape (p,)."""
         self.slow = np.zeros(len(fast))
         """Least speed of the fastest point of each body [m/s], shape (n,)."""
@@ -490,6 +485,8 @@ class Span:
         """Whether there is any."""
         self.joint_noise = np.zeros(mj.nv)
         """How far speeds of joints may be off by that noise [rad/s or m/s], shape (nv,)."""
+        self.joints = joints
+        """From `seerob.kernels.spans.joint_bounds`, shape (4, nv)."""
         self.qd, self.qdd, _, self.away = joints
         """Largest absolute speed and acceleration of every joint, and way from the model's pose, (nv,)."""
 
@@ -554,16 +551,13 @@ class Relative:
             joints += [int(mj.jnt_dofadr[j]) for j in way]
             turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in way]
             start.append(len(joints))
-        self._start, self._joints = np.array(start, np.int64), np.array(joints, np.int64)
-        self._turns, self._lengths = np.array(turns, np.bool_), np.array(lengths, float)
+        self._chains = chains_by(start, joints, turns, lengths)
 
     def quick(self, span: Span) -> Array:
         """Largest acceleration [m/s²], shape (pairs,)."""
-        fast, quick, bend = np.empty((3, len(self._start) - 1))
-        point_bounds(
-            span.qd, span.qdd, span.qdd, span.away, span.T,
-            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
-        )  # fmt: skip
+        bounds = np.array([span.qd, span.qdd, span.qdd, span.away])
+        _, quick, _ = moved = np.empty((3, len(self._chains.start) - 1))
+        point_bounds(bounds, span.T, self._chains, moved)
         return quick
 
 
@@ -669,9 +663,6 @@ def speeding(points: Iterable[int]) -> Speeding:
     return Speeding(rows_of(points))
 
 
-NO_CHAINS = np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_), np.zeros(0)
-
-
 class AllFalls:
     """Bounds what `Approaching`, `Speeding` and `Turning` do, of many figures in one compiled call.
 
@@ -692,25 +683,24 @@ class AllFalls:
                 (each.first, each.second) if isinstance(each, Approaching) else (each.rows, each.rows[:0])
             )
         ]
-        self._nears = np.array([isinstance(each, Approaching) for each in own], bool)
-        self._start = np.cumsum([0, *map(len, sets)])
-        self._rows = np.concatenate([np.zeros(0, np.int64), *sets])
-        self._points = np.array([each.point for each in self._turning], np.int64)
         couplings = [each.coupling for each in self._turning]
         joints, columns = (max((each.shares.shape[k] for each in couplings), default=0) for k in (0, 1))
-        self._moves = np.zeros((len(couplings), joints), bool)
-        self._shares = np.zeros((len(couplings), joints, columns))
-        for moves, shares, each in zip(self._moves, self._shares, couplings, strict=True):
+        self._figures = Figures(
+            np.cumsum([0, *map(len, sets)]),
+            np.concatenate([np.zeros(0, np.int64), *sets]),
+            np.array([isinstance(each, Approaching) for each in own], bool),
+            np.array([each.point for each in self._turning], np.int64),
+            np.zeros((len(couplings), joints), bool),
+            np.zeros((len(couplings), joints, columns)),
+        )
+        for moves, shares, each in zip(self._figures.moves, self._figures.shares, couplings, strict=True):
             moves[:], shares[:, : each.shares.shape[1]] = each
+        self._table = FIGURES.rows(self._figures)
         self._found = np.empty((2, len(self.bounds)))
 
     def of(self, span: Span) -> dict[Falls, Fall]:
         """What each says of a span."""
-        start, joints, turns, lengths = self._turning[0].points.every_chain if self._turning else NO_CHAINS
-        all_falls(
-            span.fast, span.quick, span.bend, span.qd, span.away, span.T, ROUNDING,
-            self._start, self._rows, self._nears,
-            self._points, start, joints, turns, lengths, self._moves, self._shares, self._found,
-        )  # fmt: skip
+        chains = self._turning[0].points.every_chain if self._turning else NO_CHAINS
+        all_falls(self._table, chains, span.joints, span.moved, span.T, ROUNDING, self._found)
         falls, below = self._found.tolist()
         return dict(zip(self.bounds, map(_FALL, zip(falls, below, strict=True)), strict=True))

@@ -27,7 +27,15 @@ from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping import many_instants
 from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
-from seerob.criteria.stopping.planned import OneOf, Stops, faster, line, permissible, terms
+from seerob.criteria.stopping.planned import (
+    OneOf,
+    Stops,
+    assumed_speed,
+    faster,
+    line,
+    permissible,
+    terms,
+)
 from seerob.criteria.stopping.reaction import joint_limits
 from seerob.criteria.stopping.required import (
     SIMULATED,
@@ -42,9 +50,17 @@ from seerob.criteria.stopping.required import (
 )
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
 from seerob.criteria.stopping.terms import At, Course, way_of_person
-from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
+from seerob.description.norms.iso_13855 import REACHING, WALKING
 from seerob.distance.least import Closests
-from seerob.kernels.separation import approach_speeds, lost_in_time, rise, separation, separations
+from seerob.kernels.separation import (
+    HumanSpeed,
+    TimedStop,
+    approach_speeds,
+    lost_in_time,
+    rise,
+    separation,
+    separations,
+)
 from seerob.kernels.spans import Indices, greatest
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
@@ -286,9 +302,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return "; ".join([*reasons, *stop.undecided_reasons])
 
     @property
-    def _approach(self) -> float:
-        """The speed of the person that is given [m/s]; NaN for that of ISO 13855."""
-        return math.nan if self.human_speed is None else self.human_speed
+    def _human_speed(self) -> HumanSpeed:
+        """How fast the person is assumed to come."""
+        return assumed_speed(self.human_speed)
 
     def _distance(self, course: Course, K: float, seen: float) -> Array:
         """S_p of each part [m], shape (n,), of a person who is seen to be as fast as ``seen`` [m/s].
@@ -299,10 +315,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             seen: [m/s].
         """
         found = np.empty(len(course.S_r))
-        separation(
-            course.S_r, course.S_s, self._time(course), K, self._approach, seen,
-            REACHING, WALKING, ARM_REACH, found,
-        )  # fmt: skip
+        separation(course.S_r, course.S_s, self._time(course), K, self._human_speed, seen, found)
         return found
 
     def _time(self, course: Course) -> float:
@@ -315,7 +328,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         found = np.empty(course.S_r.shape)
         separations(
             np.ascontiguousarray(course.S_r), np.ascontiguousarray(course.S_s), self._time(course), K,
-            self._approach, seen, REACHING, WALKING, ARM_REACH, found,
+            self._human_speed, seen, found,
         )  # fmt: skip
         return found
 
@@ -592,14 +605,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
         in_time = own._stop(model).in_time
         if in_time is None or own._tolerances():
             return None
-        T_s, share = in_time
-        T_r, v_h = own.stop.reaction, self.human_speed
+        stop, v_h = TimedStop(own.stop.reaction, *in_time), self.human_speed
 
         def lost(span: Span) -> Array:
             found = np.empty(2 * len(parts))
             lost_in_time(
-                span.fast, span.slow, people, parts, span.T, T_r, T_s, share, v_h or REACHING, v_h or WALKING,
-                ROUNDING, found,
+                span.fast, span.slow, people, parts, span.T, stop, v_h or REACHING, v_h or WALKING, ROUNDING,
+                found,
             )  # fmt: skip
             return found
 
@@ -861,7 +873,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None and present.linear:
             v_h = np.empty(len(distance))
-            approach_speeds(distance, self._approach, seen[1], REACHING, WALKING, ARM_REACH, v_h)
+            approach_speeds(distance, self._human_speed, seen[1], v_h)
             speed, factor = stop.inverse(onset(0.0), present, distance, v_h, K)
         elif now.v_r.max() > MOVING:
             factor = factor_by_search(S_p, distance, stop.costly)

@@ -10,9 +10,10 @@ from seerob.core.transforms import Array
 from seerob.criteria.stopping.models import SHARES, Stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW, Onset, accelerated
 from seerob.criteria.stopping.terms import Course, braking
-from seerob.kernels.ahead import part_speeds, reactions
+from seerob.kernels.ahead import Reaction, part_speeds, reactions
+from seerob.kernels.spans import Chains
 from seerob.model.model import Gap, Mechanism, Model
-from seerob.twin.spans import ROUNDING, Chains, Points, Ways, rows_of
+from seerob.twin.spans import ROUNDING, Indices, Points, Ways, rows_of
 from seerob.twin.states import Motion, States
 from seerob.twin.validity.hearing import SLACK
 
@@ -47,9 +48,11 @@ class _Ahead:
     They are bounded as by `seerob.criteria.stopping.onset.Foreseen`.
     """
 
-    def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float, chains: Chains) -> None:
+    def __init__(
+        self, model: Model, robot: Mechanism, gap: Gap, T_r: float, dofs: Indices, chains: Chains
+    ) -> None:
         self._robot, self._parts, self._T_r, self._chains = robot, list(gap.b), T_r, chains
-        self._period, self._home = model.workstation.engine.tick, model.mj.qpos0[chains.dofs]
+        self._dofs, self._period, self._home = dofs, model.workstation.engine.tick, model.mj.qpos0[dofs]
 
     @classmethod
     def of(cls, model: Model, gap: Gap, T_r: float) -> _Ahead | None:
@@ -61,10 +64,10 @@ class _Ahead:
         if any(model.bodies[i].holder for i in gap.b):
             return None
         ids = np.array([body.mj for body in model.bodies], np.int64)
-        chains = Points(model).chains(rows_of(gap.b), ids, model.mj)
-        own = chains.dofs.tolist() == robot.v_address.tolist()
+        dofs, chains = Points(model).chains(rows_of(gap.b), ids, model.mj)
+        own = dofs.tolist() == robot.v_address.tolist()
         direct = np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not robot.offset.any()
-        return cls(model, robot, gap, T_r, chains) if own and direct else None
+        return cls(model, robot, gap, T_r, dofs, chains) if own and direct else None
 
     def at(self, states: States, v_r: Array) -> Onset:
         """From each instant to the beginning of braking; what is not known ahead is left to be asked alone.
@@ -79,7 +82,7 @@ class _Ahead:
         if not whole.foreseen or not isinstance(whole.ways, Ways):
             states.alone = np.ones(n, bool)
             return nothing
-        period, T_r, chains, ways = self._period, self._T_r, self._chains, whole.ways
+        period, T_r, ways = self._period, self._T_r, whole.ways
         every = np.arange(len(whole.t))
         on_time = np.flatnonzero(whole.t != period * every)
         count = int(on_time[0]) if len(on_time) else len(whole.t)
@@ -102,15 +105,13 @@ class _Ahead:
         if len(others):
             elsewhere = states.elsewhere(Motion(t[others], q[others], v[others], whole.invalid_reasons))
             speeds[others] = elsewhere.largest_speeds()[:, self._parts]
-        joint_q, joint_v = (np.ascontiguousarray(each[:, chains.dofs]) for each in (q, v))
+        joint_q, joint_v = (np.ascontiguousarray(each[:, self._dofs]) for each in (q, v))
         bounds = np.empty((len(t) - 1, 2, len(self._parts)))
-        part_speeds(
-            t, joint_q, joint_v, speeds, self._home,
-            chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, bounds,
-        )  # fmt: skip
+        part_speeds(t, joint_q, joint_v, speeds, self._home, self._chains, ROUNDING, bounds)
         S_r, v_s = nothing.S_r.copy(), v_r.copy()
         ways_there, tops = np.empty((2, int(known.sum()), len(self._parts)))
         first, last = (np.asarray(ways.first[each[known]] - a, np.int64) for each in (k, ends))
-        reactions(t, bounds, first, last, v_r[known], T_r, period, SLACK, ways_there, tops)
+        reaction = Reaction(0.0, T_r + period, T_r, period, SLACK)
+        reactions(t, bounds, first, last, v_r[known], reaction, ways_there, tops)
         S_r[known], v_s[known] = ways_there, tops
         return Onset(v_r, S_r, v_s, None, None)

@@ -43,7 +43,7 @@ from seerob.criteria.stopping.terms import (
 )
 from seerob.distance.least import Per
 from seerob.kernels.pull import greatest
-from seerob.kernels.separation import largest_factor_in_time
+from seerob.kernels.separation import TimedStop, largest_factor_in_time
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.moving_base import first_moving
 from seerob.twin.state import State
@@ -370,7 +370,9 @@ def _inverse(stop: Stop) -> Inverse:
             speeds = largest_speed_decelerating(d + gained * T_r - more, v_h, T_r, a, K)
             return max(float(speeds.min()) - gained, 0.0), None
         if a is None:
-            factor = largest_factor_in_time(d, v_h, rest.S_r, now.S_r, rest.v_s, now.v_s, T_r, T_s, K, share)
+            factor = largest_factor_in_time(
+                d, v_h, rest.S_r, now.S_r, rest.v_s, now.v_s, TimedStop(T_r, T_s, share), K
+            )  # fmt: skip
         else:
             S_0, S_1 = rest.S_r, now.S_r - rest.S_r
             v_0, v_1 = rest.v_s, now.v_s - rest.v_s

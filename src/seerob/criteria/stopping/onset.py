@@ -218,8 +218,8 @@ class Foreseen:
         # Of a motion that may be another one, or jumps, nothing is known between instants.
         side = ENDS if unbounded_reason else MOST
         until_braking(
-            self._parts.table, self._window.table, k, rows, instants, side, t, T_r + period,
-            self._T_r, period, SLACK, ROUNDING, points, joints,
+            self._parts.table, self._window.table, k, rows, instants, side, self._reaction(t), ROUNDING,
+            points, joints,
         )  # fmt: skip
 
         def onset(scale: float) -> Onset:
@@ -249,13 +249,13 @@ class Foreseen:
             unbounded_reason: Why it may be another motion.
             same: As of `_keep`.
         """
-        (k, last), T_r, run = ticks, self._ahead, self._run() is state
+        (k, last), run = ticks, self._run() is state
         kept = same and run and k >= self._first
         v_now = state.fastest_speeds(self._gap.b)
         points = np.empty((3, len(v_now)))
         missing = braking_along(
             self._parts.table, self._window.table, samples, kept, k, last, ENDS if unbounded_reason else MOST,
-            state.t, self._T_r, T_r, self._period, SLACK, ROUNDING, v_now, points,
+            self._reaction(state.t), ROUNDING, v_now, points,
         )  # fmt: skip
         if missing < 0:
             return None
@@ -269,6 +269,10 @@ class Foreseen:
 
         now = onset(1.0)
         return lambda scale: now if scale == 1.0 else onset(scale)
+
+    def _reaction(self, t: float) -> kernel.Reaction:
+        """One that begins until the tick after an instant [s]."""
+        return kernel.Reaction(t, self._ahead + self._period, self._T_r, self._period, SLACK)
 
     def _others_same(self, state: State) -> bool:
         """Whether what others do with its parts is as before, where they are put now."""
@@ -370,23 +374,23 @@ class _Parts:
         if not roots or not roots <= self._roots:
             self._place(roots)
         data, partial = self._data, self._partial
-        chains = self._points.chains(self._rows, ids, mj)
+        dofs, chains = self._points.chains(self._rows, ids, mj)
         own = {dof: row for row, dof in enumerate(robot.v_address.tolist())}
-        rows = np.array([own.get(dof, -1) for dof in chains.dofs.tolist()], np.int64)
+        rows = np.array([own.get(dof, -1) for dof in dofs.tolist()], np.int64)
         others = [m.v_address for m in state.model.mechanisms.values() if m is not robot]
         self._bound = kernel.Parts(
             addresses(partial.mj, data, *POSES), data.xmat, data.xpos, data.cvel, data.subtree_com,
             np.searchsorted(partial.bodies, ids[self._rows]),
             np.searchsorted(partial.bodies, state.attachments.roots[self._rows]),
-            *self._shapes, mj.qpos0[chains.dofs], chains.start, chains.joints, chains.turns, chains.lengths,
-            np.searchsorted(partial.v, chains.dofs), rows,
-            np.isin(chains.dofs, np.concatenate([chains.dofs[:0], *others])) & (rows < 0),
+            *self._shapes, mj.qpos0[dofs], chains.start, chains.joints, chains.turns,
+            chains.lengths, np.searchsorted(partial.v, dofs), rows,
+            np.isin(dofs, np.concatenate([dofs[:0], *others])) & (rows < 0),
             *self._moved, *self._own_rows, *self._coupled,
         )  # fmt: skip
         self.table = PARTS.rows(self._bound)
         direct = np.array_equal(robot.coupling, np.eye(len(robot.v_address))) and not np.any(robot.offset)
-        self.alone = direct and chains.dofs.tolist() == robot.v_address.tolist()
-        self._beside = np.searchsorted(partial.v, chains.dofs[rows < 0])
+        self.alone = direct and dofs.tolist() == robot.v_address.tolist()
+        self._beside = np.searchsorted(partial.v, dofs[rows < 0])
         return False
 
     def put_others(self, now: mujoco.MjData) -> bool:
@@ -451,7 +455,8 @@ def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tupl
     number("lead", lead, 0.0, unit="s")
     agree(k=(len(t), len(most) + 1), n=(most.shape[1], len(now)))
     way, top = np.empty((2, len(now)))
-    kernel.farthest(np.asarray(t, float), 0.0, np.inf, most, now, T_r, lead, SLACK, way, top)
+    reaction = kernel.Reaction(0.0, math.inf, T_r, lead, SLACK)
+    kernel.farthest(np.asarray(t, float), reaction, most, now, way, top)
     return way, top
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from seerob.criteria.stopping.onset import Onset
 from seerob.criteria.stopping.required import TOP
 from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
 from seerob.distance.least import Closests, Per
-from seerob.kernels.separation import stops_in_time
+from seerob.kernels.separation import HumanSpeed, TimedStop, stops_in_time
 from seerob.model.model import Gap, Model
 from seerob.recording.series import CODES
 from seerob.twin.state import State
@@ -66,7 +66,7 @@ class Stops:
         results = list[Result | None]()
         for (one, in_time), row in zip(self._every, begins, strict=True):
             found = every.of(slice(row, row + len(one.gap.b)))
-            result = in_time.result(state, found) if one.stop.in_time is not None else None
+            result = in_time.result(state, found)
             results.append(one.alone(state, found) if result is None else result)
         return results
 
@@ -79,24 +79,27 @@ class _InTime:
         self._bodies = [body.name for body in model.bodies]
         self._names = [self._bodies[i] for i in one.gap.b]
         self._places, self._rest = BodyPlaces(model), sum(term.value or 0.0 for term in one.terms)
-        self._approach = np.nan if one.human_speed is None else one.human_speed
+        self._human_speed = assumed_speed(one.human_speed)
+        self._stop: TimedStop | None = None
+        if one.stop.in_time is not None:
+            self._stop = TimedStop(one.T_r, *one.stop.in_time)
         self._found, self._verdicts, self._permitted = np.empty((2, n)), np.empty(n, np.uint8), np.empty(2)
         self._nearest: tuple[bytes, list[str]] = b"", []
         """To which bodies parts were nearest at the last instant, and their names."""
 
     def result(self, state: State, found: Closests) -> Result | None:
         """Say which part governs; None where that, or what it does until it brakes, is not known."""
-        one, distance, (S_s, S_p) = self._one, found.distance, self._found
-        assert one.stop.in_time is not None
-        T_s, share = one.stop.in_time
+        one, distance, (S_s, S_p), stop = self._one, found.distance, self._found, self._stop
+        if stop is None:
+            return None
         least, most = one.stop.reactions(state)
         onset: Onset = least(1.0)
         if most is not None or onset.unbounded_reason or not onset.linear:
             return None
         seen, permitted = state.fastest_speed(one.gap.a), self._permitted
         k = stops_in_time(
-            onset.v_r, onset.S_r, onset.v_s, distance, one.T_r, T_s, share, one.K, self._approach, seen,
-            REACHING, WALKING, ARM_REACH, MOVING, ROUNDING, self._found, self._verdicts, permitted,
+            onset.v_r, onset.S_r, onset.v_s, distance, stop, one.K, self._human_speed, seen, MOVING, ROUNDING,
+            self._found, self._verdicts, permitted,
         )  # fmt: skip
         if k < 0 or not seen < np.inf:
             return None
@@ -116,26 +119,31 @@ class _InTime:
             )
         ]
         S_r, S_b = onset.S_r.item(k), S_s.item(k)
-        parts += terms(S_r, S_b, self._person(limit - (S_r + S_b), seen, T_s))
+        parts += terms(S_r, S_b, self._person(limit - (S_r + S_b), seen, stop))
         parts += one.terms
         speed, factor = permitted.tolist()
-        parts += permissible(speed, None if isnan(factor) else factor)
+        parts += permissible(speed, None if math.isnan(factor) else factor)
         return Result(
             name=same.name, value=value, unit=unit, limit=limit, at_most=False, verdict=verdict,
             reason=self._where(state, found, k, seen), parts=tuple(parts),
             markers=drawn(line(value, limit, found.point_b[k], found.point_a[k], verdict)),
         )  # fmt: skip
 
-    def _person(self, left: float, seen: float, T_s: float) -> float:
+    def _person(self, left: float, seen: float, stop: TimedStop) -> float:
         """S_h [m], which the ways of the robot and C, Z_d and Z_r leave of S_p, where v_h is not given."""
         one = self._one
         if one.human_speed is None:
             return left - self._rest
-        return max(one.human_speed, seen, 0.0) * (one.T_r + T_s)
+        return max(one.human_speed, seen, 0.0) * (stop.T_r + stop.T_s)
 
     def _where(self, state: State, found: Closests, k: int, seen: float) -> str:
         nearest = self._places.named(state, found.body_a.item(k), found.point_a[k])
         return f"{self._names[k]} ↔ {nearest}{faster(self._one.human, seen, self._one.human_speed)}"
+
+
+def assumed_speed(human_speed: float | None) -> HumanSpeed:
+    """How fast a person is assumed to come: v_h that is given [m/s], or as ISO 13855 has it."""
+    return HumanSpeed(math.nan if human_speed is None else human_speed, REACHING, WALKING, ARM_REACH)
 
 
 def faster(human: str, seen: float, human_speed: float | None) -> str:

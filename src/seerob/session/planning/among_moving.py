@@ -48,9 +48,9 @@ class ClearanceInTime:
         own = np.zeros(model.mj.nv, bool)
         own[robot.v_address] = True
         self._dofs = np.flatnonzero(~own & ((np.ptp(course.q, axis=0) > 0) | (course.v != 0).any(axis=0)))
-        away, home = np.zeros(model.mj.nv), np.asarray(model.mj.qpos0, float)
-        one, two, three = np.empty((3, model.mj.nv))
-        joint_bounds(course.t, course.q, course.v, course.t[0], course.t[-1], home, one, two, three, away)
+        bounds, home = np.empty((4, model.mj.nv)), np.asarray(model.mj.qpos0, float)
+        joint_bounds(course.t, course.q, course.v, course.t[0], course.t[-1], home, bounds)
+        away = bounds[3]
         which = model.shapes.arrays().which
         sides = which[clearance.apart.pair, BODY]
         mine = np.isin(sides, robot.moving)
@@ -113,7 +113,7 @@ class ClearanceInTime:
         q, qd = _cubics(rows.t, rows.q, rows.qd, t)
         q = np.ascontiguousarray(np.concatenate([q, other[:, self._dofs]], axis=1))
         v = np.ascontiguousarray(np.concatenate([qd, speed[:, self._dofs]], axis=1))
-        fast, spare, home = np.empty(q.shape[1]), np.empty((3, q.shape[1])), np.zeros(q.shape[1])
+        bounds, home = np.empty((4, q.shape[1])), np.zeros(q.shape[1])
         every, qpos = np.arange(len(need)), course.q[0].copy()
         cuts = np.linspace(begin, end, max(2, int(np.ceil((end - begin) / SPAN)) + 1))
         spans = [(a, b, every) for a, b in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)][::-1]
@@ -121,8 +121,8 @@ class ClearanceInTime:
             a, b, pairs = spans.pop()
             middle, half = (a + b) / 2, (b - a) / 2
             k, m = int(np.searchsorted(t, a, "right")) - 1, int(np.searchsorted(t, b)) + 1
-            joint_bounds(t[k:m], q[k:m], v[k:m], a, b, home, fast, *spare)
-            beyond = self._weight[pairs] @ (half * fast)
+            joint_bounds(t[k:m], q[k:m], v[k:m], a, b, home, bounds)
+            beyond = self._weight[pairs] @ (half * bounds[0])
             at = _cubics(t[k:m], q[k:m], v[k:m], np.array([middle]))[0][0]
             qpos[self._dofs] = at[n:]
             found = np.empty(len(pairs), np.int8)

@@ -36,7 +36,7 @@ from seerob.core.snapshot import Verdict
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
 
-CELLS = 300
+CELLS = 150
 """Random cells, `short` ones; `make soak` asks all relations of those from there on, as they are."""
 EACH = 1
 """Relations that are asked of a cell, by chance; of one that somebody names, all are."""

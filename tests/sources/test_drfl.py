@@ -187,7 +187,8 @@ def test_messages_that_come_twice_or_out_of_order_are_heard_once_and_in_order(po
         assert listener.join(10)
     times = [s.t_device for s in heard if isinstance(s, JointSample)]
     assert times == sorted(set(times))
-    assert set(times) <= {decode(data).time for data in held[1::2]}
+    # The first may be one that came out of order: what came before it was sent before anybody listened.
+    assert set(times[1:]) <= {decode(data).time for data in held[1::2]}
 
 
 # -- the twin -----------------------------------------------------------------------------------
